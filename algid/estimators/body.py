@@ -1,4 +1,4 @@
-"""A payload that is a body: its centre of mass off link 2's line and its inertia, where the loaded logs tell them.
+"""A payload as a body: its centre of mass off link 2's line and its inertia, if significant.
 
 Payloads act through the chain rule alone (`algid.estimators.parametrisation`), so that what the
 logs say of them follows from the quadratic likelihoods of a fit, without a further pass.
@@ -19,8 +19,9 @@ from algid.model import SINES
 from algid.physics.parameters import BODY
 
 WORTH = 2.0
-"""Wald statistic a parameter, beyond which it is kept (Akaike 1974): a stricter one would bias the mass of bodies
-whose inertia is of the size of its own error."""
+"""Wald statistic per parameter above which the parameter is kept (Akaike 1974).
+
+A stricter limit would bias the mass of bodies whose inertia is of the size of its own error."""
 
 
 def with_body(fit: Fit) -> Fit:

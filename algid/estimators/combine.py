@@ -48,7 +48,9 @@ class LogInformation:
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Gaussian knowledge of the first parameters: mean (p,) and precision (p, p), zero along what is not known.
+    """Gaussian prior of the first parameters: mean (p,) and precision (p, p).
+
+    The precision is zero along directions that are not known.
 
     Those of the names that are `absent` are nothing, by what the torque is said to hold.
     """
@@ -98,7 +100,7 @@ def scaled_pinvs(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray
 
 
 def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
-    """Pseudo-inverse of a symmetric matrix after scaling to unit diagonal, whatever the units of its rows.
+    """Pseudo-inverse of a symmetric matrix, scaled to unit diagonal so that units do not matter.
 
     Parameters
     ----------
@@ -220,7 +222,7 @@ def sandwich(
 def left_out(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> FloatArray:
-    """Most likely shared parameters (n, Q) without each of n logs in turn, from `beta` and without a further pass."""
+    """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass."""
     others = [[*logs[:place], *logs[place + 1 :]] for place in range(len(logs))]
     return np.array([combine(shared, rest, beta, prior)[0] for rest in others])
 

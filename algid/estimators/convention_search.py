@@ -1,4 +1,4 @@
-"""The convention of angles and torques under which a log obeys the equations of motion: each is tried.
+"""Find the convention of angles and torques under which a log obeys the equations of motion.
 
 See `algid.estimators.conventions` for what each does to a log, and
 `algid.estimators.convention_sums` for the fits.
@@ -64,11 +64,11 @@ BROKEN = -4.0
 MET = 4.0
 """A convention is physical where the demands of inertia are met by as many."""
 APART = 1.0
-"""Two conventions are told apart where the logarithms of what they leave of the torques differ by this in sum."""
+"""Two conventions are distinct where their summed log residuals differ by this much."""
 EVIDENCE = 15.0
-"""And where that is worth so much in log-likelihood: a chance of 1 in 3000 among a thousand conventions tried."""
+"""They also need this log-likelihood ratio: a chance of 1 in 3000 for a thousand conventions."""
 LEAST = 1e-5
-"""To leave less than this share of a torque is no merit: one joint's exact equation does not outweigh the other's."""
+"""A residual share below this is no merit: one exact equation must not outweigh the other."""
 EXPLAINED = 0.2
 """A convention that leaves more than this share of a torque explains nothing."""
 
@@ -122,7 +122,7 @@ class Candidate:
 
     @property
     def convincing(self) -> bool:
-        """Whether the log shows a real arm: every inertia is determined, nothing is broken, the torque explained."""
+        """Whether this is a real arm: inertias determined, no bound broken, torque explained."""
         inertial = (self.demands[name] for name in _INERTIAL if name in self.demands)
         return not self.broken and min(inertial) > MET and float(self.left.max()) < EXPLAINED
 
@@ -286,7 +286,7 @@ class _Trials:
             yield from self._with_zeros(families, self._zeros)
 
     def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
-        """The conventions that leave least when both zeros are free, with the zeros that fit best."""
+        """Conventions of least residual when both zeros are free, with the zeros that fit best."""
         scored = [
             pair
             for each in _families()
@@ -296,7 +296,7 @@ class _Trials:
             yield from self._with_free_zero(family, found)
 
     def scaled(self) -> Iterator[Candidate]:
-        """The scales of both angles, or of one, that leave least under the log's own signs and order."""
+        """Scales of both angles, or of one, of least residual at the log's own signs and order."""
         for joints in ((1, 1), (1, 0), (0, 1)):
             family = self._scaled(joints)
             if family is None:
@@ -326,7 +326,7 @@ class _Trials:
             yield free
 
     def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
-        """What is left with free zeros, sums of logarithms, for families of the same angles and drive."""
+        """Log residuals with free zeros, summed, of families of the same angles and drive."""
         return _sizes(solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
 
     def bent(self) -> float | None:
@@ -341,7 +341,7 @@ class _Trials:
         return float(_sizes(free[1])[0]) if max(turned) <= LARGEST_PHASE else None
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
-        """Zeros δ1 and δ2 in rad that leave least, with k1, k2 and k4 positive where the log tells."""
+        """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
         sums = self._sums(family, self._fine)
         c = self._free @ solved(sums, [family], self._free[None])[0][0]
         start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
@@ -422,7 +422,7 @@ def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
 
 
 def _grid(travel: FloatArray) -> list[float]:
-    """Scales to try for angles that `travel` so far, rad as read: two neighbours differ by half a radian at most."""
+    """Scales to try for angles of this `travel` (rad as read), at most half a radian apart."""
     scale = max(_SCALES[0], float(travel.max()) / _WIDEST)
     grid = []
     while scale < _SCALES[1]:

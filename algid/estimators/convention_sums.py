@@ -1,4 +1,4 @@
-"""Sums over a log's windows that judge conventions: moments of mapped angles, solved for many conventions at once.
+"""Sums over a log's windows that compare many conventions at once by moments of mapped angles.
 
 See `algid.estimators.conventions` for what a convention is, and for why zeros, signs and order of
 torques need no pass over the log of their own.
@@ -71,7 +71,9 @@ class ConventionSums:
 
 @dataclass(frozen=True, eq=False)
 class ThinnedLog:
-    """Angles and torques (2, N) as they were read, `dt` s apart, velocities (2, N - 2 `reach`) and windows' kernels.
+    """Angles and torques (2, N) as read, `dt` s apart, with velocities and windows' kernels.
+
+    Velocities are (2, N - 2 `reach`).
 
     `squares` (2, R) are the joints' squared velocities, averaged over each window.
     """
@@ -104,7 +106,7 @@ def thinned(
 
 
 def moving(logs: Sequence[ThinnedLog]) -> list[NDArray[np.bool_]]:
-    """Windows (R,) of each log in which a joint is faster than a share `AT_REST` of its speed, RMS over all logs.
+    """Windows (R,) of each log in which a joint exceeds `AT_REST` of its RMS speed in all logs.
 
     Where both joints stand, dry friction may hold them, and no equation of motion holds.
     """

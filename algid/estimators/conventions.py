@@ -1,4 +1,4 @@
-"""Conventions of angles and torques, each of which a log may obey: what they do to it, and what no log can tell.
+"""Conventions of angles and torques: what each does to a log, and what no log can determine.
 
 A log may have been recorded under another convention than algid's: signs, order of the joints, θ2
 from the horizontal, another zero, angles of the motors, a second motor that stands at the base.

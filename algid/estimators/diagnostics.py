@@ -49,9 +49,9 @@ _INSIDE = (
 
 @dataclass(frozen=True)
 class BrokenBound:
-    """A bound that the estimates break: its name, the value found, and how many standard deviations beyond.
+    """A bound that the estimates violate: its name, the value found, and its distance.
 
-    `distance` is None where the standard deviation is unknown.
+    `distance` counts standard deviations; it is None where the standard deviation is unknown.
     """
 
     bound: str
@@ -77,8 +77,12 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
         )
     for place, name in enumerate(shared.names):
         if name in _NOT_NEGATIVE:
-            found[f"{name} >= 0"] = lambda beta, place=place: float(beta[place])  # type: ignore[misc]
+            found[f"{name} >= 0"] = partial(_parameter, place)
     return found
+
+
+def _parameter(place: int, beta: FloatArray) -> float:
+    return float(beta[place])
 
 
 def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
@@ -231,7 +235,7 @@ _UNLIKE = 0.5  # of the larger of two values: more than any error of a model tha
 
 @dataclass(frozen=True)
 class JointsApart:
-    """A constant that the equation of joint 1 and that of joint 2, each by itself, tell differently, in its unit."""
+    """A constant on which the equations of joints 1 and 2, each by itself, disagree (its unit)."""
 
     name: str
     first: float
@@ -239,7 +243,7 @@ class JointsApart:
 
 
 def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
-    """Whether the equations of the two joints contradict each other about k1, k2 or k3, which stand in both.
+    """Whether the equations of the two joints contradict each other about the k1, k2 or k3 of both.
 
     Parameters
     ----------
@@ -287,7 +291,7 @@ _OPTIONAL = {term: EVERY_TERM[term].names for term in CHOICES}
 
 @dataclass(frozen=True)
 class TermWorth:
-    """An optional term: the criterion with it less that without it (negative: it earns its place)."""
+    """An optional term and the BIC with it less that without it: negative if it earns its place."""
 
     term: str
     delta_bic: float
@@ -299,7 +303,7 @@ class TermWorth:
 
 
 def term_worths(fit: Fit) -> list[TermWorth]:
-    """Worth of each optional term of a fit's model: n log N − W, Schwarz 1978, W the Wald statistic of its n values."""
+    """ΔBIC of each optional term: n log N − W, Schwarz 1978, W the Wald statistic of n values."""
     worths = []
     for term, names in _OPTIONAL.items():
         places = [fit.names.index(name) for name in names if name in fit.names]
@@ -343,7 +347,10 @@ def payload_distance(fit: Fit) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class MassScatter:
-    """What each of n loaded logs weighs by itself (n,), in kg, and the standard deviation of that with its interval."""
+    """Payload mass (n,) in kg of each of n loaded logs by itself, and its standard deviation.
+
+    `ci95` is the interval of the standard deviation.
+    """
 
     masses: FloatArray
     std: float
@@ -383,7 +390,7 @@ def repeatability(fit: Fit) -> MassScatter | None:
 def by_themselves(
     shared: Shared, logs: Sequence[LogInformation]
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Coefficients (q,) that logs of one kind give, their sandwich (q, q), and whether all of them are determined."""
+    """Coefficients (q,) of logs of one kind, their sandwich (q, q), whether all are determined."""
     S = np.sum([log.total[0] for log in logs], axis=0)
     inverse = scaled_pinv(S)
     c = inverse @ np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)

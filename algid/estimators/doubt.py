@@ -1,4 +1,4 @@
-"""Where no error bar stands for k1 … k5: a joint stood still, or the joints' equations contradict each other.
+"""When k1 … k5 get no error bar: a joint stood still, or the joints' equations disagree.
 
 Where a likelihood is refuted and there are few logs, what differs from run to run does not show by
 itself.
@@ -42,13 +42,13 @@ def doubted(
 
 
 UNTOLD = 0.02
-"""Of the other joint's torque: less than that at a joint without a motor is what a bearing or a cable does."""
+"""Share of the other joint's torque: less at a joint without a motor is bearing or cable."""
 
 
 def untold(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Fit:
-    """The fit with status WEAK_EXCITATION for k1 … k5 where they explain nothing of a joint without a motor.
+    """The fit with status WEAK_EXCITATION for k1 … k5 if they do not explain an undriven joint.
 
     Inertia, weight and friction, which cancel there, are then of no size beside the other joint's
     torque: constants near nothing solve that equation too, and least squares ends there where

@@ -1,4 +1,4 @@
-"""Whether least squares may stand: tests of an endogenous torque, and of one that answers the motion.
+"""Whether least squares is valid: tests for endogenous torque and for feedback from the motion.
 
 Torque that the model lacks drives the motion, and least squares is attenuated by it. Instruments
 (`algid.estimators.instruments`) are not, as long as the measured torque does not answer that
@@ -130,7 +130,7 @@ def instrumented(
     loaded: Sequence[Source],
     settings: WeakSettings,
 ) -> Fit | None:
-    """The fit's parameters by instruments that are simulated at `at` (Q,), with its terms and its prior.
+    """The fit's parameters by instruments simulated at `at` (Q,), with its terms and its prior.
 
     None where the windows cannot be simulated.
     """
@@ -218,7 +218,7 @@ def _variance(one: FloatArray, other: FloatArray) -> FloatArray:
 def _silent(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> float:
-    """Chance of such correlations between the residual and later torques where none answers (Bonferroni)."""
+    """Bonferroni p value of the residual's correlations with later torques without feedback."""
     settings, _ = _of(fit, settings)
     settings = replace(settings, estimate_delay=False)
     products, variance = np.zeros((_LAGS, 2)), np.zeros(2)
@@ -249,7 +249,7 @@ def _residual(
 
 
 def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sums (L, 2) of products of residuals with torques l windows later, l = 1 … L, and their variances (2,)."""
+    """Sums (L, 2) of products of residuals and torques l = 1 … L windows later; variances (2,)."""
     count = e.shape[1]
     memory = min(_MEMORY, count // 3)
 

@@ -1,4 +1,4 @@
-"""What a statistical estimator hands back: estimates, their covariance, and how far to trust them."""
+"""Result of a statistical estimator: estimates, their covariance, and how far to trust them."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ class Fit:
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator
     whiteness : outcome of the test on the innovations; None for the weak estimator
-    residual : sums over the innovations, log by log; empty where the estimator has not gathered them
+    residual : sums over the innovations, log by log; empty where they were not gathered
     freedom : independent stretches of log behind a sandwich, else samples of torque
     iterations, converged : of the refined estimator
     without : (n, Q) or None
         The estimates without each of the logs, where error bars needed them.
-    endogeneity : how far instruments are from least squares, in standard deviations; None where not asked
-    notes : what is to be said of the fit, such as why the refined estimator handed back the weak estimate
+    endogeneity : distance of instruments from least squares, in standard deviations, or None
+    notes : remarks on the fit, such as why the refined estimator returned the weak estimate
     moved : (2,), rad, how far each joint travelled
     shrinkage : the prior's part on the torque's terms; None where none is shrunk
     repeats : places of logs that repeat each other, where that was looked at
@@ -129,7 +129,7 @@ class Fit:
 
     @property
     def refuted(self) -> bool:
-        """Whether the refined estimator found its likelihood refuted, and another estimate stands in its place."""
+        """Whether the refined estimator rejected its likelihood and returned another estimate."""
         return any(note.code == "REFUTED" for note in self.notes)
 
     @property
@@ -163,7 +163,7 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class OwnEstimate:
-    """What one log tells by itself: coefficients and standard deviations (q,), infinite where it leaves them open."""
+    """One log's own coefficients and standard deviations (q,), infinite where not determined."""
 
     loaded: bool
     values: FloatArray
@@ -174,7 +174,7 @@ class OwnEstimate:
 
 
 def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
-    """Each log's own estimate of `Shared.log_names`, unloaded logs first, with the blocks of that log alone."""
+    """Each log's own estimate of `Shared.log_names` from its blocks alone, unloaded logs first."""
     found = []
     shared = Shared(fit.shared.model, fit.shared.delay)
     for log in fit.logs:
@@ -287,9 +287,9 @@ def examined(
 def _satterthwaite(
     within: FloatArray, wide: FloatArray, freedom: int, logs: Sequence[LogInformation]
 ) -> float:
-    """Independent squares behind variances of which `within` rests on `freedom` and the rest on what repeats.
+    """Degrees of freedom of variances whose part `within` has `freedom` degrees (Satterthwaite).
 
-    What repeats are the logs of each kind, less one.
+    The rest has as many as there are logs of each kind, less one.
     """
     known = np.diag(wide) > 0
     share = (
@@ -300,7 +300,7 @@ def _satterthwaite(
 
 
 def widened(robust: FloatArray, least: FloatArray) -> FloatArray:
-    """The covariance `robust` (Q, Q) with no standard deviation below that of `least` (Q, Q), correlations kept."""
+    """The covariance `robust` (Q, Q), no standard deviation below that of `least`."""
     size, floor = (
         np.sqrt(np.maximum(np.diag(robust), 0.0)),
         np.sqrt(np.maximum(np.diag(least), 0.0)),

@@ -50,7 +50,7 @@ STILL = 0.01  # rad: a joint that moves less has not moved
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """Directions that are not determined, in words, whether each parameter is (Q,), and their covariance (Q, Q)."""
+    """Undetermined directions in words, which parameters are determined, and their covariance."""
 
     sentences: tuple[str, ...]
     determined: tuple[bool, ...]
@@ -106,7 +106,7 @@ def open_directions(
 
 
 def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Eigenvalues and vectors of the information on the parameters over their sizes, and which count as nothing."""
+    """Eigenvalues and vectors of the information scaled by the sizes, and which count as zero."""
     scaled = S * np.outer(size, size)
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     return (
@@ -117,7 +117,10 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
-    """Size (Q,) of each parameter: the largest value of its class, of viscous friction a share of critical damping."""
+    """Size (Q,) of each parameter: the largest value of its class.
+
+    That of viscous friction is a share of critical damping.
+    """
     by_name = dict(zip(names, np.abs(values).tolist(), strict=True))
 
     def largest_of(members: Sequence[str]) -> float:
@@ -190,7 +193,7 @@ def _groups(null: FloatArray) -> list[list[int]]:
 
 
 def _relation(direction: FloatArray) -> str:
-    """What is determined of two parameters whose undetermined direction is given in their own units."""
+    """The determined relation of two parameters; `direction` is the undetermined one, own units."""
     ratio = direction[1] / direction[0]
     if abs(ratio + 1) < 0.15:
         return "as a sum"
@@ -209,7 +212,7 @@ _HEAVY = 1.0  # excess kurtosis that matters
 
 @dataclass(frozen=True, eq=False)
 class Correlations:
-    """Sums over innovations: counts (3,), lag products (3, 2, 1 + lags) by scale, fourth powers (2,)."""
+    """Innovations' counts (3,), lag products (3, 2, 1 + lags) by scale, fourth powers (2,)."""
 
     count: FloatArray
     products: FloatArray

@@ -1,4 +1,4 @@
-"""Spectrum and autocorrelation of an estimator's own residual, and how far white noise's own would scatter.
+"""Spectrum and autocorrelation of a residual, and the scatter that white noise would have.
 
 Sums over pieces of any length add up, so that a log is gone over in bounded memory. Each piece
 gives its whole periodogram (Hann's window), added up in narrow bins of equal ratio, and its lag
@@ -47,7 +47,7 @@ class ResidualSums:
     dt : float, s
     stride : rows after which white noise leaves nothing in common
     power : (s, bins), Σ P by bin
-    lines, scatter : (bins,), lines of the periodograms in each bin, and the variance of their sum for unit white noise
+    lines, scatter : (bins,), lines in each bin, and their sum's variance for unit white noise
     products, pairs : (2, lags + 1) and (lags + 1,), Σ w_i w_(i+lag) and of how many pairs
     """
 
@@ -109,7 +109,7 @@ def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Densities (s, F) at frequencies (F,) in Hz, and the factors (F,) within which 95 % of white noise's lie.
+    """Densities (s, F) at frequencies (F,) in Hz, and factors (F,) that hold 95 % of white noise's.
 
     Densities are in u²/Hz, one-sided.
     """
@@ -121,7 +121,7 @@ class Spectra:
 
 
 def spectra(sums: ResidualSums) -> Spectra:
-    """Spectra of all signals, neighbouring bins put together until each holds `_FREEDOM` degrees of freedom."""
+    """Spectra of all signals; bins are merged until each has `_FREEDOM` degrees of freedom."""
     starts, count, spread = [], 0.0, 0.0
     begin = last = 0
     for place in range(_BINS):
@@ -144,7 +144,7 @@ def spectra(sums: ResidualSums) -> Spectra:
 
 @dataclass(frozen=True, eq=False)
 class Autocorrelation:
-    """Correlations (2, L) at lags (L,) in s, and half widths (2, L) of bands that hold 95 % of those of white noise."""
+    """Correlations (2, L) at lags (L,) in s, and half widths (2, L) of white noise's 95 % bands."""
 
     lag: FloatArray
     correlation: FloatArray

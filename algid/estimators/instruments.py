@@ -14,18 +14,15 @@ combine as for any estimator:
 
     S = Aᵀ V⁻¹ A,    g = Aᵀ V⁻¹ Σ w Z (y − Xᵀ c0),    A = Σ w Z Xᵀ,    V = Σ w Z Zᵀ
 
-======  =========================================================  ===========================
-======
-symbol  name                                                       shape                        unit
-======  =========================================================  ===========================
-======
-X       columns of the two equations                               (2, q, R)                    mixed
-Z       the same of the simulated motion                           (2, q, R)                    mixed
-y       the torque's moments                                       (2, R)                       N m
-w       inverse residual variance of a row of each joint           (2,)                         1/(N m)²
-gram    [Z X y] [Z X y]ᵀ by stretch and joint                      (B, 2, 2 q + 1, 2 q + 1)     mixed
-======  =========================================================  ===========================
-======
+======  ================================================  ========================  ========
+symbol  name                                              shape                     unit
+======  ================================================  ========================  ========
+X       columns of the two equations                      (2, q, R)                 mixed
+Z       the same of the simulated motion                  (2, q, R)                 mixed
+y       the torque's moments                              (2, R)                    N m
+w       inverse residual variance of a row of each joint  (2,)                      1/(N m)²
+gram    [Z X y] [Z X y]ᵀ by stretch and joint             (B, 2, 2 q + 1, 2 q + 1)  mixed
+======  ================================================  ========================  ========
 """
 
 from __future__ import annotations
@@ -85,7 +82,7 @@ def fit(
     prior: Prior | None = None,
     start: Fit | None = None,
 ) -> Fit:
-    """Parameters of the arm, and of its payload where there are loaded logs, by windowed instruments.
+    """Parameters of the arm, and of its payload if there are loaded logs, by windowed instruments.
 
     Parameters
     ----------
@@ -162,7 +159,7 @@ def _solved(
 def solve(
     sums: Sequence[Moments], c: FloatArray, loaded: bool
 ) -> tuple[FloatArray, list[LogInformation]]:
-    """Coefficients (q,) that logs share, from weights at `c`, and each log's projected likelihood there."""
+    """Shared coefficients (q,) from weights at `c`, and each log's projected likelihood at them."""
     weights = [_weights(one, c) for one in sums]
     logs = [_information(one, weight, c, loaded) for one, weight in zip(sums, weights, strict=True)]
     S, g = (np.sum(part, axis=0) for part in zip(*(log.total for log in logs), strict=True))
@@ -195,7 +192,7 @@ def gone_astray(sums: Moments) -> bool:
 
 
 def projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
-    """A log's likelihood projected on the instruments, with the weights of its residual at `c` (q,)."""
+    """A log's likelihood projected on the instruments, weighted by its residual at `c` (q,)."""
     return _information(sums, _weights(sums, c), c, loaded)
 
 
@@ -230,7 +227,7 @@ class _Sums:
     astray: int = 0
 
     def add(self, both: FloatArray, good: NDArray[np.bool_]) -> None:
-        """Take in instruments and columns (2, 2 q + 1, R) of windows, of which some (R,) are good."""
+        """Add instruments and columns (2, 2 q + 1, R) of windows; only `good` ones (R,) count."""
         self.rows += good.size
         self.astray += int(np.sum(np.logical_not(good)))
         self.grams.add(weak.grams(np.where(good, both, 0.0), OVERLAP // _STRIDE))
@@ -277,7 +274,10 @@ def _stride(dt: float) -> int:
 def _side_by_side(
     batch: Sequence[_Piece], settings: WeakSettings, c: FloatArray
 ) -> Iterator[tuple[FloatArray, NDArray[np.bool_], bool]]:
-    """Of each piece instruments and columns (2, 2 q + 1, R), good windows (R,), and whether `c` moves the arm."""
+    """Each piece's instruments and columns, its good windows, and whether `c` moves the arm.
+
+    Their shapes are (2, 2 q + 1, R) and (R,).
+    """
     model = settings.model
     linear = c[: len(model.names)]
     cut = [_cut(piece, windows) for _, piece, windows in batch]
@@ -392,7 +392,7 @@ def _simulated(
 def _cubic(
     start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray
 ) -> FloatArray:
-    """The cubic (2, R, S) at the shares `s` (S,) of a step, of values (2, R) at both ends and their rates a step."""
+    """Cubic Hermite (2, R, S) at shares `s` (S,) of a step, from end values and rates (2, R)."""
     weights = np.stack(
         [1 - s**2 * (3 - 2 * s), s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)]
     )
@@ -423,7 +423,7 @@ def _inert(model: Model, c: FloatArray, theta: FloatArray) -> NDArray[np.bool_]:
 def endogeneity(
     unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit
 ) -> float | None:
-    """How far instruments and least squares are apart on the same windows, in standard deviations of the former.
+    """Distance of instruments from least squares on the same windows, in the former's std.
 
     The statistic of Durbin, Wu and Hausman (Hausman 1978), coefficient by coefficient; the largest
     is returned. Beyond `ENDOGENEOUS` the torque that the model lacks drives the motion. None where

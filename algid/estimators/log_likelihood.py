@@ -115,7 +115,7 @@ class LogEvidence:
 
     @property
     def refuted(self) -> bool:
-        """Whether the torque's error is no white noise: far above what neighbouring samples differ by."""
+        """Whether the torque's error is not white: far above neighbouring samples' differences."""
         return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))
 
     @property
@@ -140,7 +140,7 @@ class LogEvidence:
         return gathered.outcome(self.loaded, c, reduce(add, scores) if scores else None)
 
     def run(self, c: FloatArray) -> Outcome:
-        """Pass over the whole log at the coefficients `c`, settling each piece's trajectory by itself."""
+        """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""
         gathered = _Gathered()
         for piece in self._pieces():
             first = self._linearise(c, _first_trajectory(piece), piece, residual_only=True)
@@ -183,7 +183,7 @@ def _first_trajectory(piece: Segment) -> FloatArray:
 
 
 def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:
-    """What the digitisation of angles and torques alone contributes: step / √12, and floating point's own."""
+    """Noise of digitisation alone: step / √12 of angles and torques, and floating point's own."""
     theta = np.concatenate([piece.theta for piece in kept[:2]], axis=1)
     tau = np.concatenate([piece.tau for piece in kept[:2]], axis=1)
     least_theta = np.maximum(quantum(theta) / np.sqrt(12), _FINEST * np.abs(theta).max() + 1e-300)

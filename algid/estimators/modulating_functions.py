@@ -40,7 +40,7 @@ _WINDOW = Polynomial([0, 1]) ** 4 * Polynomial([1, -1]) ** 4
 _WINDOW_INTEGRAL = 1 / 630  # Beta(5, 5)
 
 Known = dict[Hashable, FloatArray]
-"""Moments of one piece, and its velocities, by what they are of: those that a change of the model leaves."""
+"""Cached moments and velocities of one piece, of those that stay valid for another model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +195,7 @@ class Windows:
     def _fill(
         self, X: FloatArray, model: Model, piece: Segment, theta: FloatArray, known: Known
     ) -> None:
-        """Write the moments of every column of τ = d²s/dt² + dp/dt + f into X: ∫φ″ s - ∫φ′ p + ∫φ f."""
+        """Write moments of the columns of τ = d²s/dt² + dp/dt + f to X: ∫φ″ s - ∫φ′ p + ∫φ f."""
         compiled, shape, own = model.compiled, model.shape, self._own
 
         def key(order: int, product: Product) -> Hashable:
@@ -232,7 +232,7 @@ class Windows:
         known: Known,
         key: Callable[[int, Product], Hashable],
     ) -> None:
-        """Add the moments of products of n samples, by one of the kernels, to those that are known."""
+        """Add to `known` the moments of `products` of n samples, by the `order`-th kernel."""
         if not products:
             return
         signals = np.stack([np.broadcast_to(values.of(one), samples) for one in products])
@@ -244,7 +244,7 @@ class Windows:
     def _dissipated(
         self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray
     ) -> Iterator[tuple[str, int, FloatArray]]:
-        """Of each parameter by load its joint, and |L| tanh(ω / ω_s) (N,) of the load that `c` gives."""
+        """Name, joint and |L| tanh(ω / ω_s) (N,) of each parameter by load; `c` gives load L."""
         shared = attributes(model, "by_load")
         if not shared:
             return
@@ -256,7 +256,7 @@ class Windows:
             yield name, joint, np.abs(load[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
 
     def square_speeds(self, piece: Segment) -> FloatArray:
-        """Each joint's squared velocity (2, R) in (rad/s)², averaged over each window of `equations`."""
+        """Each joint's squared velocity (2, R) in (rad/s)², averaged over `equations` windows."""
         if (len(piece) - 2 * self.margin) // self.step < OVERLAP:
             return np.zeros((2, 0))
         return self.moments(self._velocity(piece) ** 2, self._plain[0])
@@ -297,7 +297,7 @@ def _kernels(length: int, dt: float, offset: float) -> FloatArray:
 
 
 MOTORLESS = 0.1
-"""Of the driven joint's residual: the least that bearing and cables leave at a joint without a motor."""
+"""Least residual of a joint without a motor (bearing, cables), as a share of the driven one's."""
 
 
 def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> FloatArray:
@@ -330,7 +330,7 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
 
 
 def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:
-    """Complete X, made at `at`, by the columns of the gains, and the torque by what the linearisation at `at` adds.
+    """Complete X, made at `at`, by the gains' columns, and the torque by the linearisation's part.
 
     With Y the regressor at c0 and J the derivative there, τ = Y c0 + J (c - c0) is J c = τ + (J -
     Y) c0; J and Y differ in the columns of gains alone.

@@ -45,7 +45,7 @@ _MOTORLESS = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class VarianceScore:
-    """Sums over pieces: λᵀV_iλ (4,), traces (4,), average information (4, 4), YᵀV⁻¹V_iV⁻¹Y (4, q, q)."""
+    """Sums: λᵀV_iλ (4,), traces (4,), average information (4, 4), YᵀV⁻¹V_iV⁻¹Y (4, q, q)."""
 
     power: FloatArray
     trace: FloatArray
@@ -62,7 +62,9 @@ class VarianceScore:
 
 
 def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
-    """White noise of angles and torques, estimated from their sixth differences, in which smooth motion leaves nothing.
+    """White noise of angles and torques, from their sixth differences.
+
+    Smooth motion leaves nothing in those.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
 
 
 def _is_noise(signal: FloatArray) -> bool:
-    """Whether a next difference of each row grows as that of white noise does, so that no motion is left in it."""
+    """Whether each row's next difference grows as white noise's does: no motion is left in it."""
     first, second = (
         np.median(np.abs(np.diff(signal, order, axis=1)), axis=1)
         for order in (_DIFFERENCE, _DIFFERENCE + 1)
@@ -221,7 +223,9 @@ def _only(signal: FloatArray, joint: int) -> FloatArray:
 
 
 def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> NoiseLevels:
-    """Better noise levels: a step of the average information (Gilmour, Thompson & Cullis 1995), at most e² in σ².
+    """Better noise levels by one average-information step (Gilmour, Thompson & Cullis 1995).
+
+    The step changes σ² by a factor of at most e².
 
     Parameters
     ----------

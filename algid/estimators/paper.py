@@ -142,7 +142,7 @@ LARGEST_CONDITION = 1e10
 
 @dataclass(frozen=True, eq=False)
 class Solutions:
-    """Solutions (u, ...) of systems of u unknowns, NaN where singular, and their condition numbers (...)."""
+    """Solutions (u, ...) of systems of u unknowns, NaN if singular; condition numbers (...)."""
 
     x: FloatArray
     condition: FloatArray
@@ -211,7 +211,7 @@ STAGE2_NAMES = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
 
 @dataclass(frozen=True, eq=False)
 class Stage1:
-    """Series of k1 … k7 (7, ..., n), and the condition numbers of the 6×6 system and of k7's equation."""
+    """Series of k1 … k7 (7, ..., n); condition numbers of the 6×6 system and of k7's equation."""
 
     k: FloatArray
     condition: FloatArray
@@ -220,7 +220,7 @@ class Stage1:
 
 @dataclass(frozen=True, eq=False)
 class Stage2:
-    """Series of the five loaded constants x_m (5, ..., n), l1 (m) and m_p (kg), and the condition number."""
+    """Series of the loaded constants x_m (5, ..., n), l1 (m) and m_p (kg); the condition number."""
 
     x: FloatArray
     l1: FloatArray
@@ -229,7 +229,7 @@ class Stage2:
 
 
 def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> Stage1:
-    """Constants of the arm without payload: P_r x_r = q_r of eq. (3) and five more integrals, then k7 by eq. (4).
+    """Constants without payload: P_r x_r = q_r of eq. (3) and five more integrals; k7 by eq. (4).
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
 
 
 def _solved_late(first: FloatArray, dt: float) -> Solutions:
-    """Solution x (u, ..., n) of the system whose first row and right side are `first` (u + 1, ..., n): NaN before ε."""
+    """Solution (u, ..., n) of the system with first row and right side `first`: NaN before ε."""
     rows = stack_rows(first, dt, len(first) - 1)
     solution = solve_scaled(rows[:, :-1], rows[:, -1])
     solution.x[..., : int(np.ceil(EPSILON / dt - 1e-6))] = np.nan
@@ -277,7 +277,7 @@ def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArra
 def stage2(
     theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: FloatArray, gravity: float
 ) -> Stage2:
-    """Constants of the loaded arm, and the payload: P_m x_m = q_m of eq. (5) and four more integrals.
+    """Constants with payload, and the payload: P_m x_m = q_m of eq. (5) and four more integrals.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ Stage = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class PaperSeries:
-    """Estimates (s, n) of one window, its times `t` (n,) in s, and how many samples at its end are settled."""
+    """Estimates (s, n) of one window, its times `t` (n,) in s, and settled samples at its end."""
 
     t: FloatArray
     values: FloatArray
@@ -456,5 +456,5 @@ class Summary:
 
 
 def wanders(estimate: FloatArray, wander: FloatArray) -> NDArray[np.bool_]:
-    """Where estimates (s,) are not to be trusted: there is none, or it wanders (s,) by more than its own size."""
+    """Where estimates (s,) are unreliable: missing, or wandering by more than their own size."""
     return ~(wander <= np.abs(estimate))

@@ -79,7 +79,7 @@ class Shared:
         )
 
     def turn(self, beta: FloatArray) -> tuple[float, FloatArray]:
-        """What has to be added to θ1, arg K2 - arg K1 in rad, and its derivative (q,) by the log's coefficients."""
+        """Correction to add to θ1, arg K2 - arg K1 in rad; its derivative (q,) by coefficients."""
         slope = np.zeros(len(self.log_names))
         turn = 0.0
         place = self.model.compiled.place

@@ -42,7 +42,7 @@ Shift = float | Callable[[float], float]
 
 @dataclass(frozen=True)
 class PredictionFilter:
-    """Zero-phase Butterworth filters of `order`: of the motion at `motion` Hz, then of the torque at `cutoff` Hz.
+    """Zero-phase Butterworth filters of `order`: of motion at `motion`, of torque at `cutoff` Hz.
 
     `dropped` s are left out at each end.
     """
@@ -62,7 +62,7 @@ class PredictionFilter:
 
 @dataclass(frozen=True, eq=False)
 class PredictionScore:
-    """Sums by joint (2,): samples, squared residuals, torque, squared torque, and squares of the model's parts.
+    """Sums by joint (2,): samples, torque, and squares of residual, torque and the model's parts.
 
     `standing` are those of moving and of standing joints, where one set of coefficients is scored.
     """
@@ -99,7 +99,7 @@ class PredictionScore:
 
     @property
     def of_load(self) -> FloatArray:
-        """RMSE over the torque's root mean square (2,), or over that of the model's parts where it is larger.
+        """RMSE over the RMS (2,) of the torque, or of the model's parts where that is larger.
 
         A joint that is hardly driven has little torque, since inertia, weight and friction make up
         for one another there.
@@ -187,7 +187,7 @@ class PredictionSums:
         self._gram += X @ X.swapaxes(1, 2)
 
     def _rows(self, motion: Motion) -> FloatArray:
-        """The regressor (2, q, n), and where one set of coefficients is scored each joint's velocity behind it."""
+        """The regressor (2, q, n), and the velocities if one set of coefficients is scored."""
         Y = regressor(self._model, motion, self._at)
         return Y if self._at is None else np.concatenate([Y, motion.omega[:, None]], axis=1)
 
@@ -200,9 +200,9 @@ def seconds(shift: Shift, dt: float) -> float:
 def _filtered(
     rows: Callable[[Motion], FloatArray], piece: Segment, shift: float, by: PredictionFilter
 ) -> tuple[FloatArray, FloatArray]:
-    """Times (n,) in s and X (2, q + 1, n) of a piece, out of `rows` (2, q, n) of its motion: see the module's table.
+    """Times (n,) in s and X (2, q + 1, n) of a piece, from the `rows` (2, q, n) of its motion.
 
-    Empty where the piece is too short.
+    Empty where the piece is too short. See the module's table.
     """
     signals, dt, first = _decimated(piece, by)
     edge = round(by.dropped / dt)
@@ -222,7 +222,7 @@ def _filtered(
 
 
 def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float, float]:
-    """Angles and torques (4, n) at the rate that the filter asks for, the time between them and of the first, in s."""
+    """Angles and torques (4, n) at the filter's rate, the period in s, and the first time in s."""
     step = int(1 / (_PER_CUTOFF * by.motion * piece.dt))
     signals = np.concatenate([piece.theta, piece.tau])
     kernel = smoother(piece.dt, _SHARPER * by.motion)

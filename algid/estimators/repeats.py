@@ -1,8 +1,8 @@
-"""Runs of one motion: what the model lacks is the same in each, so that together they tell no more than one.
+"""Runs of one motion: the model's error is the same in each, so that together they count as one.
 
 Two logs repeat each other where their velocities are alike: with v of both joints at `_RATE` Hz,
 
-    max_l Σ v(t) w(t + l) / (Σ v(t)² Σ w(t + l)²)^½ > `ALIKE`        over shifts l of `_SHIFT` s at most
+        max_l Σ v(t) w(t + l) / (Σ v(t)² Σ w(t + l)²)^½ > `ALIKE`    for shifts l up to `_SHIFT` s
 
 Names of files tell nothing of it. The likelihoods of n repeats count as one: each is divided by n,
 and where errors are judged by how logs and stretches scatter, their mean stands for them.

@@ -1,4 +1,4 @@
-"""The arm simulated forward from a log's states under its torques, and how far from its angles it comes.
+"""Simulate the arm from a log's states under its torques, and compare it with the log's angles.
 
 A start every so often, all of them at once: Runge-Kutta of fourth order, torques between samples
 on straight lines. Angles and velocities of the starts, and the angles to compare with, pass the
@@ -61,7 +61,7 @@ class RolloutScore:
 
     @property
     def distance(self) -> FloatArray:
-        """RMS (H, 2) in rad of how far the joints moved: the RMSE of an arm that stays where it is."""
+        """RMS (H, 2) in rad of the joints' travel: the RMSE of an arm that stays where it is."""
         return self._root_mean(self.moved)
 
     def _root_mean(self, squares: FloatArray) -> FloatArray:

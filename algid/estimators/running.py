@@ -29,9 +29,9 @@ MOMENTS = 96
 
 @dataclass(frozen=True, eq=False)
 class Running:
-    """Estimates by moment: the log (T,) and the share of it (T,) gone over, then the module's table.
+    """Estimates by moment: the log (T,), the share of it (T,) processed, then the module's table.
 
-    NaN where what was gone over leaves a parameter open.
+    NaN where the data so far do not determine a parameter.
     """
 
     log: NDArray[np.int32]

@@ -1,4 +1,4 @@
-"""Which terms the torque's model needs: weighed by prediction of what was not fitted, and by evidence.
+"""Which terms the torque's model needs, by prediction of held-out data and by evidence.
 
 The normal equations of the weak form are gathered with the columns of every term, and every model
 without some of them is solved from the same Gram matrices. Moments over smooth windows are a
@@ -41,7 +41,7 @@ from algid.physics.motion import Widths
 CHOICE = tuple(
     name for name, term in EVERY_TERM.items() if name in CHOICES and term.timing != "lag"
 )
-"""Terms that the logs choose from: a lag and a delay are the same to first order, and one column tells both."""
+"""Terms that the logs choose from; one column serves lag and delay, equal to first order."""
 _DELAY, _LAG = (
     tuple(name for name, term in EVERY_TERM.items() if term.timing == timing)
     for timing in ("delay", "lag")
@@ -105,7 +105,7 @@ class Selection:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What the columns are made at: settings, shapes and coefficients by name, of unloaded and of loaded logs."""
+    """Point of the columns: settings, shapes, coefficients by name of unloaded and loaded logs."""
 
     logs: tuple[Training, ...]
     settings: WeakSettings

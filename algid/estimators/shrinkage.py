@@ -1,4 +1,4 @@
-"""Terms of the torque shrunk toward what physics expects of them: an empirical-Bayes prior in physical scales.
+"""Shrink the torque's terms toward physics: an empirical-Bayes prior in physical scales.
 
 To choose terms is to set some of them to zero, and another half of the logs sets others to zero.
 Here every term stays, with a normal prior whose spread is estimated and never exceeds what a real
@@ -6,23 +6,20 @@ arm may have (Efron & Morris 1973). All logs' scores disagree by more than white
 the information is divided by that factor first.
 
     H = S / φ + Λ,   p = H⁻¹ (g / φ + Λ m),   Λ = diag(1 / τ²)
-    τ_t² / s² = min(1, (Σ ((p - m)² + H⁻¹) / s² + u²) / (n + 1))      over the n coefficients of a term t
+            τ_t² / s² = min(1, (Σ ((p - m)² + H⁻¹) / s² + u²) / (n + 1))   for n coefficients a term
 
 As one more coefficient stands the usual spread, u = ½ of the largest one: without it a spread
 falls to nothing or stays open by chance, which would be a choice again.
 
-======  ===================================================================  ==========
-=================
-symbol  name                                                                 shape       unit
-======  ===================================================================  ==========
-=================
-S, g    information and score of all logs                                    (Q, Q), Q   1 / (unit unit)
-p       shared parameters where prior and logs meet                          (Q,)        mixed
-m, s    the prior's mean, and the spread that physics allows, of a term      (m,)        its own
-τ       the spread that the logs tell, at most s                             (m,)        its own
-φ       overdispersion: variance of the scores over the information          scalar      1
-======  ===================================================================  ==========
-=================
+======  ===============================================================  =========  ===============
+symbol  name                                                             shape      unit
+======  ===============================================================  =========  ===============
+S, g    information and score of all logs                                (Q, Q), Q  1 / (unit unit)
+p       shared parameters where prior and logs meet                      (Q,)       mixed
+m, s    the prior's mean, and the spread that physics allows, of a term  (m,)       its own
+τ       the spread that the logs tell, at most s                         (m,)       its own
+φ       overdispersion: variance of the scores over the information      scalar     1
+======  ===============================================================  =========  ===============
 """
 
 from __future__ import annotations
@@ -53,7 +50,7 @@ _FEWEST = 3  # logs whose scatter tells an overdispersion
 
 @dataclass(frozen=True)
 class TermScale:
-    """What the coefficients of a term may be: `size`, of the joint's torque (RMS), of k3, or in their own unit.
+    """Scale of a term's coefficients: `size` in joint torque (RMS), in k3, or in their own unit.
 
     The sine part of a constant is measured by the constant itself. `usual` is what most arms have
     of `size`.
@@ -82,7 +79,7 @@ SCALES = {
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What is expected of m coefficients before any log is seen: their term, mean m, largest and usual spread (m,)."""
+    """Prior of m coefficients before any log: their term, mean m, largest and usual spread (m,)."""
 
     names: tuple[str, ...]
     terms: tuple[str, ...]
@@ -165,7 +162,9 @@ def shrink(
     share: FloatArray,
     known: Prior | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Parameters p (Q,) and shares τ / s (m,) of the spreads, by expectation and maximisation from `beta` and `share`.
+    """Parameters p (Q,) and spread shares τ / s (m,) by expectation and maximisation.
+
+    The iteration starts at `beta` and `share`.
 
     Parameters
     ----------
@@ -198,7 +197,7 @@ def shrink(
 
 
 def _share(squares: FloatArray, usual: float) -> float:
-    """The share of s that n squares of a term tell, drawn to the `usual` one by one more of that size."""
+    """Share of s from n squares of a term, and one more of the size `usual` that it shrinks to."""
     return min(1.0, float(np.sqrt((np.sum(squares) + usual**2) / (squares.size + 1))))
 
 

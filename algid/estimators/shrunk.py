@@ -1,4 +1,4 @@
-"""The arm's parameters where no likelihood of white noise holds: every term of the torque, shrunk to what logs tell.
+"""Parameters where no likelihood of white noise holds: every term of the torque is shrunk.
 
 The windows of the weak form are gathered with the columns of all terms, linearised where they are
 not linear, and weighed by each joint's residual, log by log; `algid.estimators.shrinkage` finds
@@ -79,7 +79,7 @@ def resting(
 
 
 def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:
-    """The terms that logs may tell: a joint without a motor has no gain, a lag is a delay to first order."""
+    """Terms that logs can determine: no gain without a motor; a lag is a delay to first order."""
     driven = all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in (0, 1))
     return tuple(
         term
@@ -187,7 +187,7 @@ def expectation(
     beta: FloatArray,
     held: Sequence[str] = (),
 ) -> Expected:
-    """What physics expects of the terms of logs whose torque has the size that `normals` tell, save of those `held`."""
+    """Prior of the terms of logs whose torque has the size of `normals`, except those `held`."""
     squares = np.sum([normal.gram[:, :, -1, -1].sum(axis=0) for normal in normals], axis=0)
     torque = np.sqrt(squares / np.maximum(np.sum([normal.rows for normal in normals], axis=0), 1.0))
     torque = np.where(

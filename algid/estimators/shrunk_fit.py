@@ -1,4 +1,4 @@
-"""What parameters found with shrunk terms are worth: their covariance, statuses, and what the logs leave open."""
+"""Covariance and statuses of parameters found with shrunk terms, and what stays undetermined."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from algid.estimators.repeats import Groups, merged
 from algid.estimators.shrinkage import spread
 
 QUANTILE = 2.3
-"""Half width of a 95 % interval in standard deviations, which rest on few logs: `make run-to-run` holds it."""
+"""Half width of a 95 % interval in standard deviations from few logs: see `make run-to-run`."""
 
 
 def concluded(

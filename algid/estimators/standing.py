@@ -25,7 +25,7 @@ def _nothing() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """Sums by joint (2,): samples and squared residuals moving and at rest, and squares of d at rest."""
+    """Sums by joint (2,): samples and squared residuals, moving and at rest; d² at rest."""
 
     moving: FloatArray = field(default_factory=_nothing)
     moving_square: FloatArray = field(default_factory=_nothing)

@@ -1,4 +1,4 @@
-"""Normal equations of the weak form with the columns of any terms, out of which every sub-model is solved.
+"""Weak-form normal equations with the columns of any terms; every sub-model follows from them.
 
 ======  ==================================================================  ====================
 symbol  name                                                                shape
@@ -176,7 +176,7 @@ class Grams:
         return np.array(self._named(names))
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
-        """Coefficients by name of the sub-model with `terms`, of unloaded (False) and of loaded logs (True).
+        """The sub-model's coefficients by name, of unloaded (False) and of loaded logs (True).
 
         A kind of which there is no log has those of the other.
         """
@@ -188,7 +188,7 @@ class Grams:
         return {kind: found.get(kind, next(iter(found.values()))) for kind in (False, True)}
 
     def held_out_squares(self, terms: Iterable[str]) -> float:
-        """Sum of the squared moments of logs, or of blocks of a log, each predicted from the others."""
+        """Sum of squared prediction errors of moments of logs or blocks, each from the others."""
         columns = self._columns(terms)
         key = tuple(columns.tolist())  # each sub-model is asked for beside every term that it lacks
         if key not in self._squares:
@@ -205,7 +205,7 @@ class Grams:
         return self._squares[key]
 
     def wald(self, terms: Sequence[str], among: Sequence[str]) -> tuple[float, int, float]:
-        """How far the coefficients of `terms` are from nothing in the sub-model with the terms `among`.
+        """Wald statistic of the coefficients of `terms` in the sub-model with the terms `among`.
 
         Loaded logs have some of their own: a payload may lie off a link's line that is straight.
 
@@ -237,7 +237,7 @@ class Grams:
         return [*basic, *(loaded if self._both else [])]
 
     def _spread(self, columns: IntArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray], int]:
-        """Least squares with `columns`, its covariance by white noise and as a sandwich, and independent stretches."""
+        """Least squares on `columns`, plain and sandwich covariance, independent stretches."""
         inverse = scaled_pinv(self._total[np.ix_(columns, columns)])
         value = inverse @ self._total[columns, -1]
         meat, stretches = np.zeros_like(inverse), 0

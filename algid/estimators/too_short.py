@@ -1,4 +1,4 @@
-"""What an estimator raises where no log is long enough for it: the one `ValueError` that is the log's, not a fault."""
+"""The `ValueError` of an estimator if no log is long enough: the log's fault, not a defect."""
 
 from __future__ import annotations
 

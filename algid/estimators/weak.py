@@ -4,17 +4,14 @@ Normal equations are kept by stretch and by joint, so that the joints' weights, 
 and the error bars follow from them without a second pass. See
 `algid.estimators.modulating_functions` for the equations.
 
-======  ==============================================================  ======================
-======
-symbol  name                                                            shape                   unit
-======  ==============================================================  ======================
-======
-X       columns of the two equations over R windows, the torque last    (2, q + 1, R)           mixed
-gram    X Xᵀ by stretch of a window's length and joint                  (B, 2, q + 1, q + 1)    mixed
-c       coefficients of the columns                                     (q,)                    mixed
-beta    parameters that the logs share: the arm's, delay, payload       (Q,)                    mixed
-======  ==============================================================  ======================
-======
+======  ============================================================  ====================  =====
+symbol  name                                                          shape                 unit
+======  ============================================================  ====================  =====
+X       columns of the two equations over R windows, the torque last  (2, q + 1, R)         mixed
+gram    X Xᵀ by stretch of a window's length and joint                (B, 2, q + 1, q + 1)  mixed
+c       coefficients of the columns                                   (q,)                  mixed
+beta    parameters that the logs share: the arm's, delay, payload     (Q,)                  mixed
+======  ============================================================  ====================  =====
 """
 
 from __future__ import annotations
@@ -226,7 +223,7 @@ def _solved_without_each(normals: Sequence[Normal], loaded: bool) -> list[Solved
 def _linearisation(
     shared: Shared, beta: FloatArray, logs: Sequence[LogInformation]
 ) -> list[FloatArray | None]:
-    """Coefficients of the model's columns at which the next pass linearises unloaded and loaded logs."""
+    """Model coefficients at which the next pass linearises unloaded and loaded logs."""
     count = len(shared.model.names)
     found = [
         next((log.c0[:count] for log in logs if log.loaded is loaded), None)
@@ -293,7 +290,9 @@ def _from(
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """Normal equations of one log: Gram matrices (B, 2, q + 1, q + 1) by stretch and joint, the torque last.
+    """Normal equations of a log: Gram matrices (B, 2, q + 1, q + 1) by stretch and joint.
+
+    The torque is the last column.
 
     `samples` counts the log's samples, `rows` (2,) the windows of each joint, `dt` is in s, and
     `moved` (2,) is the spread of each joint's angle in rad.
@@ -359,7 +358,7 @@ def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
 
 
 def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> ResidualSums | None:
-    """Sums over the windows' residual y − Xᵀc at coefficients `c` (q,) of one log, the torque's moments beside it.
+    """Sums over the windows' residual y − Xᵀc of one log at `c` (q,), with the torque's moments.
 
     The windows are those of `normal_equations`; None where the log is too short for one.
     """
@@ -389,7 +388,7 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
 
 
 def _with_window(gather: Callable[[float], tuple[Gathered, float]], window: float) -> Gathered:
-    """What windows of a length in s gather, shorter ones where the longest piece, in s, does not hold four of them."""
+    """Gather by windows of `window` s, or shorter if the longest piece holds fewer than four."""
     found, longest = gather(window)
     return gather(longest / 4)[0] if 0 < longest < 4 * window else found
 
@@ -402,7 +401,7 @@ def _seconds(piece: Segment) -> float:
 def overlapping(
     segments: Iterable[Segment], settings: WeakSettings, window: float | None = None
 ) -> Iterator[tuple[Segment, Windows, int]]:
-    """Pieces that share the samples a window needs with the piece before, their windows and fresh samples.
+    """Pieces that repeat the last samples of the piece before, their windows and fresh samples.
 
     The windows' bandwidth is what the rate and their length leave room for.
     """
@@ -483,7 +482,7 @@ def solve(
 
 
 def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> FloatArray:
-    """Shared parameters (Q,) with the payload that fits the loaded logs best while the unloaded arm stays `arm` (q,).
+    """Shared parameters (Q,): the payload that fits the loaded logs best for a given arm (q,).
 
     Masses are tried in turn, with the link lengths that k2 and k4 of both arms tell for each
     (Table 2). `loaded` is the sum over the loaded logs, linearised at the loaded arm's own
@@ -506,7 +505,7 @@ def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> Fl
 
 
 def _length_of(shared: Shared, change: FloatArray, mass: float, name: str) -> float:
-    """The length in m that the change of the gravity constant `name` by `mass` kg tells, where that is a length."""
+    """Length in m from the change of the gravity constant `name` by `mass` kg, else a default."""
     if name not in shared.log_names:
         return _FIRST_LENGTH
     length = float(change[shared.log_names.index(name)]) / (mass * shared.model.gravity)

@@ -42,7 +42,7 @@ _ROUNDING = 8 * np.finfo(np.float64).eps
 
 @dataclass(frozen=True, eq=False)
 class NoiseLevels:
-    """Standard deviations of the white noise on the angles (2,) in rad and on the torques (2,) in N m."""
+    """Standard deviations of white noise on the angles (2,) in rad and the torques (2,) in N m."""
 
     theta: FloatArray
     tau: FloatArray
