@@ -16,6 +16,7 @@ from algid.designs.optimise import optimise
 from algid.designs.position import JUDGED_RATE, PositionProblem
 from algid.designs.swing import sampled
 from algid.designs.torque import TorqueProblem, search
+from algid.errors import SettingError
 from algid.model import Motion
 from algid.progress import Progress
 
@@ -132,7 +133,7 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     Raises
     ------
     SettingError
-        If no motion keeps the limits.
+        If no motion keeps the limits, or the angles' noise at that rate hides every torque.
     KeyboardInterrupt
         If it is interrupted before there is a motion; later, the best so far is the plan.
     """
@@ -140,15 +141,31 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
         np.arange(round(campaign.duration * campaign.experiment.rate) + 1)
         / campaign.experiment.rate
     )
-    return (
-        _swung(campaign, t, progress)
-        if campaign.drive == "torque"
-        else _guided(campaign, t, progress)
-    )
+    planned = _swung if campaign.drive == "torque" else _guided
+    try:
+        return planned(campaign, t, progress)
+    except np.linalg.LinAlgError as error:
+        # Torque noise below the rounding of the noise of twice differentiated angles.
+        raise SettingError(
+            f"--rate: at {campaign.experiment.rate:g} Hz the noise of the angles, differentiated "
+            f"twice, leaves nothing of the torque ({error}); ask for a lower rate or less "
+            "--position-noise"
+        ) from error
+
+
+def _driven_joints(limits: Limits) -> None:
+    """Raises `SettingError` where a joint that is to follow a motion has no drive."""
+    without = np.flatnonzero(limits.torque == 0)
+    if without.size:
+        raise SettingError(
+            "--torque: position control asks for a drive at either joint, found 0 for joint "
+            f"{without[0] + 1}; --drive torque plans for a joint without one"
+        )
 
 
 def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
     """The plan under position control: one motion, whatever the arm."""
+    _driven_joints(campaign.limits)
     kept = campaign.limits.within(campaign.margin)
     experiment, belief = campaign.experiment, campaign.belief
     loads = [belief.load(loaded) for loaded in experiment.kinds]

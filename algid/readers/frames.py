@@ -332,7 +332,8 @@ def _complete(
     if held is None:
         return
     if lost == 1 and cut_off:
-        yield held, (Notice("CUT_OFF", "the last row breaks off and was dropped", lossy=True),)
+        text = f"the last row, row {rows:,}, breaks off and was dropped"
+        yield held, (Notice("CUT_OFF", text, lossy=True),)
     elif lost:
         if lost == rows:
             raise LogError(

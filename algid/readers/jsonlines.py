@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,16 +29,20 @@ def is_lines(head: bytes) -> bool:
 def frame_of_lines(path: Path) -> pl.DataFrame:
     """The lines as one frame of flat columns; what a line lacks is null.
 
+    A last line that breaks off is a row of nulls.
+
     Raises
     ------
     LogError
-        If a line is no JSON object.
+        If another line is no JSON object.
     """
     import polars as pl
 
+    end = _end_of_whole_lines(path)
     try:
         with path.open("rb") as stream:
-            frame = pl.read_ndjson(stream, infer_schema_length=None)
+            source = stream if end is None else io.BytesIO(stream.read(end))
+            frame = pl.read_ndjson(source, infer_schema_length=None)
     except pl.exceptions.PolarsError as error:
         reason = str(error).split("\n", maxsplit=1)[0][:200]
         place = _wrong_line(path)
@@ -52,7 +57,28 @@ def frame_of_lines(path: Path) -> pl.DataFrame:
                 raise LogError(
                     f"{path}: more than {LIMITS.columns} columns; expected a log of an arm"
                 )
-    return frame.select(cells)
+    found = frame.select(cells)
+    return found if end is None else pl.concat([found, found.clear(1)])
+
+
+def _end_of_whole_lines(path: Path) -> int | None:
+    """Where the last line begins if it breaks off: it has no line end, and is no JSON object."""
+    with path.open("rb") as stream:
+        size = stream.seek(0, io.SEEK_END)
+        start = stream.seek(max(0, size - LIMITS.json_bytes))
+        tail = stream.read()
+    end = tail.rfind(b"\n") + 1
+    if not end or _is_object(tail[end:]):
+        return None
+    return start + end
+
+
+def _is_object(line: bytes) -> bool:
+    """Whether a line is a JSON object, or nothing."""
+    try:
+        return not line.strip() or isinstance(json.loads(line), dict)
+    except (ValueError, RecursionError):
+        return False
 
 
 def _wrong_line(path: Path) -> str:
@@ -61,10 +87,7 @@ def _wrong_line(path: Path) -> str:
         for number, line in enumerate(
             iter(lambda: stream.readline(LIMITS.json_bytes), b""), start=1
         ):
-            try:
-                if line.strip() and not isinstance(json.loads(line), dict):
-                    return f"line {number}: "
-            except (ValueError, RecursionError):
+            if not _is_object(line):
                 return f"line {number}: "
     return ""
 

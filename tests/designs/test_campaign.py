@@ -290,6 +290,10 @@ REFUSED = [
         ["case1", *SENSORS, *LIMITS, "--tip-height", "5"],
         "--tip-height: expected less than the arm's reach",
     ),
+    (
+        ["case1", *SENSORS, *LIMITS, "--torque", "1.9,0"],
+        "--torque: position control asks for a drive at either joint, found 0 for joint 2",
+    ),
     (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
     (["case1", *SENSORS, *LIMITS, "--runs", "0,0"], "--runs: expected numbers of runs"),
@@ -305,6 +309,17 @@ def test_what_makes_no_sense_is_refused_in_one_line(
     code, text = run(*arguments, "-o", str(tmp_path))
     assert code == 2
     assert words in text
+    assert "\n" not in text
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_rate_at_which_noise_hides_the_torque_is_refused(tmp_path: Path) -> None:
+    code, text = run(
+        *("case1", *LIMITS, *SENSORS, "--rate", "1e5", "--duration", "0.5", "-o", str(tmp_path))
+    )
+    assert code == 2
+    assert text.startswith("--rate: at 100000 Hz the noise of the angles, differentiated")
     assert "\n" not in text
     assert list(tmp_path.iterdir()) == []
 

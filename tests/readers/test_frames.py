@@ -196,7 +196,7 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
 @pytest.mark.parametrize(
     ("gaps", "code", "text"),
     [
-        ([29], "CUT_OFF", "the last row breaks off and was dropped"),
+        ([29], "CUT_OFF", "the last row, row 30, breaks off and was dropped"),
         ([15], "EMPTY_CELLS", "1 of 30 rows dropped for want of a value"),
         ([15, 29], "EMPTY_CELLS", "2 of 30 rows dropped for want of a value"),
         (list(range(20, 30)), "EMPTY_CELLS", "10 of 30 rows dropped for want of a value"),

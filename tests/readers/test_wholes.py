@@ -89,6 +89,26 @@ def test_a_line_that_is_no_object_is_refused_with_its_number(wrong: str, tmp_pat
         read_log(path)
 
 
+@pytest.mark.parametrize("left", [1, 30, -1])
+def test_a_last_line_that_breaks_off_is_dropped_and_counted(left: int, tmp_path: Path) -> None:
+    path = lines(tmp_path / "a.jsonl", nested())
+    whole = path.read_text().rstrip("\n")
+    last = whole.rpartition("\n")[2]
+    path.write_text(whole.removesuffix(last) + last[:left])
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta[:, :59])
+    (notice,) = (notice for notice in log.notices if notice.lossy)
+    assert notice.code == "CUT_OFF"
+    assert notice.text == "the last row, row 60, breaks off and was dropped"
+
+
+def test_a_last_line_that_ends_and_is_no_object_is_refused(tmp_path: Path) -> None:
+    path = lines(tmp_path / "a.jsonl", nested())
+    path.write_text(path.read_text().rstrip("\n")[:-1] + "\n")
+    with pytest.raises(LogError, match=r"a\.jsonl: line 60: expected a JSON object"):
+        read_log(path)
+
+
 def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
     rows = nested()
     rows[5]["motor_state"][0]["q"] = "far"

@@ -261,6 +261,12 @@ def test_an_angle_that_turned_round_is_shown_within_a_turn_and_another_is_not() 
     assert "turned" not in still.note
 
 
+def test_an_angle_of_which_no_sample_is_a_number_is_drawn_without_a_warning() -> None:
+    turns = np.linspace(0.0, 4 * np.pi, 400)
+    figure = coverage(_log(np.stack([np.full(400, np.nan), turns, turns, turns])))
+    assert np.isnan(values(figure.panels[0].traces[0]["x"])).all()
+
+
 def _parquet(path: Path, **columns: Any) -> Path:
     pl.DataFrame(columns).write_parquet(path)
     return path

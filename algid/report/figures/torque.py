@@ -191,7 +191,7 @@ def _closeup_panel(path: Path, found: TorqueLog, joint: int, logs: list[LogSumma
         line(t, residual, "@orange", "residual", "residual", width=1.0),
     ]
     where = f" of {log_name(log, logs)}" if len(found.ranges) > 1 else ""
-    largest = significant(float(np.nanmax(np.abs(residual))), 3)
+    largest = significant(float(np.fmax.reduce(np.abs(residual))), 3)
     says = f"Joint {joint}, largest residual {largest} N m at {moment:.3f} s{where}"
     layout = {"xaxis": axis(f"time{where}, s"), "yaxis": axis("N m"), "hovermode": "closest"}
     return Panel(traces, layout, says, says)
