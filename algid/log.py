@@ -104,6 +104,8 @@ class Reading:
     unwrap : whether each joint's jumps by a turn were made continuous
     start, end : float, s
         Where the log was cut, in time since its first sample.
+    torque_file : the file that the torques are from, where it is another
+    segment : the run that was read alone, of a log whose clock starts again
     accepted : codes of the checks that may not refuse the log
     """
 
@@ -124,6 +126,8 @@ class Reading:
     unwrap: tuple[bool, bool] = (False, False)
     start: float | None = None
     end: float | None = None
+    torque_file: str | None = None
+    segment: int | None = None
     accepted: tuple[str, ...] = ()
 
     def told(self, name: str) -> bool:

@@ -38,6 +38,8 @@ OWN_FLAGS = (
     ),
     *(
         "end",
+        "segment",
+        "torque_file",
         "accept",
         "gravity",
         "estimator",
@@ -68,6 +70,8 @@ OPEN = {
     "torque_constant": "K",
     "start": "S",
     "rate": "HZ",
+    "segment": "N",
+    "torque_file": "FILE",
     "end": "S",
 }
 """What stands for a value that only the user knows, by the last part of a setting's name."""
@@ -157,7 +161,7 @@ def _toml(name: str, value: Any) -> str:
     if value is not None:
         return json.dumps(value, ensure_ascii=False)
     shown = _shown(name, value)
-    quoted = isinstance(shown, tuple) or name.endswith(("source", "topic", "time"))
+    quoted = isinstance(shown, tuple) or name.endswith(("source", "topic", "time", "file"))
     return json.dumps(shown) if quoted else str(shown)
 
 
@@ -393,7 +397,11 @@ MESSAGES: Mapping[str, str] = {
         "{topic!r} ({rate:.6g} Hz) was interpolated; error, root mean square, in the log's units: "
         "{error}"
     ),
-    "NOT_COVERED": "{count:# sample was|samples were} dropped, where another topic has none",
+    "NOT_COVERED": "{count:# sample was|samples were} dropped, where another topic or file has none",
+    "OVERLAP": (
+        "{count:# sample lies|samples lie} before or behind what {file} holds, and "
+        "{count:is|are} left out"
+    ),
     "TIME_UNIT": "times are taken for {unit}, from their size and their steps",
     "SLOW_CLOCK": (
         "times in {column!r} are taken for {unit}, which makes {rate:.3g} Hz, too slow for an arm "
@@ -432,6 +440,7 @@ MESSAGES: Mapping[str, str] = {
         "from, "
         "the mean stands for the others"
     ),
+    "RESTARTS": ("time starts again {count:# time|times}: of {runs} runs {said}"),
     "GAPS": "{count:# gap|gaps}, the longest {seconds:.4g} s; no window spans one",
     "JITTER": (
         "stamps jitter by {jitter:.3g} ms about a period of {period:.4g} ms; resampling moves "

@@ -50,9 +50,21 @@ Check = Literal[
 """Checks of a log that refuse it, or its result, unless they are accepted."""
 
 
+ALL_CHANNELS = ("theta1", "theta2", "tau1", "tau2", "omega1", "omega2")
+
+
+OF_ONE_LOG = ("torque_file", "segment")
+"""Settings that no other log shares."""
+
+
 def _parts(text: object) -> object:
     """The parts of ``one,two``."""
     return [part.strip() for part in text.split(",")] if isinstance(text, str) else text
+
+
+def _plain(path: object) -> object:
+    """A path as text."""
+    return str(path) if isinstance(path, Path) else path
 
 
 def _number(text: object) -> object:
@@ -160,6 +172,11 @@ class Profile(_Strict):
         Of the joints.
     start, end : float, s since the log's first sample
         Where it is cut.
+    torque_file : str
+        The file that holds the torques, beside the log or in the working folder, where the log
+        itself has none: they are interpolated to the log's stamps.
+    segment : int
+        The run that is read alone, from 1, of a log whose clock starts again.
     accept : codes of checks
         Which may warn but not refuse.
     theta1, theta2, tau1, tau2, omega1, omega2 : dict
@@ -190,6 +207,8 @@ class Profile(_Strict):
     offsets: tuple[float, float] = (0.0, 0.0)
     start: float | None = Field(default=None, ge=0)
     end: float | None = Field(default=None, gt=0)
+    torque_file: Annotated[str | None, BeforeValidator(_plain)] = Field(default=None, min_length=1)
+    segment: Annotated[int | None, BeforeValidator(_number)] = Field(default=None, ge=1)
     accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = ()
     theta1: Angle = Angle()
     theta2: Angle = Angle()
@@ -199,6 +218,23 @@ class Profile(_Strict):
     omega2: Velocity = Velocity()
 
     _flags: frozenset[str] = PrivateAttr(frozenset())
+    _channels: tuple[str, ...] = PrivateAttr(ALL_CHANNELS)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The canonical channels that are read from the one file: all, or those of its half."""
+        return self._channels
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Those of them without which there is no log."""
+        return tuple(name for name in self._channels if not name.startswith("omega"))
+
+    def half(self, *quantities: str) -> Profile:
+        """The same for a file that holds only these quantities, as ``"tau"``, and is read whole."""
+        found = self.model_copy(update=dict.fromkeys(("torque_file", "start", "end", "segment")))
+        found._channels = tuple(name for name in ALL_CHANNELS if name[:-1] in quantities)
+        return found
 
     def told_by(self, setting: str) -> Literal["flag", "profile"]:
         """Who set `setting`, such as ``joints`` or ``tau1.unit``: a flag beats the file."""

@@ -131,6 +131,8 @@ READING = Reading(
     unwrap=(False, True),
     start=0.5,
     end=2.0,
+    torque_file="torques.csv",
+    segment=2,
     accepted=("LOST_SAMPLES",),
 )
 

@@ -71,6 +71,8 @@ OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
     "clock": (str, "Stamps of the messages' header, or of the log.", of_profile("clock")),
     "start": (str, "Leave out what comes before, s since the log's first sample.", None),
     "end": (str, "Leave out what comes after, s since the log's first sample.", None),
+    "torque_file": (Path, "File with the torques, where LOG has none: joined on the stamps.", None),
+    "segment": (str, "One run alone, 1 for the first, where the log's time starts again.", None),
     "accept": (str, "Checks that may warn but not refuse, as CODE,CODE.", listed(refusing_checks)),
     "set": (
         list[str],

@@ -179,9 +179,10 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
     """What the user says about logs, and where that is silent what was said of the earlier result's."""
-    from algid.profile import over
+    from algid.profile import OF_ONE_LOG, over
 
-    return over(profile, earlier.profile)
+    known = {name: one for name, one in earlier.profile.items() if name not in OF_ONE_LOG}
+    return over(profile, known)
 
 
 def _identified(

@@ -207,6 +207,27 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
     return [*unloaded, *marked]
 
 
+def refuse_shared_torques(sources: Sequence[LogSource]) -> None:
+    """Refuse logs whose torques would come from one file: they were not recorded at once.
+
+    Raises
+    ------
+    LogError
+        If two of them do.
+    """
+    owners: dict[str, str] = {}
+    for source in sources:
+        file = source.origin.reading.torque_file
+        if file is None:
+            continue
+        owner = owners.setdefault(file, source.name)
+        if owner != source.name:
+            raise LogError(
+                f"{source.name}: its torques would come from {file}, as those of {owner} do; put "
+                "each log and its torques into a folder of their own, under the same names"
+            )
+
+
 def _in_radians(log: Log) -> Log:
     """A log whose angles no reader made: they are rad by the definition of `Log`, however often its joints turn."""
     reading = log.origin.reading

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from typing import TYPE_CHECKING
 
-from algid.identification.source import LogSource
+from algid.identification.source import LogSource, refuse_shared_torques
 from algid.log import Log
 from algid.notices import Notice
 from algid.progress import Progress
@@ -49,6 +49,7 @@ class Survey:
     """
 
     def __init__(self, logs: Sequence[LogSource], progress: Progress | None = None) -> None:
+        refuse_shared_torques(logs)
         self.logs = tuple(logs)
         self.progress = progress
         self._seen: dict[LogSource, Seen] = {}

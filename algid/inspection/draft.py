@@ -27,6 +27,8 @@ _HEAD = """\
 # offsets = [0.0, 0.0]       # rad, added to the angles
 # start = 0.0                # s since the first sample: leave out what comes before
 # end = 60.0                 # s since the first sample: leave out what comes after
+# torque_file = "torques.csv"  # where the torques stand in another file
+# segment = 1                # one run alone, where the log's time starts again
 # accept = ["DEGREES"]       # codes of checks that may warn, but not refuse
 """
 _ENCODER = (

@@ -34,15 +34,26 @@ def open_log(path: str | Path | Columns, profile: Profile | None = None) -> Tabl
         If there is no such log, its format is unknown, it is damaged, or it lacks a channel.
     """
     from algid.profile import Profile
+    from algid.readers.memory import NAME
+
+    known = profile or Profile()
+    with during("opening", path if isinstance(path, str | Path) else NAME):
+        if known.torque_file is None:
+            return _open_one(path, known)
+        from algid.readers.halves import open_halves
+
+        return open_halves(path, known, _open_one)
+
+
+def _open_one(path: str | Path | Columns, profile: Profile) -> TableReader:
+    """Open a log that stands in one file, or in memory."""
+    if not isinstance(path, str | Path):
+        from algid.readers.memory import open_columns
+
+        return open_columns(path, profile)
     from algid.readers.formats import format_of
 
-    if not isinstance(path, str | Path):
-        from algid.readers.memory import NAME, open_columns
-
-        with during("opening", NAME):
-            return open_columns(path, profile or Profile())
-    with during("opening", path):
-        return format_of(Path(path)).open(Path(path), profile or Profile())
+    return format_of(Path(path)).open(Path(path), profile)
 
 
 def read_log(path: str | Path | Columns, profile: Profile | None = None) -> Log:

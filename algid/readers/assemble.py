@@ -17,6 +17,7 @@ from algid.limits import LIMITS
 from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
+from algid.readers.runs import one_after_another
 from algid.readers.table import BLOCK_ROWS, SampleTable, cut
 from algid.readers.timebase import in_order
 from algid.words import counted
@@ -95,9 +96,9 @@ class TableReader:
         """Checked and sorted tables that are not empty, with what is to be said of each."""
         notices, total = self.notices, 0
         held: tuple[SampleTable, tuple[Notice, ...]] | None = None
-        for table in cut(
-            self._finite(self._within(in_order(self.origin.path, self.tables(rows)))), rows
-        ):
+        path, only = self.origin.path, self.origin.reading.segment
+        ordered = in_order(path, one_after_another(path, self.tables(rows), only))
+        for table in cut(self._finite(self._within(ordered)), rows):
             notices += table.notices
             if len(table):
                 if held is not None:
@@ -238,6 +239,7 @@ def reader_of(
         unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
         start=profile.start,
         end=profile.end,
+        segment=profile.segment,
         accepted=profile.accept,
     )
     units = Conversion(

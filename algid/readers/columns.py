@@ -83,37 +83,44 @@ def assign(
             "changed "
             "or damaged; write it again, or remove its truth if it was changed on purpose"
         )
-    named = {name: column for name in CHANNELS if (column := profile.channel(name).column)}
+    named = {name: column for name in profile.channels if (column := profile.channel(name).column)}
     if profile.time:
         named["t"] = profile.time
     sources, choice = _sources(path, available, named, profile)
     plain = {name for name, column in choice.columns.items() if sources.get(name) == column}
     beside = {name: stated[column] for name, column in sources.items() if column in stated}
-    currents = [name for name in ("tau1", "tau2") if take_apart(sources[name]).stem in CURRENTS]
+    torques = [sources[name] for name in ("tau1", "tau2") if name in sources]
+    currents = [
+        name
+        for name in ("tau1", "tau2")
+        if name in sources and take_apart(sources[name]).stem in CURRENTS
+    ]
     units = {name: known for name, unit in beside.items() if (known := unit_of(unit))}
     units |= {name: unit for name, unit in choice.units.items() if name in plain}
     units |= {name: "A" for name in currents if units.get(name) not in CURRENT}
     foreign = {name: unit for name, unit in choice.foreign.items() if name in plain}
     foreign |= {name: unit for name, unit in beside.items() if unit_of(unit) is None}
-    all_named = set(JOINT_CHANNELS) <= named.keys()
+    all_named = set(profile.needed) <= named.keys()
     if profile.joints or (choice.joints and not all_named):
         reading, order = reading_of(choice.joints or (), profile)
     else:
         reading, order = Reading(joints_told="profile" if all_named else "names"), ()
     said = []
-    if take_apart(sources["tau1"]).stem in COMMANDED and profile.effort != "command":
-        both = f"{sources['tau1']}, {sources['tau2']}"
-        said.append(Notice("COMMANDED_TORQUE", numbers={"columns": both}))
+    if torques and take_apart(torques[0]).stem in COMMANDED and profile.effort != "command":
+        said.append(Notice("COMMANDED_TORQUE", numbers={"columns": ", ".join(torques)}))
     said += order
     said += _of_foreign_units(path, sources, foreign, profile)
     said += _of_motors(path, sources, currents, profile)
     said += _of_other_units(sources, units, beside, profile)
     of_time = profile.time_unit or units.get("t")
-    if all(sources[name] == name for name in ("t", *JOINT_CHANNELS)):
+    if all(sources[name] == name for name in ("t", *profile.needed)):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
-    others = other_joints(available, [sources["theta1"], sources["theta2"]])
+    angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
+    others = other_joints(available, angles)
     if profile.rate is not None:
-        sources["t"] = sources["theta1"]  # any column has a cell in each row that is counted
+        sources["t"] = sources[
+            profile.needed[0]
+        ]  # any column has a cell in each row that is counted
         return Columns(sources, units, "ns", tuple(said), True, reading, others, profile.rate)
     return Columns(
         sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others
@@ -131,13 +138,14 @@ def _sources(
                 f"found {_listed(available)}; name another: {_naming([name])}"
             )
     try:
-        choice = choose(available, profile.joints, named, profile.passive)
+        choice = choose(available, profile.joints, named, profile.passive, profile.needed)
     except LookupError as error:
         two = Remedy({"joints": None}, "choose two")
         raise LogError(
             f"{path}: {error}; {two}; or name each column: {_naming(['theta1'])} …"
         ) from error
-    sources = {**choice.columns, **named}
+    read = ("t", *profile.channels)
+    sources = {name: one for name, one in {**choice.columns, **named}.items() if name in read}
     if profile.passive and f"tau{3 - profile.passive}" in sources:
         # a joint without a motor needs no torque of its own: what stands in its place is not
         # looked at
@@ -146,7 +154,7 @@ def _sources(
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
     if profile.rate is not None:
         sources["t"] = ""
-    missing = [name for name in ("t", *JOINT_CHANNELS) if name not in sources]
+    missing = [name for name in ("t", *profile.needed) if name not in sources]
     if missing:
         text = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
         raise LogError(
@@ -165,7 +173,9 @@ def _or_a_law(missing: Sequence[str]) -> str:
     """What else makes torques where both are `missing`."""
     if not {"tau1", "tau2"} <= set(missing):
         return ""
-    return "; a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
+    other = Remedy({"torque_file": None}, "; or take them from another file")
+    law = "a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
+    return f"{other}; {law}"
 
 
 def _naming(channels: Sequence[str]) -> Remedy:
@@ -221,7 +231,8 @@ def _of_motors(
         if given in TORQUE:
             numbers = {"column": sources[name], "name": name, "given": given}
             yield Notice("CURRENT_AS_TORQUE", numbers=numbers)
-    motors = [name for name in JOINT_CHANNELS if on_motor_side(sources[name])]
+    here = [name for name in JOINT_CHANNELS if name in sources]
+    motors = [name for name in here if on_motor_side(sources[name])]
     geared = [name for name in CHANNELS if "gear_ratio" in profile.channel(name).model_fields_set]
     open_ones = [name for name in motors if name not in currents and name not in geared]
     if not open_ones:
@@ -231,7 +242,7 @@ def _of_motors(
         {f"{name}.gear_ratio": None for name in open_ones},
         "tell the gear, turns of the motor in one of the joint, 1 for a direct drive",
     )
-    if len(motors) < len(JOINT_CHANNELS):
+    if len(motors) < len(here):
         raise LogError(f"{path}: {named}: signals of motors beside those of joints; {gears}")
     yield Notice("MOTOR_SIDE", numbers={"columns": named}, remedies=(gears,))
 

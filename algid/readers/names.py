@@ -8,7 +8,7 @@ commanded torque last and commanded angles never.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -270,6 +270,7 @@ def choose(
     joints: tuple[str, str] | None = None,
     named: Collection[str] = (),
     passive: int | None = None,
+    needed: Sequence[str] = ("theta1", "theta2", "tau1", "tau2"),
 ) -> ChannelChoice:
     """Canonical channels found among `columns`; those not found are left out.
 
@@ -284,6 +285,8 @@ def choose(
         Canonical channels whose columns are given: what is chosen for them need not be plain.
     passive : 1, 2 or None
         The joint without a motor, whose torque need not be there.
+    needed : sequence of str
+        The canonical channels that make a log, or the half of one that stands in two files.
 
     Raises
     ------
@@ -293,18 +296,18 @@ def choose(
     """
     parts = {column: take_apart(column) for column in columns}
     chosen = _pairs(parts, joints)
-    if "theta1" not in chosen or "tau1" not in chosen:
+    if not set(needed) <= chosen.keys():
         states = {**parts, **_of_states(parts)}
         found = _pairs(states, joints)
-        if "theta1" in found and "tau1" in found:
+        if set(needed) <= found.keys():
             chosen, parts = found, states
-    if "theta1" not in chosen or "tau1" not in chosen:
+    if not set(needed) <= chosen.keys():
         worded = _worded(parts)
         found = _pairs({**parts, **worded}, joints)
         own = _named_joints(found, {**parts, **worded})
         if joints or (own and along_the_arm(own)[1] == "names"):
             chosen, parts = found, {**parts, **worded}
-        if joints and "theta1" not in {*chosen, *named}:
+        if joints and needed[0] not in {*chosen, *named}:
             names = [
                 name.own
                 for name in {**parts, **worded}.values()
@@ -450,9 +453,9 @@ def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, 
     None where they are numbers, or none was found.
     """
     places = list(parts)
-    pair = sorted(
-        (chosen[name] for name in ("theta1", "theta2") if name in chosen), key=places.index
-    )
+    quantity = "theta" if "theta1" in chosen else "tau"
+    own = (f"{quantity}1", f"{quantity}2")
+    pair = sorted((chosen[name] for name in own if name in chosen), key=places.index)
     names = [parts[column].own for column in pair]
     return (
         (names[0], names[1])

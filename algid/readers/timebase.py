@@ -108,9 +108,9 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
     back = np.flatnonzero(np.diff(stamps) < 0)
     order = np.argsort(stamps, kind="stable")
     moved = order - np.arange(rows)
-    set_back = _set_back(table) if back.size else None
-    if set_back is not None or back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON:
-        place = back[0] if set_back is None else set_back
+    place_back = set_back(table) if back.size else None
+    if place_back is not None or back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON:
+        place = back[0] if place_back is None else place_back
         last = stamps[place]
         raise LogError(
             f"{path}: time goes backwards by {(last - stamps[place + 1]) * 1e-9:.6g} s behind "
@@ -133,7 +133,7 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
     return table.take(kept), (int(late), repeated, int(lost))
 
 
-def _set_back(table: SampleTable) -> int | None:
+def set_back(table: SampleTable) -> int | None:
     """The row behind which the clock was set back, if it was.
 
     Samples that merely come late fill the hole that they left, or come twice. Where a clock is set
@@ -143,8 +143,6 @@ def _set_back(table: SampleTable) -> int | None:
     highest = np.maximum.accumulate(stamps)
     late = np.flatnonzero(stamps[1:] <= highest[:-1]) + 1
     runs = np.split(late, np.flatnonzero(np.diff(late) > 1) + 1)
-    step = np.diff(stamps)
-    period = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
     for run in runs:
         if run.size < _RUN:
             continue
@@ -152,6 +150,8 @@ def _set_back(table: SampleTable) -> int | None:
             max(0, run[0] - HORIZON - run.size), run[0]
         )  # in time order but for late ones among them
         before = before[np.argsort(stamps[before], kind="stable")]
+        step = np.diff(stamps[before])
+        period = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
         after = np.clip(np.searchsorted(stamps[before], stamps[run]), 0, before.size - 1)
         nearest = before[after]
         left = before[np.maximum(after - 1, 0)]
@@ -187,6 +187,12 @@ class Series:
         bridged = own[after] - own[after - 1] <= _GAP * self.period
         at_sample = (own[after] == stamps) | (own[after - 1] == stamps)
         return (bridged | at_sample) & (stamps >= own[0]) & (stamps <= own[-1])
+
+    def holds(self, stamps: IntArray) -> bool:
+        """Whether each of the stamps (N,) is a sample's."""
+        own = self.table.stamp_ns
+        places = np.minimum(np.searchsorted(own, stamps), own.size - 1)
+        return bool(np.array_equal(own[places], stamps))
 
     def at(self, stamps: IntArray) -> dict[str, FloatArray]:
         """The channels at the stamps (N,), linear between samples."""
@@ -231,6 +237,7 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
     units.
     """
     lost, held = 0, None
+    between = dict.fromkeys((other.topic for other in others), False)
     for table in main:
         if held is not None:
             yield held
@@ -243,6 +250,7 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
         columns = dict(kept.columns)
         for other in others:
             columns |= other.at(kept.stamp_ns)
+            between[other.topic] |= not other.holds(kept.stamp_ns)
         held = SampleTable(kept.stamp_ns, columns, kept.notices)
     said = [
         Notice(
@@ -254,6 +262,7 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
             },
         )
         for other in others
+        if between[other.topic]
     ]
     if lost:
         said.append(Notice("NOT_COVERED", numbers={"count": lost}, lossy=True))

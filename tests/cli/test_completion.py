@@ -22,6 +22,7 @@ FREE = {
         "columns",
         "start",
         "end",
+        "segment",
         "name",
         "poles",
         "out",

@@ -171,6 +171,16 @@ OF_A_LOG = [
     ("--start", "x", "--start (profile: start): expected a valid number, found 'x'"),
     ("--start", "-1", "--start (profile: start): expected greater than or equal to 0, found '-1'"),
     ("--start", "nan", "--start (profile: start): expected a finite number, found 'nan'"),
+    (
+        "--segment",
+        "0",
+        "--segment (profile: segment): expected greater than or equal to 1, found 0",
+    ),
+    (
+        "--segment",
+        "x",
+        "--segment (profile: segment): expected a valid integer, found 'x'",
+    ),
     ("--rate", "0", "--rate (profile: rate): expected greater than or equal to 0.001, found '0'"),
     ("--end", "0", "--end (profile: end): expected greater than 0, found '0'"),
     ("--end", "1e400", "--end (profile: end): expected a finite number, found '1e400'"),

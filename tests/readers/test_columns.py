@@ -35,6 +35,7 @@ def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> N
         '--set tau2.source=NAME (profile: time = "NAME", source = "NAME" of [tau1], source = '
         '"NAME" of [tau2]); '
         "or give the samples a second of a log without a time: --rate HZ (profile: rate = HZ); "
+        'or take them from another file: --torque-file FILE (profile: torque_file = "FILE"); '
         "a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
     )
     many = " ".join(f"c{place:02d}" + "x" * 60 for place in range(18))

@@ -156,16 +156,17 @@ def test_numpy_times_beyond_int64_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("step", [1.0, 0.9995, 0.0105, 0.05, 0.3])
 @pytest.mark.parametrize("place", [100, 2500, 70_000])
-def test_a_clock_that_is_set_back_is_refused(step: float, place: int, tmp_path: Path) -> None:
+def test_a_clock_that_is_set_back_starts_a_run(step: float, place: int, tmp_path: Path) -> None:
     rows = 80_000 if place > 4000 else 5000
     t = np.arange(rows) / 1000
     stamps = t.copy()
     stamps[place:] -= min(step, 0.09 if place == 100 else step)
     pq.write_table(pa.table({"t": stamps, **signals(t)}), tmp_path / "log.parquet")
-    with pytest.raises(
-        LogError, match=r"time goes backwards by .* split the file where its clock starts again"
-    ):
-        read_log(tmp_path / "log.parquet")
+    log = read_log(tmp_path / "log.parquet")
+    assert [one.numbers["runs"] for one in log.notices if one.code == "RESTARTS"] == [2]
+    assert np.array_equal(log.theta[0], signals(t)["theta1"])
+    steps = np.diff(log.stamp_ns)
+    assert np.flatnonzero(steps > 10_000_000).tolist() == [place - 1]
 
 
 def test_late_blocks_and_repeated_blocks_are_put_in_order(tmp_path: Path) -> None:

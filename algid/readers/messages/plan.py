@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -71,16 +71,17 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     LogError
         If no topic holds the joints, several do, or a message cannot be read.
     """
-    places = (
-        {name: profile.place(name) for name in (*JOINT_CHANNELS, *VELOCITIES)} if profile else {}
-    )
+    read, needed = _channels(profile)
+    places = {name: profile.place(name) for name in read} if profile else {}
     named = {name: (topic, source) for name, (topic, source) in places.items() if source}
-    usual = _usual_topic(source, profile) if len(named) < len(JOINT_CHANNELS) else None
+    usual = _usual_topic(source, profile) if len(named) < len(needed) else None
     sources: dict[str, tuple[str, str]] = {}
     reading = Reading(joints_told="profile")
     notices: tuple[Notice, ...] = ()
     if usual is not None:
-        sources = {channel: (usual.topic, path) for channel, path in usual.paths.items()}
+        sources = {
+            channel: (usual.topic, path) for channel, path in usual.paths.items() if channel in read
+        }
         if profile is not None and profile.joints is not None:
             reading = Reading(joints=profile.joints, joints_told=profile.told_by("joints"))
         else:
@@ -110,6 +111,13 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     )
     others = usual.others if usual is not None and usual.topic == topics[0].name else {}
     return Plan(topics, mapping, reading, notices, units, others)
+
+
+def _channels(profile: Profile | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The channels to read, and those of them without which there is no log."""
+    if profile is None:
+        return (*JOINT_CHANNELS, *VELOCITIES), JOINT_CHANNELS
+    return profile.channels, profile.needed
 
 
 def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
@@ -175,10 +183,11 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     many: dict[str, dict[str, None]] = {}
     lacking: list[str] = []
     refused: list[LogError] = []
+    _, needed = _channels(profile)
     for name, kind in _candidates(source, profile):
         try:
             for shape in _shapes(source, name, kind):
-                joints, names = joint_names(shape), names_in(shape)
+                joints, names = joint_names(shape, needed), names_in(shape)
                 if usual := _fitting(name, shape, joints, profile):
                     fitting.setdefault(name, usual)
                     break
@@ -193,9 +202,7 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
                 elif len(joints) < 2 and names:
                     last = len(names) - 1
                     short = [
-                        what
-                        for what in ("position", "effort")
-                        if shape.find(f"{what}[{last}]") is None
+                        what for what in _words(needed) if shape.find(f"{what}[{last}]") is None
                     ]
                     stays = f", whose {' and '.join(short)} stay empty" if short else ""
                     lacking.append(f"{name!r} with the joints {', '.join(names[:8])}{stays}")
@@ -213,12 +220,12 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
         raise LogError(f"{source.path}: {text}; choose: {_JOINTS}")
     if refused:
         raise refused[0]
-    if profile is not None and all(profile.channel(name).source for name in JOINT_CHANNELS):
+    if profile is not None and all(profile.channel(name).source for name in needed):
         return None
     wanted = (
         f"the joints {profile.joints}"
         if profile and profile.joints
-        else "positions and efforts of two joints"
+        else f"{' and '.join(f'{what}s' for what in _words(needed))} of two joints"
     )
     both = Remedy({"topic": None, "joints": None})
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
@@ -227,6 +234,12 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
         f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {both}; "
         f"{each}"
     )
+
+
+def _words(channels: Sequence[str]) -> list[str]:
+    """What a joint state calls the quantities of the channels."""
+    words = {"theta": "position", "tau": "effort"}
+    return [word for quantity, word in words.items() if f"{quantity}1" in channels]
 
 
 def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | None) -> _Usual | None:
@@ -246,18 +259,17 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
         )
     if joints or repeated_name(shape):
         return None
+    _, needed = _channels(profile)
     # plain numbers by their names: {"q1": …, "tau1": …} or {"q": […], "tau": […]}
     paths = [path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, ())]
     try:
-        choice = choose(paths, profile.joints if profile else None)
+        choice = choose(paths, profile.joints if profile else None, needed=needed)
     except LookupError:
         return None
     found = {name: path for name, path in choice.columns.items() if name != "t"}
     if not all(name in found for name in VELOCITIES):
         found = {name: path for name, path in found.items() if name not in VELOCITIES}
-    if not set(JOINT_CHANNELS) <= found.keys() or not all(
-        shape.find(path) for path in found.values()
-    ):
+    if not set(needed) <= found.keys() or not all(shape.find(path) for path in found.values()):
         return None
     currents = {name: "A" for name, path in found.items() if take_apart(path).stem in CURRENTS}
     return _Usual(

@@ -14,7 +14,7 @@ from algid.readers.joints import moving_joints
 from algid.readers.messages.source import Source
 from algid.readers.messages.topic import Fields, Topic
 from algid.readers.table import BLOCK_ROWS, SampleTable
-from algid.readers.timebase import aligned, whole_topic
+from algid.readers.timebase import aligned, in_order, whole_topic
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -90,6 +90,6 @@ def open_messages(
         series = [
             whole_topic(name, one.name, one.fields.paths, read(one, BLOCK_ROWS)) for one in others
         ]
-        return aligned(samples, series)
+        return aligned(in_order(name, samples), series)
 
     return reader_of(origin, tables, profile, wanted.units, (*said, *wanted.notices, *beside), rows)

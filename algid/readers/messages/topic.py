@@ -5,7 +5,7 @@ One topic's numbers as tables: the channels that carry it, its fields, its clock
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -50,10 +50,11 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
     return None
 
 
-def joint_names(shape: Shape) -> list[str]:
-    """The joints that a message of this shape has both a position and an effort for."""
+def joint_names(shape: Shape, channels: Collection[str]) -> list[str]:
+    """The joints that a message of this shape has what makes the `channels` for, as a position and an effort."""
     names = names_in(shape) or tuple(str(place) for place in range(LIMITS.joint_cells))
-    return [name for name in names if _path(shape, name, "theta") and _path(shape, name, "tau")]
+    quantities = {name[:-1] for name in channels}
+    return [name for name in names if all(_path(shape, name, one) for one in quantities)]
 
 
 def other_positions(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:

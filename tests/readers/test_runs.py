@@ -1,0 +1,118 @@
+"""Time that starts again within a log: its runs one behind another, or one alone, against files of their own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from algid import inspect
+from algid.arm import FloatArray
+from algid.errors import LogError, SettingError
+from algid.log import IntArray
+from algid.notices import Notice
+from algid.profile import Profile
+from algid.readers import read_log
+from algid.readers.runs import one_after_another
+from algid.readers.table import SampleTable, stack
+from algid.readers.timebase import in_order
+
+MS = 1_000_000
+
+
+def table(stamps: IntArray, values: FloatArray, *said: Notice) -> SampleTable:
+    return SampleTable(stamps, {"theta1": values}, said)
+
+
+def read(parts: list[SampleTable], only: int | None = None) -> SampleTable:
+    """What comes of the tables, in time order."""
+    return stack(list(in_order("log", one_after_another("log", iter(parts), only))))
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_runs_are_found_wherever_tables_are_cut(data: st.DataObject) -> None:
+    """Runs of any length, pace and start, as long as time goes back between them."""
+    sizes = data.draw(st.lists(st.integers(1100, 3000), min_size=2, max_size=4))
+    runs, start = [], 0
+    for size in sizes:
+        step = data.draw(st.sampled_from([MS, 3 * MS]))
+        runs.append(start + np.arange(size) * step)
+        start = data.draw(st.integers(0, 5)) * 100 * MS  # every run reaches beyond 1.1 s
+    stamps = np.concatenate(runs)
+    values = np.random.default_rng(1).normal(size=stamps.size)
+    cuts = sorted(data.draw(st.sets(st.integers(1, stamps.size - 1), max_size=5)))
+    parts = [
+        table(own, kept)
+        for own, kept in zip(np.split(stamps, cuts), np.split(values, cuts), strict=True)
+    ]
+    edges = np.cumsum([0, *sizes])
+    together = read(parts)
+    assert np.array_equal(together.columns["theta1"], values)
+    jumps = np.flatnonzero(np.diff(together.stamp_ns) > 6 * MS) + 1
+    assert jumps.tolist() == edges[1:-1].tolist()
+    for number in range(len(sizes)):
+        own = slice(edges[number], edges[number + 1])
+        alone = read(parts, number + 1)
+        assert np.array_equal(alone.columns["theta1"], values[own])
+        assert np.array_equal(np.diff(alone.stamp_ns), np.diff(stamps[own]))
+
+
+def test_late_blocks_start_no_run() -> None:
+    order = np.concatenate([np.arange(2000), np.arange(2400, 2800), np.arange(2000, 2400)])
+    order = np.concatenate([order, np.arange(2800, 6000)])
+    for cut in (2390, 2410, 2790, 2850):
+        parts = [table(part * MS, part * 1.0) for part in (order[:cut], order[cut:])]
+        assert read(parts).columns["theta1"].tolist() == list(range(6000))
+
+
+def test_a_clock_that_starts_all_the_time_is_refused() -> None:
+    stamps = np.tile(np.arange(80) * MS, 1001)
+    with pytest.raises(LogError, match="time starts again 1000 times; expected one clock; name"):
+        read([table(stamps, np.arange(stamps.size) * 1.0)])
+
+
+def test_what_is_said_of_other_runs_is_kept() -> None:
+    first, last = Notice("ONE", "of the first"), Notice("TWO", "of the last", lossy=True)
+    stamps = np.arange(2000) * MS
+    parts = [table(stamps, stamps * 1.0, first), table(stamps, -stamps * 1.0, last)]
+    found = read(parts, 1)
+    assert [one.code for one in found.notices] == ["ONE", "TWO", "RESTARTS"]
+    assert found.notices[-1].text == ("time starts again 1 time: of 2 runs number 1 is read alone")
+
+
+def two_runs(folder: Path) -> tuple[FloatArray, FloatArray, Path]:
+    t = np.arange(4000) / 500
+    rows = {name: np.sin((1 + place) * t) for place, name in enumerate(("theta1", "theta2"))}
+    rows |= {name: np.cos((1 + place) * t) for place, name in enumerate(("tau1", "tau2"))}
+    back = np.where(t < 5, t, t - 5)
+    pq.write_table(pa.table({"t": back, **rows}), folder / "log.parquet")
+    return t, rows["theta1"], folder / "log.parquet"
+
+
+def test_a_file_of_two_runs_and_each_alone(tmp_path: Path) -> None:
+    t, theta1, path = two_runs(tmp_path)
+    whole = read_log(path)
+    assert np.array_equal(whole.theta[0], theta1)
+    for number, own in ((1, t < 5), (2, t >= 5)):
+        alone = read_log(path, Profile(segment=number))
+        assert np.array_equal(alone.theta[0], theta1[own])
+        assert alone.origin.reading.segment == number
+        assert len(inspect(path, segment=str(number)).notices) == 1
+    with pytest.raises(
+        LogError, match=r"no segment 3: its time makes 2 runs; the last one: --segment 2"
+    ):
+        read_log(path, Profile(segment=3))
+    with pytest.raises(SettingError, match=r"segment: expected greater than or equal to 1"):
+        inspect(path, segment=0)
+
+
+def test_runs_are_cut_by_their_own_time(tmp_path: Path) -> None:
+    _, theta1, path = two_runs(tmp_path)
+    log = read_log(path, Profile(segment=2, start=1.0))
+    assert np.array_equal(log.theta[0], theta1[3000:])
