@@ -21,10 +21,13 @@ FIRST_ARM = 1000  # seeds of arms that nothing was tuned on
 
 
 def alarms(number: int) -> list[str]:
-    """Codes of the reasons that the verdict on sound log `number` has."""
+    """Codes of the reasons that the verdict on sound log `number` has, each printed with its sentence."""
     motion = motion_of(f"arm{FIRST_ARM + number}")[1]
     log = log_of(motion, ROWS["nothing"], friction=bool(number % 2), seed=FIRST_ARM + number)
-    return [reason.code for reason in identify(log, report=False).verdict.reasons]
+    reasons = identify(log, report=False).verdict.reasons
+    for reason in reasons:
+        print(f"log {number}: {reason.code}: {reason.sentence}", flush=True)
+    return [reason.code for reason in reasons]
 
 
 def interval(count: int, of: int) -> tuple[float, float]:

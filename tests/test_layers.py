@@ -21,6 +21,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "limits": room(),
     "faults": room("errors"),
     "progress": room(),
+    "significance": room(),
     "ros2": room("errors", "numpy"),
     "runtime": room("errors", "threadpoolctl"),
     "units": room(),
@@ -34,13 +35,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "model": room("arm physics", "numpy", PURE),
     "log": room("arm notices", "numpy"),
     "signals": room("arm compiled log", "numpy scipy", PURE),
-    "estimators": room("arm compiled model notices physics progress signals", "numpy scipy", PURE),
+    "estimators": room("arm compiled model notices physics progress significance signals", "numpy scipy", PURE),
     "methods": room("estimators progress"),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
     "profile": room("errors files limits units", "pydantic"),
     "settings": room("errors limits methods model physics signals"),
-    "results": room("errors files limits log model notices settings text verdict words", "numpy polars pydantic"),
+    "results": room("errors files limits log model notices settings significance text verdict "
+                    "words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log model results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
@@ -52,13 +54,13 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "inspection": room("arm errors estimators faults log notices profile readers signals units "
                        "words", "numpy"),
     "report": room(
-        "arm errors files inspection methods model notices progress results ros2 text verdict "
+        "arm errors files inspection methods model notices progress results ros2 significance text verdict "
         "words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log methods model notices physics profile "
+        "arm errors estimators files inspection log methods model notices physics profile significance "
         "progress readers report "
         "results runtime settings signals table4 text",
         "numpy polars pyarrow",
@@ -69,19 +71,20 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm errors estimators files identification model notices profile report results runtime "
+        "arm errors estimators files identification model notices profile report results runtime significance "
         "signals text verdict "
         "words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled errors estimators files identification log model notices progress report "
+        "arm compiled errors estimators files identification log model notices progress report significance "
         "results "
         "signals synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
     "exports": room("arm errors files identification model notices physics results text words", "numpy scipy"),
-    "fleet": room("errors files limits model notices physics progress report text verdict words", "numpy polars scipy"),
+    "fleet": room("errors files limits model notices physics progress report significance text "
+                  "verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exports files fleet identification "
         "inspection limits log "

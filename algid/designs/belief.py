@@ -33,9 +33,8 @@ from algid.errors import SettingError
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS, Shared
 from algid.model import DELAYS
+from algid.significance import SURE
 
-# z: standard deviations of the prior within which no limit breaks; beyond are 6 arms in 100,000
-SURE = 4.0
 UNKNOWN = 1e3  # relative bound at which a parameter that the motion leaves open is held
 _ROUND = 1e-6  # of the largest torque: how the corners of |Y F| are rounded
 # N m, whose share squared is a double still: an arm at rest without weight asks for no torque at

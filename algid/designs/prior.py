@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import Arm, FloatArray
-from algid.designs.belief import SURE, Belief
+from algid.designs.belief import Belief
 from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
@@ -17,6 +17,7 @@ from algid.identification.known import contradictions, has_error_bar, model_of
 from algid.model import DELAYS, TERMS, Model
 from algid.notices import Notice
 from algid.results import Result, read_result
+from algid.significance import SURE
 from algid.synth.cases import Case, load_case
 
 PHASES = next(name for name, term in TERMS.items() if term.sines)

@@ -35,6 +35,7 @@ from algid.estimators.convention_sums import (
 )
 from algid.estimators.conventions import AS_READ, Convention
 from algid.model import LARGEST_PHASE
+from algid.significance import SURE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
 _CLEAN = 1e-3
@@ -59,9 +60,9 @@ _INERTIAL = ("M22 > 0", "k5 > 0", "det M > 0", "k1 k2 > 0")
 
 MOST_LOGS = 32
 """Logs that are looked at, evenly spread."""
-BROKEN = -4.0
+BROKEN = -SURE
 """A demand of physics missed by more standard deviations than this is broken."""
-MET = 4.0
+MET = SURE
 """A convention is physical where the demands of inertia are met by as many."""
 APART = 1.0
 """Two conventions are distinct where their summed log residuals differ by this much."""

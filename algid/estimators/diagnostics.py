@@ -34,11 +34,12 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
 from algid.model import CHOICES, EVERY_TERM, PARAMETERS, Model, inertia, phasor
 from algid.notices import Notice
+from algid.significance import sigmas
 
 _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
-FAR_BEYOND = 3.0
-"""Standard deviations past a bound of physics that chance does not explain."""
+FAR_BEYOND = sigmas(sides=1)
+"""Standard deviations past a bound of physics that chance does not explain: of all bounds one lies nearest."""
 _INSIDE = (
     1e-6,
     1e-5,

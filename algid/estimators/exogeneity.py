@@ -26,7 +26,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import erfc, sqrt
 
 import numpy as np
 
@@ -42,9 +41,10 @@ from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import RIGID
 from algid.notices import Notice, Remedy
+from algid.significance import LEVEL, chance
 
-SURE = 1e-3  # chance of a false alarm of endogeneity
-ANSWERS = 0.01  # chance of a false alarm of feedback
+ANSWERS = 0.01
+"""p value of feedback below which instruments do not stand in place of a least squares that is off: the safe side."""
 MOVES = 1.0  # standard deviations of a constant that are worth another estimator
 _NEAR = 0.5  # of them: nearer, instruments are not simulated again
 _LAGS = 8  # steps between windows, two windows in all
@@ -71,7 +71,7 @@ class Exogeneity:
     @property
     def endogenous(self) -> bool:
         """Whether least squares is off by more than its error bars take in."""
-        return self.same < SURE and self.moved > MOVES
+        return self.same < LEVEL and self.moved > MOVES
 
     @property
     def answers(self) -> bool:
@@ -113,8 +113,8 @@ def watched(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Fit:
     """A fit by instruments, with a warning where the torque answers the motion and is none."""
-    chance = _silent(fit, unloaded, loaded, settings)
-    return fit.noted(feedback(chance)) if chance < ANSWERS else fit
+    silent = _silent(fit, unloaded, loaded, settings)
+    return fit.noted(feedback(silent)) if silent < LEVEL else fit
 
 
 def feedback(p_value: float) -> Notice:
@@ -232,7 +232,7 @@ def _silent(
     if not np.all(variance > 0):
         return 1.0
     largest = float(np.max(np.abs(products) / np.sqrt(variance)))
-    return min(1.0, products.size * erfc(largest / sqrt(2)))
+    return chance(largest, products.size)
 
 
 def _residual(

@@ -25,10 +25,11 @@ from algid.estimators.identifiability import (
     examine,
     open_directions,
 )
-from algid.estimators.innovations import NORMAL, ResidualSums
+from algid.estimators.innovations import ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.notices import Notice
+from algid.significance import NORMAL
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]

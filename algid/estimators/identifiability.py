@@ -34,6 +34,7 @@ from algid.arm import FloatArray, keep_arrays
 from algid.compiled import chi2_tail
 from algid.model import PARAMETERS, RIGID
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
+from algid.significance import LEVEL
 
 _SCALES = tuple(
     (scale, tuple(name for name, one in PARAMETERS.items() if one.scale is scale))
@@ -204,7 +205,6 @@ def _relation(direction: FloatArray) -> str:
 
 SCALES = (1, 16, 64)
 _LAGS = 10
-P_VALUE = 1e-3
 _FAINT = 0.02  # root mean square of the correlations that does not matter
 _TAILS = 6.0  # standard errors of the kurtosis
 _HEAVY = 1.0  # excess kurtosis that matters
@@ -277,7 +277,7 @@ def judge(sums: Correlations) -> Whiteness:
     Returns
     -------
     Whiteness
-        A joint is white with a p-value of `P_VALUE` at least, and without heavy tails.
+        A joint is white with a p-value of `LEVEL` at least, and without heavy tails.
 
     Notes
     -----
@@ -299,5 +299,5 @@ def judge(sums: Correlations) -> Whiteness:
     variance = power[0, :, 0] / sums.count[0]
     kurtosis = sums.fourth / sums.count[0] / variance**2 - 3
     heavy = (kurtosis > _HEAVY) & (kurtosis > _TAILS * np.sqrt(24 / sums.count[0]))
-    white = [bool(p_value[joint] >= P_VALUE and not heavy[joint]) for joint in range(2)]
+    white = [bool(p_value[joint] >= LEVEL and not heavy[joint]) for joint in range(2)]
     return Whiteness(p_value, rho[0, :, 0], kurtosis, (white[0], white[1]))

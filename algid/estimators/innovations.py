@@ -24,10 +24,9 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.compiled import chi2_exceeded
+from algid.significance import NORMAL
 
 LAGS = 40
-NORMAL = 1.959963984540054
-"""Half width of a 95 % interval in standard deviations."""
 ALIKE = 0.01  # relative difference of two periods that counts as none
 _BINS = 112
 _EDGES = np.geomspace(2.0**-14, 0.5, _BINS + 1)  # cycles a row

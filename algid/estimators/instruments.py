@@ -58,8 +58,6 @@ _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured on
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
 _EXAMINED = 4  # pieces of each log that `endogeneity` looks at
-ENDOGENEOUS = 3.0
-"""Statistic of `endogeneity` beyond which the unmodelled torque drives the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,8 +424,8 @@ def endogeneity(
     """Distance of instruments from least squares on the same windows, in the former's std.
 
     The statistic of Durbin, Wu and Hausman (Hausman 1978), coefficient by coefficient; the largest
-    is returned. Beyond `ENDOGENEOUS` the torque that the model lacks drives the motion. None where
-    the windows cannot be simulated. Of a long log the first pieces are looked at.
+    is returned, of which `algid.significance.chance` makes a p value. None where the windows cannot
+    be simulated. Of a long log the first pieces are looked at.
     """
     if fit.shared.delay:
         settings = replace(

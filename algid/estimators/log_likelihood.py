@@ -25,6 +25,7 @@ from algid.estimators.noise import (
     largest_change,
     newton_step,
     quantum,
+    roughness,
     variance_score,
 )
 from algid.estimators.parametrisation import Shared
@@ -40,7 +41,7 @@ SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
-_EXCESS = 10.0  # torque error beyond the sensor's noise that tells unmodelled dynamics
+_EXCESS = 10.0  # torque error beyond the sensor's noise and jumps that tells unmodelled dynamics
 # Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its
 # angles' noise.
 _SURE = 0.9
@@ -99,7 +100,8 @@ class LogEvidence:
         )
         guess = floored(NoiseLevels(theta, tau), floor)
         self.noise = known or guess
-        self._sensor = guess.tau
+        squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)
+        self._rough = np.maximum(guess.tau, np.sqrt(squares))
         self._floor = replace(floor, tau=np.maximum(floor.tau, _SURE * guess.tau))
         rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
         # A joint without a motor bears a load of the size of the other's.
@@ -116,7 +118,7 @@ class LogEvidence:
     @property
     def refuted(self) -> bool:
         """Whether the torque's error is not white: far above neighbouring samples' differences."""
-        return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._sensor, self._least)))
+        return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._rough, self._least)))
 
     @property
     def state(self) -> tuple[NoiseLevels, list[FloatArray]]:

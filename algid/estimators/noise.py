@@ -89,6 +89,16 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     return NoiseLevels(_white_noise(theta), np.maximum(levels, least))
 
 
+def roughness(tau: FloatArray) -> FloatArray:
+    """What neighbouring samples of the torques (2, N) differ by: white noise (2,) of the same sixth differences.
+
+    The root mean square, in N m: unlike `first_guess` it counts the jumps that dry friction makes
+    of the torque between two samples. A motion leaves nothing in it, however slow its error.
+    """
+    squares = np.mean(np.diff(tau, _DIFFERENCE, axis=1) ** 2, axis=1)
+    return np.asarray(np.sqrt(squares / comb(2 * _DIFFERENCE, _DIFFERENCE)))
+
+
 def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
     """Sixth differences of the torques (2, N - 6), less what the angles up to then tell of them.
 

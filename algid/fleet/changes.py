@@ -25,14 +25,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.significance import CERTAIN, sigmas
+
 if TYPE_CHECKING:
     import polars as pl
 
 FloatArray = NDArray[np.float64]
 
-ALPHA = 1e-6  # in a robot's life
+ALPHA = CERTAIN  # in a robot's life
 FEWEST = 4  # logs before a change and after it
-CLEAR = 5.0  # standard deviations of its step, for a parameter to be named
+CLEAR = sigmas(CERTAIN)  # of its step, for a parameter to be named
 _WILD = 6.0  # robust standard deviations, which a single log's estimate counts at most
 _MAD = 1.4826
 _LEAST = 1e-300

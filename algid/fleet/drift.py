@@ -21,11 +21,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from algid.significance import LEVEL
+
 if TYPE_CHECKING:
     import polars as pl
 
 SPAN = 3
-ALPHA = 1e-3
+ALPHA = LEVEL
 FEWEST = 8  # logs in a window that is tested
 _SUMS = ("w", "wt", "wtt", "wy", "wty", "wyy", "n")
 

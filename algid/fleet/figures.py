@@ -23,6 +23,7 @@ from algid.report.figures.base import (
     packed,
     upright,
 )
+from algid.significance import NORMAL
 from algid.text import significant, unit_text, visible
 from algid.words import counted
 
@@ -79,7 +80,7 @@ def courses(history: History, most: int) -> list[Drawn]:
 def _course(parameter: str, rows: pl.DataFrame, drifts: bool) -> Course:
     rows = rows.sort("month", "end").drop_nulls(["mean", "mean_std"])
     t = rows["end"].dt.epoch("ms").to_numpy().astype(np.float64)
-    mean, half = rows["mean"].to_numpy(), 1.96 * rows["mean_std"].to_numpy()
+    mean, half = rows["mean"].to_numpy(), NORMAL * rows["mean_std"].to_numpy()
     ends = (
         f"{significant(mean[0])} to {significant(mean[-1])}"
         if mean.size > 1
@@ -317,7 +318,7 @@ def _points(
         **place,
         "error_y": {
             "type": "data",
-            "array": _packed(1.96 * shown[std]),
+            "array": _packed(NORMAL * shown[std]),
             "color": f"{colour}/0.4",
             "thickness": 1,
             "width": 0,

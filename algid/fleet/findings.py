@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from algid.significance import CERTAIN, sigmas
+
 if TYPE_CHECKING:
     import polars as pl
 
 OUTLYING = 6.0  # robust standard deviations
-MISLABELLED = 5.0  # standard deviations: one false alarm in 1.7 million logs
+MISLABELLED = sigmas(CERTAIN)  # one false alarm in a million logs
 _MAD = 1.4826  # from the median of absolute deviations to a standard deviation
 
 

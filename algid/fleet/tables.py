@@ -11,6 +11,7 @@ from algid.fleet.drift import ALPHA, SPAN
 from algid.fleet.history import History
 from algid.model import PARAMETERS, UNITS
 from algid.report.document import Column, Table
+from algid.significance import NORMAL
 from algid.text import ABSENT, joined, resolved, significant, unit_text, visible
 from algid.words import counted
 
@@ -88,7 +89,7 @@ def change_table(history: History) -> Table:
             f"{row['before'].date().isoformat()} and {row['after'].date().isoformat()}",
             row["parameter"],
             f"{100 * row['share']:+.3g}",
-            f"{resolved(row['step'], row['step_std'])} ± {significant(1.96 * row['step_std'], 2)}",
+            f"{resolved(row['step'], row['step_std'])} ± {significant(NORMAL * row['step_std'], 2)}",
             unit_text(UNITS[row["parameter"]]),
         )
         for row in (() if found is None else found.iter_rows(named=True))
@@ -138,14 +139,14 @@ def parameter_table(history: History, robot: str, jobs: pl.DataFrame) -> Table:
 
 
 def _with_half(value: float, std: float) -> str:
-    return f"{resolved(value, std)} ± {significant(1.96 * std, 2)}"
+    return f"{resolved(value, std)} ± {significant(NORMAL * std, 2)}"
 
 
 def _trend(row: dict[str, float]) -> str:
     if np.isnan(row["p"]) or not row["mean"]:
         return "not tested"
     percent = 100 / abs(row["mean"])
-    return f"{percent * row['slope']:+.2g} ± {significant(1.96 * percent * row['slope_std'], 2)}"
+    return f"{percent * row['slope']:+.2g} ± {significant(NORMAL * percent * row['slope_std'], 2)}"
 
 
 def _found(history: History, robot: str, parameter: str) -> str:
@@ -179,7 +180,7 @@ def drift_table(history: History) -> Table:
     rows = []
     for row in history.drifts.head(MOST_ROWS).iter_rows(named=True):
         percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
-        slope, half = percent * row["slope"], 1.96 * percent * row["slope_std"]
+        slope, half = percent * row["slope"], NORMAL * percent * row["slope_std"]
         rows.append(
             (
                 visible(row["robot"]),

@@ -21,10 +21,10 @@ from algid.model import EVERY_TERM, SINES
 from algid.notices import Notice, Remedy
 from algid.physics.effort import FRICTION
 from algid.settings import Settings
+from algid.significance import SURE
 
 LONGEST, BOTH_LONG = 5.0, 2.0
 """m: no link is longer, and no two links are."""
-SURE = 4.0  # standard deviations
 NO_DAMPING = 0.02  # of critical damping: less than any joint's friction
 NO_ARM = 0.1  # of the loaded arm's inertia: less than any unloaded arm's
 

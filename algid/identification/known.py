@@ -18,8 +18,9 @@ from algid.physics.effort import absent
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.results import Result
 from algid.settings import Settings
+from algid.significance import CERTAIN, sigmas
 
-FAR = 5.0  # standard deviations beyond which two statements contradict each other
+FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
 
 
 def model_of(result: Result) -> Model:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -13,7 +12,6 @@ from algid import results
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit, own_estimates
-from algid.estimators.instruments import ENDOGENEOUS
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import (
     PredictionScore,
@@ -31,6 +29,7 @@ from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
 from algid.settings import Settings
+from algid.significance import LEVEL, chance
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
 
@@ -217,10 +216,9 @@ def fit_summary(
         noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), levels.tolist(), strict=True))
     if fit.endogeneity is not None:
         # as many coefficients were looked at as a log has (Bonferroni)
-        p_value = min(1.0, len(fit.shared.log_names) * math.erfc(fit.endogeneity / math.sqrt(2)))
-        far = fit.endogeneity > ENDOGENEOUS
+        p_value = chance(fit.endogeneity, len(fit.shared.log_names))
         endogeneity["largest"] = results.Endogeneity(
-            statistic=fit.endogeneity, p_value=p_value, endogenous=far
+            statistic=fit.endogeneity, p_value=p_value, endogenous=p_value < LEVEL
         )
     return results.FitSummary(
         noise=noise,

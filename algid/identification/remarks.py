@@ -9,15 +9,14 @@ import numpy as np
 from algid import results
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
-from algid.estimators.instruments import ENDOGENEOUS
 from algid.identification.phases import phase_note
 from algid.methods import estimator_of
 from algid.notices import Notice, Remedy
+from algid.significance import CERTAIN, LEVEL, ONE_SIDED, chance, sigmas
 
-ONE_SIDED = 1.645  # standard deviations of a one-sided bound at 95 %
 STEEL = 8000.0  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have
-FAR_APART = 5.0  # standard deviations past which two logs are not of one arm
+FAR_APART = sigmas(CERTAIN)  # past which two logs are not of one arm
 
 
 def exchanged(fit: Fit) -> bool:
@@ -42,7 +41,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
         )
     if (
         fit.endogeneity is not None
-        and fit.endogeneity > ENDOGENEOUS
+        and chance(fit.endogeneity, len(fit.shared.log_names)) < LEVEL
         and estimator_of(fit.estimator).endogenous
     ):
         instruments = Remedy({"estimator": "instruments"}, "to compare")

@@ -6,14 +6,18 @@ import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from algid.arm import FloatArray
 from algid.inspection.candidates import torques_beside
-from algid.inspection.figures import robust_deviation, saturated_share, thinned
+from algid.inspection.figures import differences, robust_deviation, saturated_share, thinned
 from algid.log import Log
 from algid.notices import Notice, Remedy
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
+_TURN_BACK, _STANDS, _CLEAR = 3, 0.4, 6.0
+"""Where a joint turns back: samples before and behind, its speed of that at those, and they over the noise."""
 _DEAD, _DEAD_RUNS = (
     0.1,
     20,
@@ -184,21 +188,50 @@ def _in_degrees(log: Log, name: str, text: str) -> Notice:
 
 
 def spikes(log: Log) -> Iterator[Notice]:
-    """Single samples thirty times further off the middle of their neighbours than noise and bends of the signal are."""
+    """Single samples that fit neither what comes before them nor what follows.
+
+    They lie thirty times further off the middle of their neighbours than noise and bends of the
+    signal do. The sample after a step fits what follows, and a pulse of the torque where the joint
+    turns back is dry friction's.
+    """
     if len(log) < 20:
         return
-    for name, values in zip(
-        ("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True
-    ):
+    channels = zip(("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True)
+    for name, values in channels:
         off = values[1:-1] - (values[:-2] + values[2:]) / 2
         size = np.abs(off)
         limit = _SPIKE * max(robust_deviation(off), float(np.quantile(thinned(size), 0.9)))
-        found = np.flatnonzero(size > limit) if limit > 0 else np.empty(0, dtype=np.int64)
-        found = found[np.abs(values[found + 2] - values[found]) < 0.2 * size[found]]
-        if found.size:
-            first = float(log.t[1:-1][found][0])
-            seen = {"channel": _source(log, name), "count": len(found), "start": first}
+        if limit == 0:
+            continue
+        places = np.flatnonzero(size > limit) + 1
+        places = places[_alone(values, places, size[places - 1])]
+        if name.startswith("tau"):
+            places = places[~_turns_back(log.theta[int(name[-1]) - 1], places)]
+        if places.size:
+            first = float(log.t[places[0]])
+            seen = {"channel": _source(log, name), "count": len(places), "start": first}
             yield Notice("SPIKES", numbers=seen)
+
+
+def _alone(values: FloatArray, places: NDArray[np.int64], size: FloatArray) -> NDArray[np.bool_]:
+    """Whether values (N,) at `places` fit neither the line before nor the line behind, which fit each other."""
+    before, after = values[places - 1], values[places + 1]
+    from_before = 2 * before - values[np.maximum(places - 2, 0)]
+    from_after = 2 * after - values[np.minimum(places + 2, values.size - 1)]
+    misfit = [np.abs(values[places] - line) for line in (from_before, from_after)]
+    return (np.abs(after - before) < 0.2 * size) & (np.minimum(*misfit) > 0.5 * size)
+
+
+def _turns_back(theta: FloatArray, places: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether a joint stands still at `places` for a sample, and moves before it and behind."""
+    noise = robust_deviation(differences(theta, 3)) / math.sqrt(20)
+    inside = np.clip(places, _TURN_BACK + 1, theta.size - _TURN_BACK - 2)
+    now, before, after = (
+        np.abs(theta[inside + apart + 1] - theta[inside + apart - 1])
+        for apart in (0, -_TURN_BACK, _TURN_BACK)
+    )
+    slower = np.minimum(before, after)
+    return (now < _STANDS * slower) & (slower > _CLEAR * noise)
 
 
 def _source(log: Log, name: str) -> str:

@@ -25,13 +25,13 @@ from algid.report.figures.base import (
 )
 from algid.report.frame import page
 from algid.results import Estimate, Result
+from algid.significance import NORMAL, sigmas
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict
 from algid.words import counted
 
 COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")
-CHANCE = 1.96  # σ that 95 % of differences by chance stay within
-FAR = 3.0  # σ that chance does not explain
+FAR = sigmas()  # beyond which chance does not explain a difference
 FARTHEST = 12.0  # σ that the first view shows
 NAME = "compare.html"
 ROW, FRAME = 24, 90  # pixels of a parameter, and of what stands around them
@@ -77,10 +77,10 @@ def verdict(found: Comparison) -> Verdict:
     if far:
         more = f" and {len(far) - 3} more" if len(far) > 3 else ""
         lie = "lies" if len(far) == 1 else "lie"
-        return Verdict("reservations", f"{joined(far[:3])}{more} {lie} beyond {FAR:g} σ")
-    inside = sum(size <= CHANCE for size, _ in distances)
+        return Verdict("reservations", f"{joined(far[:3])}{more} {lie} beyond {FAR:.2g} σ")
+    inside = sum(size <= NORMAL for size, _ in distances)
     largest = max(distances)[1]
-    within = f"{inside} of {counted(len(distances), 'difference')} within {CHANCE:g} σ"
+    within = f"{inside} of {counted(len(distances), 'difference')} within {NORMAL:.2f} σ"
     return Verdict("good", f"{within}; the largest is {largest}")
 
 
@@ -113,7 +113,7 @@ def _in_sigmas(found: Estimate | None, first: Estimate, sigma: float) -> tuple[f
     if found is None or found.estimate is None or found.std is None or first.estimate is None:
         return None
     low, high = found.ci95 or (None, None)
-    half = CHANCE * found.std if low is None or high is None else (high - low) / 2
+    half = NORMAL * found.std if low is None or high is None else (high - low) / 2
     return (found.estimate - first.estimate) / sigma, half / sigma
 
 
@@ -195,16 +195,16 @@ def _distances(found: Comparison) -> Figure:
         abs(distance) for row in found.sigma.values() for distance in row if distance is not None
     ]
     reach = max(1.1 * max(sizes, default=0.0), 4.0)
-    inside = sum(size <= CHANCE for size in sizes)
+    inside = sum(size <= NORMAL for size in sizes)
     layout = {
         "xaxis": axis("distance, σ", range=[-reach, reach]),
         "yaxis": _names(names),
-        "shapes": [stretch(-CHANCE, CHANCE, "@blue/0.25")],
+        "shapes": [stretch(-NORMAL, NORMAL, "@blue/0.25")],
         "hovermode": "closest",
     }
     largest = significant(max(sizes, default=0.0), 2)
     note = (
-        f"{inside} of {counted(len(sizes), 'difference')} within ± {CHANCE:g} σ, the largest "
+        f"{inside} of {counted(len(sizes), 'difference')} within ± {NORMAL:.2f} σ, the largest "
         f"at {largest} σ."
     )
     panels = (
@@ -214,7 +214,7 @@ def _distances(found: Comparison) -> Figure:
     )
     legend = (
         *_legend(found, 1),
-        Legend("", f"± {CHANCE:g} σ, 95 % by chance", "@blue/0.25", "area"),
+        Legend("", f"± {NORMAL:.2f} σ, 95 % by chance", "@blue/0.25", "area"),
     )
     return Figure(
         "distances", f"Distances from {found.labels[0]}", panels, f"Read: {READING}.", legend, note

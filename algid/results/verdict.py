@@ -7,7 +7,9 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from algid.model import CHOICES, EVERY_TERM
 from algid.notices import Notice, Remedy
+from algid.significance import SURE
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
 from algid.words import counted
@@ -21,7 +23,6 @@ LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
 LARGEST_SPREAD = (
     0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
 )
-FAR_FROM_TRUTH = 4.0  # σ; by chance one estimate in 16,000
 
 LONGEST_COMMAND = 4_000  # characters: a command is there to be copied
 
@@ -252,18 +253,26 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     if failed and not causes and (is_implausible(result) or poor):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
-    yield from _of_statuses(_chosen(result))
+    yield from _of_statuses(_asked_for(result))
     if result.fit is not None:
         yield from _of_fit(result.fit, failed=failed)
     yield from _far_from_truth(result)
     yield from (one for one in warnings if one.code not in CAUSES)
 
 
-def _chosen(result: Result) -> dict[str, Estimate]:
-    """The estimates less those of terms that no log had to tell from zero."""
+def _asked_for(result: Result) -> dict[str, Estimate]:
+    """The estimates that were asked for: less terms that are shrunk, or that the logs have chosen by themselves.
+
+    Such a term is there for the sake of the others. That its own coefficients are small beside
+    their error bars is no reason to doubt those.
+    """
     model = None if result.fit is None else result.fit.model
-    shrunk = () if model is None else model.shrunk
-    return {name: found for name, found in result.estimates.items() if name not in shrunk}
+    if model is None:
+        return result.estimates
+    own = set(model.shrunk)
+    if model.chosen_by == "logs":
+        own |= {name for term in CHOICES for name in EVERY_TERM[term].names}
+    return {name: found for name, found in result.estimates.items() if name not in own}
 
 
 def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:
@@ -327,6 +336,6 @@ def _far_from_truth(result: Result) -> Iterator[Notice]:
         for row in result.table4
         if row.truth is not None and row.estimate is not None and row.std
     }
-    far = [f"{name} ({significant(d, 2)} σ)" for name, d in distances.items() if d > FAR_FROM_TRUTH]
+    far = [f"{name} ({significant(d, 2)} σ)" for name, d in distances.items() if d > SURE]
     if far:
         yield Notice("FAR_FROM_TRUTH", numbers={"names": far})

@@ -21,9 +21,10 @@ from algid.report.figures.base import (
     times,
 )
 from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
+from algid.significance import NORMAL
 from algid.text import joined
 from algid.tracks.bins import CELL
-from algid.tracks.payload import HALF_BAND, HOLE, QUANTILE, Track
+from algid.tracks.payload import HALF_BAND, HOLE, Track
 from algid.tracks.result import TrackResult
 from algid.tracks.tables import mass_text
 
@@ -114,7 +115,7 @@ def _view(result: TrackResult) -> list[float]:
     found = result.track
     certain = found.std <= 3 * np.median(found.std)
     ends = [end for one in found.stretches for end in one.ci95]
-    band = QUANTILE * found.std[certain]
+    band = NORMAL * found.std[certain]
     # percentiles: a jolt's spike may leave the frame
     ends += np.percentile(found.m_p[certain] - band, [1]).tolist()
     ends += np.percentile(found.m_p[certain] + band, [99]).tolist()
@@ -152,8 +153,8 @@ def _band(found: Track) -> list[Trace]:
     edges = [0, *(np.flatnonzero(apart) + 1).tolist(), found.t.size]
     for first, last in pairwise(edges):
         starts = np.arange(first, last, size)
-        low = np.minimum.reduceat(found.m_p[:last] - QUANTILE * found.std[:last], starts)
-        high = np.maximum.reduceat(found.m_p[:last] + QUANTILE * found.std[:last], starts)
+        low = np.minimum.reduceat(found.m_p[:last] - NORMAL * found.std[:last], starts)
+        high = np.maximum.reduceat(found.m_p[:last] + NORMAL * found.std[:last], starts)
         x = found.t[starts]
         xs += [x, x[::-1], x[:1], x[:1]]
         ys += [high, low[::-1], high[:1], np.full(1, np.nan)]

@@ -16,9 +16,9 @@ from algid.report.export import START_KEY, write_series
 from algid.report.frame import page
 from algid.report.markdown import markdown
 from algid.report.tables import settings_table
+from algid.significance import NORMAL
 from algid.text import file_name, significant
 from algid.tracks.figures import figures
-from algid.tracks.payload import QUANTILE
 from algid.tracks.result import TrackResult, track_json
 from algid.tracks.tables import (
     change_table,
@@ -105,8 +105,8 @@ def _write_curve(result: TrackResult, path: Path) -> None:
         {
             "t": found.t,
             "m_p": found.m_p,
-            "low": found.m_p - QUANTILE * found.std,
-            "high": found.m_p + QUANTILE * found.std,
+            "low": found.m_p - NORMAL * found.std,
+            "high": found.m_p + NORMAL * found.std,
             "left": found.left,
             "stretch": number,
             **dict(zip(("stretch_m_p", "stretch_low", "stretch_high"), masses, strict=True)),

@@ -20,6 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.too_short import TooShortError
 from algid.signals.segments import Segment
+from algid.significance import NORMAL
 from algid.tracks.bins import CELL, Cells, IdentifiedArm, cells_of, joined, with_friction
 from algid.tracks.change_points import (
     AHEAD,
@@ -34,7 +35,6 @@ from algid.tracks.change_points import (
 from algid.tracks.drift import Drift, drift_of
 from algid.tracks.placing import Changes, Place, confirmed, cut_to
 
-QUANTILE = 1.959964  # of the normal distribution, for 95 %
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 HOLE = 0.3  # s: cells this far apart have no log between them
 FEWEST = 4  # cells that weigh a stretch
@@ -56,7 +56,7 @@ class Stretch:
     @property
     def ci95(self) -> tuple[float, float]:
         """The 95 % interval, kg."""
-        return self.m_p - QUANTILE * self.std, self.m_p + QUANTILE * self.std
+        return self.m_p - NORMAL * self.std, self.m_p + NORMAL * self.std
 
     @property
     def empty(self) -> bool:

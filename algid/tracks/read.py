@@ -14,7 +14,8 @@ from algid.files import first_misfit, read_text
 from algid.notices import Notice
 from algid.report.reduce import Block, blocks
 from algid.results import LogSummary, misfit_of_numbers
-from algid.tracks.payload import QUANTILE, Stretch, Track
+from algid.significance import NORMAL
+from algid.tracks.payload import Stretch, Track
 from algid.tracks.result import TrackResult
 
 FILE, CURVE = "track.json", "track.parquet"
@@ -118,7 +119,7 @@ def _result(found: _File, curve: Block) -> TrackResult:
             stretches=[Stretch(one.start, one.end, one.m_p, one.std) for one in found.stretches],
             t=curve["t"],
             m_p=curve["m_p"],
-            std=(curve["high"] - curve["m_p"]) / QUANTILE,
+            std=(curve["high"] - curve["m_p"]) / NORMAL,
             stretch=curve["stretch"],
             left=curve["left"],
             changes=np.array(changes, dtype=np.float64).reshape(-1, 3),

@@ -10,11 +10,11 @@ from typing import Any
 
 from algid.notices import Notice
 from algid.results import LogSummary
+from algid.significance import SURE
 from algid.tracks.payload import Stretch, Track
 
 SCHEMA_VERSION = 2
 UNDETERMINED = 0.5  # standard deviation over the payload or link 2, whichever is heavier
-FAR = 4.0  # standard deviations below nothing; by chance one stretch in 30,000
 
 
 class StretchStatus(StrEnum):
@@ -64,7 +64,7 @@ class TrackResult:
 def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
     if not stretch.std < UNDETERMINED * max(abs(stretch.m_p), tip_equivalent):
         return StretchStatus.WEAK_EXCITATION
-    if stretch.m_p + FAR * stretch.std < 0:
+    if stretch.m_p + SURE * stretch.std < 0:
         return StretchStatus.NEGATIVE_MASS
     return StretchStatus.OK
 

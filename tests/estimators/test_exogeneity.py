@@ -11,10 +11,11 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators import exogeneity, shrunk
-from algid.estimators.exogeneity import ANSWERS, SURE, _crossed
+from algid.estimators.exogeneity import ANSWERS, _crossed
 from algid.estimators.fit import Fit
 from algid.estimators.weak import Source, WeakSettings
 from algid.signals.segments import Segment
+from algid.significance import LEVEL
 from pipelines.disturbed import DT, NAMES, Scene, scene
 
 SETTINGS = WeakSettings(bandwidth=60.0)
@@ -108,9 +109,9 @@ def test_unloaded_logs_alone_are_compared() -> None:
 
 
 def test_both_conditions_are_asked() -> None:
-    far = exogeneity.Exogeneity(distance=5.0, moved=2.0, same=SURE / 2, silent=1.0)
+    far = exogeneity.Exogeneity(distance=5.0, moved=2.0, same=LEVEL / 2, silent=1.0)
     assert far.endogenous
     assert not far.answers
     assert not replace(far, moved=0.9).endogenous
-    assert not replace(far, same=2 * SURE).endogenous
+    assert not replace(far, same=2 * LEVEL).endogenous
     assert replace(far, silent=ANSWERS / 2).answers

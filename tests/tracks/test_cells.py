@@ -19,10 +19,11 @@ from algid.notices import Notice
 from algid.results import LogSummary
 from algid.settings import Settings
 from algid.signals.segments import segments
+from algid.significance import NORMAL
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from algid.tracks.bins import CELL, SUMS, Cells, IdentifiedArm, cells_of, joined
-from algid.tracks.payload import HALF_BAND, HOLE, QUANTILE, Stretch, Track, track
+from algid.tracks.payload import HALF_BAND, HOLE, Stretch, Track, track
 from algid.tracks.result import StretchStatus, TrackResult, track_json
 from algid.tracks.run import track_log
 from tests.tracks.folders import CASE, noisy
@@ -250,7 +251,7 @@ def test_track_json_holds_what_was_found() -> None:
     found = judged(Stretch(0.0, 2.0, 0.5, 0.01), schedule=((0.0, 0.5),))
     content = json.loads(track_json(found))
     (stretch,) = content["stretches"]
-    assert stretch["ci95"] == pytest.approx([0.5 - 0.01 * QUANTILE, 0.5 + 0.01 * QUANTILE])
+    assert stretch["ci95"] == pytest.approx([0.5 - 0.01 * NORMAL, 0.5 + 0.01 * NORMAL])
     assert (stretch["status"], stretch["truth"], stretch["unit"]) == ("OK", 0.5, "kg")
     assert content["changes"] == [{"t": 2.0, "from": 1.9, "to": 2.1}]
     assert content["holes"] == [[5.0, 6.0]]

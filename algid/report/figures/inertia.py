@@ -18,6 +18,7 @@ from algid.report.figures.base import (
 )
 from algid.report.series import TorqueLog
 from algid.results import Result
+from algid.significance import NORMAL
 
 TITLE = "Mass matrix M(θ)"
 NAMES = ("k1", "k3", "k5")
@@ -101,7 +102,7 @@ def _traces(theta2: FloatArray, parts: FloatArray, stds: FloatArray | None) -> l
     for place, (name, colour) in enumerate(PARTS):
         middle = parts[place]
         if stds is not None:
-            half = 1.96 * stds[place]
+            half = NORMAL * stds[place]
             area = {
                 "fill": "toself",
                 "fillcolor": f"{colour}/0.22",
