@@ -264,14 +264,19 @@ def _asked_for(result: Result) -> dict[str, Estimate]:
     """The estimates that were asked for: less terms that are shrunk, or that the logs have chosen by themselves.
 
     Such a term is there for the sake of the others. That its own coefficients are small beside
-    their error bars is no reason to doubt those.
+    their error bars is no reason to doubt those. Phases are, since they say how the arm is bent.
     """
     model = None if result.fit is None else result.fit.model
     if model is None:
         return result.estimates
     own = set(model.shrunk)
     if model.chosen_by == "logs":
-        own |= {name for term in CHOICES for name in EVERY_TERM[term].names}
+        own |= {
+            name
+            for term in CHOICES
+            for name in EVERY_TERM[term].names
+            if not EVERY_TERM[term].sines
+        }
     return {name: found for name, found in result.estimates.items() if name not in own}
 
 

@@ -16,6 +16,7 @@ from algid.estimators.noise import (
     largest_change,
     newton_step,
     quantum,
+    roughness,
     variance_score,
 )
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise
@@ -234,3 +235,19 @@ def test_a_torque_of_its_own_is_judged_by_itself(size: float) -> None:
     noisy = theta + size * rng.standard_normal((2, 4000))
     own = np.median(np.abs(np.diff(tau, 6, axis=1)), axis=1) / 0.6745 / np.sqrt(924)
     np.testing.assert_array_equal(first_guess(noisy, tau).tau, own)
+
+
+def test_jumps_of_the_torque_are_rough_and_slow_errors_are_not() -> None:
+    """A step of height h in n samples has h² 252 / (924 n) of the sixth differences' power."""
+    draw = np.random.default_rng(5)
+    n, h = 20_000, 3.0
+    noise = draw.normal(0, 0.01, (2, n))
+    jumps = np.zeros((2, n))
+    jumps[0] = h * (np.arange(n) // 500 % 2)
+    slow = 5 * np.sin(2 * np.pi * 3 * np.arange(n) * 1e-3)
+    found = roughness(noise + jumps + slow)
+    share = (n // 500 - 1) / (n - 6)
+    assert found[0] == pytest.approx(np.sqrt(1e-4 + h**2 * share * 252 / 924), rel=0.02)
+    assert found[1] == pytest.approx(0.01, rel=0.03)
+    angles = draw.normal(0, 1e-3, (2, n))
+    assert first_guess(angles, noise + jumps + slow).tau == pytest.approx([0.01, 0.01], rel=0.05)

@@ -10,7 +10,15 @@ from algid.report.markdown import markdown
 from algid.report.page import result_document
 from algid.report.tables import estimate_tables
 from algid.report.terminal import print_document
-from algid.results import Bound, Estimate, Result, Status, TorquePrediction, WhitenessTest
+from algid.results import (
+    Bound,
+    Estimate,
+    Result,
+    Status,
+    TorqueModel,
+    TorquePrediction,
+    WhitenessTest,
+)
 from tests.report.folders import estimate
 
 HANGING = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(Remedy({"zero": "hanging"}),))
@@ -353,3 +361,24 @@ def test_joints_that_move_beside_those_read_lead_the_reasons(result: Result) -> 
     found = implausible(result.model_copy(update={"notices": [HANGING, others]})).verdict
     assert [reason.code for reason in found.reasons[:2]] == ["OTHER_JOINTS", "WRONG_ZERO"]
     assert found.command == f"algid inspect {result.log.path}"
+
+
+@pytest.mark.parametrize(("chosen_by", "doubted"), [("logs", False), ("settings", True)])
+def test_terms_that_the_logs_chose_bring_no_reservation(
+    chosen_by: str, doubted: bool, result: Result
+) -> None:
+    """A wide or insignificant coefficient is one where the term was asked for, or is a phase."""
+    vague = Estimate(estimate=0.1, std=0.07, ci95=(-0.04, 0.24), unit="N m")
+    none = vague.model_copy(update={"status": Status.NOT_SIGNIFICANT})
+    content = {"terms": ["stribeck", "phases"], "coulomb_speed": 0.1, "stribeck_speed": 0.3}
+    model = TorqueModel.model_validate({**content, "chosen_by": chosen_by})
+    fitted = with_fit(result, model=model)
+    codes = {
+        name: [
+            {reason.code for reason in with_parameter(fitted, name, one).verdict.reasons}
+            for one in (vague, none)
+        ]
+        for name in ("s1", "k1s")
+    }
+    named = [{"WIDE_INTERVAL"}, {"NOT_SIGNIFICANT"}]
+    assert codes == {"s1": named if doubted else [set(), set()], "k1s": named}
