@@ -61,7 +61,7 @@ Predictions = Mapping[LogSource, PredictionSums]
 
 
 def choose_model(survey: Survey, settings: Settings, earlier: Result | None = None) -> Selection:
-    """The torque's model that the settings ask for, that an earlier result had, or that the logs choose.
+    """The torque's model: set by the user, taken from an earlier result, or chosen by the logs.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _shrunk(
 def residual_of(
     survey: Survey, settings: Settings, chosen: Selection, fit: Fit
 ) -> ResidualSums | None:
-    """Sums over the residual of the estimator whose fit it is: its innovations, or that of its windows.
+    """Residual sums of the estimator behind the fit: of its innovations, or of its windows.
 
     None where no log is long enough.
     """
@@ -239,7 +239,7 @@ def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
-    """The fit with how far instruments and least squares are apart on its logs, where it is not known."""
+    """The fit with the distance of instruments from least squares on its logs, if not yet known."""
     if fit.endogeneity is not None:
         return fit
     unloaded, loaded = _passes(survey, settings)
@@ -252,7 +252,7 @@ def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selec
 
 
 def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selection:
-    """The selection without the terms that the logs chose and whose coefficients the fit finds to be nothing.
+    """Drop the terms that the logs chose and whose coefficients are not significant in the fit.
 
     A term may earn its place before the weak estimator by what differentiation leaves behind; the
     efficient fit then finds each of its coefficients within `NOTHING` standard deviations of zero.
@@ -297,7 +297,9 @@ def _passes(
     settings: Settings,
     watched: Callable[[LogSource, Pass], Iterator[Segment]] | None = None,
 ) -> tuple[list[Pass], list[Pass]]:
-    """A callable a log, unloaded and loaded, that gives a fresh pass, `watched` where someone looks on.
+    """Callables, one per log, that give a fresh pass; unloaded and loaded logs apart.
+
+    Each pass goes through `watched`, if given.
 
     Segments have velocities only where they are not observed on the way.
     """

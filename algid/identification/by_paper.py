@@ -142,7 +142,10 @@ def _estimate(
 
 
 def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
-    """Whether no arm has these constants (7,), NaN where unknown: friction far below zero, or no positive mass."""
+    """Whether no arm has these constants (7,): friction far below zero, or mass not positive.
+
+    Constants are NaN where they are not known.
+    """
     if np.any((k + FAR_BEYOND * wander[: k.size])[[5, 6]] < 0):
         return True
     m11, m12, m22 = mass_matrix(k, np.array([[0.0, 0.0], [0.0, np.pi]]))

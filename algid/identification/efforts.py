@@ -1,4 +1,4 @@
-"""What the driver calls effort, as far as the logs tell it: a torque without weight, or without anything of the arm.
+"""The kind of effort that the logs show: a torque without gravity, or without any of the arm's.
 
 Physics binds the constants together: with the link lengths l1 and lc2
 
@@ -47,7 +47,7 @@ def told(fit: Fit, settings: Settings) -> Settings:
 
 
 def of_effort(fit: Fit, found: Settings, asked: Settings) -> list[Notice]:
-    """What there is to say of the effort that the logs of `fit` tell, `found`, where none was `asked`."""
+    """Notices of the effort that the logs of `fit` show, `found`, where none was `asked` for."""
     said = []
     if found.gravity != asked.gravity:
         said.append(Notice("PAYLOAD_WEIGHTLESS", note=True))
@@ -68,7 +68,7 @@ def of_effort(fit: Fit, found: Settings, asked: Settings) -> list[Notice]:
 
 
 def _arm_weightless(fit: Fit) -> bool:
-    """Whether unloaded logs by themselves, or else the fit, show an arm that couples its joints and weighs nothing."""
+    """Whether unloaded logs alone, or else the fit, show an arm with coupling but no weight."""
     known = _own(fit, False) or _of_fit(fit)
     (k1, of_k1), *weights = (_size(known, name) for name in ("k1", "k2", "k4"))
     least = fit.shared.model.gravity * k1 / fit.shared.lengths.get("l1", BOTH_LONG)

@@ -1,4 +1,4 @@
-"""Identify an arm and its payload from logs: the one way in for the command line, batches and notebooks."""
+"""Identify an arm and its payload from logs, for the command line, batches and notebooks."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def identify(
 
 
 def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier | None) -> Settings:
-    """The settings with what the profile says of the arm, or an earlier result, where they are silent."""
+    """The settings, completed from the profile or an earlier result where they are not set."""
     said: dict[str, Any] = (
         {} if earlier is None else {"effort": earlier.result.settings.get("effort")}
     )
@@ -178,7 +178,7 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
-    """What the user says about logs, and where that is silent what was said of the earlier result's."""
+    """The user's profile of the logs, completed by the profile of the earlier result."""
     from algid.profile import OF_ONE_LOG, over
 
     known = {name: one for name, one in earlier.profile.items() if name not in OF_ONE_LOG}
@@ -194,7 +194,7 @@ def _identified(
     *,
     series: bool = False,
 ) -> Result:
-    """The result with what the user `said` about its logs, and a warning where they were read otherwise than before.
+    """The result with the user's statements `said`, and warnings of logs read differently now.
 
     Time series go into `folder`: the paper's always, those of a likelihood where `series` asks for
     them.
@@ -280,7 +280,7 @@ def _fitted(
 def _with_the_papers(
     outcome: Identified, survey: Survey, settings: Settings, folder: Path
 ) -> Identified:
-    """The paper's convergence series of the first log of each kind, and its route to the payload."""
+    """The outcome with the paper's series of the first log of each kind, and its payload route."""
     first, second = _firsts(survey)
     logs = [log for log in (first, second) if log is not None]
     durations = [survey.summary(log).duration for log in logs]

@@ -1,4 +1,4 @@
-"""What an earlier result knows of its arm: model, constants and their prior, when its torque acts, link lengths."""
+"""What an earlier result knows of its arm: model, constants and prior, torque shift, lengths."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def model_of(result: Result) -> Model:
 
 
 def shift_of(result: Result) -> Callable[[float], float]:
-    """Time in s after which a logged torque acts, for the time between samples: hold, and delay set or found."""
+    """Time in s after which a logged torque acts, by sampling period: hold, and delay."""
     delay = result.parameters.get("delay")
     found = None if delay is None else delay.estimate
     return partial(Settings.of(result.settings).torque_shift, found_delay=found)
@@ -151,7 +151,7 @@ def first_length(result: Result) -> tuple[float, float] | None:
 
 
 def payload_length(result: Result) -> tuple[float, float] | None:
-    """The payload's l1 and its standard deviation in m, where it is told better than by `first_length`."""
+    """The payload's l1 and its standard deviation in m, if more precise than `first_length`."""
     found = result.payload.get("l1")
     if found is None or found.estimate is None or not found.std or not found.usable:
         return None
@@ -162,7 +162,7 @@ def payload_length(result: Result) -> tuple[float, float] | None:
 
 
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
-    """Notices of given lengths far from what the result says of them: by itself, and by l1 = g k1 / k2."""
+    """Notices of given lengths that contradict the result's own, or its l1 = g k1 / k2."""
     identified = {
         name: (found.estimate, found.std)
         for name, found in result.payload.items()

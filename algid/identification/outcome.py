@@ -1,4 +1,4 @@
-"""What an estimator found, as a result holds it: estimates with intervals, Table 4's rows, diagnostics, warnings."""
+"""An estimator's outcome for a result: estimates, intervals, Table 4, diagnostics, warnings."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ NEVER_ZERO = ("k3", "k5", "l1", "l2")
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Estimates by name, Table 4's rows with their standard deviations, and what else the estimator knows."""
+    """Estimates by name, Table 4's rows with standard deviations, and diagnostics."""
 
     parameters: dict[str, Estimate]
     loaded: dict[str, Estimate]
@@ -147,7 +147,10 @@ def estimate(value: float, std: float, half: float, unit: str, status: str) -> E
 
 
 def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """The estimates, those not significant whose interval holds zero and that may be zero: no inertia, no length."""
+    """The estimates; those whose interval holds zero and that may be zero are not significant.
+
+    An inertia or a length is never zero.
+    """
     return {
         name: found.model_copy(update={"status": Status.NOT_SIGNIFICANT})
         if found.status is Status.OK and name not in NEVER_ZERO and _holds_zero(found)
@@ -277,7 +280,7 @@ def fit_summary(
 def _predicted(
     fit: Fit, predictions: Predictions, survey: Survey, settings: Settings
 ) -> tuple[PredictionScore, PredictionScore | None]:
-    """How well the fit predicts its own logs and, where asked for and possible, each from the others."""
+    """How well the fit predicts its own logs and, if asked and possible, each from the others."""
     own = PredictionScore()
     for log in survey.logs:
         c = torque_coefficients(fit, log.role)

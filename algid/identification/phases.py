@@ -1,4 +1,4 @@
-"""What the sine parts of the moments mean: zeros of the angles, and centres of mass off the links' lines.
+"""Meaning of the moments' sine parts: zeros of the angles, centres of mass off the links' lines.
 
 ======  =====================================  ========  =======
 symbol  name                                   shape     unit

@@ -1,4 +1,4 @@
-"""What there is to say of a fit: warnings that a reader has to know, and notes on what its intervals leave out."""
+"""Remarks on a fit: warnings that a reader has to know, and notes on what intervals leave out."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
 
 
 def _of_mass(fit: Fit) -> Iterator[Notice]:
-    """That an arm would be heavier than steel cubes of its link's length: m1 lc1 / l1 + m2 = k4 / (g l1)."""
+    """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1)."""
     by_constants = length_by_constants(fit)
     if "k4" not in fit.names or "k4" in fit.absent or by_constants is None:
         return

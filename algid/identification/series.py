@@ -1,4 +1,4 @@
-"""The torque that a model predicts along a log, for the eye: two derivatives of angles as sharp as noise allows.
+"""The torque that a model predicts along a log, for plots, as sharp as the angles' noise allows.
 
 Time series of a result folder, written block by block.
 """
@@ -83,7 +83,7 @@ def _prediction_columns(
 
 
 def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
-    """Hz below which the angles' noise, twice differentiated, adds at most `NOISE_SHARE` of the torque.
+    """Hz below which the angles' noise in accelerations adds at most `NOISE_SHARE` of the torque.
 
     White noise σ_θ sampled at dt has σ_θ √(2 dt B/5) (2π B)² of acceleration below B; inertia
     makes it torque.
@@ -135,7 +135,7 @@ ROWS = 1 << 17
 def write_columns(
     path: Path, blocks: Iterable[Mapping[str, object]], start_ns: Sequence[int]
 ) -> None:
-    """Write blocks of flat columns as one Parquet file, with each log's first stamp in its metadata."""
+    """Write blocks of flat columns as one Parquet file, each log's first stamp in its metadata."""
     import pyarrow
     import pyarrow.parquet
 
@@ -197,7 +197,7 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
 
 
 def running_columns(fit: Fit, durations: Sequence[float]) -> dict[str, FloatArray]:
-    """Each shared parameter by time of each log, and half its 95 % interval, all logs before it included."""
+    """Each shared parameter by time of each log, half its 95 % interval, from all logs so far."""
     found = running(fit, durations)
     lengths = np.array(durations)[found.log]
     return {

@@ -229,7 +229,7 @@ def refuse_shared_torques(sources: Sequence[LogSource]) -> None:
 
 
 def _in_radians(log: Log) -> Log:
-    """A log whose angles no reader made: they are rad by the definition of `Log`, however often its joints turn."""
+    """A log from arrays: its angles are rad by the definition of `Log`, however far joints turn."""
     reading = log.origin.reading
     if "theta1" in reading.channels or "DEGREES" in reading.accepted:
         return log
@@ -258,7 +258,7 @@ def sha256_of(path: Path) -> str:
 
 
 def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> list[Notice]:
-    """Warnings of logs that were read otherwise than those of an earlier result, which `file` holds."""
+    """Warnings of logs read otherwise than those of an earlier result, which `file` holds."""
     before = earlier.log.reading
     if before is None:
         return []

@@ -1,4 +1,4 @@
-"""The result that is made of what an estimator found: its logs, what was noticed in them, Table 4."""
+"""The result made from an estimator's outcome: its logs, the notices about them, Table 4."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from algid.settings import Settings
 from algid.table4 import paper_errors, table4, true_parameters, true_rows
 
 CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES")
-"""Named checks that say that estimates are wrong, unless the user accepts them: of a time base that is too short by the
-samples it lacks, accelerations are wrong by twice their share."""
+"""Checks by which estimates are wrong, unless the user accepts them.
+
+A time base that is too short by the samples it lacks falsifies accelerations by twice their share.
+"""
 
 
 def _said_of_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 EXAMINED = 1 << 16
 """Samples at the start of a long log that the named checks look at."""
 MOST_KEPT = 1 << 20
-"""Samples of all logs together that are kept in memory, 48 bytes each with velocities, so that they are read once."""
+"""Samples of all logs together that stay in memory, 48 bytes each, so that they are read once."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What a pass over a whole log has shown: its samples, its first and last stamp in ns, and what was noticed."""
+    """Findings of a pass over a whole log: samples, first and last stamp in ns, and notices."""
 
     rows: int
     first_ns: int
@@ -215,7 +215,7 @@ class Survey:
 
 
 def _weight(log: LogSource) -> float:
-    """Gravity in m/s² that the log's torque holds: a payload's is there, of which a driver knows nothing."""
+    """Gravity in m/s² in the log's torque; no driver compensates for that of a payload."""
     weightless = log.effort in ("gravity-compensated", "external") and log.role == "unloaded"
     return 0.0 if weightless else log.gravity
 

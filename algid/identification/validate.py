@@ -26,7 +26,7 @@ class Validation:
 
 @dataclass(frozen=True)
 class Predictor:
-    """A model that is judged on logs: its torque, its coefficients for a log of a role, when a logged torque acts."""
+    """A model to be judged on logs: torque, coefficients by role, and the logged torque's shift."""
 
     model: Model
     coefficients: Callable[[Role], FloatArray]

@@ -20,7 +20,7 @@ from algid.signals.segments import Segment, append
 def with_velocities(
     survey: Survey, log: LogSource, settings: Settings, *, luenberger: bool
 ) -> Iterator[Segment]:
-    """Segments of a log with measured velocities, the paper's observer's, or the zero-phase differentiator's.
+    """Segments of a log with velocities: measured, by the paper's observer, or differentiated.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""What the torque is made of: its terms, their parameters, and the one form that everything derives from."""
+"""The torque's terms, their parameters, and the one form from which everything derives."""

@@ -42,7 +42,7 @@ class Motion:
 
 
 def sine_cosine(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sine and cosine of angles, each in the shape of `theta`, through one tangent of the half angle.
+    """Sine and cosine of angles, each in the shape of `theta`, by one tangent of the half angle.
 
     Exact to a unit in the last place of 1, also where the tangent has its poles. NumPy has vector
     instructions for the tangent on more processors than for sine and cosine: this is several times

@@ -13,7 +13,7 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Scale:
-    """Parameters that compare in size: what they have in common, and the least size that counts, in their unit."""
+    """A class of parameters that compare in size: its name, and the least size that counts."""
 
     name: str
     least: float
@@ -75,4 +75,4 @@ BODY = (
         "J_p", "J_p", "kg m^2", "inertia of the payload about its centre of mass", INERTIA, "+"
     ),
 )
-"""What a payload that is no point at the tip has beside: both are nothing where the logs do not tell them."""
+"""Parameters of a payload that is a body; both are zero where the logs do not determine them."""

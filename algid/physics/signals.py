@@ -1,4 +1,4 @@
-"""The signals that terms of motion are written in: angles, their sines and cosines, velocities, friction's shapes.
+"""Signals of the terms of motion: angles, their sines and cosines, velocities, friction shapes.
 
 =========  ==========================================  ======
 name       meaning                                     unit

@@ -110,7 +110,7 @@ class Content:
         return self.part(0, 1).schema
 
     def part(self, first: int, last: int, names: Collection[str] | None = None) -> pl.DataFrame:
-        """Some rows, of all columns or of those named: a frame of all would hold each array a second time."""
+        """Some rows of all columns, or of `names` only, since a frame holds each array twice."""
         import polars as pl
 
         if isinstance(self.columns, pl.DataFrame):
@@ -205,7 +205,7 @@ def _leaves(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, NDAr
 def columns_of(
     path: str, arrays: Mapping[str, NDArray[Any]]
 ) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
-    """Columns as long as the time, or as the longest array, and the arrays that are not, with their shapes.
+    """Columns as long as the time, or as the longest array, and the other arrays with their shapes.
 
     A nested name's last part stands for it where that is unique.
 

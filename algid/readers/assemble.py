@@ -68,7 +68,7 @@ class TableReader:
         return log
 
     def _gathered(self, most: int) -> Iterator[Log]:
-        """Logs of at most `most` samples, each converted from small tables straight into its arrays."""
+        """Logs of at most `most` samples, each converted from small tables into its arrays."""
         unwrapper = Unwrapper(self.origin.reading.unwrap)
         gatherer: Gatherer | None = None
         notices: tuple[Notice, ...] = ()

@@ -1,4 +1,4 @@
-"""The columns of a flat log, chosen by a profile and by their names: what every flat format shares."""
+"""Columns of a flat log, chosen by a profile and by their names, for every flat format."""
 
 from __future__ import annotations
 
@@ -253,7 +253,7 @@ def _of_other_units(
     beside: Mapping[str, str],
     profile: Profile,
 ) -> Iterator[Notice]:
-    """What to say where a file states another unit than the user does, or another beside a name than in it."""
+    """Notices where the file's unit differs from the user's, or the stated one from the name's."""
     for name, unit in units.items():
         given = profile.time_unit if name == "t" else profile.channel(name).unit
         other = unit_of(beside.get(name, unit))

@@ -1,4 +1,4 @@
-"""Arrays for a log or a block of it: tables are converted straight into them, so that each sample is copied once.
+"""Arrays of a log or block; tables are converted straight into them, each sample copied once.
 
 From a file's units, signs and zero to algid's: rad, N m, θ1 from the horizontal, θ2 from link 1.
 """
@@ -41,7 +41,7 @@ class Room:
 
     @classmethod
     def empty(cls, rows: int, *, velocity: bool) -> Room:
-        """Room for `rows` samples in one piece of memory, which the system hands out in large pages."""
+        """Room for `rows` samples in one piece of memory, which the system maps in large pages."""
         signals = np.empty((7 if velocity else 5, rows))
         stamps = signals[-1].view(np.int64)
         return cls(stamps, signals[0:2], signals[2:4], signals[4:6] if velocity else None)
@@ -138,10 +138,10 @@ def _law(path: str, joint: int, profile: Profile, mapping: Mapping[str, str]) ->
 
 @dataclass(frozen=True)
 class Conversion:
-    """Value · factor + offset for each channel of a table, then the zero and the reference of the angles.
+    """Value · factor + offset for each channel of a table, then zero and reference of the angles.
 
     A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of
-    both torques. The torque of the `passive` joint, which has no motor, is nought. One of a PD law
+    both torques. The torque of the `passive` joint, which has no motor, is zero. One of a PD law
     is made of the desired angle, which stands in its place, in the joint's own coordinates.
     """
 

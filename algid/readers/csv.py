@@ -1,4 +1,4 @@
-"""CSV logs, plain or compressed, through polars: only the columns that are needed, a block at a time."""
+"""CSV logs, plain or compressed, through polars: only needed columns, a block at a time."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes
 
 
 def _small(found: Iterator[bytes]) -> Iterator[bytes]:
-    """The same bytes, at most `_SPLIT` at once: a list of empty lines takes eight times their bytes."""
+    """The same bytes, at most `_SPLIT` at once: a list of empty lines takes 8 times the memory."""
     for piece in found:
         for start in range(0, len(piece), _SPLIT):
             yield piece[start : start + _SPLIT]

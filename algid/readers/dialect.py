@@ -1,4 +1,4 @@
-"""How a text table is written: separator, decimal comma, header, comments, found in its first lines."""
+"""Dialect of a text table from its first lines: separator, decimal comma, header, comments."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Dialect:
 
 
 def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Dialect:
-    """The dialect of the table whose first bytes are `head`, its columns called `names` where those are given.
+    """The dialect of the table with first bytes `head` and, if given, column names `names`.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def described(path: Path, head: bytes) -> Dialect:
 
 
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
-    """Numbered lines without those above the header, which has as many cells as the rows of numbers under it."""
+    """Numbered lines from the header on, which has as many cells as the numbers below it."""
     for first in range(min(len(data), LIMITS.title_lines)):
         for separator in (*_SEPARATORS, ""):
             table = [split(line, separator) for _, line in data[first : first + 5]]
@@ -145,7 +145,7 @@ def _numeric(cells: Sequence[str]) -> bool:
 
 
 def _is_number(cell: str) -> bool:
-    """Whether a cell holds a number: of one too long for that the pattern would take time with its square."""
+    """Whether a cell holds a number; long cells hold none, as the pattern takes quadratic time."""
     return len(cell) <= LIMITS.number_letters and _NUMBER.match(cell) is not None
 
 

@@ -1,4 +1,4 @@
-"""Feather logs (Arrow IPC files), some record batches at a time: only the columns that are needed."""
+"""Feather logs (Arrow IPC files): only the needed columns, some record batches at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of a Parquet file's structures no library tells without harm: Thrift's compact protocol, read by hand.
+"""Parquet structures that no library reads without harm: Thrift's compact protocol, by hand.
 
 Its footer (FileMetaData): whether it names encrypted columns, its row groups and where their pages
 lie. And a page's header (PageHeader): its size, and its checksum, which polars does not look at.
@@ -18,7 +18,7 @@ _STOP, _TRUE, _FALSE, _BYTE, _SHORT, _INT, _LONG, _DOUBLE, _BINARY, _LIST, _SET,
     range(13)
 )
 _ENCRYPTION = {(8,), (4, 1, 8), (4, 1, 9)}
-"""Fields: the file's encryption; of each row group's columns how they are encrypted, and their metadata so."""
+"""Fields: encryption of the file, of each row group's columns, and of their metadata."""
 _GROUP, _PAGES = (4,), (4, 1, 3)
 """Structures: a row group (RowGroup), and what it says of one of its columns (ColumnMetaData)."""
 _ROWS, _GROUP_ROWS, _PATH = (3,), (4, 3), (4, 1, 3, 3)
@@ -34,7 +34,7 @@ class FooterError(Exception):
 
 @dataclass
 class Pages:
-    """The pages of a column in a row group: the column's path, values, bytes, and where its pages start."""
+    """The pages of a column in a row group: its path, values, bytes, and the first page's place."""
 
     path: list[str] = field(default_factory=list)
     numbers: dict[int, int] = field(default_factory=dict, repr=False)
@@ -91,7 +91,7 @@ def parsed(footer: bytes) -> Footer:
 
 @dataclass(frozen=True)
 class PageHeader:
-    """What stands before a page: bytes of its header, of the page packed and unpacked, its values, its checksum."""
+    """A page's header: bytes of the header, page size packed and unpacked, values, checksum."""
 
     length: int
     packed: int

@@ -1,4 +1,4 @@
-"""The formats of logs, one entry each: what tells a file of it, how it is opened, and what it holds by name.
+"""The formats of logs, one entry each: how a file is recognised and opened, and what it holds.
 
 A format is known from a file's content: names lie, first bytes do not. Whatever must know the
 formats reads this table: opening and inspecting a log, the logs of a folder, the guide. Adding one

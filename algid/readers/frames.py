@@ -1,4 +1,4 @@
-"""Frames of a flat log's columns made into tables: their clock is found, rows that lack a value go, sums are verified.
+"""Tables from frames of a flat log's columns: clock found, incomplete rows dropped, sums checked.
 
 float64 seconds since 1970 resolve 0.24 µs, so whole and fractional seconds are converted apart.
 """
@@ -94,7 +94,7 @@ def flat_reader(
 def cells(
     schema: Mapping[str, pl.DataType], width: Callable[[str], int]
 ) -> dict[str, tuple[pl.Expr, pl.DataType]]:
-    """By name every cell of a row and its type: a column, or a place in a list column, ``q[0]``, ``q[1]``.
+    """Expression and type of every cell of a row by name: a column, or a list's ``q[0]``, ``q[1]``.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
 
 
 def beyond(cell: pl.Expr) -> pl.Expr:
-    """Where a cell has a value, the largest int64: a time that `to_nanoseconds` refuses, where int64 would wrap."""
+    """The largest int64 where a cell has a value, so that `to_nanoseconds` refuses it as a time."""
     import polars as pl
 
     return pl.when(cell.is_not_null()).then(pl.lit((1 << 63) - 1, pl.Int64))

@@ -117,7 +117,7 @@ def _read(path: str, most_bytes: int, most_arrays: int) -> dict[str, NDArray[Any
 
 
 def _check_stored(name: str, one: Any) -> None:
-    """Refuse a dataset of which more or less is stored than its shape says: HDF5 fills up what is missing.
+    """Refuse a dataset stored with more or less than its shape: HDF5 fills up what is missing.
 
     Raises
     ------

@@ -88,7 +88,7 @@ class _Message:
 
 
 def _message(stream: BinaryIO, size: int, kind: int, block: tuple[int, ...]) -> _Message:
-    """What a message claims that stands in a block: its offset, and the lengths of its head and its body."""
+    """Claims of the message in a block: its offset, and the lengths of its head and its body."""
     place, length, body = block
     if not (
         place > 0

@@ -58,7 +58,7 @@ _LETTERS = {"a": 1, "b": 2, "i": 1, "ii": 2, "one": 1, "two": 2}
 
 
 def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names", "order"]]:
-    """The two joints from the base outwards, and whether their names say so or only their order in the log.
+    """The two joints from the base outwards, and whether names or only the log's order say so.
 
     Names tell by the one number in which they differ, by a place on an arm or leg (shoulder before
     elbow, base before anything), or by the letters a and b.
@@ -88,7 +88,7 @@ def order_notice(
 
 
 def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[Notice, ...]]:
-    """Joint 1 and joint 2, as the user says or else as the two `names` tell, who said so, and what to say of it."""
+    """Joints 1 and 2 by the user or else by the two `names`, their source, and notices."""
     if profile.joints:
         return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
     joints, told = along_the_arm(names)

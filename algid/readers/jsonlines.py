@@ -1,4 +1,4 @@
-"""JSON lines, an object a line: ``{"motor_state": [{"q": 1}]}`` has the column ``motor_state[0].q``."""
+"""JSON lines, one object each: ``{"motor_state": [{"q": 1}]}`` has ``motor_state[0].q``."""
 
 from __future__ import annotations
 

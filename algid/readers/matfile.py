@@ -23,7 +23,7 @@ _HDF5 = 2
 
 
 def check_elements(path: Path) -> None:
-    """Refuse a file that holds an element of no type, one that reaches beyond what holds it, or more than any log.
+    """Refuse a file with an element of no type, beyond its container, or larger than any log.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Logs that are handed over in memory: a frame of columns or a dict of arrays, read as a file of them would be."""
+"""Logs given in memory, as a frame of columns or a dict of arrays, read as if from a file."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ NAME = "log"
 """What a log in memory is called, as by `algid.Log.from_arrays`."""
 
 Columns = Any
-"""A pandas or polars frame, a pyarrow table, or a mapping of names to arrays: the first two are no dependencies."""
+"""A pandas or polars frame, a pyarrow table, or a mapping of names to arrays."""
 
 
 def is_columns(given: object) -> TypeGuard[Columns]:
-    """Whether columns are given: a mapping, or what hands over its columns as Arrow's, as frames do."""
+    """Whether columns are given: a mapping, or an object that exports Arrow, as frames do."""
     return isinstance(given, Mapping) or any(
         hasattr(given, name) for name in ("__arrow_c_stream__", "__dataframe__")
     )

@@ -1,4 +1,4 @@
-"""Which column is which: the names that labs, drivers and plotting tools give to angles and torques.
+"""Meaning of column names that labs, drivers and plotting tools give to angles and torques.
 
 A name is taken apart into a stem, a joint and a unit, ``pos_meas1 [deg]`` → ``pos_meas``, 1,
 ``deg``. The stems of each quantity are ranked: measured before unspecified before filtered,
@@ -181,7 +181,8 @@ _STEMS = sorted(
 _MOTOR_SIDE = frozenset({"motor", "rotor", "drive"})
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
 _SUFFIX_UNIT = re.compile(
-    r"^(.*[^_\W])_(deg(?:rees?)?|m?rad|rev|turns|counts|ticks|[mk]?nm|ncm|kgf?cm|kgf?m|lbf?ft|lbf?in|ozf?in|ma|rpm|inch(?:es)?|"
+    r"^(.*[^_\W])_(deg(?:rees?)?|m?rad|rev|turns|counts|ticks|[mk]?nm|ncm|kgf?cm|kgf?m|"
+    r"lbf?ft|lbf?in|ozf?in|ma|rpm|inch(?:es)?|"
     r"grad|volts?|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
 )
 _JOINT_NAMED = re.compile(r"^(.*/[^/]+)/(position|velocity|effort)$")
@@ -218,7 +219,7 @@ class Name:
 
 @dataclass(frozen=True)
 class ChannelChoice:
-    """Columns chosen for a log: by canonical channel its column and, where the name tells, its unit.
+    """Columns chosen for a log: each canonical channel's column and, if the name has one, its unit.
 
     `joints` are the joints' own names, where they have any; `foreign` units that names state and
     algid does not know.
@@ -350,7 +351,7 @@ def choose(
 
 
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
-    """By canonical channel its column, of the quantities that stand there for two joints, or for the two given."""
+    """Columns by canonical channel, of quantities present for two joints, or for the given two."""
     chosen: dict[str, str] = {}
     for quantity in ("theta", "tau", "omega"):
         for stem in STEMS[quantity]:
@@ -372,7 +373,7 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
 
 
 def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
-    """The columns of the two joints given, else of the two there are, from the base outwards where their names tell."""
+    """Columns of the two given joints, else of the only two, ordered by name from the base."""
     if joints:
         found = [
             [key for key in by_joint if _called(joint) & {key, key.rpartition("/")[2]}]
@@ -392,14 +393,14 @@ def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str,
 
 
 def _called(joint: str) -> set[str]:
-    """What columns may call a joint that a user names: ``Joint_2`` is the joint 2 of ``Joint_2_pos``."""
+    """Column names for a joint that a user names: ``Joint_2`` is joint 2 of ``Joint_2_pos``."""
     name = joint.strip().lower()
     numbered = _NUMBERED.match(name)
     return {name, numbered[1].lstrip("0") or "0"} if numbered else {name}
 
 
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
-    """By joint the column of its angle, of the joints that are not read: those named as the columns `angles` are."""
+    """Angle columns by joint of the joints that are not read, named alike those in `angles`."""
     parts = {column: take_apart(column) for column in columns}
     parts |= _worded(parts)
     read = [parts[column] for column in angles]
@@ -413,7 +414,7 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
 
 
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:
-    """Columns named by a joint's own name and a stem, ``shoulder_pos`` or ``torque elbow``, taken apart so."""
+    """Parts of columns named by a joint and a stem: ``shoulder_pos``, ``torque elbow``."""
     found = {}
     for column, name in parts.items():
         if name.joint is not None or name.stem in _STEMS:
@@ -434,7 +435,7 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
 
 
 def _of_states(parts: dict[str, Name]) -> dict[str, Name]:
-    """Columns named by a structure of states, ``state.q[0]`` (libfranka) or ``motor_state[0].q`` (Unitree)."""
+    """Parts of columns of state structures: ``state.q[0]`` (libfranka), ``motor_state[0].q``."""
     found = {}
     for column, name in parts.items():
         text = column.strip().lower()
@@ -465,7 +466,7 @@ def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, 
 
 
 def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
-    """The torque of the joint whose angle is given, or the only torque there is, where the other joint has none."""
+    """The torque of the joint with the angle, or the only torque; the other joint has none."""
     for stem in STEMS["tau"]:
         found = [column for column, name in parts.items() if name.stem == stem]
         own = [
@@ -479,7 +480,7 @@ def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
 
 
 def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
-    """Only quantities of the joints that the angles have: torques of other joints are not theirs."""
+    """Keep quantities of the angles' joints only: torques of other joints are not theirs."""
     pair = (
         [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
     )

@@ -1,4 +1,4 @@
-"""What libraries of C++ and Rust raise about a damaged file becomes a `LogError`, at the place of the call."""
+"""Errors of C++ and Rust libraries on a damaged file, raised as a `LogError` at the call."""
 
 from __future__ import annotations
 

@@ -283,7 +283,7 @@ _parsed = lru_cache(maxsize=2)(parsed)
 
 @dataclass
 class _Groups:
-    """A Parquet file's row groups: their cells and their columns by name, the sums of the values by column.
+    """A Parquet file's row groups: cells and columns by name, and sums of values by column.
 
     The pages are `checked` by the first pass.
     """
@@ -331,7 +331,7 @@ class _PlainGroups:
     checked: bool = False
 
     def frames(self, columns: Columns, rows: int, most: int | None) -> Iterator[WholeRows]:
-        """Columns of `rows` rows, the last of fewer, over the first `most` rows where that is given."""
+        """Columns of `rows` rows each, the last of fewer, up to `most` rows in all if given."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -370,7 +370,7 @@ def _of_batch(columns: Columns, batch: pa.RecordBatch) -> WholeRows:
 def _check_pages(
     path: Path, roots: Collection[str], summed: Collection[str] = (), most: int | None = None
 ) -> None:
-    """Refuse pages of columns among `roots` that claim values which cannot be, or whose checksum is wrong.
+    """Refuse pages of columns in `roots` with impossible values or a wrong checksum.
 
     At the first polars would end the process, and at the second it does not look. The values of
     `summed` columns are verified as they are read. Where only the first `most` rows are read, the

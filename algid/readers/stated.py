@@ -1,4 +1,4 @@
-"""Units that a file states beside its columns' names: in lines above a table, in a schema's metadata.
+"""Units that a file states apart from its columns' names: above a table, or in metadata.
 
 A statement is a name and a unit, ``tau1 in mNm``, ``angles: deg``, ``tau1, tau2 [N m]``; the name
 is a column's, its stem's (``tau``), or a word for the quantity (``torques``). What names no
@@ -21,7 +21,8 @@ _NAME = r"[^\W\d][\w.\[\]]{0,79}"
 _UNIT = r"[^\W\d_°%][\w°µ·⋅*/.^%-]{0,19}(?: ?m)?|[°%][\w/]{0,9}"
 _STATEMENT = re.compile(
     rf"(?<![\w.])(?P<names>{_NAME}(?:\s?(?:,|&|\band\b)\s?{_NAME}){{0,9}})\s?"
-    rf"(?:\s(?:(?:is|are|given|measured|recorded)\s){{0,3}}in\s|:|=|[\[(])\s*(?P<unit>{_UNIT})(?=\s*(?:[\])]|[,;.](?:\s|$)|$|\s))",
+    rf"(?:\s(?:(?:is|are|given|measured|recorded)\s){{0,3}}in\s|:|=|[\[(])\s*"
+    rf"(?P<unit>{_UNIT})(?=\s*(?:[\])]|[,;.](?:\s|$)|$|\s))",
     re.IGNORECASE,
 )
 _UNITS_LINE = re.compile(r"^\s*units?\s*[:=]\s*(?P<list>.+)$", re.IGNORECASE)
@@ -64,7 +65,7 @@ def _in_text(lines: Iterable[str], columns: _Named) -> dict[str, str]:
 
 
 def in_metadata(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, str]:
-    """By column the unit that a schema's metadata state: ``units`` as JSON or text, ``tau1.unit``, ``unit:tau1``."""
+    """Units by column in schema metadata: ``units`` (JSON, text), ``tau1.unit``, ``unit:tau1``."""
     named = _Named(columns)
     found: dict[str, str] = {}
     for key, value in islice(metadata.items(), LIMITS.metadata_keys):
@@ -78,7 +79,7 @@ def in_metadata(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str
 
 
 def _of_units_key(value: str, columns: _Named) -> dict[str, str]:
-    """By column the unit that the value of the key ``units`` states: an object of units by name, or text."""
+    """Units by column in the value of the key ``units``: an object of units by name, or text."""
     try:
         content = json.loads(value)
     except (ValueError, RecursionError):
@@ -152,7 +153,7 @@ class _Named:
                 self._columns.setdefault(key, []).append(column)
 
     def of(self, name: str) -> Sequence[str]:
-        """The columns that a name stands for: one of that name, those of its stem, or those of its quantity."""
+        """The columns that a name stands for: by name, by stem, or by quantity."""
         plain = name.strip().lower()
         if plain in self._columns:
             return self._columns[plain]

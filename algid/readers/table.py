@@ -1,4 +1,4 @@
-"""Samples as a file holds them: named channels in the file's own units, before anything is converted."""
+"""Samples as a file holds them: named channels in the file's own units, not yet converted."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CHANNELS = JOINT_CHANNELS + VELOCITIES
 
 @dataclass(frozen=True, eq=False)
 class SampleTable:
-    """A stretch of samples: stamps (N,) in ns and, by canonical name, channels (N,) in the file's units."""
+    """Successive samples: stamps (N,) in ns, channels (N,) by canonical name, file's units."""
 
     stamp_ns: IntArray
     columns: Mapping[str, FloatArray]

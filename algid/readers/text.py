@@ -1,4 +1,4 @@
-"""Tables of text, also compressed: told from other bytes, and read piece by piece in bounded memory."""
+"""Tables of text, also compressed: recognised, and read in pieces with bounded memory."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _EMPTY_LINES = re.compile(rb"\n[\r\n]*\n")
 
 
 def looks_like_text(head: bytes) -> bool:
-    """Whether bytes are UTF-8 text, without control characters but tabs and line ends, or UTF-16."""
+    """Whether bytes are UTF-8 text, with tabs and line ends as only controls, or UTF-16."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return True
     if any(byte < 32 and byte not in b"\t\n\r\f" for byte in set(head)):
@@ -36,11 +36,11 @@ def looks_like_text(head: bytes) -> bool:
 
 _PIECE = 1 << 24
 _PACKED = 1 << 11
-"""Bytes given to zstd at a time: they unpack to 64 MiB at most, since a block of four bytes makes 128 KiB."""
+"""Bytes given to zstd at a time: at most 64 MiB unpacked, as a 4-byte block makes 128 KiB."""
 
 
 def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
-    """Bytes of a "csv" file, unpacked ones of a "csv.zst" or "csv.gz" file, `size` at a time or little more.
+    """Bytes of a "csv" file, or unpacked ones of "csv.zst" or "csv.gz", `size` or more at a time.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Samples on one time base: in time order, and other topics' signals interpolated to the stamps of the main one.
+"""Samples on one time base: in time order, other topics interpolated to the main one's stamps.
 
 Late samples are put in their place, repeated stamps dropped, a broken clock refused.
 """
@@ -92,9 +92,9 @@ def check_step(path: str, stamps: IntArray) -> None:
 
 
 def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int, int]]:
-    """The table in time order, and how many of its samples came late, how many repeated a stamp and went.
+    """The table in time order, with counts of late samples, dropped repeats, differing repeats.
 
-    The last count is of those among them whose values were not those of the sample that was kept.
+    The last count is of dropped samples whose values differ from those of the sample kept.
 
     Raises
     ------
@@ -179,7 +179,7 @@ class Series:
         return float(np.median(np.diff(self.table.stamp_ns))) if len(self.table) > 1 else 0.0
 
     def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
-        """Which of the stamps (N,) are those of samples, or lie between two that are not far apart."""
+        """Which of the stamps (N,) are those of samples, or between two samples that are close."""
         own = self.table.stamp_ns
         if own.size < 2:
             return np.zeros(stamps.size, np.bool_)
@@ -204,7 +204,7 @@ class Series:
         return {name: np.interp(wanted, own, values) for name, values in self.table.columns.items()}
 
     def error(self) -> str:
-        """What linear interpolation costs: an eighth of the second differences, root mean square."""
+        """Error of linear interpolation by channel: RMS of an eighth of the second differences."""
         costs = []
         for name, values in self.table.columns.items():
             bend = np.diff(values, 2) / 8

@@ -88,7 +88,7 @@ HELD = np.array([1.0, 22.0, 1.0]) / 24
 
 
 def held_torque(tau: FloatArray) -> FloatArray:
-    """Smooth torque that moves an arm through the same samples as `tau`, held from each sample to the next.
+    """Smooth torque that moves an arm through the same samples as the held torque `tau`.
 
     Parameters
     ----------

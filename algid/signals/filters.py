@@ -34,7 +34,7 @@ def half_length(dt: float, bandwidth: float) -> int:
 
 @lru_cache(maxsize=16)
 def differentiator(dt: float, bandwidth: float) -> FloatArray:
-    """Kernel (2 M + 1,) in s^-1 whose correlation with an angle is its velocity below `bandwidth` Hz."""
+    """Kernel (2 M + 1,) in s^-1 that correlates an angle to its velocity below `bandwidth` Hz."""
     n, taper = _support(dt, bandwidth)
     x = 2 * bandwidth * dt * n
     safe = np.where(n == 0, 1, n)
@@ -105,7 +105,9 @@ def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
 
 
 def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArray:
-    """Signals (m, N) after a digital Butterworth filter of `order` and `cutoff` Hz, forwards and backwards.
+    """Signals (m, N) after a zero-phase Butterworth filter: forwards, then backwards.
+
+    `cutoff` is in Hz; `order` is that of one direction.
 
     The filter is the bilinear transform of the analogue one, in sections of second order
     (Oppenheim & Schafer, Discrete-Time Signal Processing, sec. 6.3 and 7.1). Both ends continue by
@@ -142,7 +144,7 @@ def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
 
 
 def _reflected(x: FloatArray, reach: int) -> FloatArray:
-    """Signals (m, N + 2 reach) that continue by point reflection about their first and last samples."""
+    """Signals (m, N + 2 reach), continued by point reflection about first and last samples."""
     before = 2 * x[:, :1] - x[:, reach:0:-1]
     after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]
     return np.concatenate([before, x, after], axis=1)
@@ -151,7 +153,9 @@ def _reflected(x: FloatArray, reach: int) -> FloatArray:
 def recursion(
     numerator: FloatArray, denominator: FloatArray, x: FloatArray, state: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """A signal x (n,) after the filter Σ b_k z^-k / Σ a_k z^-k, b and a (m + 1,), a_0 = 1, and the state it leaves.
+    """Signal x (n,) after the filter Σ b_k z^-k / Σ a_k z^-k, and the state after it.
+
+    b and a are (m + 1,), and a_0 = 1.
 
     The recursion Σ a_k y[i - k] = Σ b_k x[i - k] is one triangular banded system. `state` (m,) is
     what the samples before add to its right side; zeros are a filter at rest.

@@ -54,7 +54,7 @@ def observer_gain(poles: tuple[complex, ...]) -> FloatArray:
 
 
 class LuenbergerObserver:
-    """The observer x̂' = (A − L C) x̂ + L y, discretised exactly for angles that are linear between samples.
+    """The observer x̂' = (A − L C) x̂ + L y, discretised exactly for piecewise linear angles.
 
     It carries its state from call to call, so that a long log may pass through in pieces. From the
     angle to the velocity each joint's three poles p make the transfer function
@@ -102,7 +102,7 @@ class LuenbergerObserver:
 def _differentiator(
     gain: FloatArray, poles: tuple[complex, ...], dt: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Numerator and denominator (4,) in z⁻¹ of a joint's velocity, for angles that are linear between samples.
+    """Numerator and denominator (4,) in z⁻¹ of a joint's velocity, for piecewise linear angles.
 
     The numerator is what makes the response to one sample, a triangle of ± dt around it (a
     first-order hold).

@@ -105,7 +105,7 @@ def _first_stamps(blocks: Iterable[Log]) -> IntArray:
 
 
 class _Sampler:
-    """Puts blocks on the time base, holding back the last samples until their successors are known."""
+    """Resample blocks on the time base; the last samples wait until their successors are known."""
 
     def __init__(self, origin_ns: int, dt: float) -> None:
         self._origin_ns = origin_ns
@@ -141,7 +141,7 @@ class _Sampler:
         return (stamp_ns - self._origin_ns) * 1e-9
 
     def _stretch(self, log: Log, *, ends: bool) -> Iterator[Segment]:
-        """The grid points that `log` settles: up to its last sample but one, or all where the stretch ends."""
+        """Grid points that `log` determines: up to its last sample but one, or all if `ends`."""
         t = self._time(log.stamp_ns)
         reach = t[-1] + EVEN * self._dt if ends else t[max(0, t.size - 2)] - EVEN * self._dt
         count = int(np.floor((reach - self._anchor) / self._dt)) + 1 - self._emitted
@@ -173,7 +173,7 @@ class _Sampler:
 
 
 def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]:
-    """Four samples around each instant of `grid` and their weights in the cubic through them (Lagrange)."""
+    """Lagrange's cubic around each instant of `grid`: its four samples and their weights."""
     corner = np.clip(np.searchsorted(t, grid, side="right") - 2, 0, t.size - 4)
     nodes = t[corner[:, None] + np.arange(4)]
     found = []

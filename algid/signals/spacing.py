@@ -1,4 +1,4 @@
-"""Samples that stand all but on top of one another, put where they belong before anything is interpolated.
+"""Samples with almost equal stamps, put in their place before anything is interpolated.
 
 Receipt times come in clusters: a sample is sent twice, or is late and arrives with its successor,
 or a buffer is emptied at once. Two nodes a microsecond apart make any polynomial through them
@@ -65,9 +65,9 @@ def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
 
 
 def _bridged(settled: list[Log]) -> Iterator[Log]:
-    """What is settled, without a crumb of a block: the last cluster of a block with `BRIDGE` samples of the next.
+    """Completed samples; a last cluster of a block joins the first `BRIDGE` samples of the next.
 
-    Whether samples lie on the grid is judged a block at a time, and a crumb of one sample lies on
+    Whether samples lie on the grid is judged a block at a time, and a block of one sample lies on
     it by chance.
     """
     if len(settled) < 2:
@@ -80,7 +80,7 @@ def _bridged(settled: list[Log]) -> Iterator[Log]:
 
 
 def near_stamps(stamp_ns: IntArray, period: float) -> int:
-    """How many samples of a log (N,) follow the one before by less than `NEAR` of a `period` in s."""
+    """Number of samples of a log (N,) less than `NEAR` of a `period` in s after the one before."""
     return int(np.count_nonzero(np.diff(stamp_ns) < NEAR * period * 1e9))
 
 

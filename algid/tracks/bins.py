@@ -54,7 +54,7 @@ FRICTION = ("k6", "k7", *COULOMB.names)
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedArm:
-    """The arm that carries the payload: its model, coefficients k (q,), link lengths in m, and noise levels."""
+    """The arm that carries the payload: model, coefficients k (q,), link lengths in m, noise."""
 
     model: Model
     k: FloatArray
@@ -87,7 +87,7 @@ class IdentifiedArm:
 
     @property
     def by_shape(self) -> FloatArray:
-        """Derivatives (2 + b, q) of `unit` by l1, l2 and what is uncertain of the payload's `body`."""
+        """Derivatives (2 + b, q) of `unit` by l1, l2 and the uncertain parts of payload `body`."""
         shared, beta = self._loaded
         T = shared.jacobian(beta, True)
         return np.stack([T[:, shared.names.index(name)] for name in ("l1", "l2", *self.body)])
@@ -151,11 +151,11 @@ class Cells:
         return float(self.B.sum() / max(self.A.sum(), 1e-300))
 
     def sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
-        """T (C, p): how the scores of a payload of `mass` (C,) kg shift with constants, lengths and its body."""
+        """T (C, p): shift of the scores of payload `mass` (C,) kg by constants, lengths, body."""
         return np.concatenate([self.S, mass[:, None] * (self.S @ arm.by_shape.T)], axis=1)
 
     def friction_sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
-        """V (C, f, p): how D shifts with constants, lengths and the body of a payload of `mass` (C,) kg."""
+        """V (C, f, p): shift of D by constants, lengths and body of a payload of `mass` (C,) kg."""
         return np.concatenate([self.N, mass[:, None, None] * (self.N @ arm.by_shape.T)], axis=2)
 
     def squares(self, mass: float | FloatArray) -> FloatArray:
@@ -175,7 +175,10 @@ def joined(parts: Sequence[Cells]) -> Cells:
 def cells_of(
     segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settle: int = 1
 ) -> list[Cells]:
-    """Cells of each piece of a log, linearised at a payload of `mass` kg and, `settle` times, at its trajectory."""
+    """Cells of each piece of a log, linearised for a payload of `mass` kg.
+
+    They are linearised `settle` times more at the trajectory found.
+    """
     c, found = arm.k + mass * arm.unit, []
     for piece in pieces(segments, _PIECE_SAMPLES):
         if len(piece) < 3 * POINTS:
@@ -315,7 +318,7 @@ def _covariance_of(result: Result, names: Sequence[str], uncertain: Sequence[str
 
 
 def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[IdentifiedArm, FloatArray]:
-    """The arm and its covariance (p, p) with columns of Coulomb friction, of nothing where it had none."""
+    """The arm and its covariance (p, p) with columns of Coulomb friction, zero if it had none."""
     if COULOMB.name in arm.model.terms:
         return arm, covariance
     model = replace(arm.model, terms=(*arm.model.terms, COULOMB.name))
@@ -330,7 +333,7 @@ def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[Identifie
 
 
 def _body(result: Result) -> tuple[float, float]:
-    """Offset and radius of gyration in m of the payload behind a result: objects are taken to be shaped like it."""
+    """Offset and radius of gyration in m of the result's payload, assumed for all objects."""
     y, J, m_p = (
         float(result.payload[name].estimate or 0.0) if name in result.payload else 0.0
         for name in ("y_p", "J_p", "m_p")

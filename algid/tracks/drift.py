@@ -1,4 +1,4 @@
-"""Friction that is not what it was when the arm was identified: it warms up, wears, or sags under a load.
+"""Drift of friction since the arm was identified: it warms up, wears, or rises under a load.
 
 An arm's friction, viscous and Coulomb, may differ from its constants by φ(t), straight lines
 between knots. Masses and φ come from the same rows, by least squares over cells:
@@ -40,7 +40,7 @@ _RIDGE = 1e-9  # of the diagonal: what a standing joint leaves open stays nothin
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """Change of friction φ (H, f) at `knots` (H,) in s, and its covariance (H f, H f) at rows of unit variance."""
+    """Change of friction φ (H, f) at `knots` (H,) in s; covariance (H f, H f) at unit variance."""
 
     knots: FloatArray
     phi: FloatArray
@@ -64,7 +64,7 @@ class Drift:
         return between(self.knots, self.phi, t)
 
     def variances(self, cells: Cells, starts: NDArray[np.int64]) -> FloatArray:
-        """What φ adds to the variances (K,) of the masses of groups of cells, at rows of unit variance."""
+        """Part of φ in the variances (K,) of the masses of cell groups, for unit variance."""
         normal = _normal(cells, starts, self.knots)
         by_mass = normal.G / normal.A[:, None]
         return np.einsum("kx,xy,ky->k", by_mass, self.covariance, by_mass)
@@ -78,7 +78,7 @@ class Drift:
     def sensitivity(
         self, cells: Cells, starts: NDArray[np.int64], T: FloatArray, V: FloatArray
     ) -> FloatArray:
-        """T (C, p): how the scores shift with the arm's constants, φ following what they shift of friction.
+        """T (C, p): shift of the scores by the arm's constants, while φ follows that of friction.
 
         `V` (C, f, p) is how `Cells.D` shifts with them.
         """
@@ -145,7 +145,7 @@ def knots_of(cells: Cells) -> FloatArray:
 
 
 def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
-    """Values (C, ...) at the times `t` (C,) on straight lines between those (H, ...) at the knots (H,)."""
+    """Values (C, ...) at times `t` (C,) by linear interpolation of (H, ...) at the knots (H,)."""
     found = np.zeros((t.size, *values.shape[1:]))
     for knot, own, hat in hats(knots, t):
         found[own] += hat.reshape(-1, *[1] * (values.ndim - 1)) * values[knot]
@@ -153,7 +153,7 @@ def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
 
 
 def hats(knots: FloatArray, t: FloatArray) -> Iterator[tuple[int, NDArray[np.int64], FloatArray]]:
-    """Of each knot, and each of its two sides, which of the times `t` (C,) lie there and what they count for."""
+    """For each knot and side, which of the times `t` (C,) lie there, and their hat functions."""
     interval = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, knots.size - 2)
     share = (t - knots[interval]) / np.diff(knots)[interval]
     for place in range(knots.size - 1):

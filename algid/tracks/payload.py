@@ -67,7 +67,7 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Stretches, and m_p(t) with its standard deviation and the stretch that each instant lies in, each (C,).
+    """Stretches; m_p(t), its standard deviation and its stretch at each instant, each (C,).
 
     Times at which the payload may be changing have no m_p(t).
     `left` (C,) is the RMS of what arm and payload leave of the torque, over the sensors' noise.
@@ -130,7 +130,7 @@ def _masses(parts: Sequence[Cells], drift: Drift | None) -> list[float]:
 
 
 def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, found: Edges) -> list[Place]:
-    """When the payload changed, of the changes that cells show, as far as their rows bear them out."""
+    """Changes of the payload: those that cells show, as far as their rows confirm them."""
     parts = [cells.part(*ends) for ends in pairwise(found.places)]
     places = []
     for place in found.places[1:-1]:
@@ -150,7 +150,7 @@ def _weigh(
     arm: IdentifiedArm,
     covariance: FloatArray,
 ) -> Track:
-    """The track of a log that changed its payload at `changes`, each stretch weighed by its `inner` cells."""
+    """The track of a log with payload changes at `changes`, each stretch from its `inner` cells."""
     counts = [len(part) for part in inner]
     starts = np.cumsum([0, *counts[:-1]])
     whole = joined(inner)
@@ -223,7 +223,7 @@ def _by_stretch(
 
 
 def _inner_parts(cells: Cells, changes: Sequence[Place]) -> list[Cells]:
-    """Each stretch's cells between the times at which the payload may have been changing, some of its middle at least."""
+    """Cells of each stretch where its payload surely is constant, or some in its middle."""
     begins = [-np.inf, *(one.safe[1] for one in changes)]
     ends = [*(one.safe[0] for one in changes), np.inf]
     bounds = [-np.inf, *(one.time for one in changes), np.inf]

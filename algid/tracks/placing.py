@@ -1,4 +1,4 @@
-"""When a payload changed, from the rows around the change as they are, whitened with all that they remember.
+"""When a payload changed, from the whitened rows around the change with all their memory.
 
 Whitening remembers for as long as noise of the angles hides accelerations: a tenth of a second and
 more. So a step of the payload at s reaches the whitened rows as its own column L⁻¹ (g h_s), and a
@@ -54,7 +54,7 @@ _AT_ONCE = 32  # candidates whose columns are whitened together
 
 @dataclass(frozen=True)
 class Place:
-    """When a change was, in s: the best time, its 95 % bracket, and the times beyond which it cannot be.
+    """Time of a change in s: the best one, its 95 % bracket, and the limits that it cannot pass.
 
     `gain` is what two masses explain beyond one, in squares of the rows' noise.
     """
@@ -112,7 +112,7 @@ def rows_of(
     moments: Sequence[float],
     masses: Sequence[float],
 ) -> Rows:
-    """The rows of a piece during which the payload has `masses` kg, changing at `moments` s as far as is known."""
+    """Rows of a piece with payloads of `masses` kg that change at the known `moments` in s."""
     stencil = Stencil(piece.dt, arm.shift)
     torques = stencil.torques(len(piece))
     t = piece.start + piece.dt * np.arange(torques.start, torques.stop) + arm.shift
@@ -141,7 +141,7 @@ def _linearised(
     masses: Sequence[float],
     friction: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """H, the torques' residual (2, n) and g (2, n), over the torques' noise, each row at its own mass."""
+    """H, torque residuals (2, n) and g (2, n) over the torques' noise, each row at its own mass."""
     motion = Motion(*stencil.differences(theta))
     coefficients = [arm.k + mass * arm.unit for mass in masses]
 
@@ -247,7 +247,7 @@ class Changes:
 
 @dataclass(frozen=True)
 class _Log:
-    """What tells of changes: passes over the log, its arm, its friction's drift, and its ends in s."""
+    """Evidence of changes: passes over the log, its arm, its friction's drift, its ends in s."""
 
     source: Callable[[], Iterable[Segment]]
     arm: IdentifiedArm
@@ -321,7 +321,7 @@ def _placed(log: _Log, changes: Changes, variance: float) -> Changes:
 
 
 def _merged(log: _Log, changes: Changes, penalty: float, variance: float) -> Changes:
-    """Pairs of close changes made one where the rows about them need no more: a jolt is no payload."""
+    """Merge close changes where their rows need only one: a jolt is no change of payload."""
     close = [
         (at, at + 1)
         for at, (one, other) in enumerate(pairwise(changes.places))
@@ -357,7 +357,7 @@ def _needed(changes: Changes, penalty: float) -> Changes:
 def windows(
     log: Iterable[Segment], spans: Sequence[tuple[float, float]], shift: float
 ) -> Iterator[tuple[int, Segment]]:
-    """The pieces of a log within `spans` (s, both ends increasing), each with its number, in one pass.
+    """Numbered pieces of a log within `spans` (s, both ends increasing), in one pass.
 
     What a gap cuts comes in parts.
     """

@@ -1,4 +1,4 @@
-"""What a track found, judged stretch by stretch: the one source of its table, pages and `track.json`."""
+"""A track's findings by stretch: the one source of its table, pages and `track.json`."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def half_text(stretch: Stretch) -> str:
 
 
 def fixed(value: float, std: float) -> str:
-    """`value` with as many decimals as its standard deviation resolves, so that a column lines up."""
+    """`value` with the decimals that its standard deviation resolves, so that columns line up."""
     decimals = (
         3
         if not (math.isfinite(std) and std > 0)

@@ -1,4 +1,4 @@
-"""The terms of the torque, one a file, in one literal tuple: where one is added or left out, everything follows."""
+"""The terms of the torque in one literal tuple, one a file; everything else derives from it."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Term:
     usual : bool
         Whether most real joints have it: other terms are weighed beside it first.
     shapes : names of the widths that its columns have, fields of `algid.physics.motion.Widths`
-    by_load : pairs of a parameter and the joint whose load times the smooth sign of its velocity it multiplies
+    by_load : pairs of a parameter and a joint: load times smooth sign of velocity it multiplies
     gains : pairs of a parameter g and the joint whose torque it multiplies by 1 + g
     sines : pairs of a parameter and the one whose sine part it is: both are one phasor
     timing : "delay" or "lag"

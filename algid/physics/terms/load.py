@@ -1,4 +1,4 @@
-"""Friction in proportion to the joint's load, as of gears: the one term that is bilinear in parameters and motion."""
+"""Friction in proportion to the joint's load, as of gears: bilinear in parameters and motion."""
 
 from algid.physics.parameters import LOAD_SHARE, Parameter
 from algid.physics.terms.base import Term

@@ -1,4 +1,4 @@
-"""Sine parts of the three moments: centres of mass off the links' lines, zeros of the angles a little off.
+"""Sine parts of the three moments: centres of mass off the links' lines, and angle offsets.
 
 The moments are phasors, K = k + i k_s: the columns of the sine parts are those of k1, k2 and k4
 with the angle a quarter turn on. With centres of mass turned by δ off the links' lines and encoder

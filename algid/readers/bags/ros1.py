@@ -70,7 +70,7 @@ class BagPart:
 
 @dataclass
 class BagLayout:
-    """What a walk over a bag found: connections, parts in file order, whether what is said of them agrees."""
+    """Result of a walk over a bag: connections, parts in file order, and whether all agrees."""
 
     channels: dict[int, MessageChannel] = field(default_factory=dict)
     parts: list[BagPart] = field(default_factory=list)
@@ -216,7 +216,7 @@ class _Outline:
             indexes[number] = (record.start, count)
 
     def _is_open(self) -> bool:
-        """Whether records stand outside of chunks: behind the head of one never closed, which claims nothing."""
+        """Whether records stand outside of chunks: after a chunk's head that was never closed."""
         last = self._found.parts[-1] if self._found.parts else None
         return last is not None and (last.loose or last.start == last.end)
 

@@ -1,4 +1,4 @@
-"""rosbag2's SQLite files: the table of messages is read row by row, in the order in which they were recorded.
+"""rosbag2's SQLite files: the table of messages, read row by row in the order of recording.
 
 Only real tables are read, never a view, nor by an index: a view may run for ever, an index may
 leave rows out. What a query may do is bounded by the size of the file, since pages of a database
@@ -36,7 +36,7 @@ _WAL = 2
 
 @dataclass(frozen=True)
 class Contents:
-    """What a database holds: its channels, the messages of each, their first and last time, messages of no channel."""
+    """A database's channels, message counts and time span, and messages without a channel."""
 
     channels: dict[int, MessageChannel]
     counts: dict[int, int]
@@ -154,7 +154,7 @@ def _columns(base: sqlite3.Connection, table: str) -> dict[str, bool]:
 
 
 def _definitions(path: Path, base: sqlite3.Connection) -> dict[str, tuple[str, bytes]]:
-    """By type the encoding and the text of its definition, where a file of newer rosbag2 holds them."""
+    """Encoding and text of each type's definition, if the file holds them (newer rosbag2)."""
     if not base.execute(
         "SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'"
     ).fetchone():

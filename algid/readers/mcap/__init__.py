@@ -1,4 +1,4 @@
-"""MCAP logs, read by columns: only the chunks that hold the joints, no Python object for a message."""
+"""MCAP logs, read by columns: only the joints' chunks, without a Python object per message."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableRea
 
 
 Known = dict[tuple[Path, int, int], Catalogue]
-"""Catalogues by path, size and time of change: several passes go over a log, and one without a summary is walked."""
+"""Catalogues by path, size and time of change, so that a log is walked once for all passes."""
 
 
 @contextmanager
@@ -54,7 +54,7 @@ def messages_in(path: Path, known: Known | None = None) -> Iterator[McapSource]:
 
 @contextmanager
 def opened(path: Path, known: Known | None = None) -> Iterator[tuple[File, Catalogue]]:
-    """The opened file and its catalogue, taken from the `known` ones, and put there, where these are given.
+    """The opened file and its catalogue; a given `known` is looked up first and then holds it.
 
     Raises
     ------

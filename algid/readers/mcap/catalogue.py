@@ -1,4 +1,4 @@
-"""What an MCAP file holds and where: from its summary where that can be trusted, else by walking through it.
+"""Contents of an MCAP file by place: from its summary if valid, else by walking through it.
 
 The summary is trusted when its CRC, the counts of its statistics and the message indexes agree,
 and when nothing but other records lies between the chunks that it lists. Everything else, a file
@@ -29,7 +29,7 @@ _LOOSE, _TORN = -1, -2
 
 @dataclass(frozen=True)
 class Span:
-    """Records side by side in the file: a chunk with the message indexes behind it, or loose records.
+    """Adjacent records of the file: a chunk with its message indexes, or loose records.
 
     `channels` are those that the index names; None where nobody knows. `torn`: a chunk that breaks
     off.
@@ -75,15 +75,15 @@ class Catalogue:
     damage: list[str] = field(default_factory=list)
     redefined: dict[int, int] = field(default_factory=dict)
     beside: dict[frozenset[int], dict[int, int]] = field(default_factory=dict)
-    """By channels that are read: what chunks of others redefine, as `redefined`; looked for once for all passes."""
+    """By channels read: redefinitions in chunks of other ones, found once for all passes."""
     _agreed: dict[tuple[int, bytes], Any] = field(default_factory=dict, repr=False)
 
     def copy(self) -> Catalogue:
-        """One that reading may add to: damage that it meets, and ids that are redefined on the way."""
+        """A copy that reading may add damage and redefined ids to."""
         return replace(self, damage=list(self.damage), redefined=dict(self.redefined))
 
     def redefines(self, others: Iterable[tuple[int, bytes]], place: int) -> None:
-        """Note from which byte on ids have another meaning, out of code and content of a span's `others`.
+        """Record the byte from which ids have another meaning, from code and content of `others`.
 
         Raises
         ------
@@ -216,7 +216,7 @@ def _from_summary(file: File) -> Catalogue | None:
 def _check_listed(
     file: File, chunks: list[ChunkIndex], statistics: Any, channels: Collection[int], end: int
 ) -> None:
-    """Hold what a summary lists against its own counts and against the file, up to the summary at `end`.
+    """Check a summary's list against its own counts and the file, up to the summary at `end`.
 
     Chunks lie in the file and do not overlap, their indexes list as many messages as the
     statistics count, for every channel, all of which are among those defined, and no message,
@@ -292,7 +292,7 @@ def _end(chunk: ChunkIndex) -> int:
 
 
 def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
-    """Bytes [start, end) around chunks in file order, up to the summary at `end`: neither these nor their indexes."""
+    """Bytes [start, end) between chunks and their indexes, in file order up to the summary."""
     ends = [_end(chunk) for chunk in chunks]
     starts = [chunk.chunk_start_offset for chunk in chunks]
     return [

@@ -1,4 +1,4 @@
-"""The frame of an MCAP file: records, each with an operation code and a length, read by their offsets.
+"""The framing of an MCAP file: records with operation code and length, read by their offsets.
 
 The content of the small records is parsed by the `mcap` package; what it raises on damaged bytes
 is turned into `DamagedError` here and nowhere else. Chunks are unpacked with a bound on what they
@@ -228,7 +228,7 @@ def parse(kind: Any, content: bytes) -> Any:
 
 
 class ChunkIndex(NamedTuple):
-    """Where the summary says that a chunk lies, and by channel where the indexes of its messages do."""
+    """A chunk's place by the summary, and the places of its message indexes by channel."""
 
     chunk_start_offset: int
     chunk_length: int

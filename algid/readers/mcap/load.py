@@ -19,7 +19,7 @@ _AHEAD_BYTES = 1 << 23
 """Chunks beyond this size are not read ahead, so that memory stays bounded by one of them."""
 
 _LOOKED_BESIDE, _SHARE_BESIDE = 1 << 22, 4
-"""Chunks of other channels that are looked at: so many bytes, and a quarter of those of the channels that are read."""
+"""Limits of the chunks of other channels to look at: bytes, and a share 1/4 of the read ones."""
 
 _GROUP_BYTES, _GROUP_UNPACKED = 1 << 16, 1 << 21
 """Small chunks are loaded together up to these sizes, packed and unpacked."""
@@ -104,7 +104,7 @@ def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Itera
 
 
 def _groups(spans: Sequence[Span]) -> Iterator[Sequence[Span]]:
-    """Spans side by side that are loaded as one: by itself each small one would cost more than its messages do."""
+    """Adjacent spans to load as one: a small one alone costs more than its messages do."""
     first = size = 0
     for place, span in enumerate(spans):
         if place > first and size + span.length > _GROUP_BYTES:
@@ -116,12 +116,12 @@ def _groups(spans: Sequence[Span]) -> Iterator[Sequence[Span]]:
 
 
 _Loaded = tuple[list[MessageBatch], Sequence[Span]]
-"""Batches of the first spans of a group, and the others where the first unpack to as much as is held at once."""
+"""Batches of a group's first spans, and the rest if the first already fill the memory limit."""
 
 
 @dataclass(frozen=True)
 class _Sound:
-    """The records of a span, whether they were checked, and of a torn chunk its size as it should be."""
+    """A span's records, whether they were checked, and a torn chunk's size as it should be."""
 
     records: Records
     checked: bool

@@ -1,4 +1,4 @@
-"""Where a channel's messages lie within unpacked records: given by the message indexes, proved by the records.
+"""Places of a channel's messages in unpacked records: by message index, proved by the records.
 
 An index has no checksum of its own, so it is believed only where the records it names, with the
 few others in between, tile the chunk without a gap. Otherwise the records are walked one by one.
@@ -21,7 +21,7 @@ from algid.readers.mcap.framing import BrokenOffError, DamagedError
 from algid.readers.messages.batch import Messages, gather
 
 HEAD = 31
-"""Bytes of a message record before its payload: code, length, channel, sequence, log and publish time."""
+"""Bytes of a message record before the payload: code, length, channel, sequence, two times."""
 _LEAST = HEAD - 9
 _SMALL = 1 << 13
 """Bytes; NumPy takes as long to look at an index as a walk over so many."""
@@ -32,7 +32,7 @@ _SOME = (1 << 16) - 1
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """Unpacked bytes (N,), the offsets of their message records (M,), and the others: code and content of each."""
+    """Unpacked bytes (N,), offsets of message records (M,), code and content of other records."""
 
     content: NDArray[np.uint8]
     offsets: IntArray

@@ -1,4 +1,4 @@
-"""A file walked from its start past what is broken: behind a broken record the next whole one is looked for.
+"""Walk a file from its start: after a broken record, the next whole one is searched for.
 
 A place is taken for a record where its code and length fit, a chunk's head agrees with its length,
 and the same holds for the records that follow, as far as these are looked at.
@@ -108,7 +108,7 @@ def _next(file: File, start: int, tried: int, among: Collection[int]) -> tuple[i
 
 
 def _is_record(file: File, place: int, among: Collection[int]) -> bool:
-    """Whether records stand in a row from `place` on, down to the end of the data none that `among` leaves out."""
+    """Whether adjacent records follow from `place` on, without those that `among` leaves out."""
     refused = set(_ANY) - set(among)
     for _ in range(_FOLLOWERS):
         left = file.size - place

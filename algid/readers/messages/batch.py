@@ -14,7 +14,7 @@ from algid.words import counted
 
 @dataclass(frozen=True, eq=False)
 class Messages:
-    """Messages in unpacked bytes (M,): where each payload (N,) starts, its size, and its log time in ns."""
+    """Messages in unpacked bytes (M,): each payload's start (N,), size, and log time in ns."""
 
     content: NDArray[np.uint8]
     starts: IntArray
@@ -63,7 +63,7 @@ class Account:
     found: int = 0
     lost: int = 0
     torn: tuple[int, int, int] | None = None
-    """Of a torn chunk the messages taken, and the bytes of its records that are there and that should be."""
+    """Of a torn chunk: messages taken, and bytes of its records present and expected."""
 
     def add(self, batch: MessageBatch) -> None:
         """Count one batch."""

@@ -1,4 +1,4 @@
-"""CDR, the encoding of ROS 2 messages (XCDR version 1, either byte order): the shape of one message.
+"""CDR, the encoding of ROS 2 messages (XCDR version 1, either byte order): a message's shape.
 
 Numbers are aligned to their own size, counted from behind the four bytes of the encapsulation.
 Messages of ROS 1 have neither: their numbers, little endian, stand one behind the other.

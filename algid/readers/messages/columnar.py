@@ -1,4 +1,4 @@
-"""The shape of one message: where its numbers stand, which bytes fix that, and what its strings say.
+"""The shape of a message: the places of its numbers, the bytes that fix them, its strings.
 
 Messages of one size whose fixing bytes are equal have the same shape, so what one walk over one
 message found holds for all of them: that is what makes reading by columns possible.
@@ -79,7 +79,7 @@ class Shape:
             self.fixed.append((start, end))
 
     def find(self, path: str) -> Numbers | None:
-        """The number at a path such as ``wrench.torque.z``, ``data[1]`` or ``position[elbow]``, or None.
+        """The number at a path (``wrench.torque.z``, ``data[1]``, ``position[elbow]``), or None.
 
         A name in brackets stands for its place in a list of strings beside the indexed one.
         """
@@ -110,7 +110,7 @@ class Shape:
         return Numbers(found.offset + index * int(found.kind[-1]), found.kind)
 
     def of_others(self, paths: Iterable[str]) -> bool:
-        """Whether the message is of other joints than those that `paths` such as ``effort[elbow]`` name.
+        """Whether the message is of other joints than those of `paths` such as ``effort[elbow]``.
 
         A message that names one of them, or numbers without any name, is no other publisher's: it
         lacks something.
@@ -144,7 +144,7 @@ class Layout:
     values: NDArray[np.uint64]
     fields: Mapping[str, Numbers] | None
     lacks: tuple[str, ...] = ()
-    """Without fields: what is wanted and not there, nothing where the message is of other joints."""
+    """Without fields: the missing ones; empty if the message is of other joints."""
 
     def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Which of the rows (R,) of messages (N, words) have this layout."""
@@ -243,7 +243,7 @@ class Decoder(ABC):
     misfit: str = ""
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
-        """Which messages hold what is wanted (N,), and the numbers of those, by name, in file order.
+        """Which messages (N,) hold the wanted fields, and their numbers by name, in file order.
 
         Raises
         ------
@@ -324,7 +324,7 @@ class ColumnDecoder(Decoder):
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]
     ) -> Iterator[tuple[NDArray[np.intp], Fields]]:
-        """The numbers of messages of one size, layout by layout, each with the messages that have it."""
+        """Numbers of messages of one size by layout, each with the messages that have it."""
         lead = _lead(size)
         window: NDArray[np.void] = np.ndarray(  # every row lies within the records, behind a head
             messages.content.size - size - lead + 1,

@@ -1,4 +1,4 @@
-"""ROS 2 message definitions as recorders store them: one text, every nested type behind a line of ``=``.
+"""ROS 2 message definitions as recorded: one text, nested types separated by lines of ``=``.
 
 Either .msg text, or IDL as rosidl makes it: modules, structures, sequences, arrays, typedefs. What
 rosidl never makes (unions, enumerations, optional members, lists of lists) is refused.
@@ -18,15 +18,18 @@ from algid.limits import LIMITS
 from algid.words import counted
 
 PRIMITIVES = {
-    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+    "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1",
+    "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 TEXTS = ("string", "wstring")
 _SHORT = {
-    "time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration", "Header": "std_msgs/Header"
+    "time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration",
+    "Header": "std_msgs/Header",
 }  # fmt: skip
 _FIELD = re.compile(
-    r"^(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[(?P<size>(<=)?\d*)\])?\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)$"
+    r"^(?P<type>[A-Za-z][\w/]*)(?P<bound><=\d+)?(?P<array>\[(?P<size>(<=)?\d*)\])?"
+    r"\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)$"
 )
 
 
@@ -54,7 +57,7 @@ _TIMES_OF_ROS1: Types = {
 
 
 def parse_ros1(root: str, text: str) -> Types:
-    """Fields by type name out of a ROS 1 definition, in which times are no messages, and a structure may be empty.
+    """Fields by type name of a ROS 1 definition; times are primitive, structures may be empty.
 
     Raises
     ------
@@ -120,7 +123,7 @@ def _fields(name: str, text: str) -> tuple[Field, ...]:
 
 
 def _resolved(field: Field, owner: str, types: Types) -> Field:
-    """A field with its type's name as `types` has it: short, within the owner's package, or with ``msg`` between."""
+    """A field with its type's name in `types`: short, in the owner's package, or with ``msg``."""
     if field.type in PRIMITIVES or field.type in TEXTS:
         return field
     wanted = field.type if "/" in field.type else f"{owner.split('/')[0]}/{field.type}"
@@ -158,12 +161,14 @@ def _check_depth(name: str, types: Types, known: dict[str, int], above: int = 0)
 
 _SECTION = re.compile(r"^=+[ \t]*\r?\nIDL:[^\n]*\n", re.MULTILINE)
 _TOKEN = re.compile(
-    r'\s+|//[^\n]*|/\*.*?(?:\*/|\Z)|\#[^\n]*|(?P<token>"(?:[^"\\]|\\.)*"?|(?:::)?[A-Za-z_]\w*(?:::\w+)*|\d[\w.]*|.)',
+    r"\s+|//[^\n]*|/\*.*?(?:\*/|\Z)|\#[^\n]*|"
+    r'(?P<token>"(?:[^"\\]|\\.)*"?|(?:::)?[A-Za-z_]\w*(?:::\w+)*|\d[\w.]*|.)',
     re.DOTALL,
 )
 _NUMBERS = {
-    "boolean": "bool", "octet": "byte", "short": "int16", "unsigned short": "uint16", "long": "int32",
-    "unsigned long": "uint32", "long long": "int64", "unsigned long long": "uint64", "float": "float32",
+    "boolean": "bool", "octet": "byte", "short": "int16", "unsigned short": "uint16",
+    "long": "int32", "unsigned long": "uint32",
+    "long long": "int64", "unsigned long long": "uint64", "float": "float32",
     "double": "float64",
 }  # fmt: skip
 _LONGER = frozenset(

@@ -19,7 +19,7 @@ from algid.readers.messages.columnar import Decoder, Fields, MisfitError, Number
 from algid.words import counted
 
 _BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
-"""What parsing takes: bytes of text, numbers of a list, fields of an object; the last are by far the slowest."""
+"""Cost of parsing: bytes of text, numbers of a list, and fields of an object, the slowest."""
 _TOO_MUCH = "more text than any recorder's file of this size"
 _BEYOND = 2**1024 - 2**970
 """From here on an integer rounds to more than the largest float64."""
@@ -136,7 +136,7 @@ class _Paths:
     def __init__(self, message: dict[str, Any]) -> None:
         self._message = message
         self._lists: dict[int, list[list[Any]]] = {}
-        """Lists that stand side by side, by the object that holds them: an object may have very many other fields."""
+        """Cache of adjacent lists by their object, which may have many other fields."""
 
     def value(self, parts: Sequence[str]) -> int | float | None:
         """The number at a path, or None."""

@@ -1,4 +1,4 @@
-"""Which topics and fields to read: given by a profile, else found by looking at the first messages."""
+"""Choice of the topics and fields to read: by a profile, else by the first messages."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
 def _topic(
     source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
 ) -> Topic:
-    """A topic by its name, with those of `sources` that are its own, of the type that misses the fewest of them."""
+    """A topic by its name, with its own `sources`, of the type that lacks the fewest of them."""
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
     for topic, kind in kinds(source):
@@ -165,7 +165,7 @@ def _topic(
 
 @dataclass(frozen=True)
 class _Usual:
-    """A topic with joint states: its two joints as they stand there, whether they have names, and its fields."""
+    """A topic with joint states: its two joints, whether they are named, and its fields."""
 
     topic: str
     joints: tuple[str, str]
@@ -309,7 +309,7 @@ def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]
 
 
 def fields_shown(source: Source, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Joints that the first message of a channel names, and its numbers' paths as a profile's source takes them."""
+    """Joints in a channel's first message, and its numbers' paths as a profile writes them."""
     channel = source.channels[number]
     try:
         shape = next(_shapes(source, channel.topic, channel.type), None)

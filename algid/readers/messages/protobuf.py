@@ -50,7 +50,7 @@ Types = dict[str, dict[int, ProtobufField]]
 
 
 def parse(root: str, data: bytes) -> Types:
-    """Fields by message type and number, of `root` and all it is made of, out of a serialised FileDescriptorSet.
+    """Fields by message type and number, of `root` and all its parts, from a FileDescriptorSet.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def parse(root: str, data: bytes) -> Types:
 
 
 def _implicit(file: Any) -> bool:
-    """Whether a number of a file's messages is left out where it is zero, unless the number says otherwise."""
+    """Whether a file's messages omit numbers that are zero, unless the field says otherwise."""
     if file.syntax == "editions":
         return int(file.options.features.field_presence) == _IMPLICIT
     return str(file.syntax) == "proto3"

@@ -1,4 +1,4 @@
-"""From files of messages to a log: what is read out of them is planned on the first, then they are read as one."""
+"""A log from files of messages: planned on the first file, then read as one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every file of messages offers: its channels, how many messages each has, and these in batches.
+"""Interface of every file of messages: channels, message counts, and batches of messages.
 
 MCAP files, ROS 1 bags and rosbag2's SQLite files differ in how they hold messages; what is in a
 message is read alike.
@@ -66,8 +66,9 @@ class Source(ABC):
         False where no honest file of this size asks for so many.
         """
 
-    def check(self, channels: frozenset[int]) -> None:  # noqa: B027  # most files have nothing to check
-        """Look for what would change the meaning of `channels`, before all of their messages are read."""
+    # Most files have nothing to check.
+    def check(self, channels: frozenset[int]) -> None:  # noqa: B027
+        """Look for what would redefine `channels`, before all of their messages are read."""
 
     def used(self) -> frozenset[int]:
         """The channels that have messages, as far as the file tells."""
@@ -87,12 +88,12 @@ class Source(ABC):
 
 
 def channels_of(source: Source, topic: str, type_name: str) -> frozenset[int]:
-    """Numbers of the channels that carry a topic with messages of one type, all defined as by the first of them."""
+    """Numbers of the channels with a topic and type whose definition is that of the first one."""
     return kinds(source).get((topic, type_name), frozenset())
 
 
 def kinds(source: Source) -> dict[tuple[str, str], frozenset[int]]:
-    """By topic and type the numbers of its channels whose messages are defined and encoded as those of the first."""
+    """Channel numbers by topic and type: those defined and encoded as the first of them."""
     groups: dict[tuple[str, str], tuple[MessageChannel, list[int]]] = {}
     for number, channel in sorted(source.channels.items()):
         first, numbers = groups.setdefault((channel.topic, channel.type), (channel, []))

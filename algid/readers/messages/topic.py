@@ -1,4 +1,4 @@
-"""Which topic, and which fields of its messages, are the joints': given by a profile or found in the messages.
+"""The joints' topic and the fields of its messages, by a profile or found in the messages.
 
 One topic's numbers as tables: the channels that carry it, its fields, its clock.
 """
@@ -94,7 +94,7 @@ def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
 
 
 def _path(shape: Shape, joint: str, quantity: str) -> str | None:
-    """Where a message of this shape has a joint's number: in a list beside its name, or among its interfaces."""
+    """Path of a joint's number in this shape: in a list beside its name, or in its interfaces."""
     field = _QUANTITIES[quantity]
     paths = (f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]")
     return next((path for path in paths if shape.find(path) is not None), None)
@@ -161,7 +161,8 @@ class Topic:
                     "guessing"
                 )
             log_ns = batch.messages.log_ns
-            parts.append(SampleTable(log_ns if held.all() else log_ns[held], columns))  # type: ignore[arg-type]
+            stamps = log_ns if held.all() else log_ns[held]
+            parts.append(SampleTable(stamps, columns))  # type: ignore[arg-type]
             size += len(parts[-1])
             if size >= rows:
                 yield self._clocked(path, parts)
@@ -231,7 +232,7 @@ class Topic:
         return whole.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
     def _left_out(self, decoder: Decoder, source: Source, channels: frozenset[int]) -> list[Notice]:
-        """What to say of messages that lack a field, do not fit, or are of another type, encoding or definition."""
+        """Notices of messages that lack a field, do not fit, or are otherwise typed or encoded."""
         said = []
         if decoder.lacking:
             lacks = ", ".join(dict.fromkeys(decoder.wanted[name] for name in decoder.lacks))
