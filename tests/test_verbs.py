@@ -18,7 +18,7 @@ import pytest
 
 import algid
 from algid.api.options import CHANNELS_OF
-from algid.cli.app import COMMANDS
+from algid.cli.app import COMMANDS, SUMMARIES
 from algid.cli.settings import OF_PROFILE
 from algid.errors import ResultError, SettingError
 from algid.profile import Profile
@@ -66,6 +66,12 @@ def test_every_setting_of_a_command_is_a_keyword_of_its_verb(command: str) -> No
 
 COMPUTING = {"numpy", "polars", "scipy", "pyarrow", "pydantic"}
 """Packages that work with numbers."""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_listed_command_has_the_first_sentence_of_its_help(name: str) -> None:
+    text = inspect.cleandoc(COMMANDS[name]().__doc__ or "")
+    assert " ".join(text.partition("\n\n")[0].split()) == SUMMARIES[name]
 
 
 def test_no_command_computes() -> None:

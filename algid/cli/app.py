@@ -18,23 +18,43 @@ from algid.cli.output import say
 from algid.errors import SettingError
 from algid.exits import epilog
 
-COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
-    "example": lambda: import_module("algid.cli.example").example,
-    "inspect": lambda: import_module("algid.cli.inspect").inspect,
-    "design": lambda: import_module("algid.cli.design").design,
-    "identify": lambda: import_module("algid.cli.identify").identify,
-    "validate": lambda: import_module("algid.cli.validate").validate,
-    "export": lambda: import_module("algid.cli.export").export,
-    "batch": lambda: import_module("algid.cli.batch").batch,
-    "fleet": lambda: import_module("algid.cli.fleet").fleet,
-    "track": lambda: import_module("algid.cli.track").track,
-    "check": lambda: import_module("algid.cli.check").check,
-    "report": lambda: import_module("algid.cli.report").report,
-    "compare": lambda: import_module("algid.cli.compare").compare,
-    "synth": lambda: import_module("algid.cli.synth").synth,
-    "convert": lambda: import_module("algid.cli.convert").convert,
-    "guide": lambda: import_module("algid.cli.guide").guide,
+SUMMARIES: dict[str, str] = {
+    "example": "Write four runs of an arm, one with a payload, and their profile: what the "
+    "guide's pages are typed along with.",
+    "inspect": "Show what a log holds, which channels would be used, and what is wrong with it.",
+    "design": "Plan the motion that tells most about an arm within its limits; write PRIOR.design.",
+    "identify": "Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write "
+    "LOG.algid.",
+    "validate": "Print RMSE, normalised RMSE and R² of the predicted torque; exit code 1 past "
+    "--max-nrmse.",
+    "export": "Write the arm of RESULT as a model.",
+    "batch": "Identify many logs: a result folder a job and OUT/jobs.parquet.",
+    "fleet": "Tell which robots' parameters drift, and which logs stand out.",
+    "track": "Find when the payload changed and what each stretch weighs; write LOG.track.",
+    "check": "Compare a result's errors with their limits, row by row; exit code 1 when one "
+    "is over.",
+    "report": "Write report.html and report.md into each RESULT and print its table.",
+    "compare": "Lay results side by side: differences in σ from the first one, and which "
+    "settings differ.",
+    "synth": "Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels "
+    "with them.",
+    "convert": "Write a log in another format, in SI units, with canonical names.",
+    "guide": "Read the guide in the terminal.",
 }
+"""The first sentence of each command's help: a list of them loads none."""
+
+
+def _loader(name: str) -> Callable[[], Callable[..., Any]]:
+    """What loads a command out of the module that has its name."""
+
+    def load() -> Callable[..., Any]:
+        command: Callable[..., Any] = getattr(import_module(f"algid.cli.{name}"), name)
+        return command
+
+    return load
+
+
+COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {name: _loader(name) for name in SUMMARIES}
 """What loads each command, in the order of `algid --help`."""
 
 
@@ -90,7 +110,7 @@ def _help(command: Callable[..., Any]) -> str:
 def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     """The application with the commands `names`, and with the profiles' where none of them is alone.
 
-    Commands that are only `listed` have their help and none of their options.
+    Commands that are only `listed` have the first sentence of their help and none of their options.
     """
     made = typer.Typer(
         help="Parameters and payload of a two-link arm, with honest error bars, from its torque "
@@ -102,18 +122,21 @@ def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:
     made.callback()(_root)
     wanted = list(names)
     for name in wanted:
-        command = COMMANDS[name]()
-        made.command(name, cls=FiniteCommand, help=_help(command), epilog=epilog(name))(
-            (lambda: None) if listed else command
-        )
+        command = _nothing if listed else COMMANDS[name]()
+        text = SUMMARIES[name] if listed else _help(command)
+        made.command(name, cls=FiniteCommand, help=text, epilog=epilog(name))(command)
     if len(wanted) != 1:
         profiles = typer.Typer(
             help="Profiles tell what a log's names, units and signs mean.", no_args_is_help=True
         )
-        new = import_module("algid.cli.profile").new
+        new = _nothing if listed else import_module("algid.cli.profile").new
         profiles.command("new", help=_help(new))(new)
         made.add_typer(profiles, name="profile")
     return made
+
+
+def _nothing() -> None:
+    """What stands for a command that is only listed."""
 
 
 def called(arguments: Sequence[str]) -> typer.Typer:
