@@ -18,6 +18,25 @@ from algid.cli.output import say
 from algid.errors import SettingError
 from algid.exits import epilog
 
+COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
+    "example": lambda: import_module("algid.cli.example").example,
+    "inspect": lambda: import_module("algid.cli.inspect").inspect,
+    "design": lambda: import_module("algid.cli.design").design,
+    "identify": lambda: import_module("algid.cli.identify").identify,
+    "validate": lambda: import_module("algid.cli.validate").validate,
+    "export": lambda: import_module("algid.cli.export").export,
+    "batch": lambda: import_module("algid.cli.batch").batch,
+    "fleet": lambda: import_module("algid.cli.fleet").fleet,
+    "track": lambda: import_module("algid.cli.track").track,
+    "check": lambda: import_module("algid.cli.check").check,
+    "report": lambda: import_module("algid.cli.report").report,
+    "compare": lambda: import_module("algid.cli.compare").compare,
+    "synth": lambda: import_module("algid.cli.synth").synth,
+    "convert": lambda: import_module("algid.cli.convert").convert,
+    "guide": lambda: import_module("algid.cli.guide").guide,
+}
+"""What loads each command, in the order of `algid --help`."""
+
 SUMMARIES: dict[str, str] = {
     "example": "Write four runs of an arm, one with a payload, and their profile: what the "
     "guide's pages are typed along with.",
@@ -42,20 +61,6 @@ SUMMARIES: dict[str, str] = {
     "guide": "Read the guide in the terminal.",
 }
 """The first sentence of each command's help: a list of them loads none."""
-
-
-def _loader(name: str) -> Callable[[], Callable[..., Any]]:
-    """What loads a command out of the module that has its name."""
-
-    def load() -> Callable[..., Any]:
-        command: Callable[..., Any] = getattr(import_module(f"algid.cli.{name}"), name)
-        return command
-
-    return load
-
-
-COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {name: _loader(name) for name in SUMMARIES}
-"""What loads each command, in the order of `algid --help`."""
 
 
 class FiniteCommand(TyperCommand):
