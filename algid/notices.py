@@ -33,6 +33,7 @@ OWN_FLAGS = (
         "topic",
         "rate",
         "columns",
+        "torque_hold",
         "clock",
         "start",
     ),
@@ -54,7 +55,18 @@ OWN_FLAGS = (
     ),
 )
 """Settings with a flag of their own; any other is one of a profile, behind ``--set``."""
-NO_PROFILE = ("estimator", "model", "delay", "l1", "l2", "range", "speed", "torque", "runs")
+NO_PROFILE = (
+    "estimator",
+    "model",
+    "torque_hold",
+    "delay",
+    "l1",
+    "l2",
+    "range",
+    "speed",
+    "torque",
+    "runs",
+)
 """Settings that no profile has."""
 UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [tau2]"}
 OPEN = {
@@ -209,6 +221,14 @@ MESSAGES: Mapping[str, str] = {
     ),
     "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is "
     "chosen",
+    "HELD_TORQUE": (
+        "the torque is held from each sample to the next: it acts {late:.3g} ms after its stamp in "
+        "the mean"
+    ),
+    "HOLD_UNTOLD": (
+        "the logs do not tell whether the torque is held from each sample to the next, which makes "
+        "it {half:.3g} ms late in the mean: the intervals hold both"
+    ),
     "UNLIKE_GAINS": (
         "the gains of the torques differ: torque 2 is {ratio:.3f} ± {half:.2g} times (95 %) what "
         "torque 1 has it; no "

@@ -116,7 +116,9 @@ class Settings:
         compensated; with `gravity` 0 a payload's weight is compensated too.
     model : 'auto', 'plain', or terms of the torque between commas
         Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
-    torque_hold : 'foh' or 'zoh'
+    torque_hold : 'auto', 'foh' or 'zoh'
+        Whether the torque moves evenly from sample to sample or is held from each to the next;
+        'auto' lets the logs tell.
     delay : float, s, between torque and angle, where it is known; the term `delay` estimates it
     l1, l2 : float, m, link lengths where known
     payload_mass : float, kg, the payload's where it is known
@@ -175,8 +177,9 @@ class Settings:
             "<terms>, like coulomb,rotor.",
         },
     )
-    torque_hold: Literal["foh", "zoh"] = field(
-        default="foh", metadata={"help": "Torque between samples: ramped or held."}
+    torque_hold: Literal["auto", "foh", "zoh"] = field(
+        default="auto",
+        metadata={"help": "Torque between samples: told by the logs, ramped or held."},
     )
     delay: float = field(
         default=0.0,

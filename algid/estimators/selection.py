@@ -24,6 +24,7 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.estimators.hold import Hold, Lateness
 from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training, term_names
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import (
@@ -91,7 +92,8 @@ class Selection:
     `trials` are those of the terms, and `held_out` is what was left out of the fit in turn; where
     the terms were given there are none. `shapes` is the model of the most common terms, whose
     friction has the shape that logs give it before any is chosen; `shrunk` says that none was
-    chosen in the end, but every term shrunk.
+    chosen in the end, but every term shrunk. `hold` is the torque's between samples, and `late` how
+    late the logs say it acts where it is not held.
     """
 
     model: Model
@@ -101,6 +103,14 @@ class Selection:
     held_out: Literal["logs", "blocks"] | None = None
     shapes: Model | None = None
     shrunk: bool = False
+    hold: Hold = "foh"
+    hold_by: Literal["logs", "settings", "parameters"] = "settings"
+    late: Lateness | None = None
+
+    @property
+    def untold(self) -> Lateness | None:
+        """How late the torque acts, where the logs were asked whether it is held and do not tell."""
+        return self.late if self.hold_by == "logs" and self.late and not self.late.told else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,14 +213,39 @@ def select(
     model = replace(look.settings.model, terms=without_delay(terms))
     delayed = len(model.terms) < len(terms)
     shapes = start.settings.model
+    late = grams.lateness(terms)
     if not candidates:
-        return Selection(model, delayed, shapes=shapes)
+        return Selection(model, delayed, shapes=shapes, late=late)
     trials = tuple(
         searches[0 if term in _DELAY else -1].trial(term, terms, kept) for term in everything
     )
-    return _as_lag(
-        start, look, terms, Selection(model, delayed, "logs", trials, grams.held_out, shapes)
-    )
+    chosen = Selection(model, delayed, "logs", trials, grams.held_out, shapes, late=late)
+    return _as_lag(start, look, terms, chosen)
+
+
+def lateness(
+    unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Lateness:
+    """How late the torque of logs acts beside the model of the settings.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`; it is called once.
+    settings : WeakSettings
+        Its hold is that of a torque that is not held.
+
+    Raises
+    ------
+    TooShortError
+        If no log is long enough for a window.
+    """
+    logs = [
+        Training.of(source, kind)
+        for kind, sources in ((False, unloaded), (True, loaded))
+        for source in sources
+    ]
+    return Grams(logs, settings, {False: {}, True: {}}).lateness(settings.model.terms)
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:

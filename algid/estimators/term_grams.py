@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import long_run_variance, scaled_pinv, scaled_pinvs
+from algid.estimators.hold import Lateness
 from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
-from algid.model import DELAYS, EVERY_TERM, loads_of
+from algid.model import DELAYS, EVERY_TERM, loads_of, without_delay
 from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
 
@@ -104,6 +105,7 @@ class Grams:
             raise TooShortError(
                 "no log is long enough: expected at least a second of samples without a gap"
             )
+        self._dt = max(normal.dt for _, normal in normals)
         self.kinds = {loaded for loaded, _ in normals}
         self._both = len(self.kinds) == 2
         self.size = len(self.names) + self._both * len(self._rigid)
@@ -225,6 +227,27 @@ class Grams:
             float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances
         ]
         return min(found), own.size, float(stretches)
+
+    def lateness(self, terms: Iterable[str]) -> Lateness:
+        """How late the torque acts in the sub-model with `terms`.
+
+        Its deviation is the larger of those by white noise and by the sandwich.
+        """
+        columns = self._columns((*without_delay(terms), CHANGE))
+        value, covariances, _ = self._spread(columns)
+        own = np.flatnonzero(columns == self.names.index(CHANGE))
+        variance = max(float(covariance[own[0], own[0]]) for covariance in covariances)
+        # what a delay that is left out adds to the others, beside their deviations
+        rest, column = np.delete(columns, own), columns[own[0]]
+        _, beside, _ = self._spread(rest)
+        slope = scaled_pinv(self._total[np.ix_(rest, rest)]) @ self._total[rest, column]
+        size = np.sqrt(np.max([np.diag(covariance) for covariance in beside], axis=0))
+        return Lateness(
+            self.settings.delay + float(value[own[0]]),
+            float(np.sqrt(max(variance, 0.0))),
+            0.5 * self._dt,
+            float(np.max(np.abs(slope) / np.maximum(size, 1e-300))),
+        )
 
     def _named(self, names: set[str]) -> list[int]:
         """Places in p of coefficients by name, the loaded arm's with them."""

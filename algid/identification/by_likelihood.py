@@ -15,6 +15,7 @@ from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.doubt import doubted, untold
 from algid.estimators.fit import Fit
+from algid.estimators.hold import Hold
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionScore, PredictionSums, score
 from algid.estimators.selection import (
@@ -22,10 +23,11 @@ from algid.estimators.selection import (
     FIRST_TERMS,
     Selection,
     TermTrial,
+    lateness,
     needs_shape,
     select,
 )
-from algid.estimators.shrinkage import SCALES
+from algid.estimators.shrinkage import SCALES, joined
 from algid.estimators.too_short import TooShortError
 from algid.identification.known import model_of
 from algid.identification.predicted import prediction
@@ -63,34 +65,95 @@ Predictions = Mapping[LogSource, PredictionSums]
 def choose_model(survey: Survey, settings: Settings, earlier: Result | None = None) -> Selection:
     """The torque's model: set by the user, taken from an earlier result, or chosen by the logs.
 
+    The same with whether the torque is held between samples. Where logs are to tell that and do
+    not, the delay is estimated.
+
     Raises
     ------
     LogError
         If no log is long enough.
     """
-    if settings.chooses and earlier is not None:
-        terms = ("delay",) if "delay" in earlier.parameters else ()
-        return replace(_given(model_of(earlier), terms), chosen_by="parameters")
-    plain = Model(gravity=settings.gravity)
-    if not settings.chooses and not needs_shape(settings.terms):
-        return _given(plain, settings.terms)
-    candidates = (
-        (CHOICE if settings.delay == 0 else without_delay(CHOICE)) if settings.chooses else ()
-    )
-    unloaded, loaded = _passes(survey, settings)
     try:
-        return select(
-            unloaded,
-            loaded,
-            _weak_settings(settings, _given(plain, ())),
-            without_terms(settings.effort, candidates),
-            settings.terms,
-            absent(settings.effort, COLUMN_NAMES),
-        )
+        if earlier is not None or settings.torque_hold != "auto":
+            return _with_model(survey, settings, earlier)
+        return _with_hold(survey, settings)
     except TooShortError as error:
         raise LogError(
             f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
         ) from error
+
+
+def _with_model(survey: Survey, settings: Settings, earlier: Result | None) -> Selection:
+    """The model where the hold is said, by the settings or by the earlier result."""
+    hold, said = settings.torque_hold, "settings"
+    if hold == "auto":
+        hold = "foh" if earlier is None else Settings.of(earlier.settings).torque_hold
+        said = "settings" if earlier is None else "parameters"
+    hold = "zoh" if hold == "zoh" else "foh"
+    if settings.chooses and earlier is not None:
+        terms = DELAYS if set(DELAYS) & set(earlier.parameters) else ()
+        chosen = replace(_given(model_of(earlier), terms), chosen_by="parameters")
+    else:
+        chosen = _modelled(survey, settings, hold)
+    return replace(chosen, hold=hold, hold_by=said)  # type: ignore[arg-type]
+
+
+def _with_hold(survey: Survey, settings: Settings) -> Selection:
+    """The model and the hold that the logs tell: not held where a delay is set or asked for."""
+    chosen = _modelled(survey, settings, "foh")
+    lagged = chosen.model.lag_name is not None
+    if settings.delay != 0 or set(DELAYS) & set(settings.terms) or lagged:
+        return chosen
+    late = chosen.late
+    if late is None:
+        passes = _passes(survey, settings)
+        late = lateness(*passes, _weak_settings(settings, chosen))
+    if late.hold == "zoh":
+        chosen = _modelled(survey, settings, "zoh")
+    elif not late.told and not chosen.delay:
+        why = "kept: the logs do not tell whether the torque is held, half a sample late"
+        open_delay = [TermTrial(term, True, np.nan, np.nan, why) for term in DELAYS]
+        trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
+        chosen = replace(chosen, delay=True, trials=(*trials, *open_delay))
+    return replace(chosen, hold=late.hold, hold_by="logs", late=late)
+
+
+def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
+    """The model that the settings ask for, or that the logs choose, of a torque with that hold."""
+    plain = Model(gravity=settings.gravity)
+    if not settings.chooses and not needs_shape(settings.terms):
+        return replace(_given(plain, settings.terms), hold=hold)
+    candidates = (
+        (CHOICE if settings.delay == 0 else without_delay(CHOICE)) if settings.chooses else ()
+    )
+    chosen = select(
+        *_passes(survey, settings),
+        _weak_settings(settings, replace(_given(plain, ()), hold=hold)),
+        without_terms(settings.effort, candidates),
+        settings.terms,
+        absent(settings.effort, COLUMN_NAMES),
+    )
+    return replace(chosen, hold=hold)
+
+
+def retold(fit: Fit, chosen: Selection) -> Selection:
+    """The selection with the hold that the fit tells where the logs did not before; the same where neither does."""
+    late = chosen.untold
+    if late is None or chosen.shrunk or not fit.converged or not set(DELAYS) <= set(fit.names):
+        return chosen
+    place = fit.names.index(DELAYS[0])
+    late = late.after(float(fit.values[place]), float(fit.std[place]))
+    if not late.told:
+        return replace(chosen, late=replace(late, effect=np.inf))
+    if late.another:
+        return replace(chosen, late=late)
+    trials = tuple(
+        replace(trial, kept=False, reason="left out: the fit tells whether the torque is held")
+        if trial.term in DELAYS
+        else trial
+        for trial in chosen.trials
+    )
+    return replace(chosen, hold=late.hold, late=late, delay=False, trials=trials)
 
 
 def _given(model: Model, terms: Sequence[str]) -> Selection:
@@ -140,9 +203,10 @@ def run_fit(
     )
     nothing = absent(settings.effort, chosen.model.names)
     try:
-        fit = estimator.fit(
-            unloaded, loaded, ours, settings.lengths, without(prior, nothing), survey.progress
-        )
+        known = without(prior, nothing)
+        if chosen.untold is not None and chosen.delay:
+            known = joined(known, chosen.untold.prior)
+        fit = estimator.fit(unloaded, loaded, ours, settings.lengths, known, survey.progress)
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
@@ -169,7 +233,9 @@ def _shrunk(
     prior: Prior | None,
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk in place of the `refuted` one's, and its model."""
-    shaped = replace(ours, model=chosen.shapes or chosen.model)
+    told = chosen.hold_by == "logs"  # by a likelihood that does not hold: a term tells the delay
+    hold: Hold = "foh" if told else chosen.hold
+    shaped = replace(ours, model=chosen.shapes or chosen.model, hold=hold)
     every = replace(shaped.model, terms=tuple(term for term in TERMS if term in SCALES))
     nothing = absent(settings.effort, every.names)
     fit = shrunk.fit(unloaded, loaded, shaped, settings.lengths, without(prior, nothing))
@@ -177,7 +243,16 @@ def _shrunk(
     fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True), *fit.notes))
     terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
     trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)
-    return fit, Selection(fit.shared.model, fit.shared.delay, chosen.chosen_by, trials, shrunk=True)
+    shrunken = Selection(
+        fit.shared.model,
+        fit.shared.delay,
+        chosen.chosen_by,
+        trials,
+        shrunk=True,
+        hold=hold,
+        hold_by=chosen.hold_by,
+    )
+    return fit, shrunken
 
 
 def residual_of(
@@ -264,6 +339,7 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
         term
         for term in CHOICES
         if (term in chosen.model.terms or set(EVERY_TERM[term].names) & set(fit.names))
+        and not (chosen.untold is not None and term in DELAYS)
         and term not in settings.terms
         and all(size.get(name, 0.0) < NOTHING for name in EVERY_TERM[term].names)
         and not (EVERY_TERM[term].sines and "y_p" in fit.shared.body)  # what tells the payload's
@@ -285,7 +361,7 @@ def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     ours = weak.WeakSettings(
         model=chosen.model,
         bandwidth=None if own_velocities else settings.bandwidth,
-        hold=settings.torque_hold,
+        hold=chosen.hold,
         delay=settings.delay,
         estimate_delay=chosen.delay,
     )

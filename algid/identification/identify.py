@@ -247,6 +247,7 @@ def _by_likelihood(
     said = of_effort(fit, settings, asked)
     if settings != asked:
         fit, predictions, chosen = _fitted(survey, settings, earlier)
+    settings = replace(settings, torque_hold=chosen.hold)
     fit = with_endogeneity(with_doubt(fit, survey, settings, chosen), survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
@@ -263,17 +264,26 @@ def _fitted(
     survey: Survey, settings: Settings, earlier: Earlier | None
 ) -> tuple[Fit, Predictions, Selection]:
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
-    from algid.identification.by_likelihood import choose_model, run_fit, without_nothing
+    from algid.identification.by_likelihood import (
+        choose_model,
+        retold,
+        run_fit,
+        without_nothing,
+    )
     from algid.identification.known import prior_of
 
     survey.begin("choosing terms")
     chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
     prior = None if earlier is None else prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
+    settings = replace(settings, torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
-    fewer = without_nothing(chosen, fit, settings)
-    if fewer is not chosen:
-        fit, predictions, chosen = run_fit(survey, settings, fewer, prior)
+    better = without_nothing(retold(fit, chosen), fit, settings)
+    if (better.model, better.delay, better.hold) != (chosen.model, chosen.delay, chosen.hold):
+        settings = replace(settings, torque_hold=better.hold)
+        fit, predictions, chosen = run_fit(survey, settings, better, prior)
+    else:
+        chosen = better
     return fit, predictions, chosen
 
 

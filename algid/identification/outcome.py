@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from algid.identification.predicted import prediction
 from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
-from algid.model import UNITS
+from algid.model import DELAYS, UNITS
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
@@ -249,9 +250,10 @@ def fit_summary(
             stribeck_speed=chosen.model.stribeck_speed,
             chosen_by=chosen.chosen_by,
             held_out=chosen.held_out,
-            shrunk=list(fit.shrinkage.names) if fit.shrinkage is not None else [],
+            shrunk=_expected(fit, chosen),
         ),
         terms=_terms(fit, chosen),
+        torque_hold=_torque_hold(chosen),
         broken_bounds=[
             results.Bound(
                 bound=b.bound,
@@ -294,6 +296,31 @@ def _predicted(
         [partial(survey.segments, log) for log in kind] for kind in (survey.unloaded, survey.loaded)
     )
     return own, cross_validate(fit, unloaded, loaded, settings.torque_shift)
+
+
+def _expected(fit: Fit, chosen: Selection) -> list[str]:
+    """Coefficients of terms that were not chosen: each is what the logs and a prior agree on."""
+    if fit.shrinkage is not None:
+        return list(fit.shrinkage.names)
+    return [name for name in DELAYS if name in fit.names and chosen.untold is not None]
+
+
+def _torque_hold(chosen: Selection) -> results.TorqueHold:
+    """What was asked of the torque's hold, what was used, and what the logs tell."""
+    late = chosen.late if chosen.hold_by == "logs" else None
+    asked: Literal["auto", "foh", "zoh"] = chosen.hold if chosen.hold_by == "settings" else "auto"
+    if late is None:
+        return results.TorqueHold(asked=asked, used=chosen.hold)
+    return results.TorqueHold(
+        asked=asked,
+        used=chosen.hold,
+        told=late.told,
+        half=late.half,
+        late=late.late,
+        late_std=finite(late.std),
+        odds=finite(late.odds),
+        share=finite(late.share),
+    )
 
 
 def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:

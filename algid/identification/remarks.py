@@ -106,7 +106,9 @@ def _of_payload(fit: Fit) -> Iterator[Notice]:
 
 
 def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
-    """What blocks of logs leave out, how well the payload repeats, the gain of the torques."""
+    """Whether the torque is held, what blocks of logs leave out, the payload's repeatability, the torques' gain."""
+    if fit.torque_hold is not None:
+        yield from _of_hold(fit.torque_hold)
     if fit.intervals == "sandwich":
         yield Notice("ONE_RUN", note=True)
     if fit.repeatability is not None:
@@ -123,3 +125,14 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
             {"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio"
         )
         yield Notice("TORQUE_GAIN", numbers=numbers, remedies=(gears,), note=True)
+
+
+def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
+    """That logs tell of a held torque, or that they do not tell."""
+    if hold.told is None or hold.half is None:
+        return
+    if not hold.told:
+        held = Remedy({"torque_hold": "zoh"}, "for a digital controller that logs what it sets")
+        yield Notice("HOLD_UNTOLD", numbers={"half": 1e3 * hold.half}, remedies=(held,), note=True)
+    elif hold.used == "zoh":
+        yield Notice("HELD_TORQUE", numbers={"late": 1e3 * hold.half}, note=True)

@@ -173,6 +173,9 @@ def used_settings(result: Result) -> Table:
     for name, value in _found(result).items():
         if value != used.get(name):
             asked[name], used[name] = used.get(name, ABSENT), value
+    hold = None if result.fit is None else result.fit.torque_hold
+    if hold is not None and hold.asked != hold.used:
+        asked["torque_hold"] = hold.asked
     for name in CONVENTIONS:
         read = {
             log.role: setting_text(getattr(log.reading, name))

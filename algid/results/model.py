@@ -153,6 +153,25 @@ class TorqueModel(_Model):
     shrunk: list[str] = []
 
 
+class TorqueHold(_Model):
+    """Whether the torque was held from each sample to the next ("zoh") or moved evenly ("foh"): asked, and used.
+
+    Where the logs were asked ("auto"), `half` is half a sample, in s, `late` how late they say it
+    acts where it is not held, `late_std` its standard deviation, `odds` the log of the odds for a held torque, and
+    `share` of its standard deviation the most that an estimate is off with the wrong one. `told`
+    says whether that decided; where it did not, the delay is a parameter whose prior is both.
+    """
+
+    asked: Literal["auto", "foh", "zoh"]
+    used: Literal["foh", "zoh"]
+    told: bool | None = None
+    half: float | None = None
+    late: float | None = None
+    late_std: float | None = None
+    odds: float | None = None
+    share: float | None = None
+
+
 class Bound(_Model):
     """A physical bound that the estimates break, and by how many standard deviations."""
 
@@ -220,6 +239,7 @@ class FitSummary(_Model):
     unidentifiable: list[str] = []
     model: TorqueModel | None = None
     terms: list[TermCriterion] = []
+    torque_hold: TorqueHold | None = None
     broken_bounds: list[Bound] = []
     by_log: list[dict[str, Estimate]] = []
     residual: TorquePrediction | None = None

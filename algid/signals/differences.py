@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import factorial
+from math import factorial, floor
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from algid.arm import FloatArray
 
 POINTS = 9
 _HALF = POINTS // 2
+_NEXT = 0.25  # of a sample, before the next whole one
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +50,12 @@ class Stencil:
 
     @cached_property
     def whole(self) -> int:
-        """Whole samples in the shift."""
-        return round(self.shift / self.dt)
+        """Whole samples in the shift.
+
+        The next one is taken from three quarters on: a delay that is estimated near none, or near
+        half a sample, stays on one stencil.
+        """
+        return floor(self.shift / self.dt + _NEXT)
 
     @cached_property
     def weights(self) -> FloatArray:

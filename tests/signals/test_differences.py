@@ -58,3 +58,11 @@ def test_noise_behind_a_held_torque_is_whitened() -> None:
     assert (
         abs(held_torque(noise)[0, 2:-1] @ held_torque(noise)[0, 1:-2]) / 20000 > 0.05
     )  # what there was to whiten
+
+
+def test_a_delay_near_half_a_sample_stays_on_one_stencil() -> None:
+    """Where it jumped, the estimate of a held torque's delay went to and fro across the jump."""
+    below, above = Stencil(1e-3, 0.49e-3), Stencil(1e-3, 0.51e-3)
+    assert below.whole == above.whole
+    # the weights are continuous there: a hundredth of a sample moves them by a few hundredths
+    np.testing.assert_allclose(above.weights[0], below.weights[0], atol=0.05)

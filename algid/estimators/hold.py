@@ -1,0 +1,91 @@
+"""Whether a logged torque is held from each sample to the next, told by how late it acts.
+
+A digital controller holds its torque h = dt / 2 late in the mean; a torque that moves evenly from
+sample to sample is not late. Logs tell how late with a deviation s, beside all that is fitted, and
+the log of the odds for a held torque is
+
+    (d² − (d − h)²) / 2 s²
+
+with d what they tell. Where neither is likelier by far, the delay stays a parameter, with the two
+as its prior: mean h / 2 and deviation h / 2. The posterior's error is then what it says, whichever
+is true.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log
+from typing import Literal
+
+import numpy as np
+
+from algid.estimators.combine import Prior
+from algid.model import DELAYS
+
+Hold = Literal["foh", "zoh"]
+SURE = log(100.0)
+"""Log of the odds from which one of the two is taken."""
+NEGLIGIBLE = 0.1
+"""Standard deviations by which half a sample may move each estimate, and nobody need know."""
+_NEAR, _SIGMAS = 0.3, 4.0
+"""Of half a sample, and standard deviations: another delay is further from what is taken."""
+
+
+@dataclass(frozen=True)
+class Lateness:
+    """How late a torque acts where the log is taken for one that is not held.
+
+    Parameters
+    ----------
+    late, std : float, s
+        The estimate beside all other parameters, and its standard deviation.
+    half : float, s
+        Half a sample.
+    effect : float, 1/s
+        Of its standard deviations, by how many an estimate moves with a second of delay that is
+        left out: the most of all.
+    """
+
+    late: float
+    std: float
+    half: float
+    effect: float = np.inf
+
+    @property
+    def odds(self) -> float:
+        """Log of the odds for a torque that is held against one that is not."""
+        return self.half * (self.late - 0.5 * self.half) / max(self.std, 1e-300) ** 2
+
+    @property
+    def share(self) -> float:
+        """Of its standard deviation, how far an estimate is off where the wrong one is taken: the most of all."""
+        return self.half * self.effect
+
+    @property
+    def told(self) -> bool:
+        """Whether one of the two is likelier by far, or it makes no difference."""
+        return self.share < NEGLIGIBLE or abs(self.odds) >= SURE
+
+    @property
+    def hold(self) -> Hold:
+        """What the log tells; not held where it tells neither, or another delay."""
+        return "zoh" if self.odds >= SURE and not self.another else "foh"
+
+    @property
+    def another(self) -> bool:
+        """Whether the log tells a delay that is longer, or shorter, than half a sample and none."""
+        off = abs(self.late - self.half)
+        return self.odds >= SURE and off > max(_NEAR * self.half, _SIGMAS * self.std)
+
+    @property
+    def prior(self) -> Prior:
+        """The delay's prior where the log does not tell."""
+        spread = 0.5 * self.half
+        return Prior(DELAYS, np.array([spread]), np.array([[spread**-2]]))
+
+    def after(self, mean: float, std: float) -> Lateness:
+        """What a posterior of `mean` and `std`, in s, tells without the prior."""
+        spread = 0.5 * self.half
+        precision = max(std**-2 - spread**-2, 1e-6 * spread**-2)
+        late = (mean * std**-2 - spread * spread**-2) / precision
+        return Lateness(late, precision**-0.5, self.half)

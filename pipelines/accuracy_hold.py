@@ -1,0 +1,213 @@
+"""Whether logs tell a held torque from one that moves evenly, and what it does to intervals.
+
+    python -m pipelines.accuracy_hold [--draws 8] [--arms 4] [--rows slow,joint2]
+
+Each row is simulated with a torque that is held from sample to sample and with one that is not,
+and identified without a flag. Asked: intervals of k1 … k7 that hold the truth in 92 % or more,
+errors within 1.5 times the bound of a known hold, and at most 1 % of the even torques taken for
+held ones.
+
+"slow" and "joint2" move under a PD controller (`pipelines.controlled`), the others in open loop.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from algid.arm import CONSTANT_NAMES, Arm, FloatArray
+from algid.identification.identify import identify
+from algid.log import Log
+from algid.synth.excitation import SampledTorque, wide_multi_sine
+from algid.synth.simulator import simulate
+from pipelines.accuracy_scenes import random_arm
+from pipelines.controlled import Controller, Plan, controlled
+from pipelines.cramer_rao import Truth, information
+
+FIRST_ARM = 300  # seeds of arms that nothing was tuned on
+SIGMA_THETA, SIGMA_TAU = 1e-3, 1e-2
+PRBS_HOLD = 0.05  # s
+STIFFNESS = 2 * np.pi * 4.0  # rad/s, the controller's bandwidth
+
+
+@dataclass(frozen=True)
+class Row:
+    """A motion: its rate in Hz, its seconds, and what drives it."""
+
+    name: str
+    rate: float
+    duration: float
+    drive: str
+
+
+ROWS = {
+    "wide": Row("wide, 1 kHz", 1000.0, 10.0, "wide"),
+    "short": Row("wide, 1 s", 1000.0, 1.0, "wide"),
+    "50": Row("wide, 50 Hz", 50.0, 20.0, "wide"),
+    "100": Row("wide, 100 Hz", 100.0, 10.0, "wide"),
+    "prbs": Row("PRBS, 50 ms", 1000.0, 10.0, "prbs"),
+    "slow": Row("slow, PD", 1000.0, 10.0, "slow"),
+    "joint2": Row("joint 2 alone, PD", 1000.0, 10.0, "joint2"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """An arm and its true motion."""
+
+    arm: Arm
+    truth: Truth
+
+    @cached_property
+    def bound(self) -> FloatArray:
+        """The least deviations (7,) of the constants, infinite where the motion tells none."""
+        return _bound(self.truth, self.arm)
+
+    def log(self, rng: np.random.Generator) -> Log:
+        """One draw of the sensors' noise."""
+        theta, tau = (rng.standard_normal(self.truth.theta.shape) for _ in range(2))
+        truth = self.truth
+        return Log.from_arrays(
+            truth.t, truth.theta + SIGMA_THETA * theta, truth.tau + SIGMA_TAU * tau
+        )
+
+
+@cache
+def scene(key: str, held: bool, seed: int) -> Scene:
+    """The motion of the arm of that seed."""
+    row = ROWS[key]
+    arm, _ = random_arm(seed)
+    t = np.arange(round(row.duration * row.rate) + 1) / row.rate
+    moved = _pd if row.drive in ("slow", "joint2") else _open
+    return Scene(arm, moved(row, arm, t, held, seed))
+
+
+def _bound(truth: Truth, arm: Arm) -> FloatArray:
+    k = arm.constants()
+    S = information(truth, k, arm.g, SIGMA_THETA, SIGMA_TAU, loaded=False)
+    size = np.sqrt(np.diag(S))
+    values, vectors = np.linalg.eigh(S / np.outer(size, size))
+    told = values > 1e-9 * values.max()
+    variance = (vectors[:, told] ** 2 / values[told]).sum(axis=1) / size**2
+    lost = (vectors[:, ~told] ** 2).sum(axis=1) > 1e-6
+    return np.where(lost, np.inf, np.sqrt(variance))
+
+
+def _open(row: Row, arm: Arm, t: FloatArray, held: bool, seed: int) -> Truth:
+    k = arm.constants()
+    wide = wide_multi_sine(arm, 1000 * seed)
+    tau = wide(t)
+    if row.drive == "prbs":
+        rng = np.random.default_rng([seed, 7])
+        levels = rng.choice([-0.8, 0.8], (2, round(row.duration / PRBS_HOLD) + 1))
+        place = (t / PRBS_HOLD + 1e-9).astype(int)
+        tau = levels[:, place] * np.array([[k[3] + k[1]], [k[1]]])
+    even = SampledTorque(t, tau, "foh") if row.drive == "prbs" else wide
+    motion = simulate(k, SampledTorque(t, tau, "zoh") if held else even, t)
+    return Truth(t, motion.theta, motion.omega, tau)
+
+
+def _pd(row: Row, arm: Arm, t: FloatArray, held: bool, seed: int) -> Truth:
+    """A PD controller follows sines: of 0.1 to 0.5 Hz, or faster ones with joint 1 at rest."""
+    rng = np.random.default_rng([seed, 3])
+    fine = np.arange(2 * t.size - 1) / (2 * row.rate)
+    alone = row.drive == "joint2"
+    frequencies = np.array([0.5, 1.1, 1.9] if alone else [0.1, 0.2, 0.3, 0.5])
+    theta, omega = np.zeros((2, fine.size)), np.zeros((2, fine.size))
+    theta[0] = -np.pi / 2
+    for joint in (1,) if alone else (0, 1):
+        phase = rng.uniform(0, 2 * np.pi, frequencies.size)
+        size = 0.5 / np.sqrt(np.arange(1, frequencies.size + 1))
+        w = 2 * np.pi * frequencies[:, None]
+        theta[joint] += (size[:, None] * np.sin(w * fine + phase[:, None])).sum(axis=0)
+        omega[joint] += (size[:, None] * w * np.cos(w * fine + phase[:, None])).sum(axis=0)
+    k = arm.constants()
+    inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])
+    gains = np.diag(inertia * STIFFNESS**2), np.diag(2 * 0.7 * inertia * STIFFNESS)
+    plan = Plan(theta, omega, np.zeros_like(theta))
+    payload, friction = np.zeros((t.size, 1)), np.zeros((1, 2, 1))
+    found = controlled(
+        arm, plan, Controller(*gains, digital=held), payload, friction, row.rate, rng
+    )
+    angles, torques = found.theta[:, :, 0], found.tau[:, :, 0]
+    return Truth(t, angles, np.gradient(angles, t, axis=1), torques)
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """Which intervals hold the truth, errors over the bound, the hold taken, whether it was told, terms, grade."""
+
+    inside: list[bool]
+    over_bound: list[float]
+    used: str
+    told: bool
+    terms: tuple[str, ...]
+    grade: str
+
+
+def draw(key: str, held: bool, seed: int, number: int) -> Draw:
+    """Identify one log without a flag."""
+    here = scene(key, held, seed)
+    log = here.log(np.random.default_rng([seed, number, held]))
+    result = identify(log, report=False)
+    inside, over = [], []
+    for name, true, least in zip(CONSTANT_NAMES, here.arm.constants(), here.bound, strict=True):
+        found = result.parameters[name]
+        if found.estimate is None or found.ci95 is None or None in found.ci95:
+            continue
+        low, high = found.ci95
+        inside.append(bool(low <= true <= high))
+        if np.isfinite(least):
+            over.append((found.estimate - true) / least)
+    hold = result.fit.torque_hold if result.fit is not None else None
+    assert hold is not None
+    terms = tuple(term for term in result.parameters if term not in CONSTANT_NAMES)
+    return Draw(inside, over, hold.used, bool(hold.told), terms, result.verdict.grade)
+
+
+def line(key: str, held: bool, arms: int, draws: int, verbose: bool) -> str:
+    """A row of the table."""
+    found = []
+    for seed in range(FIRST_ARM, FIRST_ARM + arms):
+        for number in range(draws):
+            found.append(draw(key, held, seed, number))
+            if verbose:
+                one = found[-1]
+                print("  ", seed, one.used, one.told, one.terms, one.grade, one.inside, flush=True)
+    inside = 100 * np.mean([each for one in found for each in one.inside])
+    over = np.sqrt(np.mean(np.square([each for one in found for each in one.over_bound])))
+    taken = sum(one.used == "zoh" for one in found)
+    untold = sum(not one.told for one in found)
+    false = sum(bool(set(one.terms) - {"delay"}) for one in found)
+    what = "held" if held else "even"
+    return (
+        f"| {ROWS[key].name} | {what} | {taken} | {untold} | {len(found)} | {inside:.1f} "
+        f"| {over:.2f} | {false} |"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print a Markdown table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--draws", type=int, default=8)
+    parser.add_argument("--arms", type=int, default=4)
+    parser.add_argument("--rows", default=",".join(ROWS))
+    parser.add_argument("--verbose", action="store_true")
+    wanted = parser.parse_args(arguments)
+    print(
+        "| motion | torque | taken as held | not told | of | coverage, % | over bound | false terms |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
+    for key in wanted.rows.split(","):
+        for held in (True, False):
+            print(line(key, held, wanted.arms, wanted.draws, wanted.verbose), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""How a log tells a held torque, and what stands where it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from algid.estimators.hold import SURE, Lateness
+
+HALF = 5e-4
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2, 1 / 3, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("true", [0.0, HALF])
+def test_a_wrong_hold_is_taken_in_less_than_one_of_a_hundred_logs(
+    share: float, true: float
+) -> None:
+    """Whatever the logs know: errors of a third of half a sample are the worst."""
+    std = share * HALF
+    drawn = true + std * np.random.default_rng(5).standard_normal(20_000)
+    found = [Lateness(float(one), std, HALF) for one in drawn]
+    wrong = "foh" if true else "zoh"
+    assert np.mean([one.told and one.hold == wrong for one in found]) < 0.01
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3, 1.0, 4.0])
+@pytest.mark.parametrize("true", [0.0, HALF])
+def test_the_prior_of_both_makes_errors_as_large_as_it_says(share: float, true: float) -> None:
+    """Of a normal likelihood of deviation s: posterior of the delay, RMS of error over deviation."""
+    std = share * HALF
+    drawn = true + std * np.random.default_rng(6).standard_normal(20_000)
+    prior = Lateness(0.0, std, HALF).prior
+    precision = std**-2 + float(prior.precision[0, 0])
+    mean = (drawn * std**-2 + float(prior.mean[0] * prior.precision[0, 0])) / precision
+    z = (mean - true) * np.sqrt(precision)
+    # of 20,000 draws the RMS scatters by 0.5 %
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.02)
+    assert np.mean(np.abs(z) < 1.96) > 0.945
+
+
+def test_the_posterior_without_its_prior_is_the_likelihood() -> None:
+    before = Lateness(0.7 * HALF, 0.4 * HALF, HALF)
+    prior = before.prior
+    weight = float(prior.precision[0, 0])
+    precision = before.std**-2 + weight
+    mean = (before.late * before.std**-2 + float(prior.mean[0]) * weight) / precision
+    after = before.after(mean, precision**-0.5)
+    assert (after.late, after.std) == pytest.approx((before.late, before.std))
+
+
+def test_a_posterior_wider_than_its_prior_tells_nothing() -> None:
+    assert not Lateness(0.0, HALF, HALF).after(HALF, 2 * HALF).told
+
+
+def test_a_delay_of_five_milliseconds_is_no_hold() -> None:
+    late = Lateness(5e-3, 1e-5, HALF)
+    assert late.told
+    assert late.another
+    assert late.hold == "foh"
+
+
+def test_half_a_sample_that_moves_nothing_is_left_alone() -> None:
+    late = Lateness(0.0, 10 * HALF, HALF, effect=0.05 / HALF)
+    assert late.share == pytest.approx(0.05)
+    assert abs(late.odds) < SURE
+    assert late.told
+    assert late.hold == "foh"
