@@ -369,6 +369,11 @@ MESSAGES: Mapping[str, str] = {
         "{column!r} for {name} is a current by its name, and is taken for a torque in {given} as "
         "told"
     ),
+    "PASSIVE_TORQUE": (
+        "{column!r} holds a torque of {percent:.2g} % of the other joint's at joint {joint}, which "
+        "is called passive: it is not used, and estimates lack it where a motor makes it; leave "
+        "out --passive then"
+    ),
     "MOTOR_SIDE": "{columns}: signals of motors, taken for those of joints",
     "OTHER_UNIT": (
         "the file states the unit {unit} for {name} ({column!r}), which is taken for {taken}, {why}"

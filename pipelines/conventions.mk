@@ -2,6 +2,7 @@
 
 conventions: setup ## every wrong convention of a log, on five arms, with and without friction; into build/conventions
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.conventions -o build/conventions
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.advice -o build/conventions
 
 .PHONY: false-alarms
 false-alarms: setup ## sound logs of 300 simulated arms: how many bring a warning, and which

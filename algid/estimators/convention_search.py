@@ -143,11 +143,15 @@ class Judgement:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Angles and torques (2, N) of a log as it was read, in rad and N m, `dt` s apart."""
+    """Angles and torques (2, N) of a log as it was read, in rad and N m, `dt` s apart.
+
+    The joint `passive` (1 or 2) has no motor.
+    """
 
     theta: FloatArray
     tau: FloatArray
     dt: float
+    passive: int | None = None
 
     @property
     def usable(self) -> bool:
@@ -169,14 +173,10 @@ def judge(
 def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgement | None:
     """Try every convention on logs of one arm that were read alike, on the stretches that move.
 
-    None where they do not move for six windows, or a torque is zero throughout.
+    None where they do not move for six windows, or the torque of a motor is zero throughout.
     """
-    usable = [log for log in logs if log.usable]
-    usable = usable[:: -(-len(usable) // MOST_LOGS)] if usable else usable
-    if not usable or not all(any(np.any(log.tau[joint]) for log in usable) for joint in (0, 1)):
-        return None
-    log = _Trials(usable, gravity)
-    if log.seconds < _SHORTEST:
+    log = _trials(logs, gravity)
+    if log is None:
         return None
     found = list(log.discrete())
     judged = _judged(found, log.apart)
@@ -188,6 +188,35 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
         found += log.scaled()
         judged = _judged(found, log.apart)
     return _of_a_bent_arm(judged, log)
+
+
+def tried_together(
+    logs: Sequence[Recorded], convention: Convention, *, gravity: bool = True
+) -> Candidate | None:
+    """What logs of one arm say under one convention; None where they are too short to say anything."""
+    log = _trials(logs, gravity)
+    return None if log is None else log.under(convention)
+
+
+def zeroed_together(
+    logs: Sequence[Recorded], family: Convention, *, gravity: bool = True
+) -> Candidate | None:
+    """The same under the zeros that fit best, whatever those of `family`."""
+    log = _trials(logs, gravity)
+    return None if log is None else log.zeroed(family)
+
+
+def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
+    """What tries conventions on those of the logs that may tell any."""
+    usable = [log for log in logs if log.usable]
+    usable = usable[:: -(-len(usable) // MOST_LOGS)] if usable else usable
+    if not usable or len({log.passive for log in usable}) > 1:
+        return None
+    motors = [joint for joint in (0, 1) if joint + 1 != usable[0].passive]
+    if not all(any(np.any(log.tau[joint]) for log in usable) for joint in motors):
+        return None
+    found = _Trials(usable, gravity)
+    return found if found.seconds >= _SHORTEST else None
 
 
 def _of_a_bent_arm(judged: Judgement, log: _Trials) -> Judgement:
@@ -272,6 +301,7 @@ class _Trials:
         self._coarse = _Windowed.of(logs, *_COARSE)
         self.seconds = self._fine.seconds
         kept = [not name.startswith(("k2", "k4")) or gravity for name in COLUMNS]
+        self._passive = logs[0].passive
         self._free = np.eye(len(COLUMNS))[:, kept]
         self._zeros = [
             (turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])
@@ -281,16 +311,26 @@ class _Trials:
         """By how much the scores of two conventions differ that are told apart."""
         self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
 
+    def under(self, convention: Convention) -> Candidate:
+        """The candidate of one convention."""
+        family = replace(convention, zero=AS_READ.zero)
+        (found,) = self._with_zeros([family], [convention.zero])
+        return found
+
+    def zeroed(self, family: Convention) -> Candidate:
+        """The candidate of a family with the zeros that fit best."""
+        return self.under(replace(family, zero=self._best_zero(family)))
+
     def discrete(self) -> Iterator[Candidate]:
         """Every convention without a scale, its zeros by quarter and half turns."""
-        for families in _families():
+        for families in _families(self._passive):
             yield from self._with_zeros(families, self._zeros)
 
     def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
         """Conventions of least residual when both zeros are free, with the zeros that fit best."""
         scored = [
             pair
-            for each in _families()
+            for each in _families(self._passive)
             for pair in zip(self._scores(each, self._fine), each, strict=True)
         ]
         for _, family in sorted(scored, key=lambda pair: pair[0])[:_SHIFTED]:
@@ -311,7 +351,7 @@ class _Trials:
     ) -> Iterator[Candidate]:
         """Each family of the same angles and drive with each of the zeros."""
         sums = self._sums(families[0], self._fine)
-        fitted = solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
+        fitted = self._solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
         scores = _sizes(np.maximum(fitted[1], LEAST)).tolist()
         for (family, zero), c, left, covariance, score in zip(
             product(families, zeros), *fitted, scores, strict=True
@@ -328,14 +368,15 @@ class _Trials:
 
     def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
         """Log residuals with free zeros, summed, of families of the same angles and drive."""
-        return _sizes(solved(self._sums(families[0], log), families, self._free[None])[1]).tolist()
+        sums = self._sums(families[0], log)
+        return _sizes(self._solved(sums, families, self._free[None])[1]).tolist()
 
     def bent(self) -> float | None:
         """What is left as the log was read with a phase for each moment.
 
         None where one is no phase.
         """
-        free = solved(self._sums(AS_READ, self._fine), [AS_READ], self._free[None])
+        free = self._solved(self._sums(AS_READ, self._fine), [AS_READ], self._free[None])
         c = self._free @ free[0][0]
         moments = [c[COLUMNS.index(name) :][:2] for name in ("k1", "k2", "k4")]
         turned = [np.arctan2(abs(sine), cosine) for cosine, sine in moments if cosine or sine]
@@ -344,12 +385,12 @@ class _Trials:
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
         sums = self._sums(family, self._fine)
-        c = self._free @ solved(sums, [family], self._free[None])[0][0]
+        c = self._free @ self._solved(sums, [family], self._free[None])[0][0]
         start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
 
         def scores(zeros: FloatArray) -> FloatArray:
             T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])
-            return _sizes(solved(sums, [family], T)[1])
+            return _sizes(self._solved(sums, [family], T)[1])
 
         best = _least(scores, start)
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
@@ -378,6 +419,11 @@ class _Trials:
         exact = score(nearest, self._fine) < score(scale, self._fine) + self.apart
         return _scaled_by(nearest if exact else scale, joints)
 
+    def _solved(
+        self, sums: ConventionSums, families: Sequence[Convention], T: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return solved(sums, families, T, self._passive)
+
     def _place(self, zero: tuple[float, float]) -> FloatArray:
         """T (15, q) of the zeros δ1 and δ2."""
         T = np.zeros((len(COLUMNS), len(self._names)))
@@ -405,17 +451,28 @@ class _Trials:
         return self._passes[angles][family.base]
 
 
-def _families() -> Iterator[list[Convention]]:
-    """Every convention without scale and zeros, those of the same angles and drive together."""
+def _families(passive: int | None = None) -> Iterator[list[Convention]]:
+    """Every convention without scale and zeros, those of the same angles and drive together.
+
+    The torque of a `passive` joint has no sign, and changes places with none.
+    """
     for swapped, sign, absolute, base in product(
         (False, True), (1, -1), (False, True), (False, True)
     ):
         angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
         torques = product((False, True), (1, -1), (1, -1))
-        yield [
+        every = [
             replace(angles, torques_swapped=swap, torque_signs=(one, two))
             for swap, one, two in torques
         ]
+        if passive is None:
+            yield every
+        elif not base:
+            yield [
+                one
+                for one in every
+                if not one.torques_swapped and one.torque_signs[passive - 1] > 0
+            ]
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:

@@ -196,18 +196,26 @@ def summed(
 
 
 def solved(
-    sums: ConventionSums, families: Sequence[Convention], T: FloatArray
+    sums: ConventionSums,
+    families: Sequence[Convention],
+    T: FloatArray,
+    passive: int | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Weighted least squares for each of F families with each T of (Z, 15, q), F Z fits.
 
-    Gives c (F Z, q), shares left (F Z, 2) and covariances (F Z, q, q).
+    Gives c (F Z, q), shares left (F Z, 2) and covariances (F Z, q, q). The torque of a `passive`
+    joint (1 or 2) is none: what is left there is a share of what acts on it, summed over the
+    columns, as constants near nothing leave nothing of it.
     """
+    motorless = None if passive is None else passive - 1
     order = np.array([[1, 0] if family.torques_swapped else [0, 1] for family in families])
     signs = np.array([family.torque_signs for family in families])
     cross = signs[:, :, None] * sums.cross[[0, 1], :, order]
     power = np.repeat(np.maximum(sums.power, _LEAST_POWER)[order], T.shape[0], axis=0)
     gram = np.tile(T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None], (len(families), 1, 1, 1))
     aimed = np.einsum("zxi,fax->fzai", T, cross).reshape(len(power), 2, -1)
+    if motorless is not None:
+        power[:, motorless] = power[:, 1 - motorless]
     weight = 1 / power
     ridge = 1e-12 * np.eye(T.shape[2])
     for _ in range(_REWEIGHTINGS):
@@ -216,9 +224,12 @@ def solved(
         scale = size[:, :, None] * size[:, None, :]
         inverse = np.linalg.inv(normal / scale + ridge) / scale
         c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)
-        squares = (
-            power - 2 * np.einsum("zai,zi->za", aimed, c) + np.einsum("zi,zaij,zj->za", c, gram, c)
-        )
+        model = np.einsum("zi,zaij,zj->za", c, gram, c)
+        squares = power - 2 * np.einsum("zai,zi->za", aimed, c) + model
+        if motorless is not None:
+            acting = np.einsum("zaii,zi->za", gram, c**2)[:, motorless]
+            power[:, motorless] = np.maximum(acting, _LEAST_POWER)
+            squares[:, motorless] = model[:, motorless]
         squares = np.maximum(squares, _FLOOR * power)
         weight = sums.independent / squares
     return c, squares / power, inverse

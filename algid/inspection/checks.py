@@ -14,7 +14,7 @@ from algid.inspection.channels import (
     held_efforts,
     spikes,
 )
-from algid.inspection.conventions import is_right, judged, mend
+from algid.inspection.conventions import advised, is_right, judged, mend
 from algid.inspection.dynamics import dynamic_figures, gravity_findings
 from algid.inspection.findings import yielding
 from algid.inspection.sampling import rests, sampling
@@ -72,7 +72,8 @@ def examine(
     if mended is not None:
         found.append(mended.notice)
     elif gravity > 0 and (figures := dynamic_figures(log)) is not None:
-        found += gravity_findings(figures)
+        suspicion = gravity_findings(figures)
+        found += [] if suspicion is None else [advised(log, suspicion)]
     return tuple(found)
 
 

@@ -14,8 +14,16 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from algid.estimators.convention_search import Judgement, Recorded, judge_together
+from algid.estimators.convention_search import (
+    Candidate,
+    Judgement,
+    Recorded,
+    judge_together,
+    tried_together,
+    zeroed_together,
+)
 from algid.estimators.conventions import AS_READ, Convention
+from algid.inspection.dynamics import Suspicion
 from algid.log import ZEROS, Log, Origin, Reading
 from algid.notices import Notice, Remedy
 from algid.signals.segments import Segment, append, segments
@@ -65,13 +73,18 @@ class Mend:
     @property
     def remedy(self) -> Remedy:
         """The same settings by dotted names."""
-        flat: dict[str, Any] = {}
-        for name, value in self.settings.items():
-            if isinstance(value, Mapping):
-                flat |= {f"{name}.{key}": inner for key, inner in value.items()}
-            else:
-                flat[name] = value
-        return Remedy(flat)
+        return Remedy(_flat(self.settings))
+
+
+def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by dotted names."""
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            flat |= {f"{name}.{key}": inner for key, inner in value.items()}
+        else:
+            flat[name] = value
+    return flat
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
@@ -104,7 +117,8 @@ def recorded(log: Log, seconds: float = math.inf) -> Recorded | None:
     if longest is None:
         return None
     part = longest.part(0, int(min(len(longest), seconds / longest.dt)))
-    return Recorded(part.theta.copy(), part.tau.copy(), part.dt)
+    passive = log.origin.reading.passive
+    return Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive)
 
 
 def is_right(found: Judgement | None) -> bool:
@@ -162,6 +176,30 @@ def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> lis
         return [mend(log, found) for log, _ in logs]
     own = [mend(log, judged_together([each], gravity=gravity)) for log, each in logs]
     return [None if one is None or not one.another else one for one in own]
+
+
+def advised(log: Log, suspicion: Suspicion) -> Notice:
+    """The notice of a suspicion with what mends it: only what shows a real arm where it is tried."""
+    known = recorded(log)
+    tried = () if known is None else _tried(log, suspicion, known)
+    return replace(suspicion.notice, remedies=tuple(tried))
+
+
+def _tried(log: Log, suspicion: Suspicion, known: Recorded) -> Iterator[Remedy]:
+    """The remedies that are physical and explain the torque."""
+    if suspicion.weightless and _is_real(tried_together([known], AS_READ, gravity=False)):
+        yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
+        yield Remedy({"gravity": 0}, "for a horizontal plane")
+    found = [tried_together([known], guess) for guess in suspicion.guesses]
+    if suspicion.free_zero and not any(map(_is_real, found)):
+        found += [zeroed_together([known], guess) for guess in suspicion.guesses]
+    for one in found:
+        if one is not None and one.convincing:
+            yield Remedy(_flat(_settings(one.convention, log)))
+
+
+def _is_real(found: Candidate | None) -> bool:
+    return found is not None and found.convincing
 
 
 def _clauses(convention: Convention) -> Iterator[str]:

@@ -8,15 +8,14 @@ from a right one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray, regressor
+from algid.estimators.conventions import Convention
 from algid.log import Log
-from algid.notices import Notice, Remedy
+from algid.notices import Notice
 
 _RATE = 100.0
 _MOST_ROWS = 20_000
@@ -101,44 +100,58 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
     )
 
 
-def gravity_findings(figures: DynamicFigures) -> Iterator[Notice]:
-    """What a rough fit that explains the torques says of gravity: none, upwards, or sideways."""
+@dataclass(frozen=True)
+class Suspicion:
+    """What a rough fit says of gravity, and what may mend it, which is yet to be tried.
+
+    Parameters
+    ----------
+    notice : without remedies
+    guesses : conventions, the likeliest first
+    weightless : whether torques without weight would explain it
+    free_zero : whether any other zero of θ1 may mend it too
+    """
+
+    notice: Notice
+    guesses: tuple[Convention, ...] = ()
+    weightless: bool = False
+    free_zero: bool = False
+
+
+def gravity_findings(figures: DynamicFigures) -> Suspicion | None:
+    """What a rough fit that explains the torques says of gravity: none, upwards, or sideways.
+
+    None where it pulls down, or the motion does not tell.
+    """
     if figures.condition > 1e6 or figures.explained < 0.3:
-        return
+        return None
     left = 1 - figures.explained
     weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
-        compensated = Remedy({"effort": "gravity-compensated"}, "for such a driver")
-        level = Remedy({"gravity": 0}, "for a horizontal plane")
-        yield Notice("GRAVITY_COMPENSATED", remedies=(compensated, level))
-    elif figures.seen < 0.015 or figures.gravity_share < max(0.02, _OF_LEFT * left):
-        return  # the motion does not tell where gravity pulls
-    else:
-        yield from _of_turn(figures)
+        return Suspicion(Notice("GRAVITY_COMPENSATED"), weightless=True)
+    if figures.seen < 0.015 or figures.gravity_share < max(0.02, _OF_LEFT * left):
+        return None
+    return _of_turn(figures)
 
 
-def _of_turn(figures: DynamicFigures) -> Iterator[Notice]:
+def _of_turn(figures: DynamicFigures) -> Suspicion | None:
     """What is wrong where gravity does not pull down: inertia tells a torque's sign from an arm's.
 
     Torques the other way round turn inertia and friction round too; an arm that is seen from
     behind keeps both, and its gravity pulls upwards.
     """
-    negative = figures.inertia < 0
-    turn = math.remainder(figures.turn - 180 * negative, 360)
-    numbers = {"weight": figures.weight1}
+    torques = (-1, -1) if figures.inertia < 0 else (1, 1)
+    turn = math.remainder(figures.turn - 180 * (figures.inertia < 0), 360)
+    upwards = Notice("FLIPPED_SIGN", numbers={"weight": figures.weight1})
     if abs(figures.turn) <= 45:
-        return
+        return None
     if abs(turn) <= 45:
-        torques = Remedy({"tau1.sign": -1, "tau2.sign": -1}, "for torques the other way round")
-        yield Notice("FLIPPED_SIGN", numbers=numbers, remedies=(torques,))
-    elif abs(turn) > 135:
-        seen = Remedy({"signs": [-1, -1]}, "for an arm that is seen from behind")
-        yield Notice("FLIPPED_SIGN", numbers=numbers, remedies=(seen,))
-    else:
-        torques_too: dict[str, Any] = {"tau1.sign": -1, "tau2.sign": -1} if negative else {}
-        near = Remedy({"zero": "hanging" if turn > 0 else "upright", **torques_too})
-        other = Remedy({"theta1.offset": None, **torques_too}, "another zero")
-        yield Notice("WRONG_ZERO", numbers={"turn": turn}, remedies=(near, other))
+        return Suspicion(upwards, (Convention(torque_signs=(-1, -1)),))
+    if abs(turn) > 135:
+        return Suspicion(upwards, (Convention(signs=(-1, -1), torque_signs=(-1, -1)),))
+    quarter = math.copysign(math.pi / 2, -turn)
+    zero = Convention(torque_signs=torques, zero=(quarter, 0.0))
+    return Suspicion(Notice("WRONG_ZERO", numbers={"turn": turn}), (zero,), free_zero=True)
 
 
 def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:

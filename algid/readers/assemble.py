@@ -25,6 +25,9 @@ from algid.words import counted
 if TYPE_CHECKING:
     from algid.profile import Profile
 
+PASSIVE_TORQUE = 0.01
+"""Of the other joint's: more than what a torque's noise makes of a joint without a motor."""
+
 
 @dataclass(frozen=True, eq=False)
 class TableReader:
@@ -72,7 +75,10 @@ class TableReader:
         unwrapper = Unwrapper(self.origin.reading.unwrap)
         gatherer: Gatherer | None = None
         notices: tuple[Notice, ...] = ()
+        begun = False
         for table, said in self._samples(min(ROWS, most)):
+            if not begun:
+                notices, begun = self._of_passive(table), True
             if gatherer is not None and len(gatherer) + len(table) > most:
                 yield self._log(gatherer, notices)
                 gatherer, notices = None, ()
@@ -176,6 +182,25 @@ class TableReader:
         """The columns of a table without the torque of a joint that has no motor."""
         without = f"tau{self.origin.reading.passive}"
         return {name: values for name, values in table.columns.items() if name != without}
+
+    def _of_passive(self, table: SampleTable) -> tuple[Notice, ...]:
+        """That a joint which is called passive has a torque, where its column is there and holds one."""
+        passive, mapping = self.origin.reading.passive, self.origin.mapping
+        names = f"tau{passive}", f"tau{3 - (passive or 1)}"
+        if passive is None or not set(names) <= set(mapping):
+            return ()
+        own, other = (table.columns.get(name) for name in names)
+        if own is None or other is None or mapping[names[0]] == mapping[names[1]]:
+            return ()
+        size, driving = (float(np.sqrt(np.mean(np.square(values)))) for values in (own, other))
+        if not (np.isfinite(size) and size > PASSIVE_TORQUE * driving > 0):
+            return ()
+        numbers = {
+            "column": mapping[names[0]],
+            "joint": passive,
+            "percent": 100 * size / driving,
+        }
+        return (Notice("PASSIVE_TORQUE", numbers=numbers),)
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN

@@ -399,12 +399,18 @@ def _called(joint: str) -> set[str]:
     return {name, numbered[1].lstrip("0") or "0"} if numbered else {name}
 
 
+_NO_NAMES = frozenset(
+    ("", "ch", "channel", "col", "column", "data", "f", "field", "signal", "v", "value", "var", "x")
+)
+"""Stems that number the columns of a table, which say of none that it is a joint's angle."""
+
+
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
     """Angle columns by joint of the joints that are not read, named alike those in `angles`."""
     parts = {column: take_apart(column) for column in columns}
     parts |= _worded(parts)
     read = [parts[column] for column in angles]
-    kinds = {(name.stem, name.topic) for name in read}
+    kinds = {(name.stem, name.topic) for name in read if name.stem not in _NO_NAMES}
     joints = {name.joint for name in read}
     return {
         name.own: column

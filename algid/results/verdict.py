@@ -62,7 +62,7 @@ def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
     """The command to run first: with what mends the first reason, or `algid inspect` where the cause is not known."""
     causes = [one for one in reasons if one.code in (*CAUSES, "UNKNOWN_CAUSE")]
     remedy = causes[0].remedy if causes else None
-    if remedy is not None:
+    if remedy is not None and "accept" not in remedy.settings:  # to accept a cause mends nothing
         return again(result, remedy.flags)
     if causes:
         return visible(shlex.join(["algid", "inspect", result.log.path]), LONGEST_COMMAND)

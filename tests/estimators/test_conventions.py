@@ -21,7 +21,8 @@ from algid.estimators.convention_search import (
 )
 from algid.estimators.convention_sums import ZEROED
 from algid.estimators.conventions import AS_READ, Convention
-from algid.synth.simulator import SimulatedMotion
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import SimulatedMotion, simulate
 from tests.estimators.conftest import DT, Bench
 
 Pair = tuple[FloatArray, FloatArray]
@@ -189,6 +190,26 @@ def test_logs_of_an_arm_are_judged_together(bench: Bench) -> None:
         assert found is not None
         assert found.alone
         assert found.best.convention == mistake
+
+
+@pytest.mark.parametrize("passive", [1, 2])
+@pytest.mark.parametrize("mistake", ["none", "both torques", "theta2", "hanging", "absolute"])
+def test_an_arm_with_one_motor_tells_its_convention(
+    bench: Bench, passive: int, mistake: str
+) -> None:
+    """Of the joint without one no torque is known, and its equation holds nevertheless."""
+    k, wide = bench.arm.constants(), wide_multi_sine(bench.arm, 3)
+    motors = np.array([[float(passive != 1)], [float(passive != 2)]])
+    motion = simulate(k, lambda times: wide(times) * motors, np.arange(4001) * DT)
+    theta, tau = measured(motion, coulomb=0.0)
+    read = theta, tau * motors
+    if mistake != "none":
+        read = spoiled(mistake, *read)
+    found = judge_together([Recorded(*read, DT, passive)])
+    assert found is not None
+    assert found.alone
+    assert (found.best.convention == AS_READ) == (mistake == "none")
+    np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
 
 
 def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:

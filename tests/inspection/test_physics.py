@@ -16,7 +16,7 @@ import pytest
 from algid.arm import Arm, inverse_dynamics
 from algid.cli.settings import profile_from
 from algid.estimators.conventions import AS_READ, Convention
-from algid.inspection.conventions import Mend, judged, mend
+from algid.inspection.conventions import Mend, advised, judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures, gravity_findings
 from algid.log import Log, Origin, Reading
@@ -76,7 +76,7 @@ def test_a_rough_fit_finds_the_weights_of_the_arm(rate: float) -> None:
     assert found.explained > 0.9999
     assert found.turn == pytest.approx(0, abs=1)
     assert found.gravity_share > 0.1
-    assert [*gravity_findings(found)] == []
+    assert gravity_findings(found) is None
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,8 @@ def test_gravity_is_found_turned_as_far_as_the_zero_is(degrees: float, told: str
     """cos(θ1 read - δ) pulls where algid expects cos(θ1 read): δ of the turn."""
     found = figures_of(swung(math.radians(degrees)))
     assert math.remainder(found.turn - degrees, 360) == pytest.approx(0, abs=1.5)
-    assert [one.code for one in gravity_findings(found)] == ([] if told is None else [told])
+    suspicion = gravity_findings(found)
+    assert (None if suspicion is None else suspicion.notice.code) == told
 
 
 @pytest.mark.parametrize(
@@ -103,16 +104,46 @@ def test_gravity_is_found_turned_as_far_as_the_zero_is(degrees: float, told: str
 def test_inertia_tells_torques_that_are_turned_from_an_arm_seen_from_behind(
     degrees: float, gain: int, settings: dict[str, Any]
 ) -> None:
-    (told,) = gravity_findings(figures_of(swung(math.radians(degrees), gain=gain)))
-    assert told.remedies[0].settings == settings
+    log = swung(math.radians(degrees), gain=gain)
+    suspicion = gravity_findings(figures_of(log))
+    assert suspicion is not None
+    (remedy,) = advised(log, suspicion).remedies
+    assert remedy.settings == settings
+
+
+def test_the_zero_of_an_advice_has_its_number() -> None:
+    log = swung(math.radians(70), gain=-1)
+    suspicion = gravity_findings(figures_of(log))
+    assert suspicion is not None
+    (remedy,) = advised(log, suspicion).remedies
+    assert remedy.complete
+    assert [remedy.settings[f"tau{joint}.sign"] for joint in (1, 2)] == [-1, -1]
+    # 0.6° is what the sums over windows at 125 Hz leave
+    assert remedy.settings["offsets"] == pytest.approx([math.radians(-70), 0.0], abs=0.01)
+
+
+def test_an_advice_that_helps_nothing_is_not_given() -> None:
+    """Torques of noise: whatever the suspicion, no convention shows an arm in them."""
+    log = swung()
+    noise = replace(log, tau=np.random.default_rng(3).standard_normal(log.tau.shape))
+    suspicion = gravity_findings(figures_of(swung(gain=-1)))
+    assert suspicion is not None
+    assert suspicion.guesses
+    assert advised(noise, suspicion).remedies == ()
+    weightless = gravity_findings(figures_of(swung(weight=False)))
+    assert weightless is not None
+    assert len(advised(swung(weight=False), weightless).remedies) == 2
+    assert advised(noise, weightless).remedies == ()
 
 
 def test_a_torque_the_other_way_round_pulls_upwards_and_says_so() -> None:
-    (told,) = gravity_findings(figures_of(swung(gain=-1)))
-    assert told.code == "FLIPPED_SIGN"
-    assert told.text.startswith(f"gravity pulls upwards (k4 = {-K[3]:.3g} N m)")
-    (sideways,) = gravity_findings(figures_of(swung(math.radians(-90))))
-    assert re_turn(sideways.text) == pytest.approx(-90, abs=1)
+    told = gravity_findings(figures_of(swung(gain=-1)))
+    assert told is not None
+    assert told.notice.code == "FLIPPED_SIGN"
+    assert told.notice.text.startswith(f"gravity pulls upwards (k4 = {-K[3]:.3g} N m)")
+    sideways = gravity_findings(figures_of(swung(math.radians(-90))))
+    assert sideways is not None
+    assert re_turn(sideways.notice.text) == pytest.approx(-90, abs=1)
 
 
 def re_turn(text: str) -> float:
@@ -122,13 +153,14 @@ def re_turn(text: str) -> float:
 def test_an_arm_without_weight_and_one_that_stands_still() -> None:
     found = figures_of(swung(weight=False))
     assert found.gravity_share == pytest.approx(0, abs=1e-3)
-    (told,) = gravity_findings(found)
-    assert told.code == "GRAVITY_COMPENSATED"
+    told = gravity_findings(found)
+    assert told is not None
+    assert told.notice.code == "GRAVITY_COMPENSATED"
     still = replace(swung(), theta=np.zeros((2, 8000)), tau=np.zeros((2, 8000)))
     figures = figures_of(still)
     assert figures.condition == math.inf
     assert figures.seen == pytest.approx(0, abs=1e-12)
-    assert [*gravity_findings(figures)] == []
+    assert gravity_findings(figures) is None
 
 
 def test_noise_is_not_gravitys() -> None:
@@ -201,7 +233,8 @@ UP, ASIDE = replace(SURE, turn=170), replace(SURE, turn=-90)
     ],
 )
 def test_each_limit_of_what_is_said_of_gravity(figures: DynamicFigures, code: str | None) -> None:
-    assert [one.code for one in gravity_findings(figures)] == ([] if code is None else [code])
+    suspicion = gravity_findings(figures)
+    assert (None if suspicion is None else suspicion.notice.code) == code
 
 
 def judgement(

@@ -5,6 +5,7 @@ blocks add up.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,22 @@ def test_numbers_that_are_none_are_refused_or_left_out(wrong: float, found: str)
     assert (said.text, said.lossy) == ("1 sample holds a number that is not finite; left out", True)
     # the torque of a joint without motor may be anything
     assert len(reader(4, 6, tau2=values, settings={"passive": 2}).whole()) == 10
+
+
+@pytest.mark.parametrize("share", [0.0, 0.005, 0.02])
+def test_a_torque_of_a_joint_called_passive_is_warned_of(share: float) -> None:
+    """Once, from the first samples; the other joint's own column in its place is none."""
+    other = np.sin(np.arange(200))
+    log = reader(100, 100, tau1=other, tau2=share * other, settings={"passive": 2})
+    blocks = list(log.blocks(100))
+    found = [notice for block in blocks for notice in block.notices]
+    told = [notice for notice in found if notice.code == "PASSIVE_TORQUE"]
+    assert [notice.numbers["percent"] for notice in told] == (
+        [pytest.approx(2.0)] if share == 0.02 else []
+    )
+    assert not any(block.tau[1].any() for block in blocks)
+    shared = replace(log.origin, mapping={**MAPPING, "tau2": MAPPING["tau1"]})
+    assert "PASSIVE_TORQUE" not in codes(replace(log, origin=shared).whole())
 
 
 def test_large_numbers_are_no_error() -> None:

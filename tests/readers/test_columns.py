@@ -283,6 +283,12 @@ def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
     }
 
 
+@pytest.mark.parametrize("named", ["column {}", "Var{}", "data[{}]", "x{}", "Unnamed: {}"])
+def test_columns_that_are_only_numbered_are_no_joints(named: str) -> None:
+    columns = [named.format(number) for number in range(1, 8)]
+    assert other_joints(columns, columns[1:3]) == {}
+
+
 def test_the_first_of_two_clocks_of_one_name_and_the_only_torque() -> None:
     assert choose(["t", "T", "q1", "q2", "tau1", "tau2"]).columns["t"] == "t"
     assert choose(["T", "t", "q1", "q2", "tau1", "tau2"]).columns["t"] == "T"
