@@ -232,6 +232,11 @@ def _longest_key(line: str) -> int:
 
 def first_misfit(error: ValidationError) -> str:
     """Where a pydantic model was not met, what was expected and what was found, in one line."""
+    return ": ".join(misfit(error))
+
+
+def misfit(error: ValidationError) -> tuple[str, str]:
+    """Where a pydantic model was not met; and what was expected and what was found."""
     first, *others = error.errors(include_url=False, include_context=False)
     place = ".".join(str(part) for part in first["loc"]) or "top level"
     more = f" (and {len(others)} more)" if others else ""
@@ -242,7 +247,7 @@ def first_misfit(error: ValidationError) -> str:
     else:  # a unit or a code keeps its capitals
         words = first["msg"].partition(", unable to parse")[0]
         said = f"{words[:1].lower()}{words[1:]}".replace("input should be", "expected", 1)
-    return f"{place}: {said}, found {reprlib.repr(first['input']):.60}{more}"
+    return place, f"{said}, found {reprlib.repr(first['input']):.60}{more}"
 
 
 EXISTS = "{}: exists already; choose another folder with -o, or replace it with --force"

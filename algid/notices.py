@@ -182,18 +182,29 @@ class _Words(string.Formatter):
 
     def format_field(self, value: Any, spec: str) -> str:
         """One value as `spec` has it."""
+        if spec[:1] == "~":
+            return self._where_there_is_one(value, spec[1:])
         if "|" in spec:
-            one, many = spec.removeprefix("# ").split("|")
+            shown, _, words = spec.rpartition("# ")
+            one, many = words.split("|")
             count = len(value) if isinstance(value, list | tuple) else value
-            return (
-                counted(count, one, many) if spec.startswith("# ") else one if count == 1 else many
-            )
+            if words != spec:
+                return shown + counted(count, one, many)
+            return one if count == 1 else many
         if isinstance(value, list | tuple):
             return joined(list(map(str, value)))
         return str(format(value, spec))
 
+    def _where_there_is_one(self, value: Any, spec: str) -> str:
+        """What stands behind ``~``, # for the value; empty where that is 0, None or empty."""
+        if not value:
+            return ""
+        if "|" in spec:
+            return self.format_field(value, spec)
+        return spec.replace("#", str(value))
 
-MESSAGES: Mapping[str, str] = {
+
+MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     # of estimates
     "NOT_IDENTIFIABLE": "{names} {names:is|are} not identifiable",
     "NOT_SIGNIFICANT": "{names} {names:is|are} not significant: zero lies within the 95 % interval",
@@ -202,6 +213,13 @@ MESSAGES: Mapping[str, str] = {
     "NOT_CONVERGED": "{names} {names:is|are} not converged",
     "WIDE_INTERVAL": "the 95 % interval of {names} is wide",
     "FAR_FROM_TRUTH": "{names} {names:lies|lie} far from the truth",
+    "OPEN_DIRECTION": {
+        "alone": "{names} is not determined{why}",
+        "sum": "{names} only as a sum{why}",
+        "difference": "{names} only as a difference{why}",
+        "ratio": "{names} only as {ratio:.3g} times the first plus the second{why}",
+        "several": "{names} only in {count:# combination|combinations}{why}",
+    },
     # of a fit
     "LITTLE_EXPLAINED": "the model explains only {percent:.0f} % of the torque of joint "
     "{joint}{band}",
@@ -401,6 +419,41 @@ MESSAGES: Mapping[str, str] = {
     "STRAY_MESSAGES": "{count:# message|messages} of no topic that the table 'topics' lists; left "
     "out",
     "MISSING_MESSAGES": "the file counts {promised:# message|messages} and holds {found}",
+    "CUT_OFF": {
+        "row": "the last row, row {row:,}, breaks off and was dropped",
+        "record": ("the file breaks off: an unfinished record of {bytes:# byte|bytes}, left out"),
+        "chunk": (
+            "the file breaks off: an unfinished chunk of {bytes:# byte|bytes}, read as far as it "
+            "goes"
+        ),
+        "end": "the file breaks off behind its last whole record",
+        "bag": (
+            "the bag breaks off at byte {place} ({why}); of what follows nothing is read: "
+            "{bytes:# byte|bytes}"
+        ),
+        "index": (
+            "the bag's index does not agree with what stands in it ({why}); every chunk was read"
+        ),
+    },
+    "DAMAGED_CHUNK": {
+        "chunk": (
+            "{count:# damaged chunk|damaged chunks} left out; the first: {why}"
+            "{missing:~; # message is missing|messages are missing}"
+        ),
+        "row": (
+            "{count:# damaged row|damaged rows} left out; the first: {why}"
+            "{missing:~; # message is missing|messages are missing}"
+        ),
+    },
+    "TORN_CHUNK": (
+        "the last chunk breaks off: {taken:# message|messages} taken from its first {held} of "
+        "{bytes:# byte|bytes}{lost:~, about # is lost|are lost}; they could not be checked, since "
+        "the chunk's checksum covers all of it"
+    ),
+    "NO_CHECKSUM": {
+        "file": "the file has no checksums: damaged values would go unseen",
+        "values": "the file has no sums of its values, as algid's have: changes would go unseen",
+    },
     "BROKEN_RECORD": (
         "{bytes:# byte|bytes} in {places:# place|places}, the first at byte {first}, hold no "
         "whole record"
@@ -437,6 +490,16 @@ MESSAGES: Mapping[str, str] = {
     "EFFORT_ZERO": "{channel} is zero in every sample",
     "EFFORT_DENORMAL": "{channel} never exceeds {largest:.3g} N m: no torque",
     "EFFORT_CONSTANT": "{channel} is {value:.6g} N m in every sample",
+    "DEGREES": {
+        "signal": (
+            "{what} of joint {joint} are in degrees by the other signal"
+            "{unit:~; they are taken for # as told}"
+        ),
+        "reach": (
+            "angles reach {largest:.4g}: few arms turn that far in rad"
+            "{unit:~; they are taken for # as told}"
+        ),
+    },
     "HELD_EFFORT": (
         "{channel} keeps each value for {held:.3g} ms while the angle moves: it is {late:.3g} ms "
         "late in the mean, and "
@@ -495,10 +558,46 @@ MESSAGES: Mapping[str, str] = {
         "the plan leaves out {terms}: where they are estimated too, error bars are somewhat "
         "larger than predicted"
     ),
+    "DRIFTS": "{count:# drift|drifts}: {names}",
+    "CHANGED": (
+        "{robot} changed at once between {before} and {after}: {parameter} by {percent:+.2g} %"
+        "{count:~; # change in all|changes in all}"
+    ),
+    "STAND_OUT": "{count:# log stands out|logs stand out}: {names}",
+    "SCATTERED": (
+        "{few} of {robots:# robot|robots} have {logs} logs or fewer, none at the same time: where "
+        "their folders are sessions of one robot, name it in a manifest's column robot and run "
+        "algid batch again."
+    ),
+    "NOT_TESTED": {
+        "nameless": (
+            "{count:# log|logs} left out for want of a robot: give each robot's logs their own "
+            "folder, or name robots in a manifest."
+        ),
+        "undated": (
+            "No drift was looked for in {count:# log|logs} without a date: stamps count from "
+            "1970, or a manifest tells the time."
+        ),
+        "steady": (
+            "Drift was not tested for {count:# robot|robots}: fewer than {least} dated logs "
+            "within {months} months."
+        ),
+        "alone": ("Outliers were not tested for {count:# robot|robots}: fewer than {least} logs."),
+    },
     "NOT_REACHED": "no motion within the limits tells {names}",
     "BROKEN_OFF": "the search was broken off: this is the best motion until then",
 }
-"""Text by code; what is not here brings its own."""
+"""Text by code; of a code with several cases, by the number "case"."""
+_ANYWHERE = "{accepted:~; used nevertheless, as accept says}{looked_at:~ (in its first # s)}"
+"""What may stand behind the text of every code."""
+
+
+def _text(code: str, numbers: Mapping[str, Any]) -> str:
+    """What a notice says."""
+    form = MESSAGES[code]
+    if not isinstance(form, str):
+        form = form[numbers["case"]]
+    return _Words().vformat(form + _ANYWHERE, (), {"accepted": False, "looked_at": 0, **numbers})
 
 
 @dataclass(frozen=True)
@@ -530,9 +629,7 @@ class Notice:
         if self.text:
             return
         try:
-            object.__setattr__(
-                self, "text", _Words().vformat(MESSAGES[self.code], (), self.numbers)
-            )
+            object.__setattr__(self, "text", _text(self.code, self.numbers))
         except (LookupError, TypeError, ValueError) as error:
             raise ValueError(
                 f"code {self.code!r:.60}: it has no text for the numbers {sorted(self.numbers)}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from algid.errors import SettingError
-from algid.files import first_misfit, read_toml
+from algid.files import misfit, read_toml
 from algid.limits import PHYSICAL
 from algid.units import names_of, unit_of
 
@@ -257,12 +257,20 @@ class Profile(_Strict):
         return found
 
 
+class ProfileSettingError(SettingError):
+    """A profile has no such setting, or not with that value: `place` is its name, `why` what is wrong."""
+
+    def __init__(self, text: str, place: str = "", why: str = "") -> None:
+        super().__init__(text)
+        self.place, self.why = place, why
+
+
 def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     """The profile with settings over it, channel by channel.
 
     Raises
     ------
-    SettingError
+    ProfileSettingError
         If a setting or its value is not known.
     """
     merged = profile.model_dump(exclude_unset=True)
@@ -274,7 +282,8 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     try:
         found = Profile.model_validate(merged)
     except ValidationError as error:
-        raise SettingError(f"setting {first_misfit(error)}") from error
+        place, why = misfit(error)
+        raise ProfileSettingError(f"setting {place}: {why}", place, why) from error
     found._flags = frozenset(flags)
     return found
 

@@ -5,11 +5,14 @@ Remedies are written for a command line, a profile and Python alike.
 
 from __future__ import annotations
 
+import ast
 import json
 import tomllib
+from pathlib import Path
 
 import pytest
 
+import algid
 from algid.cli.settings import OF_PROFILE, profile_from
 from algid.notices import (
     MESSAGES,
@@ -131,3 +134,58 @@ def test_a_notice_is_plain_data() -> None:
         'zero = "hanging")'
     )
     assert json.dumps(dict(one.numbers)) == '{"turn": -90.0}'
+
+
+@pytest.mark.parametrize(
+    ("code", "numbers", "text"),
+    [
+        ("CUT_OFF", {"case": "end"}, "the file breaks off behind its last whole record"),
+        (
+            "DAMAGED_CHUNK",
+            {"case": "row", "count": 1, "why": "zeros", "missing": 0},
+            "1 damaged row left out; the first: zeros",
+        ),
+        (
+            "DAMAGED_CHUNK",
+            {"case": "chunk", "count": 2, "why": "zeros", "missing": 1200},
+            "2 damaged chunks left out; the first: zeros; 1,200 messages are missing",
+        ),
+        (
+            "DEGREES",
+            {"case": "reach", "largest": 90.0, "unit": "rad"},
+            "angles reach 90: few arms turn that far in rad; they are taken for rad as told",
+        ),
+        (
+            "OPEN_DIRECTION",
+            {"case": "several", "names": ["k1", "k3", "k5"], "count": 2, "why": ""},
+            "k1, k3 and k5 only in 2 combinations",
+        ),
+        (
+            "GAPS",
+            {"count": 1, "seconds": 2.0, "accepted": True, "looked_at": 30},
+            (
+                "1 gap, the longest 2 s; no window spans one; used nevertheless, as accept says "
+                "(in its first 30 s)"
+            ),
+        ),
+    ],
+)
+def test_cases_and_parts_of_a_text_follow_the_numbers(
+    code: str, numbers: dict[str, object], text: str
+) -> None:
+    assert Notice(code, numbers=numbers).text == text
+
+
+def test_an_unknown_case_is_refused() -> None:
+    with pytest.raises(ValueError, match="CUT_OFF"):
+        Notice("CUT_OFF", numbers={"case": "elsewhere"})
+
+
+def test_every_notice_of_the_code_is_made_of_numbers() -> None:
+    """Notices with a text of their own stand where results of earlier schemas are read alone."""
+    own = []
+    for path in sorted(Path(algid.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Notice":
+                own += [ast.literal_eval(node.args[0])] if len(node.args) > 1 else []
+    assert set(own) == {"EARLIER", "EARLIER_CAUSE"}

@@ -177,7 +177,7 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
     given = {name: value for name, value in flags.items() if value not in (None, [])}
     if not given:
         return None
-    from algid.profile import Profile, load_profile, with_settings
+    from algid.profile import Profile, ProfileSettingError, load_profile, with_settings
 
     file = given.pop("profile", None)
     found = load_profile(file) if file else Profile()
@@ -186,9 +186,9 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
         meaning = _meaning(name, text)
         try:
             found = with_settings(found, meaning)
-        except SettingError as error:
-            place, _, said = str(error).removeprefix("setting ").partition(": ")
-            raise SettingError(f"{flag(name)} (profile: {place}): {said}") from error
+        except ProfileSettingError as error:
+            where = f"{flag(name)} (profile: {error.place})"
+            raise SettingError(f"{where}: {error.why}") from error
     return found
 
 

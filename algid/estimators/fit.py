@@ -53,7 +53,7 @@ class Fit:
     quantile : float
         Half width of a 95 % interval in standard deviations, normal or Student's.
     status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"
-    unidentifiable : sentences that name what the logs leave open
+    unidentifiable : what the logs leave open
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator
     whiteness : outcome of the test on the innovations; None for the weak estimator
@@ -76,7 +76,7 @@ class Fit:
     intervals: Intervals
     quantile: float
     status: tuple[Status, ...]
-    unidentifiable: tuple[str, ...]
+    unidentifiable: tuple[Notice, ...]
     logs: tuple[LogInformation, ...]
     noise: tuple[NoiseLevels, ...] | None = None
     whiteness: Whiteness | None = None
@@ -258,7 +258,7 @@ def conclude(
         quantile=quantile,
         freedom=freedom,
         status=tuple("OK" if yes else "NOT_IDENTIFIABLE" for yes in known.determined),
-        unidentifiable=known.sentences,
+        unidentifiable=known.left_open,
         logs=tuple(logs),
         prior=prior,
         without=without,
@@ -282,7 +282,7 @@ def examined(
     covariance[np.ix_(free, free)] = found.covariance
     determined = dict(zip(free, found.determined, strict=True))
     every = tuple(determined.get(place, True) for place in range(len(names)))
-    return Identifiability(found.sentences, every, covariance)
+    return Identifiability(found.left_open, every, covariance)
 
 
 def _satterthwaite(

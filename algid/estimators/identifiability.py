@@ -24,7 +24,7 @@ rho     their autocorrelations, by scale and joint           (3, 2, lags)     1
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray, keep_arrays
 from algid.compiled import chi2_tail
 from algid.model import PARAMETERS, RIGID
+from algid.notices import Notice
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
 from algid.significance import LEVEL
 
@@ -53,7 +54,7 @@ STILL = 0.01  # rad: a joint that moves less has not moved
 class Identifiability:
     """Undetermined directions in words, which parameters are determined, and their covariance."""
 
-    sentences: tuple[str, ...]
+    left_open: tuple[Notice, ...]
     determined: tuple[bool, ...]
     covariance: FloatArray
 
@@ -87,7 +88,7 @@ def examine(
     # unsure.
     inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
     return Identifiability(
-        tuple(_sentences(names, null, size, moved)), determined, inverse * np.outer(size, size)
+        tuple(_left_open(names, null, size, moved)), determined, inverse * np.outer(size, size)
     )
 
 
@@ -145,35 +146,30 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
     )
 
 
-def _sentences(
+def _left_open(
     names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray
-) -> list[str]:
-    """What the directions `null` leave open, in words; `moved` (2,) in rad is why."""
-    still = [str(joint + 1) for joint in range(2) if moved[joint] < STILL]
-    reason = (
-        ": neither joint moved"
-        if len(still) == 2
-        else f": joint {still[0]} never moved"
-        if still
-        else ""
-    )
-    sentences = []
+) -> Iterator[Notice]:
+    """What the directions `null` leave open; `moved` (2,) in rad is why."""
+    still = [joint + 1 for joint in range(2) if moved[joint] < STILL]
+    why = f": joint {still[0]} never moved" if still else ""
+    why = ": neither joint moved" if len(still) == 2 else why
     for group in _groups(null):
         part = null[group]
         together = [names[row] for row in group]
         free = int(np.linalg.matrix_rank(part, tol=_SHARE))
         if free >= len(group):
-            sentences += [f"{name} is not determined{reason}" for name in together]
+            for name in together:
+                yield _open("alone", [name], why)
         elif len(group) == 2:
-            relation = _relation(
-                part[:, int(np.argmax(np.linalg.norm(part, axis=0)))] * size[group]
-            )
-            sentences.append(f"{together[0]} and {together[1]} only {relation}{reason}")
+            widest = int(np.argmax(np.linalg.norm(part, axis=0)))
+            case, ratio = _relation(part[:, widest] * size[group])
+            yield _open(case, together, why, ratio=ratio)
         else:
-            listed = ", ".join(together[:-1]) + f" and {together[-1]}"
-            count = len(group) - free
-            sentences.append(f"{listed} only in {count} combination{'s' * (count > 1)}{reason}")
-    return sentences
+            yield _open("several", together, why, count=len(group) - free)
+
+
+def _open(case: str, names: Sequence[str], why: str, **numbers: float) -> Notice:
+    return Notice("OPEN_DIRECTION", numbers={"case": case, "names": names, "why": why, **numbers})
 
 
 def _groups(null: FloatArray) -> list[list[int]]:
@@ -193,14 +189,16 @@ def _groups(null: FloatArray) -> list[list[int]]:
     return groups
 
 
-def _relation(direction: FloatArray) -> str:
-    """The determined relation of two parameters; `direction` is the undetermined one, own units."""
-    ratio = direction[1] / direction[0]
-    if abs(ratio + 1) < 0.15:
-        return "as a sum"
-    if abs(ratio - 1) < 0.15:
-        return "as a difference"
-    return f"as {-ratio:.3g} times the first plus the second"
+def _relation(direction: FloatArray) -> tuple[str, float]:
+    """What is determined of two parameters whose undetermined direction is given in their own units.
+
+    Their sum, their difference, or a number of times the first plus the second.
+    """
+    ratio = float(-direction[1] / direction[0])
+    for case, value in (("sum", 1.0), ("difference", -1.0)):
+        if abs(ratio - value) < 0.15:
+            return case, ratio
+    return "ratio", ratio
 
 
 SCALES = (1, 16, 64)

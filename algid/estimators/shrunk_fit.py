@@ -13,6 +13,7 @@ from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
 from algid.estimators.shrinkage import spread
+from algid.notices import Notice
 
 QUANTILE = 2.3
 """Half width of a 95 % interval in standard deviations from few logs: see `make run-to-run`."""
@@ -46,7 +47,7 @@ def concluded(
     """
     beta, H, _ = combine(shared, logs, beta, prior)
     given = (*shrinkage.names, *prior.absent)
-    statuses, sentences = _judged(shared.names, beta, H, given, moved)
+    statuses, left_open = _judged(shared.names, beta, H, given, moved)
     without = _left_out(shared, logs, beta, prior)
     each = merged(logs, groups)
     alone = without if len(each) == len(logs) else _left_out(shared, each, beta, prior)
@@ -62,7 +63,7 @@ def concluded(
         quantile=QUANTILE,
         freedom=wide.freedom,
         status=statuses,
-        unidentifiable=sentences,
+        unidentifiable=left_open,
         logs=tuple(logs),
         prior=prior,
         shrinkage=shrinkage,
@@ -74,10 +75,10 @@ def concluded(
 
 def _judged(
     names: Sequence[str], beta: FloatArray, H: FloatArray, shrunk: Sequence[str], moved: FloatArray
-) -> tuple[tuple[Status, ...], tuple[str, ...]]:
-    """Each parameter's status, and sentences about what is open.
+) -> tuple[tuple[Status, ...], tuple[Notice, ...]]:
+    """Each parameter's status, and what is open.
 
-    a term is never open, since physics bounds it.
+    A term is never open, since physics bounds it.
     """
     free = np.array([name not in shrunk for name in names])
     own = scaled_pinv(scaled_pinv(H)[np.ix_(free, free)])
@@ -86,7 +87,7 @@ def _judged(
     statuses: list[Status] = [
         "OK" if not yes or next(determined) else "NOT_IDENTIFIABLE" for yes in free
     ]
-    return tuple(statuses), judged.sentences
+    return tuple(statuses), judged.left_open
 
 
 def _left_out(

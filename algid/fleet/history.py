@@ -13,6 +13,7 @@ from algid.fleet.changes import with_stints
 from algid.fleet.drift import FEWEST, SPAN, windows
 from algid.fleet.findings import mislabelled, outliers
 from algid.limits import LIMITS
+from algid.notices import Notice
 from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.progress import Progress
 from algid.words import counted
@@ -184,31 +185,24 @@ class History:
         return found.sort(pl.col("p"), "robot", "parameter")
 
     @property
-    def untested(self) -> list[str]:
-        """What was not looked for, and why: a sentence each."""
+    def untested(self) -> list[Notice]:
+        """What was not looked for, and why."""
         import polars as pl
 
         undated = int(self.roster["undated"].sum())
         steady = self.roster.filter(~pl.col("tested")).height
         alone = self.roster.filter(pl.col("logs") < FEWEST_PEERS).height
-        why = {
-            f"{counted(self.nameless, 'log')} left out for want of a robot: give each robot's "
-            "logs their own folder, "
-            "or name robots in a manifest.": self.nameless,
-            f"No drift was looked for in {counted(undated, 'log')} without a date: stamps count "
-            "from 1970, or a "
-            "manifest tells the time.": undated,
-            f"Drift was not tested for {counted(steady, 'robot')}: fewer than {FEWEST} dated logs "
-            f"within {SPAN} "
-            "months.": steady,
-            f"Outliers were not tested for {counted(alone, 'robot')}: fewer than {FEWEST_PEERS} "
-            "logs.": alone,
-        }
-        return [sentence for sentence, count in why.items() if count]
+        reasons: list[dict[str, Any]] = [
+            {"case": "nameless", "count": self.nameless},
+            {"case": "undated", "count": undated},
+            {"case": "steady", "count": steady, "least": FEWEST, "months": SPAN},
+            {"case": "alone", "count": alone, "least": FEWEST_PEERS},
+        ]
+        return [Notice("NOT_TESTED", numbers=one) for one in reasons if one["count"]]
 
     @property
-    def scattered(self) -> str:
-        """A sentence where folders may have made many robots of one; empty otherwise.
+    def scattered(self) -> Notice | None:
+        """That folders may have made many robots of one; None otherwise.
 
         Most robots have a log or two, and no two were logged in the same time.
         """
@@ -216,13 +210,8 @@ class History:
         few = int((self.roster["logs"] <= FEW).sum())
         apart = (dated["first"].shift(-1) > dated["last"]).head(-1).all() if len(dated) else False
         if self.robots < MANY or 2 * few <= self.robots or not (apart or not len(dated)):
-            return ""
-        return (
-            f"{few} of {counted(self.robots, 'robot')} have {FEW} logs or fewer, none at the same "
-            "time: where their "
-            "folders are sessions of one robot, name it in a manifest's column robot and run "
-            "algid batch again."
-        )
+            return None
+        return Notice("SCATTERED", numbers={"few": few, "robots": self.robots, "logs": FEW})
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""
@@ -232,7 +221,7 @@ class History:
         rows = {
             name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()
         }
-        return {**rows, "untested": self.untested}
+        return {**rows, "untested": [one.text for one in self.untested]}
 
 
 def history_of(path: Path, progress: Progress | None = None) -> History:

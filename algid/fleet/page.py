@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from algid import __version__
@@ -36,6 +37,9 @@ from algid.report.frame import page
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
 from algid.words import counted
+
+if TYPE_CHECKING:
+    import polars as pl
 
 READING = (
     "Read: each parameter has one scale of change for all robots; the band is the 95 % interval "
@@ -222,50 +226,46 @@ def verdict(history: History) -> Verdict:
         statement += f" (p = {p})" + (
             "" if row["drift"] else f", which does not pass p < {ALPHA:g}"
         )
-    found = [Notice("DRIFTS", _drifting(history))] if drifts else []
-    changed = 0 if history.changes is None else history.changes.n_unique(["robot", "after"])
-    if changed:
-        found.append(Notice("CHANGED", _changes(history, changed)))
+    found = [_drifting(history)] if drifts else []
+    if history.changes is not None and history.changes.height:
+        found.append(_changed(history.changes))
     if findings:
-        found.append(Notice("STAND_OUT", _standing_out(history)))
-    if history.scattered:
-        found.append(Notice("SCATTERED", history.scattered))
-    return graded(statement, [*found, *(Notice("NOT_TESTED", why) for why in history.untested)])
+        found.append(_standing_out(history))
+    if history.scattered is not None:
+        found.append(history.scattered)
+    return graded(statement, [*found, *history.untested])
 
 
-def _drifting(history: History) -> str:
+def _drifting(history: History) -> Notice:
     """How many parameters drift, and the clearest ones."""
     shown = history.drifts.head(MOST_NAMED).select("robot", "parameter").rows()
-    words = [f"{parameter} of {visible(robot)}" for robot, parameter in shown]
+    names = [f"{parameter} of {visible(robot)}" for robot, parameter in shown]
     rest = history.drifts.height - len(shown)
     if rest:
-        words.append(f"{rest} more")
-    return f"{counted(history.drifts.height, 'drift')}: {joined(words)}"
+        names.append(f"{rest} more")
+    return Notice("DRIFTS", numbers={"count": history.drifts.height, "names": names})
 
 
-def _standing_out(history: History) -> str:
+def _standing_out(history: History) -> Notice:
     """How many logs stand out, and the ones that do so most."""
     import polars as pl
 
     worst = history.findings.sort(pl.col("sigmas").abs(), descending=True)
     rows = worst.head(MOST_NAMED).select("job", "parameter", "sigmas").rows()
-    words = [
+    names = [
         f"{visible(job)} ({parameter}, {significant(sigmas, 2)} σ)"
         for job, parameter, sigmas in rows
     ]
     rest = worst.height - len(rows)
     if rest:
-        words.append(f"{rest} more")
-    return f"{counted(worst.height, 'log stands out', 'logs stand out')}: {joined(words)}"
+        names.append(f"{rest} more")
+    return Notice("STAND_OUT", numbers={"count": worst.height, "names": names})
 
 
-def _changes(history: History, count: int) -> str:
-    """The first change in words, and how many there are."""
-    assert history.changes is not None
-    row = history.changes.row(0, named=True)
-    words = (
-        f"{visible(row['robot'])} changed at once between {row['before'].date()} and "
-        f"{row['after'].date()}: "
-        f"{row['parameter']} by {100 * row['share']:+.2g} %"
-    )
-    return words if count == 1 else f"{words}; {counted(count, 'change')} in all"
+def _changed(changes: pl.DataFrame) -> Notice:
+    """The first change, and how many there are where it is not alone."""
+    row, count = changes.row(0, named=True), changes.n_unique(["robot", "after"])
+    numbers = {name: str(row[name].date()) for name in ("before", "after")}
+    numbers |= {"robot": visible(row["robot"]), "parameter": row["parameter"]}
+    more = {"percent": 100 * row["share"], "count": count if count > 1 else 0}
+    return Notice("CHANGED", numbers={**numbers, **more})

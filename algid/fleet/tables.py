@@ -59,7 +59,8 @@ def robot_table(history: History) -> Table:
         if shown.height == history.robots
         else f"{counted(history.robots, 'robot')}; the first {shown.height} are shown."
     )
-    note = " ".join(filter(None, (note, history.scattered)))
+    if history.scattered is not None:
+        note = f"{note} {history.scattered.text}".strip()
     table = Table("Robots", columns, rows, note)
     return table if changed else table.without(("Changed",))
 

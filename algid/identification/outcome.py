@@ -243,7 +243,7 @@ def fit_summary(
             for joint in range(2)
             if tests is not None
         },
-        unidentifiable=list(fit.unidentifiable),
+        unidentifiable=[one.text for one in fit.unidentifiable],
         model=results.TorqueModel(
             terms=list(chosen.model.terms),
             coulomb_speed=chosen.model.coulomb_speed,

@@ -32,7 +32,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     yield from fit.notes
     if not fit.converged and not any(note.code == "NOT_FEASIBLE" for note in fit.notes):
         yield Notice("REFINED_FAILED")
-    yield from (Notice("OPEN_DIRECTION", sentence) for sentence in fit.unidentifiable)
+    yield from fit.unidentifiable
     if fit.shared.model.gravity == 0:
         needed = fit.shared.payload and not fit.shared.lengths
         yield Notice(

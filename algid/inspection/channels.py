@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,14 +148,13 @@ def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
     for joint, ratio in enumerate(ratios, start=1):
         for what, quantity, factor in pairs:
             if len(log) > 20 and 0.8 < ratio / factor < 1.25:
-                text = f"{what} of joint {joint} are in degrees by the other signal"
-                yield _in_degrees(log, f"{quantity}{joint}", text)
+                seen = {"case": "signal", "what": what, "joint": joint}
+                yield _in_degrees(log, f"{quantity}{joint}", seen)
     widest = np.abs(log.theta).max(axis=1)
     row = int(np.argmax(widest))
     if widest[row] > 12 * math.pi and not any(ratios) and not is_right():
-        yield _in_degrees(
-            log, f"theta{row + 1}", f"angles reach {widest[row]:.4g}: few arms turn that far in rad"
-        )
+        seen = {"case": "reach", "largest": float(widest[row])}
+        yield _in_degrees(log, f"theta{row + 1}", seen)
 
 
 def _travelled_over_summed(log: Log, row: int) -> float:
@@ -171,11 +171,11 @@ def _travelled_over_summed(log: Log, row: int) -> float:
     return float(np.sum(travelled[moving])) / total if total > 0 else 0.0
 
 
-def _in_degrees(log: Log, name: str, text: str) -> Notice:
+def _in_degrees(log: Log, name: str, seen: Mapping[str, Any]) -> Notice:
     """Refused, unless the user has said the unit of the channel `name`."""
     if log.origin.reading.told(name):
         unit = log.origin.reading.channels[name].unit
-        return Notice("DEGREES", f"{text}; they are taken for {unit} as told")
+        return Notice("DEGREES", numbers={**seen, "unit": unit})
     remedies = [
         Remedy({"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"})
     ]
@@ -184,7 +184,8 @@ def _in_degrees(log: Log, name: str, text: str) -> Notice:
             Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear")
         )
     remedies.append(Remedy({f"{name}.unit": "rad"}, "where it is right"))
-    return Notice("DEGREES", text, refuse=True, remedies=tuple(remedies))
+    numbers = {**seen, "unit": None}
+    return Notice("DEGREES", numbers=numbers, refuse=True, remedies=tuple(remedies))
 
 
 def spikes(log: Log) -> Iterator[Notice]:

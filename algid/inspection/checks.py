@@ -96,5 +96,10 @@ def noticed(
     refused = next((finding for finding in findings if finding.refuse), None)
     if refused is not None and whole:
         raise LogError(f"{log.origin.path}: {refused.code}: {refused.clause}")
-    place = "" if whole else f" (in its first {log.duration:.0f} s)"
-    return tuple(replace(one, text=f"{one.text}{place}", refuse=False) for one in findings)
+    looked_at = 0 if whole else round(log.duration)
+    return tuple(
+        replace(one, text="", numbers={**one.numbers, "looked_at": looked_at}, refuse=False)
+        if looked_at
+        else replace(one, refuse=False)
+        for one in findings
+    )

@@ -48,11 +48,7 @@ def yielding(notice: Notice, accepted: Collection[str]) -> Notice:
     if not notice.refuse:
         return notice
     if notice.code in accepted:
-        return replace(
-            notice,
-            refuse=False,
-            remedies=(),
-            text=f"{notice.text}; used nevertheless, as accept says",
-        )
+        numbers = {**notice.numbers, "accepted": True}
+        return replace(notice, refuse=False, remedies=(), text="", numbers=numbers)
     override = Remedy({"accept": notice.code}, "to use it nevertheless")
     return replace(notice, remedies=(*notice.remedies, override))

@@ -332,8 +332,7 @@ def _complete(
     if held is None:
         return
     if lost == 1 and cut_off:
-        text = f"the last row, row {rows:,}, breaks off and was dropped"
-        yield held, (Notice("CUT_OFF", text, lossy=True),)
+        yield held, (Notice("CUT_OFF", numbers={"case": "row", "row": rows}, lossy=True),)
     elif lost:
         if lost == rows:
             raise LogError(

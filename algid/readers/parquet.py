@@ -36,9 +36,7 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _NO_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless")
-_NO_SUMS = Notice(
-    "NO_CHECKSUM", "the file has no sums of its values, as algid's have: changes would go unseen"
-)
+_NO_SUMS = Notice("NO_CHECKSUM", numbers={"case": "values"})
 
 
 def open_parquet(path: Path, profile: Profile) -> TableReader:

@@ -125,7 +125,9 @@ def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
 def test_directions_without_information_are_put_in_words() -> None:
     S = 1e8 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
     known = examine(("k1", "k3", "k5"), np.array([0.02, 0.05, 0.04]), S, np.array([1.0, 0.001]))
-    assert known.sentences == ("k3 and k5 only as a sum: joint 2 never moved",)
+    assert tuple(one.text for one in known.left_open) == (
+        "k3 and k5 only as a sum: joint 2 never moved",
+    )
     assert known.determined == (True, False, False)
 
 

@@ -332,7 +332,7 @@ def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
 
 def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
     refusal, warning = (
-        Notice("STILL", "joint 2 is still", refuse=True),
+        Notice("EFFORT_ZERO", numbers={"channel": "tau2"}, refuse=True),
         Notice("RESTS", "the arm rests"),
     )
     assert yielding(warning, ()) == warning
@@ -341,11 +341,12 @@ def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
     assert named.refuse
     assert (
         named.clause
-        == 'joint 2 is still: to use it nevertheless: --accept STILL (profile: accept = ["STILL"])'
+        == "tau2 is zero in every sample: to use it nevertheless: --accept EFFORT_ZERO "
+        '(profile: accept = ["EFFORT_ZERO"])'
     )
-    accepted = yielding(refusal, ("RESTS", "STILL"))
+    accepted = yielding(refusal, ("RESTS", "EFFORT_ZERO"))
     assert not accepted.refuse
-    assert accepted.text == "joint 2 is still; used nevertheless, as accept says"
+    assert accepted.text == "tau2 is zero in every sample; used nevertheless, as accept says"
 
 
 def test_joints_that_turn_many_times_are_read_where_physics_holds_for_radians() -> None:

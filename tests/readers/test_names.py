@@ -133,7 +133,7 @@ def test_dialects(text: str, tmp_path: Path) -> None:
     found = read_log(tmp_path / "log.csv")
     assert found.theta.tolist() == [[1.5, 1.5], [2, 2]]
     assert found.tau.tolist() == [[3, 3], [4, 4]]
-    cut = [Notice("CUT_OFF", "the last row, row 3, breaks off and was dropped", lossy=True)]
+    cut = [Notice("CUT_OFF", numbers={"case": "row", "row": 3}, lossy=True)]
     assert [one for one in found.notices if one.lossy] == (cut if text.endswith("2") else [])
 
 

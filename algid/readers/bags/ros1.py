@@ -254,11 +254,9 @@ class _Outline:
 
     def broken(self, place: int, why: str) -> None:
         """Note that nothing is read from byte `place` on."""
-        rest = counted(self._file.size - place, "byte")
-        text = (
-            f"the bag breaks off at byte {place} ({why}); of what follows nothing is read: {rest}"
-        )
-        self._found.notices.append(Notice("CUT_OFF", text, lossy=True))
+        rest = self._file.size - place
+        numbers = {"case": "bag", "place": place, "why": why, "bytes": rest}
+        self._found.notices.append(Notice("CUT_OFF", numbers=numbers, lossy=True))
         self._found.damage.append(f"{why} at byte {place}")
 
     def layout(self) -> BagLayout:
@@ -266,9 +264,11 @@ class _Outline:
         found = self._found
         wrong, lost = self._wrong()
         if wrong and not found.notices:
-            damaged = Notice("DAMAGED_INDEX", numbers={"why": wrong})
-            cut = Notice("CUT_OFF", damaged.text, lossy=True)
-            found.notices.append(cut if lost else damaged)
+            if lost:
+                numbers = {"case": "index", "why": wrong}
+                found.notices.append(Notice("CUT_OFF", numbers=numbers, lossy=True))
+            else:
+                found.notices.append(Notice("DAMAGED_INDEX", numbers={"why": wrong}))
         found.agreed = found.agreed and not wrong and not found.notices
         found.span_ns = (min(self._times), max(self._times)) if self._times else None
         return found

@@ -395,19 +395,12 @@ def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -
         said.append(Notice("BROKEN_RECORD", numbers=numbers, lossy=True))
         found.damage += [f"no record at byte {gap.start}" for gap in inside]
     if last is not None:
-        length = counted(last.end - last.start, "byte")
-        piece = (
-            f"chunk of {length}, read as far as it goes"
-            if last.torn
-            else f"record of {length}, left out"
-        )
-        text = f"the file breaks off: an unfinished {piece}"
-        said.append(Notice("CUT_OFF", text, lossy=True))
+        case = "chunk" if last.torn else "record"
+        unfinished = {"case": case, "bytes": last.end - last.start}
+        said.append(Notice("CUT_OFF", numbers=unfinished, lossy=True))
         found.damage.append(f"it breaks off at byte {last.start}")
     elif ended is None:
-        said.append(
-            Notice("CUT_OFF", "the file breaks off behind its last whole record", lossy=True)
-        )
+        said.append(Notice("CUT_OFF", numbers={"case": "end"}, lossy=True))
     return said
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.log import IntArray
 from algid.notices import Notice
-from algid.words import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,33 +83,17 @@ class Account:
         said = []
         if self.spans:
             missing = self.lost if promised is None else promised - self.found
-            text = (
-                f"{counted(self.spans, f'damaged {self.what}')} left out; the first: {self.reason}"
-            )
-            counting = (
-                f"; {counted(missing, 'message is missing', 'messages are missing')}"
-                if missing
-                else ""
-            )
-            said.append(Notice("DAMAGED_CHUNK", text + counting, lossy=True))
+            damage = {"case": self.what, "count": self.spans, "why": self.reason}
+            numbers: dict[str, Any] = {**damage, "missing": missing}
+            said.append(Notice("DAMAGED_CHUNK", numbers=numbers, lossy=True))
         elif promised is not None and promised != self.found:
             numbers = {"promised": promised, "found": self.found}
             said.append(Notice("MISSING_MESSAGES", numbers=numbers, lossy=True))
         if self.torn:
             taken, held, size = self.torn
-            lost = (  # counted by the share of bytes
-                f"about {counted(round(taken * (size - held) / held), 'is lost', 'are lost')}"
-                if taken
-                else "the rest is lost"
-            )
-            text = (
-                f"the last chunk breaks off: {counted(taken, 'message')} taken from its first "
-                f"{held} of {counted(size, 'byte')}, {lost}; "
-                "they could not be checked, since the chunk's checksum covers all of it"
-            )
-            said.append(Notice("TORN_CHUNK", text, lossy=True))
+            numbers = {"taken": taken, "held": held, "bytes": size}
+            numbers["lost"] = round(taken * (size - held) / held) if taken else 0  # by their bytes
+            said.append(Notice("TORN_CHUNK", numbers=numbers, lossy=True))
         if self.unchecked:
-            said.append(
-                Notice("NO_CHECKSUM", "the file has no checksums: damaged values would go unseen")
-            )
+            said.append(Notice("NO_CHECKSUM", numbers={"case": "file"}))
         return said

@@ -44,7 +44,14 @@ _TELLING = (b"effort", b"tau_est", b"tau_J")
 
 
 class NothingFoundError(LogError):
-    """There is no such topic or message; damage to the file may be why."""
+    """There is no such topic or message; damage to the file may be why.
+
+    `lacking` is the text without the file's name.
+    """
+
+    def __init__(self, text: str, lacking: str = "") -> None:
+        super().__init__(text)
+        self.lacking = lacking or text
 
 
 @dataclass(frozen=True)
@@ -149,7 +156,7 @@ def _topic(
             f"there is no message on topic {name!r}; found {listed(source)}; name another: {_TOPIC}"
         )
         one = Remedy({"tau1.topic": None}, "for one channel")
-        raise NothingFoundError(f"{source.path}: {text}; {one}")
+        raise NothingFoundError(f"{source.path}: {text}; {one}", f"{text}; {one}")
     kind, missing, known, stamp = best
     for channel in missing:
         raise LogError(
@@ -230,10 +237,8 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     both = Remedy({"topic": None, "joints": None})
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
     there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(source)
-    raise NothingFoundError(
-        f"{source.path}: no topic holds {wanted}; found {there}; name topics and fields: {both}; "
-        f"{each}"
-    )
+    why = f"no topic holds {wanted}; found {there}; name topics and fields: {both}; {each}"
+    raise NothingFoundError(f"{source.path}: {why}", why)
 
 
 def _words(channels: Sequence[str]) -> list[str]:

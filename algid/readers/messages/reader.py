@@ -64,8 +64,7 @@ def open_messages(
                 raise
             places = list(dict.fromkeys(source.damage))
             where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
-            left = str(error).removeprefix(f"{source.path}: ")
-            text = f"the file is damaged ({where}); copy it again; in what is left: {left}"
+            text = f"the file is damaged ({where}); copy it again; in what is left: {error.lacking}"
             raise LogError(f"{source.path}: {text}") from error
         truth = source.truth()
         main = wanted.topics[0]
