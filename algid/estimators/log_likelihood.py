@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from operator import add
 
 import numpy as np
@@ -48,14 +48,45 @@ _SURE = 0.9
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
 
+@dataclass(eq=False)
+class _Innovations:
+    """The innovations (2, n) of a piece, `dt` s apart; of most passes nobody asks for their sums."""
+
+    joints: FloatArray
+    dt: float
+
+    @cached_property
+    def correlations(self) -> Correlations:
+        return correlations(self.joints)
+
+    @cached_property
+    def residual(self) -> ResidualSums:
+        return residual_sums(self.joints, self.dt)
+
+    def summed(self) -> _Innovations:
+        """The sums alone, without what they are made of."""
+        _ = self.correlations, self.residual
+        self.joints = np.empty((2, 0))
+        return self
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What one pass over pieces of a log gives."""
 
     information: LogInformation
     noise_score: VarianceScore | None
-    innovations: Correlations
-    residual: ResidualSums
+    pieces: tuple[_Innovations, ...]
+
+    @cached_property
+    def innovations(self) -> Correlations:
+        """Sums over the innovations."""
+        return reduce(add, [piece.correlations for piece in self.pieces])
+
+    @cached_property
+    def residual(self) -> ResidualSums:
+        """Sums that the innovations' spectrum is made of."""
+        return reduce(add, [piece.residual for piece in self.pieces])
 
 
 class LogEvidence:
@@ -148,7 +179,7 @@ class LogEvidence:
             first = self._linearise(c, _first_trajectory(piece), piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
-            gathered.take(self._linearise(c, theta, piece), piece.dt)
+            gathered.take(self._linearise(c, theta, piece), piece.dt).summed()
         return gathered.outcome(self.loaded, c)
 
     def improve_noise(self, outcome: Outcome) -> float:
@@ -194,15 +225,14 @@ def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:
 
 
 class _Gathered:
-    """A log's information and score, by stretches, and the sums over its innovations."""
+    """A log's information and score, by stretches, and its innovations."""
 
     def __init__(self) -> None:
         self._S, self._g = BlockSums(), BlockSums()
-        self._innovations: list[Correlations] = []
-        self._residual: list[ResidualSums] = []
+        self._pieces: list[_Innovations] = []
 
-    def take(self, linear: Linearised, dt: float) -> None:
-        """Add a piece, its samples `dt` s apart."""
+    def take(self, linear: Linearised, dt: float) -> _Innovations:
+        """Add a piece, its samples `dt` s apart; gives its innovations."""
         Z, w = linear.columns[:-1], linear.columns[-1]
         rows = 2 * _STRETCH
         count = -(-w.size // rows)
@@ -212,13 +242,10 @@ class _Gathered:
         gram = parts @ parts.swapaxes(1, 2)
         self._S.add(gram[:, :-1, :-1])
         self._g.add(gram[:, :-1, -1])
-        joints = np.ascontiguousarray(w.reshape(-1, 2).T)
-        self._innovations.append(correlations(joints))
-        self._residual.append(residual_sums(joints, dt))
+        self._pieces.append(_Innovations(np.ascontiguousarray(w.reshape(-1, 2).T), dt))
+        return self._pieces[-1]
 
     def outcome(self, loaded: bool, c: FloatArray, score: VarianceScore | None = None) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        return Outcome(
-            information, score, reduce(add, self._innovations), reduce(add, self._residual)
-        )
+        return Outcome(information, score, tuple(self._pieces))

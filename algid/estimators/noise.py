@@ -20,13 +20,16 @@ component  order: angle 1, angle 2, torque 1, torque 2  (4,)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
+from algid.signals.differences import POINTS
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
 _FED_BACK = (
@@ -192,7 +195,7 @@ def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
             _only(torques, 1),
         ]
     )
-    whitened = linear.solve(_by_row(directions))
+    whitened = linear.solve_in_place(_by_row(directions))
     joints = np.stack([_by_joint(row) for row in multipliers[:-1]])
     backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
     smears = linear.smeared(joints)
@@ -205,16 +208,34 @@ def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
 
 
 def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray:
-    signs = np.random.default_rng(seed)
-    probes = np.empty((_PROBES, 4, 2, rows // 2))
-    for probe in range(_PROBES):
-        z_tau = signs.choice([-1.0, 1.0], (2, rows // 2))
-        z_theta = signs.choice([-1.0, 1.0], (2, length))
+    H, first, n = linear.H, linear.first, rows // 2
+    on_torques, on_angles = _signs(seed, n, length)
+    probes = np.zeros((_PROBES, 4, 2, n))
+    products = np.empty((2, n))
+    for probe, angles in zip(probes, on_angles.astype(np.float64), strict=True):
         for joint in range(2):
-            probes[probe, joint] = forward(linear.H, _only(z_theta, joint), linear.first)
-            probes[probe, 2 + joint] = linear.smeared(_only(z_tau, joint))
-    whitened = linear.solve(_by_row(probes.reshape(-1, 2, rows // 2)))
-    return np.sum(whitened**2, axis=1).reshape(_PROBES, 4).mean(axis=0)
+            for point in range(POINTS):  # as `forward` of the one joint's signs
+                touched = angles[joint, first + point : first + point + n]
+                np.multiply(H[:, joint, point], touched, out=products)
+                probe[joint] += products
+    torques = linear.smeared(on_torques.astype(np.float64))
+    for joint in range(2):
+        probes[:, 2 + joint, joint] = torques[:, joint]
+    whitened = linear.solve_in_place(_by_row(probes.reshape(-1, 2, n)))
+    powers = np.sum(np.square(whitened, out=whitened), axis=1)
+    return np.asarray(powers.reshape(_PROBES, 4).mean(axis=0))
+
+
+@lru_cache(maxsize=32)
+def _signs(seed: int, torques: int, angles: int) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Random signs of torques (`_PROBES`, 2, n) and of angles (`_PROBES`, 2, N), the same for a piece in every pass."""
+    signs = np.random.default_rng(seed)
+    on_torques = np.empty((_PROBES, 2, torques), dtype=np.int8)
+    on_angles = np.empty((_PROBES, 2, angles), dtype=np.int8)
+    for probe in range(_PROBES):
+        on_torques[probe] = signs.choice([-1.0, 1.0], (2, torques))
+        on_angles[probe] = signs.choice([-1.0, 1.0], (2, angles))
+    return on_torques, on_angles
 
 
 def _by_joint(row: FloatArray) -> FloatArray:

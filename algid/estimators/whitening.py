@@ -70,6 +70,10 @@ class Linearised:
         """L⁻¹ of columns (m, 2 n)."""
         return triangular(self.factor, columns, "N")
 
+    def solve_in_place(self, columns: FloatArray) -> FloatArray:
+        """L⁻¹ of columns (m, 2 n), which are gone then."""
+        return triangular(self.factor, columns, "N", in_place=True)
+
     def solve_transposed(self, columns: FloatArray) -> FloatArray:
         """L⁻ᵀ of columns (m, 2 n)."""
         return triangular(self.factor, columns, "T")
@@ -83,17 +87,21 @@ class Linearised:
         return held_torque(padded)[..., 1:-1]
 
 
-def triangular(factor: FloatArray, columns: FloatArray, transposed: str) -> FloatArray:
+def triangular(
+    factor: FloatArray, columns: FloatArray, transposed: str, *, in_place: bool = False
+) -> FloatArray:
     """L⁻¹ of columns (m, 2 n), or L⁻ᵀ where `transposed` is "T" and not "N".
 
-    `factor` is L's band.
+    `factor` is L's band. With `in_place` the columns' memory takes the solution.
 
     Raises
     ------
     LinAlgError
         Where the band is singular.
     """
-    solution, info = lapack.dtbtrs(factor, columns.T, uplo="L", trans=transposed)
+    solution, info = lapack.dtbtrs(
+        factor, columns.T, uplo="L", trans=transposed, overwrite_b=in_place
+    )
     if info != 0:
         raise np.linalg.LinAlgError(f"banded substitution failed with info {info}")
     return solution.T
@@ -158,7 +166,7 @@ def linearise(
         parts = [J.swapaxes(0, 1), *extra, *parts]
     rows = np.concatenate(parts)
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
-    columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N")
+    columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N", in_place=True)
     return Linearised(columns, factor, H, first, error, stencil.held)
 
 
@@ -277,11 +285,13 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
     n = H.shape[-1]
     band = np.zeros((n, 2, 2 * POINTS))
     for lag in range(POINTS):
-        block = np.zeros((2, 2, n - lag))
+        block, products = np.zeros((2, 2, n - lag)), np.empty((2, 2, n - lag))
         for point in range(POINTS - lag):
             early, late = H[:, :, lag + point, : n - lag], H[:, :, point, lag:]
             for b in range(2):
-                block += early[:, None, b] * late[None, :, b]
+                # New memory for each product would take longer than the products.
+                np.multiply(early[:, None, b], late[None, :, b], out=products)
+                block += products
         for a in range(2):
             for other in range(2):
                 below = 2 * lag + other - a
