@@ -122,7 +122,7 @@ class Arm:
 
 
 def payload_constants(m_p: float, l1: float, l2: float, g: float) -> FloatArray:
-    """Constants z1 … z5 of a payload of `m_p` kg at the tip of links `l1`, `l2` m (Table 2): (5,)."""
+    """Constants z1 … z5 (5,) of a payload of `m_p` kg at the tip of links `l1`, `l2` m: Table 2."""
     return m_p * np.array([l1**2, l2**2, l1 * l2, g * l1, g * l2])
 
 

@@ -1,4 +1,4 @@
-"""LAPACK's banded routines and four distributions, from SciPy's compiled modules without the packages around them.
+"""LAPACK's banded routines and four distributions, from SciPy's compiled modules alone.
 
 Importing `scipy.linalg` and `scipy.special` takes 0.2 s, a third of what a short log takes as a
 whole, nearly all of it for a layer over other array libraries. Both packages are thin here: what
@@ -103,7 +103,7 @@ _STEPS = 60
 
 @cache
 def student_quantile(freedom: float, probability: float = 0.975) -> float:
-    """Quantile of Student's t of any `freedom` of 1 or more, for a `probability` from 0.5 to 0.9999.
+    """Quantile of Student's t for `freedom` of 1 or more and `probability` from 0.5 to 0.9999.
 
     Newton's method on P = 1/2 + ∫ density, from the normal quantile. With t = √ν tan φ the
     integrand is cos^(ν−1) φ, which Gauss and Legendre's rule integrates to rounding; P is concave,

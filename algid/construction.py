@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 MARK = ".algid-"
-"""Stands between the name of what is made and a number of eight digits: ``.NAME.algid-0123abcd``."""
+"""Separates a temporary name's target from its eight digits: ``.NAME.algid-0123abcd``."""
 OLD = ".algid-old-"
 """Likewise, of a result that makes room for its successor where the two cannot be exchanged."""
 MOST_TRIES = 100
@@ -132,7 +132,7 @@ def _remove(place: Path) -> None:
 
 
 def folders_below(root: Path) -> Iterator[tuple[str, list[str]]]:
-    """A folder and those within it, each with the names of what is no folder in it, or was left by algid.
+    """A folder and those in it, each with the names of its other entries and algid's remains.
 
     Links are not followed, and what cannot be looked at is passed over. ``os.walk`` of Python 3.11
     ends at a thousand.
@@ -164,7 +164,7 @@ def remove_left(folder: Path, name: str | None = None) -> None:
 
 
 class _Left:
-    """Something that may have been left: its path, the name it was made for, and whether it is an old result."""
+    """A possible remain: its path, the name it was made for, and whether it is an old result."""
 
     def __init__(self, folder: Path, entry: str, match: re.Match[str]) -> None:
         self.path = folder / entry

@@ -49,7 +49,7 @@ class OutputError(AlgidError):
 
 
 def without_credentials(text: str) -> str:
-    """`text` with every URL of an object as it may be printed and kept: without users' names, passwords and tokens.
+    """`text` with every URL of an object stripped of users' names, passwords and tokens.
 
     In Azure's URLs a name before the @ is the container's or the account's, and stays.
     """
@@ -77,7 +77,7 @@ def text_of(error: BaseException) -> str:
 
 
 def chain_of(error: BaseException) -> Iterator[BaseException]:
-    """An exception and what it came from, each once: chains may be circles, and as long as a program runs."""
+    """An exception and its causes, each once: chains may be circular, or very long."""
     seen: set[int] = set()
     following: BaseException | None = error
     while following is not None and id(following) not in seen and len(seen) < LONGEST_CHAIN:

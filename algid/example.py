@@ -1,4 +1,4 @@
-"""Logs to try algid on: four runs of an arm that is simulated with all that a first real log has, and a payload.
+"""Example logs: four simulated runs of an arm with a real log's faults, one with a payload.
 
 Its angles are zero where it hangs straight down, and its log does not say so; its joints have dry
 friction, and its sensors noise and steps. What it truly is stands in `ARM`, `FRICTION` and
@@ -21,7 +21,8 @@ from algid.synth.simulator import HANGING, simulate
 from algid.writers import write_log
 
 ARM = Arm(
-    m1=1.2, m2=0.8, lc1=0.15, lc2=0.12, l1=0.30, l2=0.25, I1=0.010, I2=0.006, b1=0.50, b2=0.40, g=9.81
+    m1=1.2, m2=0.8, lc1=0.15, lc2=0.12, l1=0.30, l2=0.25, I1=0.010, I2=0.006, b1=0.50, b2=0.40,
+    g=9.81,
 )  # fmt: skip
 PAYLOAD = 0.5
 """kg, at the tip in ``loaded.csv``."""
@@ -40,7 +41,7 @@ zero = "hanging"  # θ1 is zero hanging straight down, not along the horizontal
 
 
 def write_example(folder: str | Path, force: bool = False) -> list[Path]:
-    """Write the logs ``run1.csv`` to ``run4.csv`` and ``loaded.csv``, and the arm's profile ``arm.toml``.
+    """Write the logs ``run1.csv`` to ``run4.csv`` and ``loaded.csv``, and a profile ``arm.toml``.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def write_example(folder: str | Path, force: bool = False) -> list[Path]:
 
 
 def run(number: int, payload: float) -> Log:
-    """One run of the arm: a motion of its own, with `payload` in kg at the tip, angles from hanging."""
+    """One run of the arm: its own motion, `payload` in kg at the tip, angles from hanging."""
     sensors = replace(SENSORS, seed=number)
     k = with_payload(ARM.constants(), ARM.payload_constants(payload))
     t = sample_times(RATE, DURATION, sensors)

@@ -61,7 +61,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def refuse_links(folder: Path, name: str) -> None:
-    """Raises `OutputError` where a folder on the way from `folder` to what is to be `name` is a link out of it."""
+    """Raise `OutputError` if a folder from `folder` to the future `name` links out of it."""
     place = folder
     for part in name.split("/")[:-1]:
         place /= part
@@ -223,7 +223,7 @@ _BETWEEN_KEYS = re.compile(r"[=,#\[\]{}]")
 
 
 def _longest_key(line: str) -> int:
-    """Parts of the longest dotted key that may stand in a line, however blanks stand around its dots."""
+    """Parts of the longest dotted key in a line, also with blanks around its dots."""
     if line.lstrip().startswith("#"):
         return 0
     plain = "".join(_QUOTED.sub("q", line).split())
@@ -261,7 +261,7 @@ def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path
 
 
 def refuse_misleading(name: str | None) -> None:
-    """Raises `SettingError` where the name of a result's folder is none, or would lead elsewhere."""
+    """Raise `SettingError` if the name of a result's folder is empty or leads elsewhere."""
     if name == "":
         raise SettingError(
             "--name: expected a name for the result folder, found ''; leave it out for the log's "

@@ -1,4 +1,4 @@
-"""Bounds on what a file may claim, ask for or hold: one object, so that none is forgotten and each can be tested.
+"""Bounds on what a file may claim, ask for or hold, in one object so that each can be tested.
 
 A size, a count or a depth that stands in a file is anybody's. Whatever loops over such a number,
 or reserves memory for it, compares it with a bound from here first. Each is far beyond what a
@@ -37,7 +37,7 @@ class FileLimits:
     reserved_rows: int = 1 << 26
     """Rows to reserve memory for on a file's word alone."""
     largest_value: float = 1e30
-    """Beyond this a value is no angle and no torque; covariances hold its eighth power, which is a double still."""
+    """A larger value is no angle or torque; its eighth power, in covariances, is a double."""
     largest_time_ns: float = 9.2e18
     """int64 nanoseconds end at 292 years."""
     shortest_step_ns: float = 1000.0
@@ -61,12 +61,12 @@ class FileLimits:
     metadata_keys: int = 8192
     """Of a schema that are looked at for units: each column may have one."""
     name_letters: int = 512
-    """Of a column's, a topic's or a joint's name that is taken apart; a longer one is none of a joint's."""
+    """Of a name of a column, topic or joint to take apart; a longer one is no joint's."""
     number_letters: int = 400
     """Of a cell that holds a number: the largest float64 has 309 digits before its point."""
     free_text_bytes: int = 256 << 20
     text_a_byte: int = 250
-    """What a compressed table may unpack to: rows of numbers pack 3 to 20 times, a log at rest a hundred times."""
+    """Unpacked bytes a byte of a table: numbers pack 3 to 20 times, a log at rest 100 times."""
     zstd_window_bytes: int = 1 << 27
 
     # Parquet
@@ -81,7 +81,7 @@ class FileLimits:
     """Of a record that is neither a message, a chunk nor an attachment."""
     summary_bytes: int = 1 << 28
     chunk_bytes: int = 1 << 28
-    """Of a chunk, packed and unpacked: a recorder closes one at some MiB; more is a mistake or an attack."""
+    """Of a chunk, packed and unpacked: recorders close one at some MiB; more is not genuine."""
     other_records: int = 300_000
     """Schemas, channels and the like side by side; ids end at 65,535."""
     file_records: int = 1_000_000
@@ -95,7 +95,7 @@ class FileLimits:
     """Gaps between messages of a chunk, beyond which its index is not followed."""
     free_unpacked_bytes: int = 384 << 20
     unpacked_a_byte: int = 250
-    """What a file may unpack to: logs of joints pack 5 to 50 times, logs at rest up to a hundred times."""
+    """Unpacked bytes a byte of a file: joint logs pack 5 to 50 times, logs at rest up to 100."""
     free_work: int = 1_500_000
     work_a_byte: int = 4
     """What a file may have done message by message, in steps of about a microsecond."""
@@ -155,7 +155,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Physical:
-    """What may stand for a quantity, in SI units: far beyond any arm, and so that its powers are still numbers."""
+    """Valid ranges of quantities in SI units: beyond any arm, with powers that are still finite."""
 
     length: Range = (1e-4, 1e3)
     mass: Range = (1e-9, 1e6)

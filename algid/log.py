@@ -86,7 +86,7 @@ class ChannelReading:
 
 @dataclass(frozen=True)
 class Reading:
-    """Everything that a reader decided, or was given, about a log: how to read it the same way again.
+    """What a reader decided, or was given, about a log: how to read it the same way again.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a log came from: its file, format, each channel's source, and a synthetic log's truth."""
+    """A log's origin: its file, format, each channel's source, and a synthetic log's truth."""
 
     path: str
     format: str
@@ -288,7 +288,7 @@ def _two_rows(name: str, values: ArrayLike, count: int) -> FloatArray:
 
 
 def usual_period(stamp_ns: IntArray) -> float:
-    """Usual time between samples (N,) in s: the median step, or the mean pace where samples come in bursts.
+    """Usual time between samples (N,) in s: the median step, or the mean step of bursts.
 
     A buffer that is emptied every ten samples leaves nine steps of microseconds for one of ten
     periods: the median step says nothing then. Steps over 64 samples do.

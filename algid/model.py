@@ -343,7 +343,7 @@ def phasor(model: Model, c: FloatArray, name: str) -> complex:
 
 
 def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
-    """Pairs of a parameter and the joint on which it acts in the way `kind`, of the columns that the model has."""
+    """Pairs of a parameter of the model's columns and the joint on which it acts as `kind`."""
     return [
         pair
         for term in model.terms

@@ -178,7 +178,7 @@ def _toml(name: str, value: Any) -> str:
 
 
 class _Words(string.Formatter):
-    """Format strings in which ``{count:# sample has|samples have}`` agrees with its number, and lists are joined."""
+    """Format strings: ``{count:# sample has|samples have}`` takes its number, lists are joined."""
 
     def format_field(self, value: Any, spec: str) -> str:
         """One value as `spec` has it."""
@@ -475,7 +475,9 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "{topic!r} ({rate:.6g} Hz) was interpolated; error, root mean square, in the log's units: "
         "{error}"
     ),
-    "NOT_COVERED": "{count:# sample was|samples were} dropped, where another topic or file has none",
+    "NOT_COVERED": (
+        "{count:# sample was|samples were} dropped, where another topic or file has none"
+    ),
     "OVERLAP": (
         "{count:# sample lies|samples lie} before or behind what {file} holds, and "
         "{count:is|are} left out"

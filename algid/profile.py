@@ -77,7 +77,7 @@ class _Strict(BaseModel):
 
 
 class Channel(_Strict):
-    """Where one channel comes from: a column, or a topic and the path of a field in its messages."""
+    """The source of one channel: a column, or a topic and a field's path in its messages."""
 
     topic: str | None = None
     source: str | None = None
@@ -164,8 +164,9 @@ class Profile(_Strict):
         A joint without a motor, as an acrobot's first or a pendubot's second: its torque is zero,
         whatever the log says.
     gravity : float, m/s^2
-    effort : 'raw', 'gravity-compensated', 'friction-compensated', 'external', 'command' or 'current'
-        What the driver logs as torque.
+    effort : str
+        'raw', 'gravity-compensated', 'friction-compensated', 'external', 'command' or 'current':
+        what the driver logs as torque.
     velocity : bool
         Whether recorded velocities are read.
     signs, offsets : pairs of 1 or -1, and of float in rad

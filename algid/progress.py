@@ -5,4 +5,4 @@ from __future__ import annotations
 from collections.abc import Callable
 
 Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is of it, 0 where nobody knows."""
+"""Called with the name of the work, the amount done, and the whole amount, 0 if unknown."""

@@ -1,4 +1,4 @@
-"""The ROS 2 messages that algid writes: their names and definitions, and the stamps that they hold."""
+"""ROS 2 messages that algid writes: their names, definitions and stamps."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ _VARIABLES = (
 
 
 def bound_by_environment() -> None:
-    """One thread for any BLAS that is loaded from now on, unless the user's environment says otherwise."""
+    """One thread for any BLAS loaded from now on, unless the user's environment differs."""
     for variable in _VARIABLES:
         os.environ.setdefault(variable, "1")
 
@@ -160,7 +160,7 @@ _has_other_cores = True
 
 
 def keep_to_one_core() -> None:
-    """From now on this process does all work in the thread that asks for it: the other cores have their own work."""
+    """Do all work of this process in the calling thread: other cores have other processes."""
     global _has_other_cores  # like BLAS's threads, a matter of the process
     _has_other_cores = False
 

@@ -111,8 +111,9 @@ class Settings:
         windows (0.4 s).
     bandwidth : float, Hz, of the zero-phase differentiator
     gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
-    effort : 'raw', 'gravity-compensated', 'friction-compensated', 'external', 'command', 'current' or None
-        What the logged torque is. None takes it for raw, unless the logs tell that gravity is
+    effort : str or None
+        What the logged torque is: 'raw', 'gravity-compensated', 'friction-compensated',
+        'external', 'command' or 'current'. None is raw, unless the logs show that gravity is
         compensated; with `gravity` 0 a payload's weight is compensated too.
     model : 'auto', 'plain', or terms of the torque between commas
         Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
@@ -269,7 +270,7 @@ class Settings:
         }
 
     def torque_shift(self, dt: float, found_delay: float | None = None) -> float:
-        """Time in s after which a logged torque acts: half a sample of hold, and the delay, found or set."""
+        """Time in s after which a logged torque acts: half a sample of hold, plus the delay."""
         hold = 0.5 * dt if self.torque_hold == "zoh" else 0.0
         if found_delay is not None:
             return hold + found_delay

@@ -1,4 +1,4 @@
-"""How far beyond chance a check must see something before it speaks: one budget of false alarms a log.
+"""Significance of all checks together: one budget of false alarms a log.
 
 A sound log brings a warning by chance at most `BUDGET` of the time. The budget is shared evenly by
 `TESTS`, and the share of a test by the comparisons that it makes (Bonferroni 1936). A test that
@@ -41,12 +41,12 @@ ONE_SIDED = 1.6448536269514722
 
 @cache
 def sigmas(level: float = LEVEL, comparisons: int = 1, sides: int = 2) -> float:
-    """Standard deviations that the largest of several normal variables exceeds by chance, with probability `level`.
+    """Standard deviations that the largest of several normal variables exceeds with `level`.
 
     Parameters
     ----------
     level : float
-        For all comparisons together.
+        Probability for all comparisons together.
     comparisons : int
         How many variables there are.
     sides : 1 or 2
@@ -56,9 +56,9 @@ def sigmas(level: float = LEVEL, comparisons: int = 1, sides: int = 2) -> float:
 
 
 def chance(distance: float, comparisons: int = 1) -> float:
-    """The p value of the largest of several distances in standard deviations, both sides (Bonferroni)."""
+    """Two-sided p value of the largest of several distances in standard deviations (Bonferroni)."""
     return min(1.0, comparisons * erfc(distance / sqrt(2)))
 
 
 SURE = sigmas(comparisons=16)
-"""Standard deviations that none of an arm's and its payload's numbers, 16 at most, exceeds by chance: 4.0."""
+"""Standard deviations that none of an arm's and payload's 16 numbers exceeds by chance: 4.0."""

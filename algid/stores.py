@@ -1,4 +1,4 @@
-"""Where files live: a folder of this machine, or a prefix of an object store behind s3://, gs:// or az://.
+"""Places of files: a local folder, or a prefix of an object store at s3://, gs:// or az://.
 
 Files appear whole or not at all: on this machine through `algid.files.whole_file`, in object
 stores by their nature.
@@ -47,7 +47,7 @@ def public(path: str) -> str:
 
 
 def shown(place: str) -> str:
-    """A folder's path or a URL as messages name it: without credentials, and without what follows the key."""
+    """A folder's path or URL for messages: without credentials and without the query."""
     return public(place).partition("?")[0].rstrip("/") if is_url(place) else place
 
 
@@ -150,7 +150,7 @@ class Store:
 
 
 def _names_below(root: Path, under: str) -> list[str]:
-    """Of a folder of this machine: links to folders are not followed, what cannot be looked at is passed over."""
+    """Names in a local folder; links to folders and unreadable entries are skipped."""
     start = len(str(root)) + 1
     paths = (
         f"{folder}/{name}"
@@ -242,7 +242,7 @@ def reading(url: str) -> Iterator[tuple[Any, str]]:
 def _translated(
     place: str, kind: type[AlgidError], what: str, do: str = "check name and rights"
 ) -> Iterator[None]:
-    """What a store's client raises becomes an error of ours that names the place, `what` cannot be done, what to do."""
+    """Turn errors of a store's client into ours: the place, `what` failed, and what to do."""
     import pyarrow as pa
 
     try:

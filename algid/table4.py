@@ -1,4 +1,4 @@
-"""The paper's Table 4 from any estimator's numbers, beside the truth and the paper's errors where known."""
+"""The paper's Table 4 from any estimator's numbers, with truth and the paper's errors if known."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def true_rows(truth: Truth | None, payload: float | None) -> dict[str, float]:
 
 
 def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, float]:
-    """k1 … k7 of the arm behind a synthetic log, and with the loaded log's `payload` in kg what goes with it."""
+    """True k1 … k7 of a synthetic log's arm, with m_p, l1 and l2 if there is a `payload` in kg."""
     if truth is None:
         return {}
     constants = dict(zip(CONSTANT_NAMES, truth.arm.constants().tolist(), strict=True))

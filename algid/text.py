@@ -14,13 +14,13 @@ _HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 
 
 def visible(text: str, longest: int = LONGEST) -> str:
-    """`text` with every character that cannot be seen written as an escape, and cut to a sane length."""
+    """`text` with every invisible character escaped, cut to a length of `longest`."""
     shown = "".join(map(_shown, text[:longest]))
     return shown if len(text) <= longest else shown + "…"
 
 
 def printable(text: str) -> str:
-    """`text` with every character that cannot be seen, but for line feeds and tabs, as an escape that JSON knows."""
+    """`text` with every invisible character but line feeds and tabs as a JSON escape."""
     if text.isascii() and text.replace("\n", "").replace("\t", "").isprintable():
         return text
     return "".join(
@@ -101,7 +101,7 @@ def resolved(value: float | None, std: float | None) -> str:
 
 
 def digits_of(value: float | None, std: float | None) -> int:
-    """Significant digits of `value` that its standard deviation leaves worth writing: two to eight."""
+    """Significant digits of `value` that its standard deviation supports: two to eight."""
     if (
         value is None
         or std is None

@@ -1,4 +1,4 @@
-"""How far to trust what a report is about: a grade, a headline, the reasons behind it, and what to run first."""
+"""How far to trust a report: a grade, a headline, its reasons, and what to run first."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def graded(
     things: str = "numbers",
     command: str | None = None,
 ) -> Verdict:
-    """The verdict on `headline`: failed where there is a `failure`, after which `things` must not be used."""
+    """The verdict on `headline`: failed on a `failure`, after which `things` must not be used."""
     if failure is not None:
         return Verdict(
             "failed", f"{failure}; do not use these {things}", tuple(reasons), tuple(notes), command

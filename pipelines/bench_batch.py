@@ -40,7 +40,8 @@ with socket.socket() as _free:
     PORT = _free.getsockname()[1]
 CLUSTER = {
     **dict.fromkeys(THREADS, "1"),
-    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",  # it samples stacks: some 6 % of a worker's processor time
+    # sampling of stacks takes some 6 % of a worker's processor time
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
 }
 ADDRESS = f"tcp://127.0.0.1:{PORT}"
 

@@ -165,7 +165,8 @@ def run(scene: Scene, draws: int) -> Tally:
         schedule = scene.schedules[draw % len(scene.schedules)]
         log = drawn(picking(schedule), scene, rng)
         arm, covariance = arm_for(scene, log, rng)
-        tally.add(track(lambda log=log: segments([log]), arm, covariance), schedule)  # type: ignore[misc]
+        found = track(lambda log=log: segments([log]), arm, covariance)  # type: ignore[misc]
+        tally.add(found, schedule)
     return tally
 
 

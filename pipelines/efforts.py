@@ -84,7 +84,10 @@ def _exit(result: Result) -> int:
 
 def lines(draws: int, processes: int) -> Iterator[str]:
     """The table, row by row."""
-    yield "| effort | draws | named | exit 0 without a flag | exit 0 with it | m_p held | other advice |"
+    yield (
+        "| effort | draws | named | exit 0 without a flag | exit 0 with it | m_p held "
+        "| other advice |"
+    )
     yield "|---|---|---|---|---|---|---|"
     with ProcessPoolExecutor(processes) as pool:
         for effort in NAMES:

@@ -21,7 +21,7 @@ FIRST_ARM = 1000  # seeds of arms that nothing was tuned on
 
 
 def alarms(number: int) -> list[str]:
-    """Codes of the reasons that the verdict on sound log `number` has, each printed with its sentence."""
+    """Codes of the verdict's reasons on sound log `number`, each printed with its sentence."""
     motion = motion_of(f"arm{FIRST_ARM + number}")[1]
     log = log_of(motion, ROWS["nothing"], friction=bool(number % 2), seed=FIRST_ARM + number)
     reasons = identify(log, report=False).verdict.reasons

@@ -87,7 +87,8 @@ def judged(job: tuple[str, int, int]) -> Counter[str]:
 
 def lines(draws: int, processes: int) -> Iterator[str]:
     """The table, row by row."""
-    yield f"| joint without motor | draws | converged | failed | nothing | {' | '.join(CONSTANT_NAMES)} |"
+    names = " | ".join(CONSTANT_NAMES)
+    yield f"| joint without motor | draws | converged | failed | nothing | {names} |"
     yield f"|{'---|' * (5 + len(CONSTANT_NAMES))}"
     with ProcessPoolExecutor(processes) as pool:
         for passive, title in ((1, "1 (acrobot)"), (2, "2 (pendubot)")):

@@ -168,7 +168,13 @@ class _Unexamined(Survey):
     of the time.
     """
 
-    def _examined(self, log: LogSource, block: Log, alone: bool) -> tuple[Notice, ...]:  # noqa: ARG002
+    def _checked(
+        self,
+        log: LogSource,  # noqa: ARG002
+        begin: Log,  # noqa: ARG002
+        *,
+        whole: bool,  # noqa: ARG002
+    ) -> tuple[Notice, ...]:
         return ()
 
 

@@ -74,7 +74,7 @@ SMALL = {
     "arm22": (0.0084, 5.6e-3),
     "arm23": (0.0084, 2.9e-3),
 }
-"""Standard deviations of a phase in ° and of a radius of gyration in m, as logs of `Row()` tell them."""
+"""Standard deviations of a phase in ° and a radius of gyration in m, from logs of `Row()`."""
 
 
 def scene(name: str, row: Row) -> tuple[Arm, FloatArray]:

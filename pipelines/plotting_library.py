@@ -26,12 +26,14 @@ TARGET = "algid/report/assets/plotly.min.js.gz"
 PATIENCE = 120.0  # s
 
 
-class PlottingLibrary(BuildHookInterface[Any]):  # type: ignore[misc]  # hatchling stands in the build alone
+# hatchling is installed in the build alone
+class PlottingLibrary(BuildHookInterface[Any]):  # type: ignore[misc]
     """Puts the library among the page's assets before they are packed."""
 
     PLUGIN_NAME = "custom"
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002  (the interface's names)
+    # the names of the arguments are the interface's
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """Fetch the library unless it is there; a build without npm goes on without it."""
         target = Path(self.root) / TARGET
         if target.is_file():

@@ -6,20 +6,17 @@ Simulated: five kinds of arms (`pipelines.race_scenes`), three seeds of each, on
 500 Hz, another to predict. Real, where `--data` is: the runs of two builds of a torque-controlled
 arm, by halves and leave one out.
 
-=======================
-===============================================================================
-column                   what it is
-=======================
-===============================================================================
-error over bound         RMS of k1 … k7's errors over their Cramér-Rao bound; straight arms and encoders
-error, %                 median over parameters and arms of the error's magnitude
-intervals that hold      share of 95 % intervals that hold the truth, or of halves that agree
-repeatability, %         mean over k1 … k5 of the scatter between halves
-held out                 RMSE of the torque of a log not used, motion below 20 Hz, residual below 5 Hz
-processor                seconds a fit, without imports
-choices                  what a user had to choose beforehand
-=======================
-===============================================================================
+===================  =============================================================================
+column               meaning
+===================  =============================================================================
+error over bound     RMS of k1 … k7's errors over their Cramér-Rao bound; straight arms, encoders
+error, %             median over parameters and arms of the error's magnitude
+intervals that hold  share of 95 % intervals that hold the truth, or of halves that agree
+repeatability, %     mean over k1 … k5 of the scatter between halves
+held out             RMSE of the torque of an unused log, motion below 20 Hz, residual below 5 Hz
+processor            seconds a fit, without imports
+choices              number of choices that a user makes beforehand
+===================  =============================================================================
 """
 
 from __future__ import annotations
@@ -233,7 +230,8 @@ def simulated_table(rows: Sequence[Row]) -> str:
         lines.append(
             f"| {peer} | {_number(np.sqrt(np.nanmean(bounds**2)) if bounds.size else None)} | "
             + " / ".join(_number(np.nanmedian(one) if one else None) for one in errors)
-            + f" | {_number(100 * np.mean(inside) if inside else None)}{f' of {len(inside)}' if inside else ''} | "
+            + f" | {_number(100 * np.mean(inside) if inside else None)}"
+            + f"{f' of {len(inside)}' if inside else ''} | "
             + f"{_number(np.nanmedian([row.held_out for row in good]) if good else None)} | "
             + f"{_number(np.nanmedian([row.held_out_moving for row in good]) if good else None)} | "
             + f"{_number(np.mean([row.seconds for row in good]) if good else None)} | {choices} |"

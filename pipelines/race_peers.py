@@ -375,4 +375,4 @@ PEERS: dict[str, tuple[Contender, int]] = {
     "pinocchio regressors": (pinocchio, 6),
     "the paper's method": (without_length(algid_by("paper")), 2),
 }
-"""Each contender, and how many choices its user makes: cut-offs, orders, windows, widths, terms, starts, lengths."""
+"""Each contender, and the number of its user's choices, such as cut-offs, orders or windows."""

@@ -102,7 +102,7 @@ def scene(kind: str, seed: int) -> Scene:
         if kind == "position-controlled":
             truth = _moved(plant, _controlled(plant, seed + 50 * place), held=True)
         else:
-            truth = _moved(plant, lambda now, _, drive=drive: drive(np.array([now]))[:, 0])  # type: ignore[misc]
+            truth = _moved(plant, _open_loop(drive))
         truths.append(truth)
         logs.append(_logged(truth, kind, rng))
     bound = None
@@ -137,6 +137,11 @@ def _controlled(plant: _Plant, seed: int) -> Drive:
         return np.asarray(stiffness * (wanted - x[:2]) + stiffness / 10.0 * (speed - x[2:]))
 
     return torque
+
+
+def _open_loop(torque: MultiSine) -> Drive:
+    """The drive of a torque (2, N) over times (N,)."""
+    return lambda now, _: torque(np.array([now]))[:, 0]
 
 
 def _moved(plant: _Plant, drive: Drive, held: bool = False) -> Truth:

@@ -39,7 +39,8 @@ class Errors:
 
     Parameters
     ----------
-    coulomb, stribeck, asymmetry : share of Coulomb friction, of what more there is at rest, of half its asymmetry
+    coulomb, stribeck, asymmetry : share of Coulomb friction, of its excess at rest, of half its
+        asymmetry
     stribeck_speed : rad/s
     load : friction over the joint's load
     rotor : inertia of joint 2's rotor over k3

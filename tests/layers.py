@@ -25,7 +25,7 @@ PURE = frozenset(
         *("itertools", "math", "operator", "string", "typing", "warnings"),
     }
 )
-"""What the mathematics may take from the standard library: nothing that reads, writes, prints or waits."""
+"""Standard library for the mathematics: nothing that reads, writes, prints or waits."""
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,11 @@ ROOT = Path(__file__).parents[1]
 SERVER = "from tests.processes import serve; serve()"
 LARGEST = 1 << 20  # bytes of a request
 FRESH = "ALGID_TESTS_FRESH"
-"""Set where a fork of what is loaded cannot be trusted: old Arrow and Polars leave locks held in it."""
+"""Set where a fork of loaded packages is unsafe: old Arrow and Polars leave locks held in it."""
 LOADED = (
-    "polars", "pyarrow.csv", "pyarrow.fs", "pyarrow.parquet", "scipy.integrate", "scipy.interpolate", "scipy.linalg",
-    "scipy.optimize", "scipy.stats", "plotly.graph_objects", "plotly.subplots", "rich.progress",
+    "polars", "pyarrow.csv", "pyarrow.fs", "pyarrow.parquet", "scipy.integrate",
+    "scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.stats",
+    "plotly.graph_objects", "plotly.subplots", "rich.progress",
 )  # fmt: skip
 """What commands import where they need it, beside algid's own modules."""
 

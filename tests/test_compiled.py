@@ -74,7 +74,8 @@ from algid import compiled
 packages = [name for name in ("scipy.linalg", "scipy.special") if name in sys.modules]
 tail = float(compiled.chi2_tail(4, 3.0))
 import scipy.linalg, scipy.special
-print(json.dumps([packages, tail, float(scipy.special.chdtrc(4, 3.0)), compiled.lapack is not None]))
+theirs = float(scipy.special.chdtrc(4, 3.0))
+print(json.dumps([packages, tail, theirs, compiled.lapack is not None]))
 """
 REFUSAL = (
     "lambda self, module, real=importlib.machinery.ExtensionFileLoader.exec_module: "

@@ -35,7 +35,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "model": room("arm physics", "numpy", PURE),
     "log": room("arm notices", "numpy"),
     "signals": room("arm compiled log", "numpy scipy", PURE),
-    "estimators": room("arm compiled model notices physics progress significance signals", "numpy scipy", PURE),
+    "estimators": room(
+        "arm compiled model notices physics progress significance signals", "numpy scipy", PURE
+    ),
     "methods": room("estimators progress"),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
@@ -54,15 +56,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "inspection": room("arm errors estimators faults log notices profile readers signals units "
                        "words", "numpy"),
     "report": room(
-        "arm errors files inspection methods model notices progress results ros2 significance text verdict "
-        "words",
+        "arm errors files inspection methods model notices progress results ros2 significance "
+        "text verdict words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log methods model notices physics profile significance "
-        "progress readers report "
-        "results runtime settings signals table4 text",
+        "arm errors estimators files inspection log methods model notices physics profile "
+        "significance progress readers report results runtime settings signals table4 text",
         "numpy polars pyarrow",
     ),
     "batches": room(
@@ -71,30 +72,29 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm errors estimators files identification model notices profile report results runtime significance "
-        "signals text verdict "
-        "words",
+        "arm errors estimators files identification model notices profile report results runtime "
+        "significance signals text verdict words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled errors estimators files identification log model notices progress report significance "
-        "results "
-        "signals synth text verdict writers",
+        "arm compiled errors estimators files identification log model notices progress report "
+        "significance results signals synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
-    "exports": room("arm errors files identification model notices physics results text words", "numpy scipy"),
+    "exports": room(
+        "arm errors files identification model notices physics results text words", "numpy scipy"
+    ),
     "fleet": room("errors files limits model notices physics progress report significance text "
                   "verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exports files fleet identification "
-        "inspection limits log "
-        "methods model notices physics profile progress readers report results runtime settings "
-        "stores synth tracks "
-        "units writers",
+        "inspection limits log methods model notices physics profile progress readers report "
+        "results runtime settings stores synth tracks units writers",
         "matplotlib numpy polars",
     ),
     "cli": room(
-        "api errors exits faults files limits profile report runtime settings text units words", "rich typer"
+        "api errors exits faults files limits profile report runtime settings text units words",
+        "rich typer",
     ),
 }  # fmt: skip
 

@@ -18,7 +18,8 @@ from tests.cli.commands import app
 
 def test_every_setting_is_an_option_with_its_default_and_help() -> None:
     for command in ("identify", "batch"):
-        options = {option.name: option for option in get_command(app).commands[command].params}  # type: ignore[attr-defined]
+        called = get_command(app).commands[command]  # type: ignore[attr-defined]
+        options = {option.name: option for option in called.params}
         for field in fields(Settings):
             assert options[field.name].opts == [flag(field.name)]
             assert options[field.name].help == field.metadata["help"]

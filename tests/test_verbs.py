@@ -172,7 +172,8 @@ def test_a_plot_has_a_row_a_parameter_and_needs_matplotlib(
     low, high = weighed.parameters["k1"].ci95 or (0.0, 0.0)
     assert low is not None
     assert high is not None
-    bars = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) == 2]  # type: ignore[arg-type]
+    ends = [np.asarray(line.get_xdata()) for line in axes.lines]
+    bars = [one for one in ends if len(one) == 2]
     assert bars[0] == pytest.approx(
         np.array([-50, 50]) * (high - low) / (weighed.parameters["k1"].estimate or 1.0)
     )
@@ -206,15 +207,27 @@ def test_what_is_written_is_what_the_command_writes(
         (lambda: algid.inspect({}, joints="one"), "^--joints: expected two names"),
         (lambda: algid.track({}, "none", l1=0.0), "^--l1: expected a number from 0.001 to 1000"),
         (lambda: algid.validate("none", {}, max_nrmse=-1), "^--max-nrmse: expected a number"),
-        (lambda: algid.export("none", "step"), "^--to: expected one of urdf, "),  # type: ignore[arg-type]
+        (
+            lambda: algid.export("none", "step"),  # type: ignore[arg-type]
+            "^--to: expected one of urdf, ",
+        ),
         (lambda: algid.export("none", "c", m1=float("nan")), "^--m1: expected a number from"),
         (lambda: algid.compare("none"), "^compare: expected two results or more, found 1"),
         (lambda: algid.design("case1", margin=0.9), "^--margin: expected a number from 0 to 0.5"),
-        (lambda: algid.design("case1", drive="hand"), "^--drive: expected one of position,"),  # type: ignore[arg-type]
-        (lambda: algid.design("case1", speed=(1, 2, 3)), "^--speed: expected rad/s like 3 or 3,4"),  # type: ignore[arg-type]
+        (
+            lambda: algid.design("case1", drive="hand"),  # type: ignore[arg-type]
+            "^--drive: expected one of position,",
+        ),
+        (
+            lambda: algid.design("case1", speed=(1, 2, 3)),  # type: ignore[arg-type]
+            "^--speed: expected rad/s like 3 or 3,4",
+        ),
         (lambda: algid.synthesise("case1", drop=2.0), "^--drop: expected a number from 0 to 0.9"),
         (lambda: algid.synthesise("case1", excitation="x"), "^--torque x: expected case, wide"),
-        (lambda: algid.synthesise("case1", kind="txt"), "^--format: expected one of mcap,"),  # type: ignore[call-overload]
+        (
+            lambda: algid.synthesise("case1", kind="txt"),  # type: ignore[call-overload]
+            "^--format: expected one of mcap,",
+        ),
         (lambda: algid.batch("x", "y", timeout=0), "^--timeout: expected a number from 0.001"),
         (lambda: algid.batch("x", "y", estimator="best"), "^--estimator: expected one of refined"),
     ],

@@ -51,7 +51,7 @@ class Planned:
         return dict(zip(self.design.names, self.design.std.tolist(), strict=True))
 
     def to_frame(self) -> pl.DataFrame:
-        """The trajectory as ``trajectory.csv`` has it: time, angles, velocities, accelerations, torques."""
+        """The trajectory of ``trajectory.csv``: time, angle, velocity, acceleration, torque."""
         import polars as pl
 
         from algid.designs.write import trajectory

@@ -20,7 +20,7 @@ FORMATS = ("urdf", "mjcf", "sdf", "python", "c", "yaml")
 
 @dataclass(frozen=True)
 class Exported:
-    """An arm as a model: its text, warnings about what does not fit, and where it was written, if it was."""
+    """An arm as a model: its text, warnings of what does not fit, and its file, if written."""
 
     text: str
     warnings: tuple[Notice, ...]
@@ -98,7 +98,7 @@ def export(
 
 
 def file_of(result: Path, to: str) -> Path:
-    """The file that a result's export goes to where none is named: its name with the format's ending."""
+    """The default file of a result's export: the result's name with the format's suffix."""
     from algid.exports.formats import FORMATS as WRITTEN
 
     stem = (result if result.name != "result.json" else result.resolve().parent).stem or "arm"

@@ -79,7 +79,9 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         ) from error
     _reach(address)
     try:
-        client: Any = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+        client: Any = Client(  # type: ignore[no-untyped-call]
+            address, timeout=CONNECT_SECONDS, set_as_default=False
+        )
     except (OSError, ValueError) as error:
         raise SettingError(
             f"--scheduler {address}: no scheduler answers ({error}); start dask scheduler"
@@ -119,7 +121,7 @@ _ADDRESS = re.compile(
 
 
 def _reach(address: str) -> None:
-    """Find out whether a scheduler answers: a client that fails to connect cannot be got rid of cleanly.
+    """Check that a scheduler answers: a client that fails to connect cannot be removed cleanly.
 
     Raises
     ------
@@ -166,7 +168,8 @@ def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | No
                 f"{socket.gethostname()}: algid {found} stands there; install algid {version} "
                 "and restart the worker"
             )
-        if mark is not None and not os.path.exists(mark):  # noqa: PTH110  # nothing but what is named here is certain
+        # only what this function imports is certain to be there
+        if mark is not None and not os.path.exists(mark):  # noqa: PTH110
             return (
                 f"{socket.gethostname()}: it does not see {out}; choose a place with -o that "
                 "all machines see"
@@ -259,7 +262,7 @@ class _Cluster(Executor):
         self._give_up("the batch has ended")
 
     def _send(self) -> None:
-        """Keep two tasks a thread with the scheduler: one that runs, and one that is there when it ends."""
+        """Keep two tasks a thread with the scheduler: one that runs, and one that runs next."""
         while self._waiting and len(self._sent) < 2 * self._threads and self._gone is None:
             calls = self._next_calls()
             key = self._prefix + uuid.uuid4().hex
@@ -275,7 +278,7 @@ class _Cluster(Executor):
             remote.add_done_callback(self._finished.put)
 
     def _next_calls(self) -> list[_Call]:
-        """As many as a task should hold, fewer near the end, when each thread should have its share."""
+        """Calls of the next task; fewer near the end, so that each thread has its share."""
         if self._waiting[0].alone:
             return [self._waiting.popleft()]
         share = -(-len(self._waiting) // (2 * self._threads))
@@ -383,7 +386,7 @@ def answered_in_turn(calls: list[bytes], timeout: float | None) -> tuple[float, 
 
 
 def answered_within(call: bytes, timeout: float | None) -> bytes:
-    """`answered` in a thread of its own, which is interrupted after `timeout` and, if it goes on, given up.
+    """`answered` in a thread of its own, interrupted after `timeout` and abandoned if it goes on.
 
     A thread of Python cannot be ended from outside; an exception reaches it between two of its own
     instructions.

@@ -62,7 +62,7 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
 
 
 Found = tuple[str, str, str | None]
-"""A log's path or URL, its name below its source without suffix, and what it cannot be looked at for."""
+"""A log's path or URL, its name below its source without suffix, and why it is unreadable."""
 
 
 def _logs(source: str, out: str) -> list[Found]:
@@ -89,7 +89,7 @@ def _logs(source: str, out: str) -> list[Found]:
 
 
 def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
-    """Whether an object of that name below `source` is hidden, part of a result, or lies in `out`."""
+    """Whether an object's name below `source` is hidden, part of a result, or in `out`."""
     below, place = f"{shown(source)}/", f"{shown(out)}/"
     inside = unquote(place.removeprefix(below)) if is_url(out) and place.startswith(below) else None
 
@@ -195,7 +195,8 @@ def _matches(pattern: str, out: str) -> Iterator[_File]:
     """
     parts = Path(pattern).parts
     first = parts.index("**") if "**" in parts else len(parts)
-    found = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207  # a pattern may be absolute
+    # a pattern may be absolute
+    found = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207
     if first == len(parts):
         yield from (_File(match, _is_bag(Path(match))) for match in found)
         return

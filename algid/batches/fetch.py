@@ -1,4 +1,4 @@
-"""Logs out of an object store onto this machine: of MCAP and Parquet what is needed, of everything else the whole.
+"""Fetch logs from an object store: of MCAP and Parquet the needed parts, of others the whole.
 
 The format's own reader says what it needs. What it finds where is known from a few small parts of
 the object: the summary and the heads of the message indexes of an MCAP file, the footer of a

@@ -89,7 +89,7 @@ def _bytes(name: str) -> int:
 
 
 def checked_name(name: str, place: str) -> str:
-    """`name`, once it is certain that a file of that name lies within OUT and takes no other job's place.
+    """`name`, once its file certainly lies within OUT and does not replace that of another job.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def safe_name(name: str) -> str:
 
 
 def kept_path(path: str) -> str:
-    """A path or URL as it is printed and kept: without credentials, and in letters that every file can hold."""
+    """A path or URL to print and keep: without credentials, in letters that any file can hold."""
     return public(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
 
 

@@ -1,4 +1,4 @@
-"""What is known of a job that has come to an end: one small file each, written whole, below ``OUT/.jobs``."""
+"""Records of ended jobs: one small file each, written atomically, below ``OUT/.jobs``."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ FAILURES = (End.FAILED, End.KILLED)
 
 @dataclass(frozen=True)
 class Input:
-    """A log as it was when the job started: size in bytes, times of change in ns, and what was in it.
+    """A log as it was when the job started: size in bytes, times of change in ns, and its hash.
 
     A URL stands without the credentials that the job's own holds.
 
@@ -136,7 +136,7 @@ def unchanged(before: Input, path: str) -> Input | None:
 
 
 def same_logs(before: Sequence[Input], now: Sequence[Input]) -> bool:
-    """Whether logs hold what they held: by their hashes where both are known, by their times of change elsewhere."""
+    """Whether logs are unchanged: by hashes if both are known, else by size and time of change."""
 
     def same(one: Input, other: Input) -> bool:
         hashed = one.sha256 is not None and other.sha256 is not None
@@ -190,7 +190,7 @@ def write_record(store: Store, record: JobRecord) -> None:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of earlier jobs: their records, and why some of them cannot be read, by their places."""
+    """Records of earlier jobs, and why some of them cannot be read, by their places."""
 
     records: dict[str, JobRecord]
     unreadable: dict[str, str]
@@ -240,7 +240,7 @@ def _record_in(content: bytes, place: str) -> JobRecord:
 
 
 def _fault(record: JobRecord, place: str) -> str | None:
-    """What keeps a record from being one: no row of the table could hold it, or it is another job's."""
+    """Why a record is invalid: no row of the table could hold it, or it is another job's."""
     job = record.job
     whole = [record.start_ns or 0, *(number for one in record.inputs for number in (one.size,))]
     whole += [label for label in job.labels.values() if type(label) is int]
@@ -269,6 +269,6 @@ def _fault(record: JobRecord, place: str) -> str | None:
 
 
 def _is_estimates(name: str) -> bool:
-    """Whether a parameter may be called so: its column, and those of its error and its status, are no other's."""
+    """Whether a parameter's name is valid: its columns, with error and status, are no other's."""
     others = name in COLUMNS or name.startswith("label_") or name.endswith(("_std", "_status"))
     return 0 < len(name) <= LIMITS.estimate_letters and name.isprintable() and not others

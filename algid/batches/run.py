@@ -1,4 +1,4 @@
-"""Run a batch: what is to be done is done, what comes to an end is recorded, whatever happens to the workers."""
+"""Run a batch: do every due job and record every ended one, whatever happens to workers."""
 
 from __future__ import annotations
 
@@ -128,9 +128,9 @@ def plan(
 
 
 def _standing(record: JobRecord | None, task: Task, store: Store) -> JobRecord | None:
-    """The record with its job and logs as they are now, if it still tells what would come of the task.
+    """The record with its job and logs as they are now, if its outcome is still valid.
 
-    Times of change that moved while the content did not are taken over, so that it is hashed once
+    Times of change that moved while the content did not are stored, so that it is hashed once
     for them.
     """
     job = kept(task.job)
@@ -163,7 +163,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a batch ended: its jobs' records, how many were run now, and how many are left where it was stopped.
+    """Outcome of a batch: its jobs' records, the number run now, and the number left when stopped.
 
     `stopped` says why it could not go on, where it could not.
     """
@@ -201,7 +201,7 @@ class Batch:
         self._ran = 0
         self._written = False
         self.stop = threading.Event()
-        """Set it, and `run` returns at once; what was running is left to whoever ends the executor."""
+        """If set, `run` returns at once; running jobs are left to whoever ends the executor."""
         prepare(store)
         known = read_records(store)
         self.records = known.records
@@ -315,7 +315,7 @@ class Batch:
 
 
 class Settling:
-    """Finds jobs whose logs have not changed since the look before: logs that are being written are left alone."""
+    """Find jobs whose logs are unchanged since the last look: others are still being written."""
 
     def __init__(self) -> None:
         self._before: dict[str, Input | None] = {}

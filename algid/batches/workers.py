@@ -1,4 +1,4 @@
-"""Workers that may die, hang or fail in any way without harm to each other: processes of this machine.
+"""Worker processes of this machine that may die, hang or fail without harm to each other.
 
 Each worker is a `concurrent.futures.ProcessPoolExecutor` of one process, tended by a thread here
 that knows which call it runs: such a pool gives up as a whole when a process of it dies, without
@@ -49,7 +49,7 @@ class WorkerDiedError(Exception):
 
 
 class CallFailedError(Exception):
-    """A call raised an exception, took too long, or cannot travel: what is known of it, in words."""
+    """A call raised an exception, took too long, or cannot be sent; its text says which."""
 
 
 class WorkersGoneError(Exception):

@@ -33,7 +33,7 @@ def main() -> None:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run a command and give its exit code: the outermost place, where what is raised becomes a line.
+    """Run a command and return its exit code: the outermost place, where errors become lines.
 
     Raises
     ------
@@ -94,4 +94,4 @@ class _Stopping:
 
 
 class _StoppedError(SystemExit):
-    """A signal ends algid. typer hands it on, where it would make a `KeyboardInterrupt` an exit without a word."""
+    """A signal ends algid. typer passes it on, but turns `KeyboardInterrupt` into a silent exit."""

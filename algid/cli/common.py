@@ -1,4 +1,4 @@
-"""What several commands share: options that mean the same everywhere, and how a result is printed."""
+"""Options that mean the same in several commands, and how results are printed."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def command_line() -> str:
 
 
 def print_report(document: Document, json: Callable[[], str], form: ResultFormat) -> None:
-    """Print `document`, or what `json` gives, to stdout: nothing but it, so that it can be piped."""
+    """Print `document`, or the text of `json`, alone to stdout, so that it can be piped."""
     from algid.report.markdown import markdown
     from algid.report.terminal import print_document
 

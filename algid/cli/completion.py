@@ -1,4 +1,4 @@
-"""What a shell completes behind options whose choices no type tells: words, a profile's own choices, cases."""
+"""Shell completion of options whose choices no type states: words, a profile's choices, cases."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def words(*known: str) -> Completion:
 
 
 def listed(known: Callable[[], list[str]]) -> Completion:
-    """Completes the last of several words with commas between them, each of which may stand there once."""
+    """Complete the last of several words, separated by commas and each used once."""
 
     def complete(incomplete: str) -> list[str]:
         *before, last = incomplete.split(",")

@@ -1,4 +1,4 @@
-"""`algid design`: the motion of an identification run, planned within limits, its error bars known beforehand."""
+"""`algid design`: plan an identification run within limits and predict its error bars."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ def example(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write four runs of an arm, one with a payload, and their profile: what the guide's pages are typed along with.
+    """Write four runs of an arm, one with a payload, and their profile, for the guide's examples.
 
     Example: algid example -o try
     """

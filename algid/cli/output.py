@@ -28,7 +28,7 @@ def remark(text: str) -> None:
 
 
 def complain(text: str) -> None:
-    """Print one line about what is wrong to standard error: no line feed of a foreign name breaks it."""
+    """Print one line of error to standard error; line feeds in foreign names are escaped."""
     remark("algid: " + text.replace("\n", "\\n"))
 
 

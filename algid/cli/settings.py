@@ -80,11 +80,11 @@ OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
         settings_of_profile,
     ),
 }
-"""Type, help and completion of a profile's file, of each of its settings with a flag of its own, and of any other."""
+"""Type, help and completion of a profile's file, its settings with flags, and any other."""
 
 
 def options_of_settings() -> Iterator[inspect.Parameter]:
-    """An option for each field of `Settings`: a bool has no --no-, and what has its own parser is text."""
+    """An option for each field of `Settings`: a bool has no --no-; parsed fields are text."""
     hints = get_type_hints(Settings)
     for field in fields(Settings):
         kind, default = hints[field.name], field.default
@@ -167,7 +167,7 @@ class Choice:
 
 
 def profile_from(flags: Mapping[str, Any]) -> Profile | None:
-    """The profile of the file of ``--profile`` with the other flags of `OF_PROFILE` over it, in their order.
+    """The profile of ``--profile``, with the other flags of `OF_PROFILE` over it, in their order.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def _meaning(name: str, text: str) -> dict[str, Any]:
 
 
 def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
-    """Give `command`, whose first parameter is the `Choice`, the options of logs and of settings after its own."""
+    """Give `command`, whose first parameter is `Choice`, the options of logs and then settings."""
     return _taking(command, [*options_of_profile()], [*options_of_settings()])
 
 
@@ -245,6 +245,7 @@ def _taking(
         *profile,
         *settings,
     ]
-    with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]  # typer reads it
+    # typer reads it
+    with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in every}
     return with_options

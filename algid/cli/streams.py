@@ -12,9 +12,12 @@ from typing import Any
 from algid.errors import OutputError
 
 SPELLINGS = {
-    "–": "-", "—": "-", "−": "-", "…": "...", "±": "+-", "•": "*", "·": "*", "×": "x", "∞": "inf", "°": " deg",
-    "→": "->", "≤": "<=", "≥": ">=", "≈": "~", "Δ": "d", "α": "alpha", "θ": "theta", "σ": "sigma", "τ": "tau",
-    "ω": "omega", "µ": "u", "μ": "u", "√": "sqrt", "²": "^2", "³": "^3", "─": "-", "‘": "'", "’": "'",
+    "–": "-", "—": "-", "−": "-", "…": "...", "±": "+-", "•": "*", "·": "*", "×": "x",
+    "∞": "inf", "°": " deg",
+    "→": "->", "≤": "<=", "≥": ">=", "≈": "~", "Δ": "d", "α": "alpha", "θ": "theta",
+    "σ": "sigma", "τ": "tau",
+    "ω": "omega", "µ": "u", "μ": "u", "√": "sqrt", "²": "^2", "³": "^3", "─": "-",
+    "‘": "'", "’": "'",
 }  # fmt: skip
 
 
@@ -49,7 +52,7 @@ def _to_nowhere(handle: int) -> None:
 
 
 def harden_streams() -> None:
-    """Let this process print whatever it has to: to a reader that leaves, and in letters that the terminal lacks."""
+    """Let this process print to a reader that leaves, and to a terminal that lacks characters."""
     codecs.register_error("spelled", _spelled)
     for name, handle, told_as in (("stdout", 1, "standard output"), ("stderr", 2, None)):
         if (

@@ -1,4 +1,4 @@
-"""What is believed of an arm before its run, how wrong that may be, and which of it a design is to make certain.
+"""Belief about an arm before its run: its error, and the parameters that a design is to determine.
 
 β = β̄ + F u, where u is standard normal (a result's covariance) or anywhere in the box |u| ≤ 1
 (masses and friction of which only a percentage is known, each its own u). Torques are linear in a
@@ -45,7 +45,7 @@ _SEEN = 2.0  # standard deviations of the prior from zero, for a parameter to ha
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """Coefficients of one kind of log: mean c (q,), and how they vary F (q, r), within a box or normally."""
+    """Coefficients of one kind of log: mean c (q,), and spread F (q, r), in a box or normal."""
 
     loaded: bool
     c: FloatArray
@@ -53,7 +53,7 @@ class Load:
     box: bool
 
     def largest(self, Y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Torque of the mean arm (2, N), what other arms add at most (2, N), and its derivative by Y (2, q, N)."""
+        """Mean arm's torque (2, N), most that others add (2, N), its derivative by Y (2, q, N)."""
         torque = np.einsum("aqn,q->an", Y, self.c)
         varied = np.einsum("aqn,qr->arn", Y, self.F)
         least = _ROUND * max(float(np.abs(torque).max()), _TINY)
@@ -106,9 +106,9 @@ class Belief:
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """Sizes (Q,) of the parameters, which of them the prior knows (Q,), and which the design is for (Q,).
+    """Sizes (Q,) of the parameters, which of them the prior knows (Q,), and the wanted ones (Q,).
 
-    What the prior cannot tell from zero has the size of its class.
+    A parameter whose prior is not significantly different from zero has the size of its class.
     """
 
     size: FloatArray

@@ -1,4 +1,4 @@
-"""What a motion tells about an arm, under the likelihood of `refined`, and how that changes with the motion.
+"""Information of a motion about an arm, by the likelihood of `refined`, and its derivatives.
 
 The information of a log is S = Yᵀ V⁻¹ Y with V = Σ_τ + G Σ_θ Gᵀ (`algid.estimators.whitening`).
 White noise of σ at R samples a second is, below half of r samples a second, white noise of σ √(r /
@@ -67,7 +67,7 @@ class Experiment:
 
 
 class Slopes:
-    """Regressor and torque derivatives along a motion at `rate` Hz, and their derivatives by the motion."""
+    """Regressor and torque derivatives along a motion at `rate` Hz, and theirs by the motion."""
 
     def __init__(self, model: Model, motion: Motion, rate: float) -> None:
         self.model, self.motion, self.rate = model, motion, rate
@@ -205,7 +205,7 @@ class Information:
 def informations(
     experiment: Experiment, motions: dict[bool, Motion], beta: FloatArray, every: int, rate: float
 ) -> list[Information]:
-    """The information of each kind's runs, its motion thinned to every so manieth of `rate` samples a second."""
+    """The information of each kind's runs, from every `every`-th of `rate` samples a second."""
     found = []
     for loaded, motion in motions.items():
         runs = (0, experiment.runs[1]) if loaded else (experiment.runs[0], 0)

@@ -91,7 +91,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Row:
-    """A limit and its side: its flag, its joint, whether at its upper end, and for a torque whether loaded."""
+    """A limit and its side: flag, joint, whether the upper end, and for torque whether loaded."""
 
     limit: str
     joint: int | None
@@ -101,7 +101,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Usage:
-    """Usages u (m, N) along a motion, the rows they belong to, and their derivatives (m, 6, N) by the motion."""
+    """Constraint use u (m, N) along a motion, its rows, and derivatives (m, 6, N) by the motion."""
 
     rows: tuple[Row, ...]
     u: FloatArray
@@ -117,7 +117,7 @@ _Found = tuple[Row, FloatArray, FloatArray]
 
 
 def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bool = True) -> Usage:
-    """How much of each limit the motion of `slopes` uses, for every arm of the belief behind `loads`.
+    """Use of each limit by the motion of `slopes`, for every arm of the belief behind `loads`.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _torque(limit: FloatArray, slopes: Slopes, load: Load, derivatives: bool) ->
 
 
 def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
-    """A posture (2,) that keeps the limits: the middle of the range, or the one that uses the least of them.
+    """A posture (2,) that keeps the limits: the middle of the range, or the one of least use.
 
     Raises
     ------

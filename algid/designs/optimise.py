@@ -27,7 +27,7 @@ KEPT = 1  # of them, that go on to the later stages
 
 @dataclass(frozen=True)
 class Stage:
-    """Sharpness of the figure's p-norm and of the limits' soft maximum, samples a second, iterations at most."""
+    """Sharpness of the figure's p-norm and the limits' soft maximum, rate (Hz), most iterations."""
 
     sharpness: float
     hardness: float
@@ -139,7 +139,7 @@ def kept(problem: Problem, x: FloatArray, rate: float, most: float = 1.0) -> Flo
 
 
 class _Search:
-    """Runs stages, remembers the best motion that keeps the limits, and tells how far it has come."""
+    """Run stages, keep the best motion that obeys the limits, and report the progress."""
 
     def __init__(self, problem: Problem, rate: float, progress: Progress | None) -> None:
         self._problem, self._rate, self._progress = problem, rate, progress

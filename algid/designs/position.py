@@ -1,4 +1,4 @@
-"""Motions under position control, at rest at both ends: a finite Fourier series a joint, blended to rest.
+"""Motions under position control: a finite Fourier series a joint, at rest at both ends.
 
 θ_i(t) = c_i + w(t) Σ_l (a_il sin ω_l t + b_il cos ω_l t) / ω_l with ω_l = 2π l / T (Swevers et al.
 1997). The window w rises from 0 to 1 and falls back with three derivatives that vanish at its
@@ -89,14 +89,14 @@ class Fourier:
         return Motion(theta + x[:2, None], omega, alpha)
 
     def gradient(self, by_motion: FloatArray, basis: FloatArray) -> FloatArray:
-        """Derivatives (..., size) by x of functions whose derivatives by the motion (..., 6, N) are known."""
+        """Derivatives (..., size) by x from those by the motion, (..., 6, N)."""
         per_order = by_motion.reshape(*by_motion.shape[:-2], 3, 2, by_motion.shape[-1])
         coefficients = np.einsum("...ojn,oln->...jl", per_order, basis, optimize=True)
         centre = per_order[..., 0, :, :].sum(axis=-1)
         return np.concatenate([centre, coefficients.reshape(*centre.shape[:-1], -1)], axis=-1)
 
     def random(self, rng: np.random.Generator, centre: FloatArray) -> FloatArray:
-        """A random motion about a posture (2,): as much velocity in each harmonic, on the average."""
+        """A random motion about a posture (2,), with equal mean velocity in each harmonic."""
         return np.concatenate([centre, rng.standard_normal(self.size - 2)])
 
 

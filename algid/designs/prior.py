@@ -1,4 +1,4 @@
-"""What is known of an arm before its run: from a result's folder, a shipped case, or a TOML file of the arm."""
+"""Prior of an arm before its run: from a result's folder, a shipped case, or a TOML file."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class BelievedArm:
 
 @dataclass(frozen=True)
 class KnownBefore:
-    """What the user knows better than the prior: link lengths and payload, and how wrong the rest may be."""
+    """What the user knows beside the prior: link lengths, payload, and the error of the rest."""
 
     l1: float | None = None
     l2: float | None = None
@@ -103,7 +103,7 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
 
 
 def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
-    """The prior of a simulated or drawn arm: its masses and friction may be wrong, its shape is right.
+    """The prior of a simulated or drawn arm: masses and friction uncertain, lengths exact.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Many arms swung open loop at once, each by a torque of its own: what a plan of torques does to all it is for.
+"""Simulate many arms open loop at once, each under its own torque.
 
 Runge-Kutta of fourth order at a fixed step, which follows the fastest joint: friction over inertia.
 
@@ -103,7 +103,7 @@ def swing(
 
 
 def sampled(t: FloatArray, motion: Motion, wanted: FloatArray) -> Motion:
-    """The motion at the times `wanted` (N,), by cubics through angles and velocities, and through accelerations."""
+    """The motion at the times `wanted` (N,), by cubics of angle, velocity and acceleration."""
     from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
     theta = CubicHermiteSpline(t, motion.theta, motion.omega, axis=1)(wanted)

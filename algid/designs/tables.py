@@ -156,7 +156,7 @@ def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
 
 
 def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
-    """The design in one clause, and what is against it: `doubts` about its prior, what no motion reaches."""
+    """The design in one clause, with reasons: `doubts` about its prior, undetermined parameters."""
     reasons = [*doubts]
     if design.open_parameters:
         wider = tuple(

@@ -1,4 +1,4 @@
-"""Open loop: a multi-sine of torques swings the arm from rest, and limits hold for arms drawn from the belief.
+"""Open loop: a multi-sine torque moves the arm from rest; limits hold for arms of the belief.
 
 τ_i(t) = w(t) τ̂_i Σ_l (a_il sin ω_l t + b_il cos ω_l t), with the window w of
 `algid.designs.position` and amplitudes in shares of τ̂: the torque's limit or, where a drive is far
@@ -40,7 +40,7 @@ _INFORMATION_RATE = 100.0  # Hz, about
 
 @dataclass(frozen=True, eq=False)
 class Swung:
-    """A pattern x (n,) that keeps the limits: each kind's motion of the believed arm at the times t, what it uses."""
+    """A pattern x (n,) within limits: motions of the believed arm by kind at t, constraint use."""
 
     x: FloatArray
     t: FloatArray
@@ -157,7 +157,7 @@ class TorqueProblem:
         )
 
     def figures(self, patterns: FloatArray) -> FloatArray:
-        """What the search makes small (P,): the logarithm of the largest relative bound, and a penalty on limits."""
+        """Objective (P,): logarithm of the largest relative bound, and a penalty on limits."""
         kinds = list(self._experiment.kinds)
         swings = self._swings(patterns, self._arms)
         width = len(self._arms) * len(kinds)
@@ -185,7 +185,7 @@ class TorqueProblem:
         return bound if np.isfinite(bound) else np.inf
 
     def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
-        """Usages of limits by motions: kinematic ones, the torque itself, rest at the end of the believed arm."""
+        """Constraint use of motions: kinematics, torque, the believed arm's rest at the end."""
         model = self._experiment.shared.model
         found = [
             usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False)
@@ -201,7 +201,7 @@ class TorqueProblem:
         return found
 
     def checked(self, x: FloatArray) -> Swung:
-        """The motion of a pattern, its amplitude drawn back until no limit breaks for any arm that is checked."""
+        """The pattern's motion, its amplitude reduced until all checked arms keep the limits."""
         kinds, limits = list(self._experiment.kinds), self._limits
         reach = np.concatenate([limits.half, limits.speed])[:, None]
         middle = np.concatenate([limits.middle, np.zeros(2)])[:, None]

@@ -31,7 +31,7 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a design comes from: its prior's file and doubts about it, command line, names of the robot's joints."""
+    """Origin of a design: its prior's file and doubts, command line, and names of the joints."""
 
     source: str
     command: str
@@ -92,7 +92,7 @@ def _signals(motion: Motion, names: Sequence[str]) -> dict[str, FloatArray]:
 
 
 def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
-    """The motion as trajectory_msgs/JointTrajectory in YAML, as a joint_trajectory_controller takes it."""
+    """The motion as trajectory_msgs/JointTrajectory in YAML, for a joint_trajectory_controller."""
     every = max(1, round(design.campaign.experiment.rate / POINTS))
     places = [*range(0, design.t.size - 1, every), design.t.size - 1]
     lines = [
@@ -102,8 +102,8 @@ def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
             "second's from link 1."
         ),
         (
-            "# Hanging straight down is (-1.5708, 0). Move the arm slowly to the first point before "
-            "it is played."
+            "# Hanging straight down is (-1.5708, 0). Move the arm slowly to the first point "
+            "before it is played."
         ),
         "header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}",
         f"joint_names: {json.dumps(list(joints), ensure_ascii=False)}",

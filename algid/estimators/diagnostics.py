@@ -39,7 +39,7 @@ from algid.significance import sigmas
 _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = sigmas(sides=1)
-"""Standard deviations past a bound of physics that chance does not explain: of all bounds one lies nearest."""
+"""Standard deviations past a bound of physics beyond which chance is no explanation; one-sided."""
 _INSIDE = (
     1e-6,
     1e-5,

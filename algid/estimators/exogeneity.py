@@ -44,7 +44,7 @@ from algid.notices import Notice, Remedy
 from algid.significance import LEVEL, chance
 
 ANSWERS = 0.01
-"""p value of feedback below which instruments do not stand in place of a least squares that is off: the safe side."""
+"""p value of feedback below which instruments do not replace a biased least squares."""
 MOVES = 1.0  # standard deviations of a constant that are worth another estimator
 _NEAR = 0.5  # of them: nearer, instruments are not simulated again
 _LAGS = 8  # steps between windows, two windows in all

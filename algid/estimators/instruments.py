@@ -260,7 +260,7 @@ def _batches(
 
 
 def _alike(one: Windows, other: Windows) -> bool:
-    """Whether windows have the same samples and steps, however long a sample is: no clock is another's."""
+    """Whether windows have the same samples and steps, whatever the sampling period."""
     return (one.step, _stride(one.dt)) == (other.step, _stride(other.dt))
 
 

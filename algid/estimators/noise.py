@@ -93,10 +93,10 @@ def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
 
 
 def roughness(tau: FloatArray) -> FloatArray:
-    """What neighbouring samples of the torques (2, N) differ by: white noise (2,) of the same sixth differences.
+    """White noise (2,) with the same sixth differences as the torques (2, N), in N m.
 
-    The root mean square, in N m: unlike `first_guess` it counts the jumps that dry friction makes
-    of the torque between two samples. A motion leaves nothing in it, however slow its error.
+    It is a root mean square: unlike `first_guess` it counts the jumps of the torque between two
+    samples that dry friction makes. A motion leaves nothing in it, however slow its error.
     """
     squares = np.mean(np.diff(tau, _DIFFERENCE, axis=1) ** 2, axis=1)
     return np.asarray(np.sqrt(squares / comb(2 * _DIFFERENCE, _DIFFERENCE)))

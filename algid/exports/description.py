@@ -1,4 +1,4 @@
-"""All that an export writes: the arm's coefficients, its links, and where each of its numbers comes from.
+"""Content of an export: the arm's coefficients, its links, and the source of each number.
 
 k1 = m2 l1 lc2 and k2 = m2 g lc2 leave l1 = g k1 / k2 to a model made of links. Where l1 is known,
 the estimates are conditioned on it: with their covariance C and a the gradient of g k1 - l1 k2,
@@ -34,7 +34,7 @@ from algid.text import joined
 
 @dataclass(frozen=True)
 class Coefficients:
-    """The torque's model, its coefficients by name, and the standard deviation of each that has one.
+    """The torque's model, its coefficients by name, and their standard deviations where known.
 
     `value` holds a zero for every coefficient that the model lacks; `conditioned` says whether l1
     moved them.
@@ -47,7 +47,7 @@ class Coefficients:
 
 
 def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coefficients:
-    """The coefficients of the result in `file`, conditioned on the length `l1` in m of link 1 where it is given.
+    """Coefficients of the result in `file`, conditioned on link 1's length `l1` in m if given.
 
     Raises
     ------
@@ -136,7 +136,7 @@ class Description:
 
 
 def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Description:
-    """The arm of the result in `file`, with links chosen from what is known where `links` are asked for.
+    """The arm of the result in `file`; with `links`, its links chosen from what is known.
 
     Raises
     ------
@@ -279,8 +279,8 @@ def header(arm: Description, remarks: list[str]) -> list[str]:
     return [
         f"Two-link arm by algid export, from {arm.source}.",
         (
-            "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down; SI "
-            "units."
+            "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down; "
+            "SI units."
         ),
         "",
         *(str(number).rstrip() for number in arm.numbers),

@@ -1,4 +1,4 @@
-"""The formats of an export by name, how one is written, and the payload as YAML for planners and controllers."""
+"""Export formats by name with their writers, and the payload as YAML for planners."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from algid.results import Result
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its files' suffix, the text of an arm in it, what it is made of links, and which flags it takes."""
+    """A format: its suffix, its text of an arm, whether it needs links, and its flags."""
 
     suffix: str
     text: Callable[[Description], str]
@@ -129,7 +129,7 @@ def _covariance(result: Result, shared: Sequence[str]) -> list[list[float]]:
 
 
 def _told(result: Result, name: str) -> tuple[float, float | None]:
-    """What a result tells of its payload's body, and how surely: nothing where it is a point at the tip."""
+    """Estimate and standard deviation of a part of the payload's body: zero if it has no body."""
     found = result.payload.get(name)
     return (0.0, 0.0) if found is None or found.estimate is None else (found.estimate, found.std)
 

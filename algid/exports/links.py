@@ -1,4 +1,4 @@
-"""Two links that move as k1 … k7 say: what the constants leave free is chosen nearest to uniform links.
+"""Two links that move by k1 … k7: what the constants leave free is nearest to uniform links.
 
 ======  ========================================================  ==========  ======
 symbol  name                                                      shape       unit
@@ -60,7 +60,7 @@ class Knowns:
 
 @dataclass(frozen=True)
 class Link:
-    """A link along x from its joint: length in m, mass in kg, centre in m, inertia about its centre in kg m^2."""
+    """A link along x from its joint: length m, mass kg, centre m, inertia about it kg m^2."""
 
     length: float
     mass: float
@@ -69,14 +69,14 @@ class Link:
 
     @property
     def tensor(self) -> tuple[float, float, float]:
-        """Principal inertias about x, y, z at the centre: of an axially symmetric bar, which meets the triangle."""
+        """Principal inertias about x, y, z at the centre, of an axially symmetric bar."""
         return ALONG * self.inertia, self.inertia, self.inertia
 
 
 def links_of(
     k: Mapping[str, float], gravity: float, l1: float, knowns: Knowns, file: str
 ) -> tuple[Link, Link]:
-    """Two links that move as the constants `k` say under `gravity` in m/s^2, link 1 being `l1` m long.
+    """Two links with the motion of the constants `k` under `gravity` in m/s^2, link 1 of `l1` m.
 
     Raises
     ------

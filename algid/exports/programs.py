@@ -1,4 +1,4 @@
-"""A C99 file that needs nothing but the mathematical library, and a Python module that needs nothing but Python.
+"""A C99 file with the mathematical library only, and a Python module with nothing but Python.
 
 Both are written out of the model's columns, in expressions that the two languages read alike:
 inertia, what is left of the torque at zero acceleration, and how terms act on the torque. In them
@@ -86,7 +86,7 @@ def _definitions(expressions: list[Weighted], form: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _Expressions:
-    """The model's expressions: M and n of the joints' load, and what the other terms add to both."""
+    """The model's expressions: M and n of the joints' load, and the part of the other terms."""
 
     model: Model
 
@@ -174,14 +174,17 @@ _C = """/*
 $TEXT
  */
 
-/* Angles in rad, velocities in rad/s, accelerations in rad/s^2, torques in N m, inertias in kg m^2. In other files:
+/* Angles in rad, velocities in rad/s, accelerations in rad/s^2, torques in N m, inertias in
+ * kg m^2. In other files:
  * #define ARM_DECLARATIONS_ONLY, then #include this one. */
 #ifndef ALGID_ARM_DECLARED
 #define ALGID_ARM_DECLARED
 void gravity(const double theta[2], double tau[2]);
 void inertia(const double theta[2], double matrix[2][2]);
-void inverse_dynamics(const double theta[2], const double omega[2], const double alpha[2], double tau[2]);
-void forward_dynamics(const double theta[2], const double omega[2], const double tau[2], double alpha[2]);
+void inverse_dynamics(const double theta[2], const double omega[2], const double alpha[2],
+                      double tau[2]);
+void forward_dynamics(const double theta[2], const double omega[2], const double tau[2],
+                      double alpha[2]);
 #endif
 
 #ifndef ARM_DECLARATIONS_ONLY
@@ -220,7 +223,8 @@ $DEFINE_FRICTION    r[0] = $R1;
     r[1] = $R2;
 }
 
-void inverse_dynamics(const double theta[2], const double omega[2], const double alpha[2], double tau[2])
+void inverse_dynamics(const double theta[2], const double omega[2], const double alpha[2],
+                      double tau[2])
 {
 $DEFINE_LOAD    double n[2], r[2], load1, load2;
     rest(theta, omega, n);
@@ -231,7 +235,8 @@ $LOAD    tau[0] = ${GAIN1}(load1 + r[0]$EXTRA1);
     tau[1] = ${GAIN2}(load2 + r[1]$EXTRA2);
 }
 
-void forward_dynamics(const double theta[2], const double omega[2], const double tau[2], double alpha[2])
+void forward_dynamics(const double theta[2], const double omega[2], const double tau[2],
+                      double alpha[2])
 {
 $DEFINE_INERTIA    const double m11 = $M11, m12 = $M12, m21 = $M21, m22 = $M22;
     double n[2], r[2], left1, left2;
@@ -249,7 +254,8 @@ _C_BY_TERM = {
     "load": """    load1 += ($SHARE1) * fabs(load1);
     load2 += ($SHARE2) * fabs(load2);
 """,
-    "solved": """    const double a = m11$X11, b = m12$X12, c = m21$X21, d = m22$X22, det = a * d - b * c;
+    "solved": """\
+    const double a = m11$X11, b = m12$X12, c = m21$X21, d = m22$X22, det = a * d - b * c;
     const double b1 = left1 - n[0], b2 = left2 - n[1];
     alpha[0] = (d * b1 - b * b2) / det;
     alpha[1] = (a * b2 - c * b1) / det;
@@ -257,7 +263,8 @@ _C_BY_TERM = {
     "solved with load": """\
     const double e1 = $SHARE1, e2 = $SHARE2;
     int up1 = left1 > 0, up2 = left2 > 0;
-    for (int trial = 0; trial < 4; trial++) { /* friction grows with the load, whose signs must turn out as assumed */
+    /* friction grows with the load, whose signs must turn out as assumed */
+    for (int trial = 0; trial < 4; trial++) {
         const double d1 = 1 + (up1 ? e1 : -e1), d2 = 1 + (up2 ? e2 : -e2);
         const double a = d1 * m11$X11, b = d1 * m12$X12, c = d2 * m21$X21, d = d2 * m22$X22;
         const double b1 = left1 - d1 * n[0], b2 = left2 - d2 * n[1], det = a * d - b * c;
@@ -295,7 +302,7 @@ $DEFINE_FRICTION    return $R1, $R2
 
 
 def inverse_dynamics(theta, omega, alpha):
-    """Torques in N m that give the accelerations alpha in rad/s^2 at theta in rad and omega in rad/s."""
+    """Torques in N m for accelerations alpha in rad/s^2 at theta in rad and omega in rad/s."""
 $DEFINE_LOAD    n1, n2 = _rest(theta, omega)
     r1, r2 = _friction(theta, omega)
     load1 = ($M11) * alpha[0] + ($M12) * alpha[1] + n1

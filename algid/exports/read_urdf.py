@@ -11,6 +11,7 @@ import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -54,7 +55,7 @@ _NOTHING = _Body(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
-    """The model of a URDF file for logs of the arm without payload, and sentences about what it cannot take over.
+    """The model of a URDF file for logs without payload, and remarks on what it cannot hold.
 
     Raises
     ------
@@ -105,8 +106,7 @@ class _Robot:
             raise ValueError(
                 f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn"
             )
-        inner = {joint.find("child").attrib["link"]: joint for joint in self._joints}  # type: ignore[union-attr]
-        self._parent = inner
+        self._parent = {_linked(joint, "child"): joint for joint in self._joints}
 
     def arm(self) -> tuple[Arm, tuple[float, float], list[str]]:
         """The arm, its joints' Coulomb friction in N m, and what it does not take over."""
@@ -136,23 +136,24 @@ class _Robot:
         return arm, (_loss(first, "friction"), _loss(second, "friction")), warnings
 
     def _child(self, joint: ET.Element) -> str:
-        return joint.find("child").attrib["link"]  # type: ignore[union-attr]
+        return _linked(joint, "child")
 
     def _frame(self, joint: ET.Element) -> tuple[str, tuple[FloatArray, FloatArray]]:
-        """The moving link (or the base) that a joint hangs from, and where its frame stands there."""
+        """The moving link (or the base) that carries a joint, and the joint's frame in it."""
         rotation, at = _origin(joint)
-        link = joint.find("parent").attrib["link"]  # type: ignore[union-attr]
+        link = _linked(joint, "parent")
         while link in self._parent and self._parent[link] not in self._moving:
             turn, shift = _origin(self._parent[link])
             rotation, at = turn @ rotation, shift + turn @ at
-            link = self._parent[link].find("parent").attrib["link"]  # type: ignore[union-attr]
+            link = _linked(self._parent[link], "parent")
         return link, (rotation, at)
 
     def _fixed(self, link: str) -> list[ET.Element]:
         return [
-            joint for joint in self._joints
-            if joint not in self._moving and joint.find("parent").attrib["link"] == link  # type: ignore[union-attr]
-        ]  # fmt: skip
+            joint
+            for joint in self._joints
+            if joint not in self._moving and _linked(joint, "parent") == link
+        ]
 
     def _body(self, link: str) -> _Body:
         """A link with all that is fixed to it, in its frame."""
@@ -183,7 +184,7 @@ class _Robot:
     def _planar(
         self, link: str, about: FloatArray, end: FloatArray, warnings: list[str], number: str
     ) -> tuple[float, tuple[float, float, float]]:
-        """Length of a link in the plane, and its mass, centre along its line and inertia about its centre."""
+        """Length of a link in the plane; mass, centre on its line, inertia about the centre."""
         body = self._body(link)
         if body.mass <= 0:
             raise ValueError(f"link {link} has no mass")
@@ -202,6 +203,11 @@ class _Robot:
         along = float(line @ centre)
         second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint
         return length, (body.mass, along, second - body.mass * along**2)
+
+
+def _linked(joint: ET.Element, side: Literal["parent", "child"]) -> str:
+    """The name of a joint's parent or child link."""
+    return joint.find(side).attrib["link"]  # type: ignore[union-attr]
 
 
 def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:

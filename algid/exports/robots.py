@@ -23,7 +23,7 @@ TIMESTEP = 5e-4  # s: Runge-Kutta of fourth order errs far below 1e-5 rad a seco
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint as the formats know it: damping in N m s/rad, Coulomb friction in N m, rotor inertia in kg m^2."""
+    """A joint of the formats: damping N m s/rad, Coulomb friction N m, rotor inertia kg m^2."""
 
     name: str
     damping: float
@@ -152,7 +152,7 @@ def mjcf(arm: Description) -> str:
 
 
 def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], list[str]]:
-    """The joints, and remarks about what a format, with or without rotors, cannot hold: nothing negative, for one."""
+    """The joints, none of their values negative, and remarks on what the format cannot hold."""
     value, model = arm.coefficients.value, arm.coefficients.model
     kinds = ("damping", "friction", "rotor") if rotors else ("damping", "friction")
     held = [term for term in EVERY_TERM.values() if any(getattr(term, kind) for kind in kinds)]
@@ -177,7 +177,7 @@ def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], lis
 def _rotorless(
     arm: Description, form: str
 ) -> tuple[tuple[Link, Link], tuple[Joint, Joint], list[str]]:
-    """Links, joints and remarks for the format `form`, which has no rotors: joint 1's stays in link 1's inertia."""
+    """Links, joints and remarks for the format `form` without rotors: joint 1's is in link 1."""
     assert arm.links is not None
     joints, remarks = _joints(arm, rotors=False)
     if arm.rotor1:

@@ -33,7 +33,7 @@ _SUMS = ("w", "wt", "wtt", "wy", "wty", "wyy", "n")
 
 
 def windows(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)) -> pl.DataFrame:
-    """A row a robot and month: mean and slope of `parameter` on the window that ends with that month.
+    """A row a robot and month: mean and slope of `parameter` on the window that the month ends.
 
     Parameters
     ----------

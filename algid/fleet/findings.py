@@ -1,4 +1,4 @@
-"""Single logs that stand out of a robot's history: estimates far from the others', payloads unlike their labels."""
+"""Logs that stand out of a robot's history: outlying estimates, payloads unlike their labels."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ _MAD = 1.4826  # from the median of absolute deviations to a standard deviation
 
 
 def outliers(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)) -> pl.DataFrame:
-    """Estimates of `parameter` far from their robot's median, in the larger of their own and the history's scatter.
+    """Estimates of `parameter` far from the robot's median, in the larger of two scatters.
+
+    These are the estimate's own standard deviation and the scatter of the history.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A fleet's history from ``jobs.parquet``: who drifts, which logs stand out, and what could not be tested."""
+"""A fleet's history from ``jobs.parquet``: drifting robots, outlying logs, untested ones."""
 
 from __future__ import annotations
 
@@ -148,7 +148,8 @@ class History:
     ----------
     windows : as `windows` gives them, of all parameters
     findings : as `outliers` and `mislabelled` give them
-    roster : a row a robot: robot, logs, undated, first and last (times), latest (job), tested (for drift of anything)
+    roster : a row a robot: robot, logs, undated, first and last (times), latest (job), and
+        tested (for drift of anything)
     nameless : logs that name no robot, and are left out
     jobs : every log, the latest of each robot first, as `read_jobs` gives them
     changes : as `with_stints` gives them
@@ -282,7 +283,7 @@ def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
 
 
 def write_history(history: History, out: Path, batch: Path) -> list[Path]:
-    """Write ``fleet.parquet``, ``findings.parquet`` and ``fleet.html``, which links to the reports in `batch`.
+    """Write ``fleet.parquet``, ``findings.parquet``, ``fleet.html`` with links into `batch`.
 
     Raises
     ------

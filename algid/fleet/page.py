@@ -132,7 +132,7 @@ def _drawn(history: History) -> list[str]:
 
 
 def _only(history: History, robots: list[str]) -> History:
-    """The history with the logs and windows of those robots alone, which are looked through often."""
+    """The history of those robots alone, since their logs and windows are searched often."""
     import polars as pl
 
     own = pl.col("robot").is_in(robots)
@@ -158,7 +158,8 @@ def _robot_section(history: History, robot: str, key: str, reports: Mapping[str,
     jobs = history.jobs.filter(pl.col("robot") == robot)
     links = [(visible(job), reports[job]) for job in jobs["job"].to_list() if job in reports]
     days = jobs["time"].drop_nulls()
-    when = f" · {days.min().date()} to {days.max().date()}" if len(days) else ""  # type: ignore[union-attr]
+    first, last = days.min(), days.max()
+    when = f" · {first.date()} to {last.date()}" if len(days) else ""  # type: ignore[union-attr]
     own = pl.col("robot") == robot
     drifting = history.drifts.filter(own)["parameter"].sort().to_list()
     said = f" · {joined(drifting)} drift{'s' * (len(drifting) == 1)}" if drifting else ""

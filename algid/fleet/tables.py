@@ -90,7 +90,9 @@ def change_table(history: History) -> Table:
             f"{row['before'].date().isoformat()} and {row['after'].date().isoformat()}",
             row["parameter"],
             f"{100 * row['share']:+.3g}",
-            f"{resolved(row['step'], row['step_std'])} ± {significant(NORMAL * row['step_std'], 2)}",
+            " ± ".join(
+                (resolved(row["step"], row["step_std"]), significant(NORMAL * row["step_std"], 2))
+            ),
             unit_text(UNITS[row["parameter"]]),
         )
         for row in (() if found is None else found.iter_rows(named=True))
@@ -104,7 +106,7 @@ def change_table(history: History) -> Table:
 
 
 def parameter_table(history: History, robot: str, jobs: pl.DataFrame) -> Table:
-    """Every parameter of a robot, whose logs are `jobs`: its latest value, its mean, its trend and what was found."""
+    """Every parameter of a robot with logs `jobs`: latest value, mean, trend, and findings."""
     import polars as pl
 
     columns = (

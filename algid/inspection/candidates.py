@@ -1,4 +1,4 @@
-"""Channels of a log that may hold a torque, where the one that was read holds none, and what takes them."""
+"""Channels that may hold a torque, if the one that was read holds none, with their remedies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def torques_beside(log: Log, channel: str) -> list[Remedy]:
 
 
 def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str, Remedy]]:
-    """What a mapping calls each channel that may be a torque, and what takes it: torques first, then currents."""
+    """Name and remedy of each channel that may be a torque: torques first, then currents."""
     places = [(entry.name, field) for entry in entries for field in entry.fields]
     places += [("", entry.name) for entry in entries if not entry.fields]
     amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}

@@ -1,4 +1,4 @@
-"""Checks of single channels: torques that are none, angles that jump, freeze or are in degrees, spikes."""
+"""Checks of single channels: false torques, angles that jump, freeze or are in degrees, spikes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from algid.notices import Notice, Remedy
 _DENORMAL = 1e-6
 _SPIKE = 30.0
 _TURN_BACK, _STANDS, _CLEAR = 3, 0.4, 6.0
-"""Where a joint turns back: samples before and behind, its speed of that at those, and they over the noise."""
+"""Turning points: samples before and after, share of their speed, their speed over the noise."""
 _DEAD, _DEAD_RUNS = (
     0.1,
     20,
@@ -26,7 +26,7 @@ _DEAD, _DEAD_RUNS = (
 _HELD_RUNS, _HELD_SHARE = 50, 0.6
 """Changes of a torque that tell its clock, and of how many of the samples at most they are."""
 _OFF_STEP, _IN_STEP = 0.15, 0.9
-"""Of a held torque's step: how far its runs may be off whole steps, and the share of runs that are not."""
+"""Largest distance of a held torque's runs from whole steps, and least share of such runs."""
 _TURN = 2 * math.pi
 
 
@@ -80,7 +80,7 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
 
 
 def held_efforts(log: Log) -> Iterator[Notice]:
-    """Torques that keep each value for several samples, in step with a slower clock, while the angle moves.
+    """Torques that hold values for several samples, at a slower clock, while the angle moves.
 
     A torque in coarse counts keeps its values too, but changes whenever it passes a count: its runs
     are of every length. A log whose angles are held as well was recorded slowly as a whole.
@@ -215,7 +215,7 @@ def spikes(log: Log) -> Iterator[Notice]:
 
 
 def _alone(values: FloatArray, places: NDArray[np.int64], size: FloatArray) -> NDArray[np.bool_]:
-    """Whether values (N,) at `places` fit neither the line before nor the line behind, which fit each other."""
+    """Whether values (N,) at `places` fit neither the line before nor after, though these agree."""
     before, after = values[places - 1], values[places + 1]
     from_before = 2 * before - values[np.maximum(places - 2, 0)]
     from_after = 2 * after - values[np.minimum(places + 2, values.size - 1)]

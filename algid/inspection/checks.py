@@ -1,4 +1,4 @@
-"""All checks of `algid.inspection.findings` on a log: channels, sampling, then what physics says of its convention."""
+"""All checks of `algid.inspection.findings` on a log: channels, sampling, then convention."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The convention under which a log obeys physics, where it is not the one it was read by, and what sets it.
+"""Another convention than the one read, under which a log obeys physics, and its remedy.
 
 `algid.estimators.convention_search` finds it; here it becomes words, and settings of a profile
 that change the reading.
@@ -289,7 +289,7 @@ def _own_sign(reading: Reading, name: str) -> int:
 
 
 def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> dict[str, Any]:
-    """Zero and offsets of the profile: what is added to the angles as recorded, once signs and scales are right."""
+    """The profile's zero and offsets, to add to recorded angles once signs and scales are right."""
     channels = (reading.channels.get("theta1"), reading.channels.get("theta2"))
     own = [0.0 if channel is None else channel.offset for channel in channels]
     read = [

@@ -13,8 +13,9 @@ from algid.readers.table import CHANNELS
 from algid.units import names_of
 
 _HEAD = """\
-# What the log's names, units and signs mean. Lines behind # are defaults or not known: edit what is wrong.
-# zero = "hanging"           # θ1 is zero hanging straight down, not along the horizontal; or "upright"
+# What the log's names, units and signs mean: edit what is wrong.
+# Lines behind # are defaults or not known.
+# zero = "hanging"           # θ1 is zero hanging straight down, not horizontal; or "upright"
 # second_angle = "absolute"  # θ2 from the horizontal or vertical, not from link 1
 # drive = "base"             # the second motor stands at the base: its torque acts on θ1 + θ2
 # passive = 2                # the joint without a motor: its torque is zero
@@ -75,7 +76,7 @@ def draft_profile(path: Path) -> str:
 
 
 def _source(origin: Origin | None, kind: str) -> str:
-    """The lines of topic, joints, clock and time: those of the log, behind # where they are not known."""
+    """Lines of topic, joints, clock and time as in the log, behind # where they are not known."""
     reading = origin.reading if origin else Reading()
     joints = (
         f"joints = [{', '.join(map(_quoted, reading.joints))}]"
@@ -123,7 +124,7 @@ def _channels(origin: Origin | None, kind: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """As a TOML basic string: its escapes are JSON's, save those of characters that JSON writes as two halves."""
+    """As a TOML basic string: escapes as in JSON, save those of two surrogates."""
     letters = (f"\\U{ord(one):08x}" if ord(one) > 0xFFFF else json.dumps(one)[1:-1] for one in text)
     return f'"{"".join(letters)}"'
 

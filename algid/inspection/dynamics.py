@@ -1,4 +1,4 @@
-"""A rough look at a log's dynamics: whether it moves the arm enough, and its torque carries the arm's weight.
+"""Rough check of a log's dynamics: enough motion, and a torque that carries the arm's weight.
 
 The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and
 once with gravity turned by a right angle. That is no identification; it tells a wrong sign or zero
@@ -22,7 +22,7 @@ _MOST_ROWS = 20_000
 _EDGE = 10
 _K2, _K3, _K4, _K5 = 1, 2, 3, 4
 _OF_LEFT = 0.1
-"""Of what the rough fit leaves: errors of its differentiation make gravity's columns fit a part of it."""
+"""Share of the rough fit's residual that gravity's columns fit by differentiation errors."""
 _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
@@ -185,7 +185,7 @@ def _left(matrix: FloatArray, found: FloatArray, target: FloatArray) -> float:
 
 
 def _standing_out(columns: FloatArray, others: FloatArray) -> float:
-    """Smallest singular value of scaled `columns` after `others` have explained what they can of them."""
+    """Smallest singular value of scaled `columns` after least squares on `others`."""
     scale = np.linalg.norm(columns, axis=0)
     if not np.all(scale > 0):
         return 0.0

@@ -13,13 +13,13 @@ from algid.log import Log
 from algid.signals.spacing import near_stamps, spaced
 
 GAP_PERIODS = 2.5
-"""A step this many periods long is a gap: a jittering clock stays below, two lost samples lie above."""
+"""A step of this many periods is a gap: jitter stays below it, two lost samples exceed it."""
 ENOUGH = 1 << 18
 """Values that tell a quantile of any number of them: a median to 0.25 % of the deviation."""
 
 
 def thinned(values: Any) -> Any:
-    """Evenly spread ones of many values (…, N), a view: all below `ENOUGH`, else as many up to twice that."""
+    """Evenly spread values (…, N), a view: all below `ENOUGH`, else that many or up to twice."""
     return values[..., :: max(1, values.shape[-1] // ENOUGH)]
 
 
@@ -45,7 +45,7 @@ class SignalFigures:
 
 @dataclass(frozen=True)
 class ClockFigures:
-    """The stamps: rate in Hz, jitter (standard deviation of steps without gaps) and longest gap in s."""
+    """The stamps: rate in Hz, jitter (standard deviation of steps but gaps), longest gap in s."""
 
     rows: int
     duration: float
@@ -67,7 +67,7 @@ def signal_figures(values: FloatArray) -> SignalFigures:
 
 
 def robust_deviation(values: FloatArray) -> float:
-    """Standard deviation of normal noise that outliers do not move: 1.4826 times the median deviation.
+    """Standard deviation of normal noise, robust to outliers: 1.4826 times the median deviation.
 
     Of many values those that `thinned` leaves.
     """
@@ -96,7 +96,7 @@ def grid_step(values: FloatArray) -> float:
 
 
 def saturated_share(values: FloatArray) -> float:
-    """Share of samples at the very highest or lowest value whose neighbours on both sides are there too."""
+    """Share of samples at the highest or lowest value whose neighbours on both sides are too."""
     if values.size < 3:
         return 0.0
     low, high = values.min(), values.max()

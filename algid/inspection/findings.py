@@ -12,7 +12,7 @@ ANGLE_CONSTANT        no       an angle that never changes
 STUCK_SENSOR          no       an angle freezes in motion and jumps when it comes back
 SPIKES                no       single samples far off their neighbours
 SATURATED_EFFORT      no       a torque clipped at its limit
-HELD_EFFORT           no       a torque that keeps each value for several samples while the angle moves
+HELD_EFFORT           no       a torque that holds its value for samples while the angle moves
 DEAD_EFFORT           no       a torque that keeps one value where others change all the time
 LOST_SAMPLES          no       steps twice as long as usual, though the stamps are even
 RESTS                 no       the arm stands still before it moves, or after
@@ -22,7 +22,7 @@ SLOW_SAMPLING         no       fewer than ten samples in a period of the motion
 SHORT_LOG             no       less than a second
 NEAR_STAMPS           no       samples that stand all but on top of one another
 GRAVITY_COMPENSATED   no       torques do not carry the arm's weight
-WRONG_CONVENTION      no       physics contradicts signs, order, reference or zeros, and one other convention is right
+WRONG_CONVENTION      no       physics contradicts the convention, and one other is right
 ZERO_OFFSET           no       the zeros of the angles are a little off
 FLIPPED_SIGN          no       gravity pulls upwards: a sign is wrong
 WRONG_ZERO            no       gravity pulls sideways: θ1 is not from the horizontal

@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Look(Generic[T]):
-    """A log that may be refused: its format and entries in any case, then what was read of it, or why not."""
+    """A log that may be refused: its format and entries, then its content or the refusal."""
 
     format: str
     entries: tuple[Entry, ...]

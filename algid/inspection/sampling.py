@@ -1,4 +1,4 @@
-"""Checks of how a log samples its motion: length, rate, stamps, lost samples, and rest at both ends."""
+"""Checks of a log's sampling: length, rate, stamps, lost samples, and rest at both ends."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from algid.notices import Notice, Remedy
 from algid.signals.spacing import NEAR, near_stamps
 
 _LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
-"""Of a step: how near it lies to the double; of the samples: how many do; and over those as near to none at all."""
+"""Lost samples: distance to a double step, share of samples, and ratio to as near no step."""
 _SHORTEST = 1.0
 _FEWEST = 10.0
 _REST, _STILL = 0.5, 1e-3
-"""Seconds at rest that are worth a word; and of an angle's range, how far it may creep meanwhile."""
+"""Least seconds at rest for a notice, and largest creep in that time, of an angle's range."""
 
 
 def sampling(log: Log) -> Iterator[Notice]:
@@ -116,7 +116,7 @@ def rests(log: Log, whole: bool) -> Iterator[Notice]:
 
 
 def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> float:
-    """Seconds until one of the angles (2, N) at times t (N,) has left its place, the median of the first `few`.
+    """Seconds until an angle (2, N) at times t (N,) leaves its place, the median of `few` samples.
 
     `room` (2,) is how far noise and encoder let it be from there.
     """

@@ -81,7 +81,7 @@ def _beside(log: Any, name: str) -> Path:
 
 
 def _torques(other: Path, profile: Profile, angles: Origin, open_one: Opener) -> TableReader:
-    """The file of the torques, whose joints stand in the order of the angles' where both have names."""
+    """The file of the torques; its joints follow the order of the angles' if both have names."""
     names = {entry.name for entry in format_of(other).entries(other)}
     of_angles = {"columns": None}
     for key in ("time", "topic"):
@@ -117,7 +117,7 @@ def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> O
 
 
 def _overlap(path: str, main: Iterator[SampleTable], other: Series) -> Iterator[SampleTable]:
-    """The rows of `main` within the time of the other file; the last table tells how many are not."""
+    """The rows of `main` within the other file's time; the last table counts those outside."""
     first, last = int(other.table.stamp_ns[0]), int(other.table.stamp_ns[-1])
     rows, inside, held = 0, 0, None
     begin, end = None, 0

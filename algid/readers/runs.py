@@ -19,7 +19,7 @@ from algid.readers.timebase import HORIZON, set_back
 from algid.words import counted
 
 _SHORTEST = 64
-"""Late samples at the end of a table that wait for the next one, and that a far run has at least."""
+"""Late samples at a table's end that wait for the next table, and least samples of a far run."""
 _MOST = 1000
 """Runs of a log: more are a broken clock's."""
 _PAUSE = 20
@@ -91,7 +91,7 @@ class _Clock:
         self._latest_ns = -(1 << 63)
 
     def parts(self, tables: Iterator[SampleTable]) -> Iterator[tuple[int, SampleTable]]:
-        """Parts of the tables, and the run of each; late rows at a table's end wait for the next."""
+        """Parts of the tables, each with its run; late rows at a table's end wait for the next."""
         waiting: SampleTable | None = None
         for each in tables:
             if not len(each):

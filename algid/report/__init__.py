@@ -1,1 +1,1 @@
-"""Reports: the terminal's table, `report.md`, `report.html`, comparisons, and logs for other viewers."""
+"""Reports: the terminal's table, `report.md`, `report.html`, comparisons, logs for viewers."""

@@ -43,7 +43,7 @@ def brief(result: Result, place: str = "") -> list[str]:
 
 
 def run_first(command: str | None) -> list[str]:
-    """What to run first, to be copied: a longer one goes on behind a backslash, as shells read it."""
+    """The command to run first; a long one continues behind a backslash, as shells read it."""
     if not command:
         return []
     words = [shlex.quote(word) for word in shlex.split(command)]
@@ -65,7 +65,7 @@ def _wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
 
 
 def _reasons(judged: Verdict, room: int) -> Iterator[str]:
-    """As many of the first reasons as there is room for, each whole, and how many there are more."""
+    """As many first reasons as fit, each whole, and the number of the others."""
     shown = 0
     for reason in judged.reasons[:MOST_REASONS]:
         lines = _wrapped(f"{visible(reason.text, 1000)} [{reason.code}]", " • ", "   ")
@@ -84,7 +84,7 @@ def _reasons(judged: Verdict, room: int) -> Iterator[str]:
 
 
 def _estimates(result: Result) -> Iterator[str]:
-    """The arm's constants and the payload: estimate, half the 95 % interval, unit, error where it is known, meaning."""
+    """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning."""
     errors = _errors(result)
     for name, found in {
         **{k: v for k, v in result.parameters.items() if k in ARM},

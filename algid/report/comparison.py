@@ -16,7 +16,7 @@ from algid.words import counted
 
 @dataclass(frozen=True)
 class Comparison:
-    """Results side by side: the estimates, how far each lies from the first one's, and what was set otherwise.
+    """Results side by side: estimates, their distances from the first one's, other settings.
 
     `sigma` holds, by parameter, the distance of each result from the first in combined standard
     deviations; None where either has no estimate or no standard deviation.
@@ -85,7 +85,7 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
 
 
 def comparison_json(found: Comparison, results: Sequence[Result]) -> str:
-    """The comparison as JSON: by parameter the estimates, their standard deviations and the distances in σ."""
+    """The comparison as JSON: estimates, standard deviations and distances in σ by parameter."""
     parameters = {
         name: {
             "estimate": [_number(result, name, "estimate") for result in results],

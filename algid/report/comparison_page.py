@@ -1,4 +1,4 @@
-"""A comparison as a page: intervals side by side, and distances in σ against what chance explains."""
+"""A comparison as a page: intervals side by side, and distances in σ with the limit of chance."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def _in_sigmas(found: Estimate | None, first: Estimate, sigma: float) -> tuple[f
 
 
 def _sigmas(results: Sequence[Result], names: Sequence[str]) -> dict[str, float]:
-    """Each row's largest standard deviation, of the parameters of which the first result has an estimate."""
+    """Each row's largest standard deviation, of the parameters that the first result has."""
     found = {}
     for name in names:
         first = results[0].estimates.get(name)
@@ -130,7 +130,7 @@ def _sigmas(results: Sequence[Result], names: Sequence[str]) -> dict[str, float]
 
 
 def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
-    """A forest plot: every result's interval from the first one's estimate, a row a parameter, each row in its own σ."""
+    """A forest plot: intervals about the first result's estimate, a row each in its own σ."""
     known = _sigmas(results, list(found.sigma))
     first = results[0].estimates
     apart = 0.6 / len(results)

@@ -186,7 +186,7 @@ class Document:
     title : what it is, in one line
     verdict : how far to trust what it is about
     sections : in the order in which they are read
-    kicker, name, facts : a page's head: what kind of page, of what, and the numbers that identify it
+    kicker, name, facts : a page's head: kind of page, its subject, and identifying numbers
     made : what made it, the page's last line
     tab : the browser's title where `name` is not enough
     """

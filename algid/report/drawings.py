@@ -172,7 +172,7 @@ def _bar(name: str, value: float, scale: float) -> str:
 
 
 def gauges(shares: Mapping[str, float]) -> dict[str, str]:
-    """A drawing a row: how much of the whole a share between 0 and 1 is, the whole a line at the end."""
+    """A drawing a row: a bar for a share between 0 and 1, and a line for the whole."""
     return {name: _gauge(name, share) for name, share in shares.items()}
 
 
@@ -195,7 +195,7 @@ USUAL = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Values (n,) at times `t` (n,) in any unit, half the width of their bands, whether they are to be looked at."""
+    """Values (n,) at times `t` (n,) in any unit, half band widths, and whether they are marked."""
 
     t: FloatArray
     value: FloatArray

@@ -176,7 +176,7 @@ def field_names(columns: list[str]) -> list[str]:
 
 
 class JointStates:
-    """Writes JointState messages of two joints: effort alone, or position, velocity and effort where `whole`."""
+    """Write JointState messages of two joints: effort only, or with position and velocity."""
 
     def __init__(self, names: tuple[str, str], *, whole: bool = False) -> None:
         body = bytearray(12)  # the stamp and an empty frame's length come first

@@ -1,4 +1,4 @@
-"""A document as a page: one file that opens offline, with the plotting library and the scripts that draw its figures.
+"""A document as a page: one offline file with the plotting library and its own scripts.
 
 Nothing but this package's own scripts runs: the page's Content-Security-Policy names them by their
 hashes, or by a nonce for the library beside the page, so that a name out of a log could not run

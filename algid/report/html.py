@@ -1,4 +1,4 @@
-"""A document's parts as HTML: foreign text escaped, tables with their drawings, places that the page's script fills."""
+"""A document's parts as HTML: escaped text, tables with drawings, places for the scripts."""
 
 from __future__ import annotations
 
@@ -59,7 +59,10 @@ def _folded(title: str, notices: Sequence[Notice]) -> str:
     """Notices behind their title; nothing where there is none."""
     if not notices:
         return ""
-    return f"<details><summary>{escaped(title)}</summary><ul>{_listed(_sentences(notices))}</ul></details>"
+    return (
+        f"<details><summary>{escaped(title)}</summary>"
+        f"<ul>{_listed(_sentences(notices))}</ul></details>"
+    )
 
 
 def _listed(sentences: tuple[str, ...]) -> str:
@@ -67,7 +70,7 @@ def _listed(sentences: tuple[str, ...]) -> str:
 
 
 def contents(document: Document) -> str:
-    """The page's contents: the numbers first, then its sections, and the figures of those without a heading."""
+    """The page's contents: numbers first, then sections, and figures without a heading."""
     links = [
         ("numbers", "Numbers"),
         *(link for section in document.sections for link in _links(section)),
@@ -165,7 +168,8 @@ def table_html(table: Table) -> str:
     return (
         f'<div class="scroll{cards}" role="region" tabindex="0" '
         f'aria-label="{escaped(table.title)}"><table>'
-        f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>"
+        f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n"
+        f"<tbody>\n{body}</tbody>"
         f"</table></div>{note}\n"
     )
 

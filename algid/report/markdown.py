@@ -13,7 +13,7 @@ _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
 
 
 def markdown(document: Document) -> str:
-    """`document` as GitHub's Markdown: title, verdict and tables, and what was read, and how, folded away."""
+    """`document` as GitHub's Markdown: title, verdict, tables, and folded reading and method."""
     judged = document.verdict
     lines = [
         f"### {escaped(document.title)}",

@@ -1,4 +1,4 @@
-"""The report of an identification: what it contains, and the files `report.html` and `report.md`."""
+"""The report of an identification: its content, and the files `report.html`, `report.md`."""
 
 from __future__ import annotations
 
@@ -167,8 +167,8 @@ def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
     marks += (
         [
             (
-                "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond the "
-                "scale"
+                "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond "
+                "the scale"
             )
         ]
         if logs

@@ -1,4 +1,4 @@
-"""Figures for papers: each figure of a page as a PDF or PNG, drawn by matplotlib out of what the page draws."""
+"""Figures for papers: each figure of a page as PDF or PNG, drawn by matplotlib."""
 
 from __future__ import annotations
 

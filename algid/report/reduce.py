@@ -60,9 +60,9 @@ PLACES = frozenset({"log", "t", "x"})
 def blocks(
     path: Path, names: Sequence[str], rows: int = ROWS, *, finite: Collection[str] = PLACES
 ) -> Iterator[Block]:
-    """Yield the columns `names` of `path`, `rows` samples at a time, missing values and those beyond `LARGEST` as NaN.
+    """Yield columns `names` of `path`, `rows` samples at a time; missing ones are NaN.
 
-    Columns that are `finite` may have none of these.
+    Values beyond `LARGEST` are NaN too. Columns that are `finite` may have none of these.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class Share:
-    """Share of the samples in every `size` ones for which something holds, 0 to 1, from each one's start."""
+    """Share, 0 to 1, of each `size` samples for which a condition holds, with its start."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -275,6 +275,6 @@ def bucket_size(samples: int, points: int) -> int:
 
 
 def broken_at_gaps(x: FloatArray, y: FloatArray, gap: float) -> tuple[FloatArray, FloatArray]:
-    """The series with a NaN wherever two samples lie more than `gap` apart, so that the line breaks."""
+    """The series with a NaN where two samples lie over `gap` apart, to break the line."""
     after = np.flatnonzero(np.diff(x) > gap) + 1
     return np.insert(x, after, x[after]), np.insert(y, after, np.nan)

@@ -43,7 +43,7 @@ Series = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class SeriesLog:
-    """Series by name: `lines` by their extremes, `samples` for their size, `middles` their running medians.
+    """Series by name: extremes of `lines`, sizes of `samples`, running medians of `middles`.
 
     `singular` is the share of samples that have no estimate, after ε, because the system was
     singular; `condition` is the condition number, infinite ones left out. `start`, `end` and
@@ -183,7 +183,7 @@ LONGEST_GAP = 5  # sampling periods; longer breaks the line
 
 @dataclass
 class LogRange:
-    """What one log spans: its times in s, its samples, its largest gap in s, its sampling period in s."""
+    """Extent of one log: its times in s, samples, largest gap in s, sampling period in s."""
 
     first: float
     last: float
@@ -311,7 +311,7 @@ class _Gathering:
 
 
 def read_scored(path: Path) -> dict[int, dict[str, Series]]:
-    """The torque that is scored, its prediction and their difference, by log and name as in a `TorqueLog`.
+    """The scored torque, its prediction and their difference by log and name, as a `TorqueLog`.
 
     Raises `ResultError` where `path` cannot be read or lacks a column.
     """

@@ -1,4 +1,4 @@
-"""The tables of a result: its estimates, then what is known beside them: fit, logs, settings, provenance.
+"""Tables of a result: its estimates, then fit, logs, settings and provenance.
 
 A column that holds nothing but dashes is dropped, so that a table says only what is known.
 """
@@ -83,7 +83,7 @@ def fit_tables(result: Result) -> tuple[Table, ...]:
 
 
 def terms_tables(result: Result) -> tuple[Table, ...]:
-    """The optional terms of the torque that were tried or given, and what each is worth: first where the logs chose."""
+    """Optional terms of the torque and their worth, first in the order if the logs chose them."""
     fit = result.fit
     if fit is None:
         return ()
@@ -316,7 +316,7 @@ PREDICTION_COLUMNS = (
 
 
 def estimate_tables(result: Result) -> tuple[Table, ...]:
-    """What was identified: the arm, its payload, the paper's route to it, the loaded arm, Table 4, how it predicts."""
+    """Estimates: arm, payload, the paper's route, loaded arm, Table 4, and prediction."""
     groups = {
         "Parameters": result.parameters,
         "Payload": result.payload,

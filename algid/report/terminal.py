@@ -36,7 +36,7 @@ def print_document(document: Document, console: Console) -> None:
 
 
 def print_verdict(judged: Verdict, console: Console, most: int | None = None) -> None:
-    """Print grade and headline, what to run first, and as many of the reasons as are asked for, all by default."""
+    """Print grade and headline, what to run first, and `most` of the reasons, by default all."""
     from rich.table import Table as RichTable
     from rich.text import Text
 
@@ -93,7 +93,7 @@ def print_table(table: Table, console: Console) -> None:
 
 
 def _least(column: Column, cells: tuple[str, ...]) -> int:
-    """The width in which no word of a column breaks, but for those that are too long for any table, and no number."""
+    """Least width that breaks no number of a column, and no word but those longer than any."""
     from rich.cells import cell_len
 
     words = [min(cell_len(word), LONGEST_WORD) for cell in cells for word in cell.split()]

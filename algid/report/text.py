@@ -12,7 +12,7 @@ LONGEST_ON_PAGE = 4_000
 
 
 def escaped(text: str) -> str:
-    """`text` as the content of a page's element or of a quoted attribute, every control character shown."""
+    """`text` for an element or a quoted attribute of a page, with visible control characters."""
     return html.escape(visible(text, LONGEST_ON_PAGE), quote=True)
 
 

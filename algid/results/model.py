@@ -83,7 +83,7 @@ class Table4Row(_Model):
 
 
 class LogSummary(_Model):
-    """A log that was used: first stamp in ns, duration in s, rate in Hz, each signal's channel, how it was read.
+    """A log used: first stamp in ns, duration in s, rate in Hz, channels, and how it was read.
 
     `sha256` is null where only what was needed of a log was fetched from an object store.
     `reading` is null in results of schema version 1.
@@ -102,7 +102,7 @@ class LogSummary(_Model):
 
 
 class WhitenessTest(_Model):
-    """Whether the torque residual of one joint is white: the test's p-value and the lag-one correlation."""
+    """Whether one joint's torque residual is white: p-value and correlation at lag one."""
 
     white: bool
     p_value: float | None
@@ -110,7 +110,7 @@ class WhitenessTest(_Model):
 
 
 class TermCriterion(_Model):
-    """Whether an optional term of the model earned its place: change of the criterion, negative is better.
+    """Worth of an optional term of the model: change of the criterion, negative is better.
 
     Where the terms were chosen automatically, `gain_heldout` is by how much the term lowers the
     squared error of torque that was held out, as a share, `evidence` the log of the odds for it,
@@ -126,7 +126,7 @@ class TermCriterion(_Model):
 
 
 class Endogeneity(_Model):
-    """Whether the regressors correlate with the error: the statistic of Durbin, Wu and Hausman, and its p-value.
+    """Whether regressors correlate with the error: the Durbin-Wu-Hausman statistic and p-value.
 
     By "largest" stands the coefficient at which instruments and least squares are furthest apart,
     in deviations.
@@ -138,7 +138,7 @@ class Endogeneity(_Model):
 
 
 class TorqueModel(_Model):
-    """The torque's terms beside eq. (1), the speeds in rad/s that shape friction, and who chose the terms.
+    """The torque's terms beside eq. (1), friction's speeds in rad/s, and who chose the terms.
 
     `held_out` says what was left out of the fit to try each term: whole logs, or blocks of them.
     `shrunk` names the coefficients of terms that were not chosen: each is what the logs and what
@@ -185,7 +185,7 @@ TRIFLE = 0.1
 
 
 class TorquePrediction(_Model):
-    """How well the model predicts the torque of logs: RMSE in N m, RMSE over the torque's RMS, and R², a joint.
+    """Prediction of the logs' torque by joint: RMSE in N m, RMSE over the torque's RMS, R².
 
     Scored is what lies below `bandwidth`, in Hz; `filter` says how it is cut out. `of_load` is the
     RMSE over what acts on a joint: its torque, or the model's parts where they are larger.
@@ -205,14 +205,14 @@ class TorquePrediction(_Model):
     rmse_held: tuple[float | None, float | None] | None = None
 
     def unexplained(self, least: float) -> tuple[int, ...]:
-        """Joints, 1 or 2, whose R² is below `least`, and whose residual is no trifle beside what acts on them."""
+        """Joints, 1 or 2, with R² below `least` and a residual above `TRIFLE` of their torque."""
         of_load = self.nrmse if self.of_load is None else self.of_load
         pairs = zip((1, 2), self.r2, of_load, strict=True)
         return tuple(joint for joint, r2, of in pairs if r2 < least and of > TRIFLE)
 
 
 class Repeatability(_Model):
-    """What each loaded log weighs by itself, and the standard deviation of that over the runs, in kg."""
+    """Payload mass of each loaded log by itself, and their standard deviation, in kg."""
 
     masses: list[float]
     std: float
@@ -596,7 +596,7 @@ def _check_covariance(fit: FitSummary) -> None:
 
 
 def _check_size(place: str, value: float | None, *, positive: bool = False) -> None:
-    """Raises `SettingError` where a number is not 0 and so small that it cannot be divided by, or is negative."""
+    """Raise `SettingError` for a number so small that it cannot be divided by, or negative."""
     if value is not None and (
         0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0)
     ):
@@ -606,7 +606,7 @@ def _check_size(place: str, value: float | None, *, positive: bool = False) -> N
 
 
 def _current(content: dict[str, Any]) -> dict[str, Any]:
-    """The content of a result of an earlier schema as this one has it: sentences become notices without numbers."""
+    """A result of an earlier schema in this one: sentences become notices without numbers."""
     if content["schema_version"] == SCHEMA_VERSION:
         return content
     kept = {

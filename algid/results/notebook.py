@@ -1,4 +1,4 @@
-"""A result as a notebook shows it: its verdict, and each estimate with its meaning and a bar of its interval."""
+"""A result in a notebook: its verdict, and each estimate with meaning and interval bar."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _text(text: str) -> str:
 
 
 def interval_bar(found: Estimate) -> str:
-    """An SVG of the estimate and its 95 % interval, on a scale that holds zero and ends where the interval does.
+    """An SVG of the estimate and its 95 % interval, on a scale from zero to the interval's end.
 
     A wide bar is an interval as large as the estimate; empty where there is no bounded interval.
     """

@@ -1,4 +1,4 @@
-"""Whether to trust a result: judged by its statuses, its intervals, its residual and its notices."""
+"""Whether to trust a result, by its statuses, intervals, residual and notices."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def judge(result: Result) -> Verdict:
 
 
 def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
-    """The command to run first: with what mends the first reason, or `algid inspect` where the cause is not known."""
+    """The command to run first: the first reason's remedy, or `algid inspect` without a cause."""
     causes = [one for one in reasons if one.code in (*CAUSES, "UNKNOWN_CAUSE")]
     remedy = causes[0].remedy if causes else None
     if remedy is not None and "accept" not in remedy.settings:  # to accept a cause mends nothing
@@ -157,7 +157,7 @@ def _failure(result: Result) -> str | None:
 
 
 def _identified(result: Result) -> str:
-    """How many parameters are identified, and by which estimator where it is not the one that was asked for."""
+    """How many parameters are identified, and by which estimator if it was not the requested."""
     identified = sum(
         found.status == "OK" and found.estimate is not None for found in result.estimates.values()
     )
@@ -244,7 +244,7 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 
 
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
-    """What makes a result doubtful, the weightiest first: causes, statuses, fit, then what was noticed."""
+    """Reasons for doubt in a result, the weightiest first: causes, statuses, fit, notices."""
     warnings = [one for one in result.notices if not one.note]
     causes = sorted(
         (one for one in warnings if one.code in CAUSES), key=lambda one: CAUSES.index(one.code)
@@ -261,7 +261,7 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
 
 
 def _asked_for(result: Result) -> dict[str, Estimate]:
-    """The estimates that were asked for: less terms that are shrunk, or that the logs have chosen by themselves.
+    """The requested estimates: those without shrunk terms and terms that the logs have chosen.
 
     Such a term is there for the sake of the others. That its own coefficients are small beside
     their error bars is no reason to doubt those. Phases are, since they say how the arm is bent.
@@ -319,7 +319,7 @@ def _of_fit(fit: FitSummary, *, failed: bool) -> Iterator[Notice]:
 
 
 def _worse_than_constant(fit: FitSummary | None) -> Iterator[Notice]:
-    """The joints whose torque a constant would predict better, where there is something to explain."""
+    """Joints whose torque a constant predicts better, if there is something to explain."""
     prediction = _prediction(fit)
     for joint in () if prediction is None else prediction.unexplained(least=0.0):
         yield Notice("WORSE_THAN_MEAN", numbers={"joint": joint})

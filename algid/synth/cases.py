@@ -41,7 +41,7 @@ Phases = Annotated[list[Annotated[float, _within(PHYSICAL.angle)]], _SOME]
 
 @dataclass(frozen=True)
 class Case:
-    """An arm, its payload in kg, the torque that drives it, and the paper's errors in percent where known."""
+    """An arm, its payload in kg, its driving torque, and the paper's errors in % if known."""
 
     name: str
     arm: Arm
@@ -49,12 +49,12 @@ class Case:
     torque: MultiSine | None
     paper_error_percent: dict[str, float]
     place: tuple[float | None, float] = (None, 0.0)
-    """Of the payload's centre of mass, x and y in m in the frame of link 2; without x it is at the tip."""
+    """Of the payload's centre of mass: x and y in m in link 2's frame; without x at the tip."""
     inertia: float = 0.0
     """Of the payload about its centre of mass, kg m^2."""
 
     def constants(self, payload: float) -> FloatArray:
-        """Constants (10,) of the arm with so many kg: an object of another mass has the shape of the case's payload."""
+        """Constants (10,) with `payload` kg; another mass has the shape of the case's payload."""
         share = payload / self.payload if self.payload else 1.0
         x, y = self.place
         return self.arm.phasors(payload, x, y, share * self.inertia if payload else 0.0)

@@ -1,6 +1,6 @@
-"""Gauss collocation of equations of motion: all nodes of a window at once, where steppers go one by one.
+"""Gauss collocation of equations of motion, for all nodes of a window at once.
 
-    ω(t) = ω₀ + ∫ α(s, θ, ω) ds,   θ(t) = θ₀ + ∫ ω ds,   α interpolated at each piece's Gauss-Legendre nodes
+        ω(t) = ω₀ + ∫ α(s, θ, ω) ds,   θ(t) = θ₀ + ∫ ω ds,   α interpolated at Gauss-Legendre nodes
 
 With Q, which integrates from the window's start to each node, the velocities W at the nodes solve
 
@@ -35,7 +35,7 @@ from algid.arm import FloatArray
 from algid.limits import PHYSICAL
 
 Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
-"""Accelerations (n, M) from angles (n, M) and velocities (n, M), at times that are known already."""
+"""Accelerations (n, M) from angles (n, M) and velocities (n, M), at times set before."""
 
 NODES = 16
 TOLERANCE = 1e-12
@@ -51,7 +51,7 @@ _SLOPE = 1e-6  # rad and rad/s, for the derivatives of α: they only steer the i
 _X, _WEIGHTS = leggauss(NODES)
 _ORDERS = np.arange(NODES)
 _COEFFICIENTS = (_ORDERS + 0.5)[:, None] * legvander(_X, NODES - 1).T * _WEIGHTS
-"""From values at the nodes to coefficients of Legendre's polynomials: exact up to the degree 2s − 1."""
+"""From node values to coefficients of Legendre's polynomials: exact up to degree 2s − 1."""
 
 
 def _integrals(x: FloatArray) -> FloatArray:
@@ -66,7 +66,7 @@ _TO_NODES = _integrals(_X) @ _COEFFICIENTS
 
 @dataclass(frozen=True)
 class Window:
-    """The polynomials that the iteration of a window found: rates (2n, P, s) of the state (2n,) at `edges` (P + 1,)."""
+    """A window's polynomials: rates (2n, P, s) of the state (2n,) at `edges` (P + 1,)."""
 
     edges: FloatArray
     state: FloatArray
@@ -105,7 +105,9 @@ def integrate(
     corners: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
 ) -> FloatArray:
-    """States (2n, N) at the times `t` (N,) of θ̈ = α(t, θ, ω) from `start` (2n,), angles then velocities, at ``t[0]``.
+    """States (2n, N) of θ̈ = α(t, θ, ω) at the times `t` (N,) from `start` (2n,) at ``t[0]``.
+
+    A state holds angles, then velocities.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A simulated arm that follows a planned motion: feed-forward torque and a position controller around it.
+"""A simulated arm that follows a planned motion by feed-forward and a position controller.
 
     τ = τ_ff(t) + M(θ) (ω_c² (θ_d − θ) + 2 ω_c (θ̇_d − θ̇))
 
@@ -37,7 +37,7 @@ LOADED_COLUMNS = ("loaded_tau1", "loaded_tau2")
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A motion to follow: times t (N,) in s, angles, velocities, torques without and with payload, each (2, N)."""
+    """A motion to follow: times t (N,) in s; angles, velocities, both kinds' torques, (2, N)."""
 
     t: FloatArray
     theta: FloatArray
@@ -100,7 +100,7 @@ def follow(
     loaded: bool,
     reached: Callable[[float], None] | None,
 ) -> SimulatedMotion:
-    """The motion of the arm `k` (7,) that a controller holds to the plan, at the times `t` (N,) in s.
+    """Motion of the arm `k` (7,) under a controller that follows the plan, at times `t` (N,) in s.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def excitation(case: Case, name: str) -> Torque:
 
 
 def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTorque:
-    """The torque as a drive applies it that is commanded at `rate` Hz: held, or ramped, between commands."""
+    """The torque of a drive commanded at `rate` Hz: held, or ramped, between commands."""
     t = np.arange(round(rate * duration) + 1) / rate
     return SampledTorque(t, torque(t), hold)
 
@@ -80,7 +80,7 @@ def synthesise(
 def rehearse(
     case: Case, plan: Reference, recording: Recording, progress: Progress | None = None
 ) -> list[Log]:
-    """The unloaded and, with a payload, the loaded log of a case whose controller follows a plan from its start."""
+    """Logs of a case whose controller follows a plan: unloaded and, with a payload, loaded."""
     logs: list[Log] = []
     unloaded = case.constants(0.0)
     for payload in dict.fromkeys((0.0, case.payload)):
@@ -102,7 +102,7 @@ def with_schedule(
     schedule: Sequence[tuple[float, float]],
     progress: Progress | None = None,
 ) -> Log:
-    """A log during which the payload changes: pairs of time in s, increasing, and payload in kg from then on.
+    """A log with changes of payload: pairs of time in s, increasing, and payload in kg from then.
 
     Before the first time the arm is unloaded. An object is grasped and let go at the tip's own
     velocity, so that the motion has no step. The truth that the log bears names the schedule.

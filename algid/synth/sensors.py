@@ -41,7 +41,7 @@ class Sensors:
 
 
 def sample_times(rate: float, duration: float, sensors: Sensors) -> FloatArray:
-    """Sampling instants (N,) in s, on whole nanoseconds: uniform but for jitter, less the samples dropped.
+    """Sampling instants (N,) in s, on whole nanoseconds, with jitter and without dropped samples.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from algid.synth.collocation import Acceleration, integrate
 from algid.synth.excitation import SampledTorque, Torque
 
 Driven = Callable[[FloatArray, FloatArray], FloatArray]
-"""Torque (2, M) N m for angles (2, M) rad and velocities (2, M) rad/s, at times that are known already."""
+"""Torque (2, M) in N m for angles and velocities (2, M) in rad and rad/s, at known times."""
 
 HANGING = np.array([-np.pi / 2, 0.0])
 

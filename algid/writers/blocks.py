@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from algid.log import Log, add, word_sum
 
 _EXACT_SECONDS_NS = 1 << 53
-"""Stamps below 104 days survive as float64 seconds: their half unit in the last place is under half a ns."""
+"""Stamps below 104 days survive as float64 seconds: half a unit in the last place is < 0.5 ns."""
 
 
 def as_blocks(log: Log | Iterable[Log]) -> Iterator[Log]:

@@ -78,7 +78,7 @@ class ChunkedFile:
         self._write(Header(self.profile, self.library))
 
     def add(self, stamp_ns: IntArray, content: NDArray[np.void]) -> None:
-        """Write a chunk of messages: their stamps (N,), of which none is negative, and contents (N,)."""
+        """Write a chunk of messages: their stamps (N,), none negative, and contents (N,)."""
         before = b"" if self._chunks else _bytes_of(self.schema, self.channel)
         rows = np.zeros(len(content), np.dtype([*_MESSAGE, ("content", content.dtype)]))
         rows["code"], rows["length"] = Opcode.MESSAGE, rows.itemsize - _PREFIX

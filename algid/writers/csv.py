@@ -1,4 +1,4 @@
-"""CSV logs: canonical columns, every float to its last bit, the truth in ``LOG.csv.truth.json`` beside it."""
+"""CSV logs: canonical columns, every float exact, the truth in ``LOG.csv.truth.json``."""
 
 from __future__ import annotations
 

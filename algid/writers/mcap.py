@@ -1,4 +1,4 @@
-"""MCAP logs as a ROS 2 recorder writes them: sensor_msgs/msg/JointState on /joint_states, CDR, zstd chunks.
+"""MCAP logs as of a ROS 2 recorder: sensor_msgs/msg/JointState, /joint_states, CDR, zstd.
 
 All messages of a chunk are laid out at once as rows of one structured array, since only the stamp
 and the numbers differ between them.
@@ -75,7 +75,7 @@ def write(
 
 
 def messages(block: Log) -> NDArray[np.void]:
-    """The samples of a block as JointState messages in CDR (N,), of stamps that `check_stamps` passes."""
+    """The samples of a block as JointState messages in CDR (N,); `check_stamps` must hold."""
     rows = np.zeros(len(block), _layout(block.omega is not None))
     rows["encapsulation"] = (0, 1, 0, 0)
     rows["sec"] = block.stamp_ns // 10**9

@@ -251,7 +251,7 @@ def test_a_growing_log_is_left_alone(tmp_path: Path) -> None:
     assert found == [0, 0, 1]
 
 
-def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_stays_to_be_looked_at(
+def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_is_kept(
     logs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     failed = Verdict(

@@ -348,8 +348,8 @@ def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -
 
 def test_replayed_torque_gives_the_same_motion(logs: Path, tmp_path: Path) -> None:
     replayed = Outcome(
-        "synth", "case1", "--torque", logs / "case1-unloaded.csv", "--torque-hold", "foh", "--format", "csv",
-        "--duration", "0.5", "-o", tmp_path,
+        "synth", "case1", "--torque", logs / "case1-unloaded.csv", "--torque-hold", "foh",
+        "--format", "csv", "--duration", "0.5", "-o", tmp_path,
     )  # fmt: skip
     assert replayed.code == 0, replayed.err
     first = pl.read_csv(logs / "case1-unloaded.csv").head(501)
@@ -361,8 +361,8 @@ def test_replayed_torque_gives_the_same_motion(logs: Path, tmp_path: Path) -> No
 def test_validate_predicts_another_log(tmp_path: Path) -> None:
     for seed, name in enumerate(("one", "two")):
         Outcome(
-            "synth", "case1", "-o", tmp_path / name, "--torque", "wide", "--duration", "4", "--seed", str(seed),
-            "--position-noise", "1e-4", "--torque-noise", "1e-2",
+            "synth", "case1", "-o", tmp_path / name, "--torque", "wide", "--duration", "4",
+            "--seed", str(seed), "--position-noise", "1e-4", "--torque-noise", "1e-2",
         )  # fmt: skip
     logs = [
         [tmp_path / name / f"case1-{role}.mcap" for role in ("unloaded", "loaded")]

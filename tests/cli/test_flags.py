@@ -34,7 +34,7 @@ CALLS: dict[str, tuple[str, ...]] = {
     "profile new": ("log.csv",),
     "example": (),
 }
-"""A call of each command that no file answers: what is wrong with a flag is told before one is sought."""
+"""A call of each command without a file: a wrong flag is reported before a file is opened."""
 READERS = ("inspect", "convert", "identify", "batch", "validate", "track")
 """Commands that take what a log means."""
 
@@ -253,11 +253,12 @@ NOISE = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
 BESIDE = ": a motion starts where it was planned and carries one payload; leave it out"
 OWN = [
     *(("synth", ("--payload-schedule", text), f"{SCHEDULE}{text!r}") for text in (
-        "", "2", "what", "a=1", "1=x", "1=2=3", "1=0.1,", "1=0.1,1=0", "2=0.1,1=0", "1=-0.1", "-1=0.1", "nan=1",
-        "1=nan", "1=inf", "inf=1", "1;2",
+        "", "2", "what", "a=1", "1=x", "1=2=3", "1=0.1,", "1=0.1,1=0", "2=0.1,1=0", "1=-0.1",
+        "-1=0.1", "nan=1", "1=nan", "1=inf", "inf=1", "1;2",
     )),
     *(("synth", ("--initial", text), f"{STATE}{text!r}") for text in (
-        "", "0", "0,0,0", "0,0,0,0,0", "a,0,0,0", "0,0,0,nan", "inf,0,0,0", "inf,-inf,0,0", "0;0;0;0",
+        "", "0", "0,0,0", "0,0,0,0,0", "a,0,0,0", "0,0,0,nan", "inf,0,0,0", "inf,-inf,0,0",
+        "0;0;0;0",
     )),
     ("synth", ("--torque", "loud"), ("--torque loud: expected case, wide, none or a log, found "
                                     "neither")),

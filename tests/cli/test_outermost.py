@@ -158,8 +158,8 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
         assert code == 2, arguments
         assert told == [
             (
-                "algid: standard output: cannot write (No space left on device); send it elsewhere, "
-                "or make room"
+                "algid: standard output: cannot write (No space left on device); send it "
+                "elsewhere, or make room"
             )
         ], arguments
 

@@ -47,8 +47,8 @@ def test_too_few_open_files_are_told_and_more_are_taken_where_they_may_be() -> N
         (
             (16, 16),
             (
-                "algid: the limit on open files: expected 32 or more, found 16; raise it with ulimit "
-                "-n\n"
+                "algid: the limit on open files: expected 32 or more, found 16; raise it with "
+                "ulimit -n\n"
             ),
         ),
         ((16, 64), "algid: absent.csv: there is no such file"),

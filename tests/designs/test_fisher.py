@@ -61,7 +61,10 @@ def slopes_by(function: object, beta: FloatArray, step: float = 1e-6) -> FloatAr
     columns = []
     for place in range(beta.size):
         moved = step * np.eye(beta.size)[place] * max(1.0, abs(beta[place]))
-        ahead, behind = (function(beta + sign * moved).ravel() for sign in (1, -1))  # type: ignore[operator]
+        ahead, behind = (
+            function(beta + sign * moved).ravel()  # type: ignore[operator]
+            for sign in (1, -1)
+        )
         columns.append((ahead - behind) / (2 * moved[place]))
     return np.stack(columns, axis=1)
 

@@ -34,7 +34,8 @@ class Ball:
     def random(self, rng: np.random.Generator) -> FloatArray:
         return 3 * rng.standard_normal(self.target.size)
 
-    def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:  # noqa: ARG002 - the search passes it
+    # the search passes a stage
+    def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:  # noqa: ARG002
         self.calls += 1
         eye = np.eye(x.size)
         return Evaluation(

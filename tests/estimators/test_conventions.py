@@ -78,9 +78,10 @@ def spoiled(name: str, theta: FloatArray, tau: FloatArray) -> Pair:
     return pairs[name]
 
 
-ROWS = """all signs, both torques, both angles, tau1, tau2, theta1, theta2, joint 1, joint 2, joints swapped,
-torques swapped, angles swapped, absolute, motor at the base, hanging, upright, theta1 by half a turn,
-theta2 by half a turn, theta2 by a quarter, degrees, motor side, free gears, three at once"""
+ROWS = """all signs, both torques, both angles, tau1, tau2, theta1, theta2, joint 1, joint 2,
+joints swapped, torques swapped, angles swapped, absolute, motor at the base, hanging, upright,
+theta1 by half a turn, theta2 by half a turn, theta2 by a quarter, degrees, motor side,
+free gears, three at once"""
 
 
 @pytest.mark.parametrize("row", ROWS.replace("\n", " ").split(", "))

@@ -67,8 +67,8 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     assert (note.code, note.text) == (
         "CONSTRAINED",
         (
-            f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which the "
-            "logs contradict"
+            f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which "
+            "the logs contradict"
         ),
     )
     before = Notice("BEFORE", "before")

@@ -228,7 +228,7 @@ def test_of_a_long_log_the_first_pieces_are_looked_at(
 
 
 def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:
-    """Also where rates differ, so that their windows cannot be simulated together, or clocks a little."""
+    """Also where rates differ, so that windows need their own simulations, or clocks a little."""
     k, log = bench.arm.constants(), bench.log()
     drifting = replace(log, dt=1.001 * log.dt)
     slower = Segment(0.0, 2 * log.dt, log.theta[:, ::2], log.tau[:, ::2])

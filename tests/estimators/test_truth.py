@@ -124,7 +124,8 @@ def _truth(fit: Fit) -> np.ndarray:
 def test_every_kind_of_estimate_is_the_truth_within_its_error(
     cases: dict[tuple[str, bool], Case], estimator: str, terms: str, payload: bool
 ) -> None:
-    unloaded: list[Source] = [lambda seed=seed: [cases[terms, False].log(seed)] for seed in (1, 2)]  # type: ignore[misc]
+    logs = [cases[terms, False].log(seed) for seed in (1, 2)]
+    unloaded: list[Source] = [lambda log=log: [log] for log in logs]  # type: ignore[misc]
     loaded: list[Source] = [lambda: [cases[terms, True].log(3)]] if payload else []
     fit = _fit(estimator, terms, unloaded, loaded)
     assert fit.estimator == estimator

@@ -26,18 +26,21 @@ CAD = """<robot name="cad">
   <joint name="floor" type="fixed"><parent link="world"/><child link="stand"/>
     <origin xyz="0.3 -0.2 1" rpy="1.5707963267948966 0 0.4"/></joint>
   <joint name="elbow" type="revolute"><parent link="arm"/><child link="forearm"/>
-    <origin xyz="0 0.4 0.02" rpy="0 0 0.7"/><axis xyz="0 0 1"/><dynamics damping="0.2" friction="0.1"/>
+    <origin xyz="0 0.4 0.02" rpy="0 0 0.7"/><axis xyz="0 0 1"/>
+    <dynamics damping="0.2" friction="0.1"/>
     <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
   <joint name="shoulder" type="revolute"><parent link="stand"/><child link="arm"/>
     <origin xyz="0 0.1 0" rpy="0 0 -1.1"/><axis xyz="0 0 2"/><dynamics damping="0.3"/>
     <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
   <link name="arm"><inertial><origin xyz="0 0.15 0.01" rpy="0.3 0.2 0.1"/><mass value="2"/>
-    <inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0.002" iyz="-0.001"/></inertial></link>
+    <inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0.002" iyz="-0.001"/>
+    </inertial></link>
   <link name="forearm"><inertial><origin xyz="0.1 0 0"/><mass value="0.6"/>
     <inertia ixx="0.001" iyy="0.004" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <link name="hand"><inertial><origin xyz="0.02 0 0"/><mass value="0.2"/>
     <inertia ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="wrist" type="fixed"><parent link="forearm"/><child link="hand"/><origin xyz="0.25 0 0"/></joint>
+  <joint name="wrist" type="fixed"><parent link="forearm"/><child link="hand"/>
+    <origin xyz="0.25 0 0"/></joint>
 </robot>
 """
 

@@ -132,8 +132,8 @@ def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -
     day, first = 86_400 * 10**9, 1_700_000_000 * 10**9
     records = [
         JobRecord(
-            Job(f"r/{number}", ("a.csv",), robot="r"), End.OK, "", "", (), {}, "", 1.0, first + number * day, 10.0,
-            "refined",
+            Job(f"r/{number}", ("a.csv",), robot="r"), End.OK, "", "", (), {}, "", 1.0,
+            first + number * day, 10.0, "refined",
             # k4 grows through zero and is the clearest; its mean is none to be a percentage of
             {"k1": (1.0 + 0.002 * number, 0.01, "OK"), "k4": (0.1 * (number - 9), 0.01, "OK")},
         )
@@ -219,8 +219,8 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
     day = 86_400 * 10**9
     records = [
         JobRecord(
-            Job(f"r{robot}/{number}", ("a.csv",), robot=f"r{robot}"), End.OK, "", "", (), {}, "", 1.0,
-            1_700_000_000 * 10**9 + number * day, 10.0, "refined",
+            Job(f"r{robot}/{number}", ("a.csv",), robot=f"r{robot}"), End.OK, "", "", (), {}, "",
+            1.0, 1_700_000_000 * 10**9 + number * day, 10.0, "refined",
             {"k1": (1.0 + 0.001 * ((7 * number) % 5 - 2), 0.01, "OK")},
         )
         for robot in range(2)

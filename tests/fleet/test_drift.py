@@ -286,8 +286,8 @@ def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path)
     )  # without a date it stands last
     assert [one.text for one in history.untested] == [
         (
-            "No drift was looked for in 1 log without a date: stamps count from 1970, or a manifest "
-            "tells the time."
+            "No drift was looked for in 1 log without a date: stamps count from 1970, or a "
+            "manifest tells the time."
         )
     ]
 

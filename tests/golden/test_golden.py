@@ -13,11 +13,11 @@ from tests.golden.cases import SHARED, Case, cases
 from tests.golden.record import EXPECTED
 
 SHARE = 1e-6
-"""Of a standard deviation: other kernels sum in another order, which weak problems amplify to some 1e-8."""
+"""Of a standard deviation: kernels sum in different orders, amplified to 1e-8 by weak problems."""
 EXACT = 1e-7
-"""Of a number's own size, where its deviation is smaller or none: kernels differ by 1e-8 on logs without noise."""
+"""Of a number's own size, if its deviation is smaller: kernels differ by 1e-8 without noise."""
 ROUNDING = 1e-6
-"""Of a number's own size: a smaller deviation is that of a log without noise, and made of rounding."""
+"""Of a number's own size: a smaller deviation is rounding, on a log without noise."""
 
 ALL = list(cases())
 

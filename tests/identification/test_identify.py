@@ -67,9 +67,9 @@ def test_noise_lies_within_the_intervals(noisy: tuple[Log, Log]) -> None:
     result = identify(*noisy)
     assert result.fit is not None
     assert result.fit.converged
-    truth = dict(
-        zip(result.parameters, algid.Arm.constants(noisy[0].origin.truth.arm), strict=False)  # type: ignore[union-attr]
-    )
+    known = noisy[0].origin.truth
+    assert known is not None
+    truth = dict(zip(result.parameters, algid.Arm.constants(known.arm), strict=False))
     for name, true in truth.items():
         found = result.parameters[name]
         assert found.estimate is not None
@@ -183,7 +183,7 @@ def test_blocks_change_no_estimate(
     from algid.readers.assemble import TableReader
 
     blocks = TableReader.blocks
-    monkeypatch.setattr(TableReader, "blocks", lambda self, rows=0: blocks(self, 700))  # noqa: ARG005
+    monkeypatch.setattr(TableReader, "blocks", lambda self, _rows=0: blocks(self, 700))
     parts = identify(tmp_path / "log.parquet", None, settings)
     for name, found in whole.parameters.items():
         assert parts.parameters[name].estimate == pytest.approx(found.estimate, rel=1e-12)
@@ -335,8 +335,8 @@ def test_a_bound_broken_by_chance_is_no_failure() -> None:
         )
         bounds = [results.Bound(bound="k6 >= 0", value=-1, distance_sigma=sigma)]
         return results.FitSummary(
-            noise={}, covariance_names=[], covariance=[], intervals="sandwich", iterations=0, converged=True,
-            broken_bounds=bounds, residual=predicted,
+            noise={}, covariance_names=[], covariance=[], intervals="sandwich", iterations=0,
+            converged=True, broken_bounds=bounds, residual=predicted,
         )  # fmt: skip
 
     assert not is_implausible(fit(2.9, 0.9, 0.3))

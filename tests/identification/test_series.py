@@ -164,7 +164,12 @@ def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
         np.concatenate(
             [
                 b["tau1_predicted"]
-                for b in torque_blocks(survey, Model(), {"unloaded": K}, lambda _, s=s: s)  # type: ignore[misc]
+                for b in torque_blocks(
+                    survey,
+                    Model(),
+                    {"unloaded": K},
+                    lambda _, s=s: s,  # type: ignore[misc]
+                )
             ]
         )
         for s in (5 * DT, 0.0)

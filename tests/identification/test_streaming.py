@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +34,10 @@ SETTINGS = {
 def chopped(log: Log, rows: int) -> LogSource:
     """A log that comes in blocks of `rows` samples."""
     starts = range(0, len(log), rows)
-    blocks = lambda: (log.part(first, min(first + rows, len(log))) for first in starts)  # noqa: E731
+
+    def blocks() -> Iterator[Log]:
+        return (log.part(first, min(first + rows, len(log))) for first in starts)
+
     return replace(open_source(log, "unloaded"), blocks=blocks, promised=0)
 
 
@@ -92,7 +96,12 @@ def test_logs_that_fit_in_memory_are_read_once(
     monkeypatch.setattr(surveys, "MOST_KEPT", room)
     begun: list[int] = []
     log = chopped(uneven, 5000)
-    counting = replace(log, blocks=lambda: begun.append(1) or log.blocks())  # type: ignore[func-returns-value]
+
+    def blocks() -> Iterator[Log]:
+        begun.append(1)
+        return log.blocks()
+
+    counting = replace(log, blocks=blocks)
     survey = Survey([counting])
     passes = [list(survey.segments(counting)) for _ in range(3)]
     assert len(begun) == readings

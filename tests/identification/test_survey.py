@@ -40,7 +40,8 @@ def moving(
     theta = np.stack([np.sin(9 * t) - 1.5, np.cos(7 * t)])
     truth = None if payload is None else Truth(ARM, payload)
     stamps = 5_000_000_000 + np.arange(samples) * 1_000_000
-    return Log(stamps, theta, 3 * np.cos(theta), Origin(name, "csv", {}, truth, **origin))  # type: ignore[arg-type]
+    came = Origin(name, "csv", {}, truth, **origin)  # type: ignore[arg-type]
+    return Log(stamps, theta, 3 * np.cos(theta), came)
 
 
 def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> LogSource:
@@ -56,8 +57,8 @@ def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> LogSource:
             0.2,
             "unloaded",
             (
-                "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap the "
-                "logs"
+                "expected a log of the unloaded arm, its metadata say a payload of 0.2 kg; swap "
+                "the logs"
             ),
         ),
         (
@@ -171,7 +172,12 @@ def test_files_of_lengths_of_their_own_are_opened_without_hashing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hashed: list[Path] = []
-    monkeypatch.setattr(source, "sha256_of", lambda path: hashed.append(path) or str(path))  # type: ignore[func-returns-value]
+
+    def sha256_of(path: Path) -> str:
+        hashed.append(path)
+        return str(path)
+
+    monkeypatch.setattr(source, "sha256_of", sha256_of)
     files = [tmp_path / f"{name}.parquet" for name in "abc"]
     for file, samples in zip(files, (300, 301, 300), strict=True):
         write_log(file, moving(samples=samples))

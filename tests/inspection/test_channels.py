@@ -497,7 +497,7 @@ def test_coarse_counts_and_logs_that_are_slow_as_a_whole_are_not_held() -> None:
 
 
 def test_dry_friction_makes_no_spikes_and_a_bus_does() -> None:
-    """A joint that turns back between two samples for one, or or whose torque is on its way when a step is logged."""
+    """A joint turns back between two samples, or its torque changes while a step is logged."""
     draw = np.random.default_rng(3)
     omega = 30 * np.sin(2 * math.pi * 3 * T)
     turn = np.searchsorted(T, T[-1] / 2)

@@ -144,7 +144,8 @@ model = Model(tuple(result.fit.model.terms), 9.81, result.fit.model.coulomb_spee
 c = np.array([result.parameters[name].estimate for name in model.names])
 one = np.array([[0.3], [0.4]])
 ours = torque(model, c, Motion(one, one, one))[:, 0]
-np.testing.assert_allclose(module["inverse_dynamics"]([0.3, 0.4], [0.3, 0.4], [0.3, 0.4]), ours, rtol=1e-12)
+written = module["inverse_dynamics"]([0.3, 0.4], [0.3, 0.4], [0.3, 0.4])
+np.testing.assert_allclose(written, ours, rtol=1e-12)
 
 # the command line
 from pathlib import Path
@@ -165,7 +166,8 @@ for page, row in (
 table = np.column_stack([log.t, *log.theta, *(1e3 * log.tau)])[::4]
 head = "t,theta1,theta2,tau1 [N mm],tau2 [N mm]"
 toy = Path("arm.toy")
-toy.write_text("TOYLOG\\n" + head + "\\n" + "\\n".join(",".join(map(repr, map(float, row))) for row in table) + "\\n")
+rows = [",".join(map(repr, map(float, row))) for row in table]
+toy.write_text("\\n".join(["TOYLOG", head, *rows, ""]))
 from algid.batches.discover import jobs_of
 assert [job.name for job in jobs_of([str(toy.parent.absolute())], "results")] == ["arm"]
 from algid.cli.completion import of_profile
@@ -177,7 +179,8 @@ assert "toy" in seen and f"{len(table):d} toys" in seen and "--zero hanging" in 
 done = called("identify", toy, "--estimator", "toy", "--model", "plain", "--no-report")
 assert done.exit_code == 0, done.output
 found = algid.read_result("arm.algid")
-assert found.estimator == "toy" and [n.code for n in found.notices].count("TOY_SEEN") == 1, found.notices
+codes = [notice.code for notice in found.notices]
+assert found.estimator == "toy" and codes.count("TOY_SEEN") == 1, found.notices
 print("all follow", here)
 """
 

@@ -221,7 +221,8 @@ import re, sys
 from pathlib import Path
 from algid.readers import open_log
 rows = sum(map(len, open_log(sys.argv[1]).blocks()))
-status = Path("/proc/self/status").read_text()  # of this program alone: ru_maxrss goes on from the one that starts it
+# of this program alone: ru_maxrss goes on from the one that starts it
+status = Path("/proc/self/status").read_text()
 print(rows, 1024 * int(re.search(r"VmHWM:\\s*(\\d+)", status)[1]))
 """
 

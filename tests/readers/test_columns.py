@@ -154,8 +154,8 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
         (
             "OTHER_UNIT",
             (
-                "the file states the unit rad for theta1 ('q1_deg'), which is taken for deg, as its "
-                "name says"
+                "the file states the unit rad for theta1 ('q1_deg'), which is taken for deg, as "
+                "its name says"
             ),
         )
     ]

@@ -27,6 +27,10 @@ def _npy(path: Path, columns: Columns) -> None:
     np.save(path, table)
 
 
+def _packed_npz(path: Path, columns: Columns) -> None:
+    np.savez_compressed(path, **columns)  # type: ignore[arg-type]
+
+
 WRITERS: dict[str, Callable[[Path, Columns], object]] = {
     "csv": lambda path, columns: pl.DataFrame(columns).write_csv(path, float_precision=6),
     "csv.zst": lambda path, columns: path.write_bytes(_packed(columns)),
@@ -34,7 +38,7 @@ WRITERS: dict[str, Callable[[Path, Columns], object]] = {
     "feather": lambda path, columns: feather.write_feather(pa.table(columns), str(path)),
     "one.feather": lambda path, columns: pl.DataFrame(columns).write_ipc(path),
     "npz": lambda path, columns: np.savez(path, **columns),  # type: ignore[arg-type]
-    "packed.npz": lambda path, columns: np.savez_compressed(path, **columns),  # type: ignore[arg-type]
+    "packed.npz": _packed_npz,
     "npy": _npy,
     "mat": lambda path, columns: savemat(path, columns),
     "packed.mat": lambda path, columns: savemat(path, columns, do_compression=True),

@@ -147,11 +147,12 @@ def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
 
 WRONG: dict[str, tuple[Callable[[Records], Records], str]] = {
     "a chunk of no length": (
-        changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)), (r"it claims a chunk at "
-                                                                           r"byte \d+")
+        changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)),
+        r"it claims a chunk at byte \d+",
     ),
     "a chunk behind the end": (
-        changing(ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)), r"it claims a chunk at byte"
+        changing(ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)),
+        r"it claims a chunk at byte",
     ),
     "a chunk left out": (shorter, r"it lists \d+ of \d+ chunks"),
     "a count": (

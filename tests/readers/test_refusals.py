@@ -58,8 +58,8 @@ def table(header: str, **columns: Any) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         names = header.split(",")
         t = np.arange(ROWS) * 1e-3
-        rows = [[f"{columns.get(name, np.sin(5 * t + place))[row]:.9g}" for place, name in enumerate(names)]
-                for row in range(ROWS)]  # fmt: skip
+        values = [columns.get(name, np.sin(5 * t + place)) for place, name in enumerate(names)]
+        rows = [[f"{value[row]:.9g}" for value in values] for row in range(ROWS)]
         if names[0] not in columns:
             for row in range(ROWS):
                 rows[row][0] = f"{t[row]:.6f}"
@@ -138,16 +138,20 @@ REFUSALS = {
         "--set tau1.torque_constant=0.1 --set tau2.torque_constant=0.1",
     ),
     "current that is a torque": Refusal(
-        table("t,q1,q2,current1,current2"), "unit", '--set tau1.unit="N m" --set tau2.unit="N m"', "CURRENT_AS_TORQUE"
+        table("t,q1,q2,current1,current2"), "unit",
+        '--set tau1.unit="N m" --set tau2.unit="N m"', "CURRENT_AS_TORQUE",
     ),
     "counts": Refusal(
         table("t,q1_counts,q2_counts,tau1,tau2"), "counts a turn", "--set theta1.counts=4096 "
                                                                    "--set theta2.counts=4096"
     ),
     "inches": Refusal(
-        table("t,q1 [inch],q2,tau1,tau2"), "'inch', which is no unit", '--set theta1.unit="rad"', "FOREIGN_UNIT"
+        table("t,q1 [inch],q2,tau1,tau2"), "'inch', which is no unit",
+        '--set theta1.unit="rad"', "FOREIGN_UNIT",
     ),
-    "a torque in degrees": Refusal(table("t,q1,q2,tau1 [deg],tau2"), "expected one of", '--set tau1.unit="N m"'),
+    "a torque in degrees": Refusal(
+        table("t,q1,q2,tau1 [deg],tau2"), "expected one of", '--set tau1.unit="N m"'
+    ),
     "motor torques beside joint angles": Refusal(
         table("t,joint1_pos,joint2_pos,motor1_torque,motor2_torque"),
         "motors beside",
@@ -157,15 +161,21 @@ REFUSALS = {
                                "--set tau1.source=tau1 --set tau2.source=b"),
     "missing time": Refusal(table("when,q1,q2,tau1,tau2"), "no column for t", "--set time=when"),
     "three joints": Refusal(table("t,q1,q2,q3,tau1,tau2,tau3"), "3 joints", "--joints 1,3"),
-    "joints that are not there": Refusal(table("t,a_pos,b_pos,a_torque,b_torque"), "", "--joints a,b"),
+    "joints that are not there": Refusal(
+        table("t,a_pos,b_pos,a_torque,b_torque"), "", "--joints a,b"
+    ),
     "one name twice": Refusal(table("t,q1,q_1,q2,tau1,tau2"), "are both q of joint 1",
                               "--set theta1.source=q1 --set theta2.source=q2"),
     "time that stands still": Refusal(
         table("t,q1,q2,tau1,tau2,time_s", t=np.zeros(ROWS), time_s=np.arange(ROWS) * 1e-3),
         "time stands still", "--set time=time_s"),
-    "a value that is no number": Refusal(with_nan(), "finite number", "--accept NOT_FINITE", "NOT_FINITE"),
+    "a value that is no number": Refusal(
+        with_nan(), "finite number", "--accept NOT_FINITE", "NOT_FINITE"
+    ),
     "two topics": Refusal(states(("/one", "/two"), ("j1", "j2")), "/one, /two", "--topic /two"),
-    "three joints of a topic": Refusal(states(("/one",), ("j1", "j2", "j3")), "3 joints", "--joints j1,j3"),
+    "three joints of a topic": Refusal(
+        states(("/one",), ("j1", "j2", "j3")), "3 joints", "--joints j1,j3"
+    ),
 }  # fmt: skip
 
 
@@ -237,15 +247,20 @@ REFUSALS["header stamps that are none"] = Refusal(flat(1e300), "header stamp wit
 
 TAKEN = {"source": "position[a]", "topic": "/other"}
 WRONG: dict[str, tuple[Callable[[Path], Path], dict[str, Any], str]] = {
-    "a column that is not there": (table("t,q1,q2,tau1,tau2"), {"theta1": {"source": "b"}}, "--set theta1.source=NAME"),
+    "a column that is not there": (
+        table("t,q1,q2,tau1,tau2"), {"theta1": {"source": "b"}}, "--set theta1.source=NAME"
+    ),
     "a time that is not there": (table("t,q1,q2,tau1,tau2"), {"time": "b"}, "--set time=NAME"),
     "a field that is not there": (
-        states(("/one",), ("a", "b")), {"theta1": {"source": "b", "topic": "/one"}}, "--set theta1.source=NAME"
+        states(("/one",), ("a", "b")), {"theta1": {"source": "b", "topic": "/one"}},
+        "--set theta1.source=NAME",
     ),
     "a topic that is not there": (states(("/one",), ("a", "b")), {"tau1": TAKEN}, "--topic NAME"),
-    "joints that are not there": (states(("/one",), ("a", "b")), {"joints": ("c", "d")}, "--joints A,B"),
+    "joints that are not there": (
+        states(("/one",), ("a", "b")), {"joints": ("c", "d")}, "--joints A,B"
+    ),
 }  # fmt: skip
-"""Logs that are refused for what a profile says of them, which that is, and the flag that the message names."""
+"""Logs that a profile makes invalid, the profile, and the flag that the message names."""
 
 
 def flag_first(message: str) -> bool:

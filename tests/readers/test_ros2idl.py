@@ -50,7 +50,8 @@ module sensor_msgs {
 """
 HEADER = """\
 #include "builtin_interfaces/msg/Time.idl"
-module std_msgs { module msg { struct Header { builtin_interfaces::msg::Time stamp; string frame_id; }; }; };
+module std_msgs { module msg {
+struct Header { builtin_interfaces::msg::Time stamp; string frame_id; }; }; };
 """
 TIME = """\
 module builtin_interfaces { module msg { /* seconds
@@ -176,7 +177,8 @@ def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
     text = """
     module arm {
       module msg {
-        module State_Constants { const uint8 BRAKED = 1; @unit (value="s") const string<5> NAME = "};"; };
+        module State_Constants {
+          const uint8 BRAKED = 1; @unit (value="s") const string<5> NAME = "};"; };
         typedef float float__3[3];
         typedef float__3 currents;
         struct Joint { octet flags; double angle, torque; };

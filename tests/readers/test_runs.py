@@ -1,4 +1,4 @@
-"""Time that starts again within a log: its runs one behind another, or one alone, against files of their own."""
+"""Time that starts again within a log: all its runs, or one alone, against separate files."""
 
 from __future__ import annotations
 

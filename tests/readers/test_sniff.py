@@ -23,8 +23,9 @@ from algid.readers.formats import FORMATS, SUFFIXES, sniff
 from algid.readers.text import head_of, looks_like_text, pieces, whole_lines
 
 CONTENT = {
-    "mcap": b"\x89MCAP0\r\n...", "parquet": b"PAR1...", "bag": b"#ROSBAG V2.0\n", "db3": b"SQLite format 3\x00...",
-    "feather": b"ARROW1\0\0", "npy": b"\x93NUMPY\x01", "mat": b"MATLAB 5.0 MAT-file", "csv": b"t,q1\n",
+    "mcap": b"\x89MCAP0\r\n...", "parquet": b"PAR1...", "bag": b"#ROSBAG V2.0\n",
+    "db3": b"SQLite format 3\x00...", "feather": b"ARROW1\0\0", "npy": b"\x93NUMPY\x01",
+    "mat": b"MATLAB 5.0 MAT-file", "csv": b"t,q1\n",
     "csv.gz": gzip.compress(b"t,q1\n", mtime=0), "csv.zst": zstandard.compress(b"t,q1\n"),
 }  # fmt: skip
 

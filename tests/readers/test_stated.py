@@ -30,13 +30,22 @@ def table(above: str, header: str = ",".join(COLUMNS)) -> str:
     ("line", "units"),
     [
         ("tau in mNm", {"tau1": "mNm", "tau2": "mNm"}),
-        ("on Monday; tau1, tau2 in mN m, q1 and q2 in deg", {"q1": "deg", "q2": "deg", "tau1": "mN m", "tau2": "mN m"}),
+        (
+            "on Monday; tau1, tau2 in mN m, q1 and q2 in deg",
+            {"q1": "deg", "q2": "deg", "tau1": "mN m", "tau2": "mN m"},
+        ),
         ("torques are in mNm.", {"tau1": "mNm", "tau2": "mNm"}),
         ("angles: degrees", {"q1": "degrees", "q2": "degrees"}),
         ("q [deg], tau [mNm]", dict(zip(COLUMNS[1:], ("deg", "deg", "mNm", "mNm"), strict=True))),
         ("tau2 = mNm", {"tau2": "mNm"}),
-        ("units: s, deg, deg, mNm, Nm", dict(zip(COLUMNS, ("s", "deg", "deg", "mNm", "Nm"), strict=True))),
-        ("units: ms, deg, mNm", dict(zip(COLUMNS, ("ms", "deg", "deg", "mNm", "mNm"), strict=True))),
+        (
+            "units: s, deg, deg, mNm, Nm",
+            dict(zip(COLUMNS, ("s", "deg", "deg", "mNm", "Nm"), strict=True)),
+        ),
+        (
+            "units: ms, deg, mNm",
+            dict(zip(COLUMNS, ("ms", "deg", "deg", "mNm", "mNm"), strict=True)),
+        ),
         ("torque (Nm)", {"tau1": "Nm", "tau2": "Nm"}),
         ("time in ms", {"time": "ms"}),
         ("position in inch", {"q1": "inch", "q2": "inch"}),

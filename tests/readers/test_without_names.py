@@ -41,7 +41,9 @@ def test_rows_without_a_time_are_counted(kind: str, log: algid.Log, tmp_path: Pa
     assert found.theta == pytest.approx(log.theta)
     assert found.t == pytest.approx(log.t, abs=1e-9)
     assert found.origin.mapping["t"] == "rows at 200 Hz"
-    assert algid.inspect(given, rate=200.0).clock.rate == pytest.approx(200.0)  # type: ignore[union-attr]
+    clock = algid.inspect(given, rate=200.0).clock
+    assert clock is not None
+    assert clock.rate == pytest.approx(200.0)
     with pytest.raises(LogError, match=r"no column for t; .* --rate HZ \(profile: rate = HZ\)"):
         algid.read_log(given)
 

@@ -29,10 +29,13 @@ const behind = (element) => {
 };
 const poor = [];
 for (const element of document.querySelectorAll("body *")) {
-  const own = [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
-  if (!own || element.closest("script, style, noscript, .hoverlayer, .skip, .heatmaplayer")) continue;
+  const own = [...element.childNodes].some(
+    (node) => node.nodeType === 3 && node.textContent.trim());
+  const hidden = "script, style, noscript, .hoverlayer, .skip, .heatmaplayer";
+  if (!own || element.closest(hidden)) continue;
   const style = getComputedStyle(element);
-  if (style.visibility === "hidden" || style.display === "none" || !element.getClientRects().length) continue;
+  if (style.visibility === "hidden" || style.display === "none") continue;
+  if (!element.getClientRects().length) continue;
   const ink = parse(element instanceof SVGElement ? style.fill : style.color);
   const [a, b] = [luminance(ink), luminance(behind(element))].sort((x, y) => y - x);
   const ratio = (a + 0.05) / (b + 0.05);

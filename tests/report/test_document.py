@@ -160,7 +160,8 @@ def test_an_arm_stands_beside_its_section_and_brings_its_script_once() -> None:
 
 def test_a_fold_is_open_or_closed() -> None:
     for fold, attribute in (("open", " open"), ("closed", "")):
-        text = section_html(Section((table("T"),), "key", "A <fold>", fold=fold))  # type: ignore[arg-type]
+        section = Section((table("T"),), "key", "A <fold>", fold=fold)  # type: ignore[arg-type]
+        text = section_html(section)
         assert text.startswith(
             f'<details class="paper" id="key"{attribute}><summary>A &lt;fold&gt;</summary>'
         )

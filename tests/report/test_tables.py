@@ -37,7 +37,8 @@ from tests.report.folders import estimate, hostile
 
 def terminal(result: Result, width: int = 200, **options: object) -> str:
     stream = io.StringIO()
-    print_document(result_document(result), Console(file=stream, width=width, **options))  # type: ignore[arg-type]
+    console = Console(file=stream, width=width, **options)  # type: ignore[arg-type]
+    print_document(result_document(result), console)
     return stream.getvalue()
 
 

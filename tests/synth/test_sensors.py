@@ -32,7 +32,8 @@ def motion(count: int = COUNT) -> SimulatedMotion:
 
 
 def recorded(**sensors: float | int | None) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    log = record(motion(), Sensors(**sensors), Truth(CASE.arm, 0.0, "case1"), "it")  # type: ignore[arg-type]
+    fitted = Sensors(**sensors)  # type: ignore[arg-type]
+    log = record(motion(), fitted, Truth(CASE.arm, 0.0, "case1"), "it")
     return log.theta, log.tau, log.omega
 
 

@@ -200,8 +200,8 @@ def judged(
 ) -> TrackResult:
     nothing = np.zeros(0)
     found = Track(
-        list(stretches), nothing, nothing, nothing, nothing, nothing, np.array([[2.0, 1.9, 2.1]]), 1.5, 0.99,
-        np.array([[5.0, 6.0]]), bare,
+        list(stretches), nothing, nothing, nothing, nothing, nothing,
+        np.array([[2.0, 1.9, 2.1]]), 1.5, 0.99, np.array([[5.0, 6.0]]), bare,
     )  # fmt: skip
     log = LogSummary(
         path="a",

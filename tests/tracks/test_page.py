@@ -111,7 +111,8 @@ def test_tables_and_figures_say_what_they_show(result: TrackResult) -> None:
     assert changes.note == "Between: the change's 95 % interval."
     assert [row[5] for row in changes.rows] == ["1.500", "3.000"]
     assert [column.heading for column in stretch_table(result).columns] == [
-        "Stretch", "From, s", "To, s", "Payload", "± 95 %", "Unit", "Status", "95 % interval", "Truth", "Error",
+        "Stretch", "From, s", "To, s", "Payload", "± 95 %", "Unit", "Status", "95 % interval",
+        "Truth", "Error",
     ]  # fmt: skip
     payload, left = figures(result)
     whole = [result.track.stretches[0].start, result.track.stretches[2].end]
@@ -131,8 +132,8 @@ def test_tables_and_figures_say_what_they_show(result: TrackResult) -> None:
         "%{y:.3g} times the noise at %{x:.3f} s<extra></extra>",
     ]
     assert [entry.words for entry in payload.legend] == [
-        "m_p(t) from ± 0.25 s around, within its stretch", "its 95 % band", "mass of each stretch", "true schedule",
-        "95 % interval of a change's time",
+        "m_p(t) from ± 0.25 s around, within its stretch", "its 95 % band",
+        "mass of each stretch", "true schedule", "95 % interval of a change's time",
     ]  # fmt: skip
 
 

@@ -151,9 +151,10 @@ def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
     holey = replace(moving, track=replace(moving.track, holes=np.array([[0.25, 0.5]])))
     document = track_document(holey)
     titles = [table.title for table in document.tables(*Depth)]
-    assert titles == ["Payload by stretch", "Changes", "Fit", "Logs", "Channels", ("Times without "
-                                                                                  "samples"), "Settings",
-                      "Provenance"]  # fmt: skip
+    assert titles == [
+        "Payload by stretch", "Changes", "Fit", "Logs", "Channels", "Times without samples",
+        "Settings", "Provenance",
+    ]  # fmt: skip
     assert quality_tables(holey)[-1].rows == (("0.250", "0.500"),)
     log, channels = quality_tables(holey)[1:3]
     assert [column.heading for column in log.columns] == [

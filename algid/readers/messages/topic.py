@@ -51,7 +51,7 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
 
 
 def joint_names(shape: Shape, channels: Collection[str]) -> list[str]:
-    """The joints that a message of this shape has what makes the `channels` for, as a position and an effort."""
+    """Joints for which a message of this shape has all `channels`, such as position and effort."""
     names = names_in(shape) or tuple(str(place) for place in range(LIMITS.joint_cells))
     quantities = {name[:-1] for name in channels}
     return [name for name in names if all(_path(shape, name, one) for one in quantities)]

@@ -50,7 +50,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: its title, panels and legend, one line that tells how to read it, one about what it holds.
+    """A figure: title, panels, legend, a line on how to read it, and a line on its content.
 
     `views` are stretches of the time axis to choose from: name, start and end.
     """
@@ -76,7 +76,7 @@ class Missing:
 
 
 def packed(values: FloatArray, precise: bool = False) -> dict[str, str]:
-    """`values` as plotly's typed array: single precision, or double where `precise` or beyond its range."""
+    """`values` as plotly's typed array: single precision, or double if `precise` or beyond it."""
     size = np.abs(values[np.isfinite(values)])
     kind = "f8" if precise or np.any(size > np.finfo(np.float32).max) else "f4"
     data = np.ascontiguousarray(values, dtype=f"<{kind}")
@@ -84,7 +84,7 @@ def packed(values: FloatArray, precise: bool = False) -> dict[str, str]:
 
 
 def times(x: FloatArray) -> dict[str, str]:
-    """Increasing `x` in single precision where that tells neighbours apart to a hundredth of their distance."""
+    """Increasing `x` in single precision where its error is below 1 % of the usual step."""
     steps = np.diff(x)
     steps = steps[steps > 0]
     coarse = 1e2 * np.finfo(np.float32).eps * np.abs(x).max() if x.size else 0.0

@@ -1,4 +1,4 @@
-"""The paper's Figure 2: how each estimate converges, with the final value, its band and the truth."""
+"""The paper's Figure 2: convergence of each estimate, with final value, band and truth."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _condition(read: SeriesLog, condition: Series, sync: str) -> Panel:
 
 
 def _view(samples: FloatArray, target: Target) -> list[float] | None:
-    """The range that shows where the series settles: spikes near singular instants stay outside at first."""
+    """The range in which the series settles; spikes near singular instants start outside."""
     finite = samples[np.isfinite(samples)]
     settled = finite[finite.size // 4 :]
     if not settled.size:

@@ -44,7 +44,7 @@ def information(path: Path, result: Result) -> Figure | Missing:
 def _summed(
     names: list[str], found: list[tuple[int, Block]]
 ) -> tuple[FloatArray, FloatArray, dict[int, LogRange]]:
-    """Middles of the stretches on the running time, information (names, m) in them, each log's range.
+    """Middles of the stretches in running time, their information (names, m), each log's range.
 
     Information adds up, so that the seconds of a long log are summed, not thinned.
     """
@@ -104,7 +104,7 @@ def information_panel(
 
 
 def _note(names: list[str], x: FloatArray, shares: FloatArray) -> str:
-    """The least share of the time that holds half of a parameter's information, of the parameter that has least."""
+    """Least share of time with half of a parameter's information, of the most uneven parameter."""
     half = {}
     for name, row in zip(names, shares, strict=True):
         most = np.cumsum(np.sort(row)[::-1])

@@ -1,4 +1,4 @@
-"""What the estimator left: spectrum and autocorrelation of its own residual, with the band of white noise."""
+"""The estimator's residual: its spectrum and autocorrelation with white noise's band."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ BAND = Legend("", "95 % band of white noise", "@blue/0.25", "area")
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One quantity of one joint: its axis, its values, and the band that holds 95 % of white noise's, or NaN."""
+    """One quantity of one joint: axis, values, and white noise's 95 % band, or NaN."""
 
     x: FloatArray
     value: FloatArray

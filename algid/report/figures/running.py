@@ -45,7 +45,7 @@ LEGEND = (
 
 @dataclass(frozen=True, eq=False)
 class RunningCourse:
-    """One parameter's estimate and the half width of its 95 % interval (T,), NaN while it is open."""
+    """A parameter's estimate and half its 95 % interval (T,), NaN while not determined."""
 
     name: str
     value: FloatArray
@@ -114,7 +114,7 @@ def _panel(course: RunningCourse, t: FloatArray, final: Estimate, starts: list[L
 
 
 def _note(courses: list[RunningCourse], t: FloatArray, result: Result) -> str:
-    """When the last band missed its final estimate, and how often the bands hold a truth that is known."""
+    """When the last band missed its final estimate, and how often bands hold a known truth."""
     note = "Every band held the final estimate from the start."
     late = {course.name: float(t[course.strays[-1]]) for course in courses if course.strays.size}
     if late:

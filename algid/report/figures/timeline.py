@@ -19,7 +19,7 @@ ROOM = 26  # pixels above a panel, for names; the page's script makes more where
 
 
 def offsets(ranges: Mapping[int, LogRange]) -> dict[int, float]:
-    """What to add to each log's times so that the logs follow one another, the first one unmoved."""
+    """Offsets to each log's times that put the logs in a row; the first keeps its times."""
     space = SPACE * sum(span.duration for span in ranges.values())
     moved: dict[int, float] = {}
     end = None

@@ -1,4 +1,4 @@
-"""What the logs hold over time: torques measured and predicted, their worst moment at full rate, the signals."""
+"""Time series of the logs: measured and predicted torque, worst moment at full rate, signals."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ MEASURED, PREDICTED = (
 
 @dataclass(frozen=True, eq=False)
 class Scored:
-    """The torque that is scored, by log and name as in a `TorqueLog`, and how well it is predicted."""
+    """The scored torque by log and name, as in a `TorqueLog`, and the score of its prediction."""
 
     series: Mapping[int, Mapping[str, Series]]
     score: TorquePrediction
 
 
 def torque(found: TorqueLog, logs: list[LogSummary], scored: Scored | None = None) -> Figure:
-    """Measured and predicted torque of all logs one after another, and the residual below it, a panel a joint.
+    """Measured and predicted torque of all logs in a row, above the residual; a panel a joint.
 
     With `scored` they are drawn as they are scored, and as recorded on demand.
     """
@@ -198,7 +198,7 @@ def _closeup_panel(path: Path, found: TorqueLog, joint: int, logs: list[LogSumma
 
 
 def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
-    """Angles, the velocities that the estimator used, and measured torques of all logs, both joints in one panel."""
+    """Angles, velocities of the estimator and torques of all logs; a panel holds both joints."""
     moved = offsets(found.ranges)
     panels = []
     for name, words, unit in (
