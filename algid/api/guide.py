@@ -12,6 +12,8 @@ class GuideTopic(StrEnum):
 
     START = "start"
     ARM = "arm"
+    LAB = "lab"
+    CAMPAIGN = "campaign"
     LOGS = "logs"
     MOTION = "motion"
     EXPORT = "export"
@@ -30,6 +32,8 @@ class GuideTopic(StrEnum):
 SUMMARIES = {
     GuideTopic.START: "a first result from a real log",
     GuideTopic.ARM: "the drawing, the equation of motion, what each constant is",
+    GuideTopic.LAB: "a real arm, from its logs to what it carries, to be typed along",
+    GuideTopic.CAMPAIGN: "from a design over the recording to the export, to be typed along",
     GuideTopic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
     GuideTopic.MOTION: "which motion to record",
     GuideTopic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C; the payload as YAML",

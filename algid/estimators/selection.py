@@ -5,7 +5,9 @@ without some of them is solved from the same Gram matrices. Moments over smooth 
 residual filtered after the model, so that the held-out ones measure how well a model predicts.
 
 Terms are taken in where they lower the squared moments of folds (logs, or blocks of a log) that
-were left out of the fit, and where the evidence outweighs its price,
+were left out of the fit by more than a hundredth of a period in the stamps would make, since a log
+without noise has the errors of its sampling all the same, and where the evidence outweighs its
+price,
 
     W > n (log N + 2 log T)
 
@@ -299,9 +301,17 @@ class _Search:
             beside
         )
 
+    def beyond_sampling(self, terms: Sequence[str], beside: Sequence[str]) -> bool:
+        """Whether the held-out squares fall by more than what the log's stamps leave open.
+
+        A simulator's log has no noise, and what its integration and sampling leave is no term.
+        """
+        without, with_terms = map(self.grams.held_out_squares, (beside, [*beside, *terms]))
+        return without - with_terms > self.grams.open_squares
+
     def agreed(self, terms: Sequence[str], beside: Sequence[str]) -> bool:
         """Whether what was left out, and physics, speak for `terms` too."""
-        return self.gain(terms, beside) > 0 and self.plausible(terms, beside)
+        return self.beyond_sampling(terms, beside) and self.plausible(terms, beside)
 
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are plausible."""
@@ -373,6 +383,8 @@ class _Search:
             reason = "left out: the logs cannot tell it from nothing"
         elif gain <= 0:
             reason = "left out: predicts no better what was left out"
+        elif not self.beyond_sampling([term], beside):
+            reason = "left out: explains less than sampling leaves open"
         elif not self.plausible([term], beside):
             reason = "left out: its value would contradict physics"
         else:

@@ -39,6 +39,8 @@ _PIECE_SAMPLES = 16384
 _FOLDS = 5  # blocks of a log, where there are too few logs to leave whole ones out
 _FEWEST_LOGS = 3
 _REWEIGHTINGS = 4
+_STAMPS = 0.01
+"""Of a period: what stamps leave open at least, also in the log of a simulator."""
 CHANGE = next(iter(DELAYS), "change of the delay")
 """The column of a change of the delay."""
 
@@ -82,6 +84,11 @@ class Grams:
     at : coefficients by name, of unloaded and of loaded logs
         Where terms that are not linear are linearised.
 
+    Attributes
+    ----------
+    open_squares : float
+        Sum of squared moments that a torque makes which comes a hundredth of a period late.
+
     Raises
     ------
     TooShortError
@@ -95,12 +102,13 @@ class Grams:
         self.names = (*settings.model.names, CHANGE)
         loads = loads_of(settings.model)
         self._rigid = [place for place, name in enumerate(self.names) if name in loads]
-        normals = []
+        normals, periods = [], []
         for log in logs:
             here = np.array([at[log.loaded].get(name, 0.0) for name in settings.model.names])
             normal = normal_equations(log.segments, settings, here, log.known)
             if normal is not None:
                 normals.append((log.loaded, normal))
+                periods.append(log.pieces[0].dt)
         if not normals:
             raise TooShortError(
                 "no log is long enough: expected at least a second of samples without a gap"
@@ -110,6 +118,11 @@ class Grams:
         self._both = len(self.kinds) == 2
         self.size = len(self.names) + self._both * len(self._rigid)
         self._weigh(normals)
+        of_delay = self.names.index(CHANGE)
+        self.open_squares = sum(
+            (_STAMPS * dt) ** 2 * float(gram[:, of_delay, of_delay].sum())
+            for gram, dt in zip(self._logs, periods, strict=True)
+        )
         whole = all(
             sum(loaded is kind for loaded, _ in normals) >= _FEWEST_LOGS for kind in self.kinds
         )

@@ -78,9 +78,8 @@ def _reasons(judged: Verdict, room: int) -> Iterator[str]:
     left = judged.reasons[shown:]
     if left:
         codes = ", ".join(dict.fromkeys(one.code for one in left))
-        yield textwrap.shorten(
-            f" • {counted(len(left), 'more reason')}, with -v: {codes}", WIDTH, placeholder=" …"
-        )
+        text = f"• {counted(len(left), 'more reason')}, with -v: {codes}"
+        yield f" {textwrap.shorten(text, WIDTH - 1, placeholder=' …')}"
 
 
 def _estimates(result: Result) -> Iterator[str]:

@@ -9,7 +9,7 @@ import pytest
 
 from algid.estimators.selection import CHOICE, Selection, _Search, needs_shape, select
 from algid.estimators.weak import WeakSettings
-from algid.model import TERMS, Model
+from algid.model import EVERY_TERM, TERMS, Model
 from tests.estimators.conftest import Bench
 from tests.estimators.test_terms import term_log, term_values
 
@@ -40,6 +40,23 @@ def test_the_terms_that_are_there_are_chosen_and_no_other(
     assert {trial.term for trial in chosen.trials if trial.kept} == set(terms)
     assert all(trial.prediction > 0 and trial.evidence > 0 for trial in chosen.trials if trial.kept)
     assert len(chosen.trials) == len(CHOICE)
+
+
+@pytest.mark.parametrize(("share", "found"), [(1e-4, False), (0.1, True)])
+@pytest.mark.parametrize("term", ["rotor", "offset"])
+def test_a_term_below_the_sampling_error_of_a_log_without_noise_is_left_out(
+    bench: Bench, term: str, share: float, found: bool
+) -> None:
+    """A hundredth of a period in the stamps makes more of the torque than such a term."""
+    model = Model((term,))
+    values = term_values(bench, (term,))
+    values |= {name: share * values[name] for name in EVERY_TERM[term].names}
+    log = term_log(bench, model, values, noise=0.0)
+    chosen = select([lambda: [log]], [], SETTINGS, candidates=("rotor", "offset", "gain"))
+    assert chosen.model.terms == ((term,) if found else ())
+    if not found:
+        reasons = {trial.term: trial.reason for trial in chosen.trials}
+        assert reasons[term] == "left out: explains less than sampling leaves open"
 
 
 def test_the_width_of_friction_is_found(bench: Bench) -> None:

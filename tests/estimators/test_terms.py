@@ -42,8 +42,14 @@ def term_values(bench: Bench, terms: tuple[str, ...]) -> dict[str, float]:
     return found
 
 
-def term_log(bench: Bench, model: Model, values: dict[str, float], loaded: bool = False) -> Segment:
-    """A log whose torque SymPy's equations give along an exact motion."""
+def term_log(
+    bench: Bench,
+    model: Model,
+    values: dict[str, float],
+    loaded: bool = False,
+    noise: float = SIGMA,
+) -> Segment:
+    """A log whose torque SymPy's equations give along an exact motion, with `noise` of the angles in rad."""
     moved = bench.burdened if loaded else bench.bare
     k = bench.arm.constants()
     if loaded:
@@ -54,8 +60,8 @@ def term_log(bench: Bench, model: Model, values: dict[str, float], loaded: bool 
     if "lag" in values:
         tau = _behind(tau, values["lag"])
     rng = np.random.default_rng(loaded)
-    noise = SIGMA * rng.standard_normal((2, *tau.shape))
-    return Segment(0.0, DT, moved.theta + noise[0], tau + 10 * noise[1])
+    drawn = noise * rng.standard_normal((2, *tau.shape))
+    return Segment(0.0, DT, moved.theta + drawn[0], tau + 10 * drawn[1])
 
 
 def _behind(tau: FloatArray, lag: float) -> FloatArray:

@@ -1,0 +1,72 @@
+"""The pages of the guide that are typed along: their commands are run, and what they print is written into them.
+
+A fence ``text`` holds the output of the fence ``sh`` before it. One that begins with ``…`` shows
+lines that were chosen by hand, and stays as it is.
+
+Usage: python -m pipelines.typed [PAGE …]
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGES = ("lab", "campaign")
+FENCE = re.compile(r"^```(sh|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def run(command: str, folder: Path) -> str:
+    """What bash prints for a block, standard error last; a failure stops it."""
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "COLUMNS": "80",
+    }
+    done = subprocess.run(
+        ["bash", "-e", "-u", "-c", command],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(f"{command}{done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
+
+
+def typed(text: str, folder: Path) -> str:
+    """The page with what its commands print in `folder`."""
+    printed = ""
+
+    def block(found: re.Match[str]) -> str:
+        nonlocal printed
+        kind, inside = found[1], found[2]
+        if kind == "sh":
+            printed = run(inside, folder)
+            return found[0]
+        if inside.startswith("…\n"):  # lines that were chosen by hand
+            return found[0]
+        lines = [line.rstrip() for line in printed.strip("\n").splitlines()]
+        return "```text\n" + "".join(f"{line}\n" for line in lines) + "```"
+
+    return FENCE.sub(block, text)
+
+
+def main(pages: list[str]) -> None:
+    for page in pages:
+        path = ROOT / "algid" / "guide" / f"{page}.md"
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            shutil.copytree(ROOT / "data", folder / "data")
+            path.write_text(typed(path.read_text(encoding="utf-8"), folder), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or list(PAGES))
