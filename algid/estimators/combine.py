@@ -223,8 +223,38 @@ def left_out(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> FloatArray:
     """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass."""
-    others = [[*logs[:place], *logs[place + 1 :]] for place in range(len(logs))]
-    return np.array([combine(shared, rest, beta, prior)[0] for rest in others])
+    found = np.empty((len(logs), len(shared.names)))
+    sums = {kind: _sum_of_rest(logs, kind) for kind in {log.loaded for log in logs}}
+    for kind, (_, without_each) in sums.items():
+        others = [whole for other, (whole, _) in sums.items() if other is not kind]
+        places = [place for place, log in enumerate(logs) if log.loaded is kind]
+        for place, rest in zip(places, without_each, strict=True):
+            left = [*others, rest] if len(places) > 1 else others
+            found[place] = combine(shared, left, beta, prior)[0]
+    return found
+
+
+def _sum_of_rest(
+    logs: Sequence[LogInformation], loaded: bool
+) -> tuple[LogInformation, list[LogInformation]]:
+    """The likelihood of all logs of a kind in one sum, and without each of them.
+
+    Without differences of sums: one log may tell 1e16 times as much as the others.
+    """
+    own = [log for log in logs if log.loaded is loaded]
+    c0 = own[0].c0
+    S = np.stack([log.total[0] for log in own])
+    g = np.stack([log.total[1] - log.total[0] @ (c0 - log.c0) for log in own])
+
+    def rest(parts: FloatArray) -> FloatArray:
+        nothing = np.zeros_like(parts[:1])
+        before = np.cumsum(np.concatenate([nothing, parts[:-1]]), axis=0)
+        after = np.cumsum(np.concatenate([nothing, parts[:0:-1]]), axis=0)[::-1]
+        return before + after
+
+    every = LogInformation(loaded, c0, S.sum(axis=0)[None], g.sum(axis=0)[None])
+    pairs = zip(rest(S), rest(g), strict=True)
+    return every, [LogInformation(loaded, c0, each[None], score[None]) for each, score in pairs]
 
 
 FEWEST_LOGS = 4

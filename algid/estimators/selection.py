@@ -60,6 +60,8 @@ _SHAPED = {
     for shape in fields(Widths)
 }
 _RELINEARISED = {name for name in CHOICE if not EVERY_TERM[name].linear or EVERY_TERM[name].timing}
+MOST_LOGS = 100
+"""Logs of a kind, evenly spread, that are looked at."""
 _ROUNDS = 4
 _TOGETHER = 2  # terms that are tried at once
 
@@ -165,7 +167,8 @@ def select(
     Parameters
     ----------
     unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`; it is called once.
+        Each gives a fresh iterable of `Segment`; it is called once. Of more than `MOST_LOGS` some,
+        evenly spread.
     settings : WeakSettings
         Its model's gravity, its window, bandwidth, hold and delay.
     candidates : names in `CHOICE`
@@ -183,7 +186,7 @@ def select(
     logs = [
         Training.of(source, kind)
         for kind, sources in ((False, unloaded), (True, loaded))
-        for source in sources
+        for source in sources[:: max(1, -(-len(sources) // MOST_LOGS))]
     ]
     if not all(log.driven for log in logs):
         candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
@@ -245,7 +248,7 @@ def lateness(
     logs = [
         Training.of(source, kind)
         for kind, sources in ((False, unloaded), (True, loaded))
-        for source in sources
+        for source in sources[:: max(1, -(-len(sources) // MOST_LOGS))]
     ]
     return Grams(logs, settings, {False: {}, True: {}}).lateness(settings.model.terms)
 

@@ -172,6 +172,22 @@ def test_what_is_left_out_tells_nothing() -> None:
         )
 
 
+def test_what_is_left_out_is_what_the_others_tell_however_much_a_log_tells() -> None:
+    """Of two kinds, at coefficients of their own, one 1e18 times as sure as the others."""
+    flat = Shared(Model(gravity=0.0), payload=True)
+    rng = np.random.default_rng(7)
+    logs = []
+    for number in range(6):
+        A = rng.standard_normal((8, 5)) * (1e9 if number == 1 else 1.0)
+        c0 = 1 + 0.1 * rng.standard_normal(5)
+        logs.append(LogInformation(number > 3, c0, (A.T @ A)[None], (A.T @ A @ c0)[None] * 1e-3))
+    beta = np.concatenate([np.ones(5), np.full(len(flat.names) - 5, 0.1)])
+    for place, found in enumerate(left_out(flat, logs, beta)):
+        rest = [*logs[:place], *logs[place + 1 :]]
+        expected, _, _ = combine(flat, rest, beta)
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
 def test_no_blocks_have_no_sums() -> None:
     with pytest.raises(ValueError, match="no blocks were added"):
         BlockSums().values()

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from algid.estimators import instruments, refined, weak
+from algid.estimators import instruments, refined, selection, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.refined import RefinedSettings
@@ -225,6 +225,26 @@ def test_of_a_long_log_the_first_pieces_are_looked_at(
     apart = instruments.endogeneity([source], [], WeakSettings(), least)
     assert apart is not None
     assert 4 <= max(taken) + 1 <= 6  # one more is asked for before a piece is known to be whole
+
+
+def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evenly spread, for the choice of terms and for endogeneity."""
+    monkeypatch.setattr(instruments, "_MOST_EXAMINED", 2)
+    monkeypatch.setattr(selection, "MOST_LOGS", 2)
+    looked_at: list[int] = []
+
+    def source(number: int) -> list[Segment]:
+        looked_at.append(number)
+        return [bench.log(sigma=1e-3, seed=number)]
+
+    sources: list[Source] = [partial(source, number) for number in range(4)]
+    least = weak.fit(sources)
+    looked_at.clear()
+    assert instruments.endogeneity(sources, [], WeakSettings(), least) is not None
+    assert looked_at == [0, 2]
+    looked_at.clear()
+    assert not selection.select(sources, [], WeakSettings()).model.terms
+    assert looked_at == [0, 2]
 
 
 def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:
