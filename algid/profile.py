@@ -259,7 +259,7 @@ class Profile(_Strict):
 
 
 class ProfileSettingError(SettingError):
-    """A profile has no such setting, or not with that value: `place` is its name, `why` what is wrong."""
+    """A profile's setting or value is invalid: `place` is its name, `why` the reason."""
 
     def __init__(self, text: str, place: str = "", why: str = "") -> None:
         super().__init__(text)

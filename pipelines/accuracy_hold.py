@@ -139,7 +139,7 @@ def _pd(row: Row, arm: Arm, t: FloatArray, held: bool, seed: int) -> Truth:
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """Which intervals hold the truth, errors over the bound, the hold taken, whether it was told, terms, grade."""
+    """Intervals that hold the truth, errors over the bound, the hold, its source, terms, grade."""
 
     inside: list[bool]
     over_bound: list[float]
@@ -201,7 +201,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--verbose", action="store_true")
     wanted = parser.parse_args(arguments)
     print(
-        "| motion | torque | taken as held | not told | of | coverage, % | over bound | false terms |"
+        "| motion | torque | taken as held | not told | of | coverage, % | over bound "
+        "| false terms |"
     )
     print("|---|---|---|---|---|---|---|---|")
     for key in wanted.rows.split(","):

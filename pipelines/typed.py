@@ -1,4 +1,4 @@
-"""The pages of the guide that are typed along: their commands are run, and what they print is written into them.
+"""Run the commands of the guide's pages and write their output into the pages.
 
 A fence ``text`` holds the output of the fence ``sh`` before it. One that begins with ``…`` shows
 lines that were chosen by hand, and stays as it is.

@@ -193,7 +193,7 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
 def tried_together(
     logs: Sequence[Recorded], convention: Convention, *, gravity: bool = True
 ) -> Candidate | None:
-    """What logs of one arm say under one convention; None where they are too short to say anything."""
+    """Candidate of one convention from the logs of one arm; None if the logs are too short."""
     log = _trials(logs, gravity)
     return None if log is None else log.under(convention)
 

@@ -58,7 +58,7 @@ class Lateness:
 
     @property
     def share(self) -> float:
-        """Of its standard deviation, how far an estimate is off where the wrong one is taken: the most of all."""
+        """Largest error of any estimate under the wrong hold, in its standard deviations."""
         return self.half * self.effect
 
     @property

@@ -190,7 +190,7 @@ def _groups(null: FloatArray) -> list[list[int]]:
 
 
 def _relation(direction: FloatArray) -> tuple[str, float]:
-    """What is determined of two parameters whose undetermined direction is given in their own units.
+    """The determined relation of two parameters; `direction` is the undetermined one, own units.
 
     Their sum, their difference, or a number of times the first plus the second.
     """

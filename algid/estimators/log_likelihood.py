@@ -50,7 +50,7 @@ _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry
 
 @dataclass(eq=False)
 class _Innovations:
-    """The innovations (2, n) of a piece, `dt` s apart; of most passes nobody asks for their sums."""
+    """The innovations (2, n) of a piece, `dt` s apart; most passes do not need their sums."""
 
     joints: FloatArray
     dt: float

@@ -228,7 +228,7 @@ def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray
 
 @lru_cache(maxsize=32)
 def _signs(seed: int, torques: int, angles: int) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Random signs of torques (`_PROBES`, 2, n) and of angles (`_PROBES`, 2, N), the same for a piece in every pass."""
+    """Random signs of torques (`_PROBES`, 2, n) and angles (`_PROBES`, 2, N); fixed for a piece."""
     signs = np.random.default_rng(seed)
     on_torques = np.empty((_PROBES, 2, torques), dtype=np.int8)
     on_angles = np.empty((_PROBES, 2, angles), dtype=np.int8)

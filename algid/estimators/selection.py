@@ -113,7 +113,7 @@ class Selection:
 
     @property
     def untold(self) -> Lateness | None:
-        """How late the torque acts, where the logs were asked whether it is held and do not tell."""
+        """The torque's lateness, if the logs were to choose its hold and do not determine it."""
         return self.late if self.hold_by == "logs" and self.late and not self.late.told else None
 
 

@@ -137,7 +137,7 @@ def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
 
 
 def retold(fit: Fit, chosen: Selection) -> Selection:
-    """The selection with the hold that the fit tells where the logs did not before; the same where neither does."""
+    """The selection with the hold that the fit determines, if the logs did not; else unchanged."""
     late = chosen.untold
     if late is None or chosen.shrunk or not fit.converged or not set(DELAYS) <= set(fit.names):
         return chosen

@@ -106,7 +106,7 @@ def _of_payload(fit: Fit) -> Iterator[Notice]:
 
 
 def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
-    """Whether the torque is held, what blocks of logs leave out, the payload's repeatability, the torques' gain."""
+    """Notes on the torque's hold, intervals from blocks, the payload's repeatability, and gains."""
     if fit.torque_hold is not None:
         yield from _of_hold(fit.torque_hold)
     if fit.intervals == "sandwich":

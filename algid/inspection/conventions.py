@@ -179,7 +179,7 @@ def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> lis
 
 
 def advised(log: Log, suspicion: Suspicion) -> Notice:
-    """The notice of a suspicion with what mends it: only what shows a real arm where it is tried."""
+    """The notice of a suspicion with its remedies: those under which the log shows a real arm."""
     known = recorded(log)
     tried = () if known is None else _tried(log, suspicion, known)
     return replace(suspicion.notice, remedies=tuple(tried))

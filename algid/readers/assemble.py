@@ -184,7 +184,7 @@ class TableReader:
         return {name: values for name, values in table.columns.items() if name != without}
 
     def _of_passive(self, table: SampleTable) -> tuple[Notice, ...]:
-        """That a joint which is called passive has a torque, where its column is there and holds one."""
+        """Notice of a torque in the column of a joint that is called passive."""
         passive, mapping = self.origin.reading.passive, self.origin.mapping
         names = f"tau{passive}", f"tau{3 - (passive or 1)}"
         if passive is None or not set(names) <= set(mapping):

@@ -154,12 +154,13 @@ class TorqueModel(_Model):
 
 
 class TorqueHold(_Model):
-    """Whether the torque was held from each sample to the next ("zoh") or moved evenly ("foh"): asked, and used.
+    """The hold of the torque between samples: "zoh" holds it, "foh" is linear; asked and used.
 
-    Where the logs were asked ("auto"), `half` is half a sample, in s, `late` how late they say it
-    acts where it is not held, `late_std` its standard deviation, `odds` the log of the odds for a held torque, and
-    `share` of its standard deviation the most that an estimate is off with the wrong one. `told`
-    says whether that decided; where it did not, the delay is a parameter whose prior is both.
+    If the logs were to choose ("auto"), `half` is half a sample in s, `late` the estimated delay in
+    s of a torque that is not held, `late_std` its standard deviation, `odds` the log of the odds
+    for a held torque, and `share` the largest error of any estimate under the wrong hold, in its
+    standard deviations. `told` says whether these decided; if not, the delay is a parameter whose
+    prior covers both.
     """
 
     asked: Literal["auto", "foh", "zoh"]

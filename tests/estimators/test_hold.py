@@ -26,7 +26,7 @@ def test_a_wrong_hold_is_taken_in_less_than_one_of_a_hundred_logs(
 @pytest.mark.parametrize("share", [0.05, 0.3, 1.0, 4.0])
 @pytest.mark.parametrize("true", [0.0, HALF])
 def test_the_prior_of_both_makes_errors_as_large_as_it_says(share: float, true: float) -> None:
-    """Of a normal likelihood of deviation s: posterior of the delay, RMS of error over deviation."""
+    """For a normal likelihood of deviation s: RMS error of the posterior over its deviation."""
     std = share * HALF
     drawn = true + std * np.random.default_rng(6).standard_normal(20_000)
     prior = Lateness(0.0, std, HALF).prior

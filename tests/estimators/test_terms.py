@@ -49,7 +49,7 @@ def term_log(
     loaded: bool = False,
     noise: float = SIGMA,
 ) -> Segment:
-    """A log whose torque SymPy's equations give along an exact motion, with `noise` of the angles in rad."""
+    """A log with SymPy's torque along an exact motion, with `noise` of the angles in rad."""
     moved = bench.burdened if loaded else bench.bare
     k = bench.arm.constants()
     if loaded:

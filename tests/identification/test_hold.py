@@ -1,4 +1,4 @@
-"""Logs tell whether the torque is held between samples; a controller by a road of its own makes them."""
+"""Logs determine whether the torque is held between samples; a separate controller makes them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FARTHEST = 3.6  # standard deviations: of seven right ones the largest is beyond
 
 
 def moved(held: bool, rate: float = 1000.0, late: int = 0) -> tuple[Log, FloatArray]:
-    """A log of two seconds of a wide torque, and k1 … k7; the torque is logged `late` samples early."""
+    """A log of 2 s of a wide torque, and k1 … k7; the torque is logged `late` samples early."""
     k = random_arm(SEED)[0].constants()
     t = np.arange(round(2 * rate) + 1) / rate
     wide = wide_multi_sine(random_arm(SEED)[0], SEED)
