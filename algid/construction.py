@@ -47,6 +47,21 @@ def under_construction(path: Path, make: Callable[[Path], None]) -> Iterator[Pat
             remove(temporary)
 
 
+def new_file(path: Path) -> None:
+    """Make an empty file that nobody else may read; raises `FileExistsError` where one stands."""
+    path.touch(mode=0o600, exist_ok=False)
+
+
+def new_folder(path: Path) -> None:
+    """Make a folder; raises `FileExistsError` where something stands."""
+    path.mkdir(mode=0o755)
+
+
+def own_folder(path: Path) -> None:
+    """The same, that nobody else may look into."""
+    path.mkdir(mode=0o700)
+
+
 def _made(path: Path, make: Callable[[Path], None]) -> tuple[Path, int]:
     """What `make` has made, and the hold on it.
 

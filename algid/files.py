@@ -6,6 +6,7 @@ TOML files are checked against a pydantic model, with errors that name file, pla
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import os
 import re
@@ -21,6 +22,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from algid.construction import (
     beside,
+    new_file,
+    new_folder,
+    own_folder,
     put_file_in_place,
     put_in_place,
     remove_left,
@@ -95,7 +99,7 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
             path.parent.mkdir(parents=True, exist_ok=True)
             if sweep:
                 remove_left(path.parent, path.name)
-            temporary = stack.enter_context(under_construction(path, _touch))
+            temporary = stack.enter_context(under_construction(path, new_file))
         with writing(path):
             yield temporary
             mask = os.umask(0)
@@ -107,8 +111,17 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
                 raise OutputError(EXISTS.format(path)) from error
 
 
-def _touch(path: Path) -> None:
-    path.touch(mode=0o600, exist_ok=False)
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file, or of a folder's files in the order of their names."""
+    digest = hashlib.sha256()
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if (
+            file.is_file() and file.stat().st_size
+        ):  # one of none is empty, or waits for ever, as /proc/kmsg does
+            with file.open("rb") as opened:
+                while chunk := opened.read(1 << 20):
+                    digest.update(chunk)
+    return digest.hexdigest()
 
 
 def read_whole(path: Path) -> bytes:
@@ -304,17 +317,13 @@ def whole_folder(folder: Path, force: bool, *, sweep: bool = True) -> Iterator[P
             folder.parent.mkdir(parents=True, exist_ok=True)
             if sweep:
                 remove_left(folder.parent, folder.name)
-            temporary = stack.enter_context(under_construction(folder, _make_folder))
+            temporary = stack.enter_context(under_construction(folder, new_folder))
         with writing(folder):
             yield temporary
             try:
                 put_in_place(temporary, folder, replace=force)
             except FileExistsError as error:
                 raise OutputError(EXISTS.format(folder)) from error
-
-
-def _make_folder(path: Path) -> None:
-    path.mkdir(mode=0o755)
 
 
 def remove_whole(place: Path) -> None:
@@ -349,13 +358,9 @@ def temporary_folder() -> Iterator[Path]:
         try:
             place = Path(tempfile.gettempdir())
             remove_left(place, TEMPORARY)
-            folder = stack.enter_context(under_construction(place / TEMPORARY, _make_own_folder))
+            folder = stack.enter_context(under_construction(place / TEMPORARY, own_folder))
         except OSError as error:
             raise OutputError(
                 f"no temporary folder can be made ({reason_of(error)}); name one in TMPDIR"
             ) from error
         yield folder
-
-
-def _make_own_folder(path: Path) -> None:
-    path.mkdir(mode=0o700)

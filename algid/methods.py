@@ -63,15 +63,7 @@ def _refined(
 ) -> Fit:
     from algid.estimators import refined
 
-    settings = refined.RefinedSettings(
-        model=windows.model,
-        hold=windows.hold,
-        delay=windows.delay,
-        estimate_delay=windows.estimate_delay,
-        lengths=lengths,
-        prior=prior,
-        weak=windows,
-    )
+    settings = refined.RefinedSettings(windows, lengths=lengths, prior=prior)
     return refined.fit(unloaded, loaded, settings, progress)
 
 

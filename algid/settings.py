@@ -16,6 +16,7 @@ from algid.errors import SettingError
 from algid.limits import PHYSICAL, Range
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 from algid.physics.effort import Effort, without_terms
+from algid.signals.shift import TorqueShift
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
     EstimatorName = str
@@ -269,12 +270,10 @@ class Settings:
             name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None
         }
 
-    def torque_shift(self, dt: float, found_delay: float | None = None) -> float:
-        """Time in s after which a logged torque acts: half a sample of hold, plus the delay."""
-        hold = 0.5 * dt if self.torque_hold == "zoh" else 0.0
-        if found_delay is not None:
-            return hold + found_delay
-        return hold + self.delay
+    def torque_shift(self, found_delay: float | None = None) -> TorqueShift:
+        """After how long a logged torque acts: its hold, and the delay, found or set."""
+        delay = self.delay if found_delay is None else found_delay
+        return TorqueShift(self.torque_hold == "zoh", delay)
 
     def as_json(self) -> dict[str, Any]:
         """For `result.json`; complex poles as text, the paper's where none are set."""

@@ -109,10 +109,7 @@ def _refined(
     sources: Sequence[Source], chosen: Selection, weak: WeakSettings
 ) -> tuple[Fit, Selection]:
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    settings = refined.RefinedSettings(
-        model=chosen.model, hold=weak.hold, estimate_delay=chosen.delay, weak=weak
-    )
-    return refined.fit(sources, settings=settings), chosen
+    return refined.fit(sources, settings=refined.RefinedSettings(weak)), chosen
 
 
 def evaluate(draws: int, kinds: Iterable[str] = KINDS) -> list[Row]:

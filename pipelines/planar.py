@@ -27,6 +27,7 @@ from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.estimators import refined
 from algid.estimators.body import with_body_of
 from algid.estimators.fit import Fit
+from algid.estimators.weak import WeakSettings
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.model import Model
@@ -180,7 +181,7 @@ def costs() -> Iterator[str]:
 
 def _fitted(logs: list[Segment], model: Model) -> Fit:
     unloaded, loaded = logs
-    settings = refined.RefinedSettings(model=model)
+    settings = refined.RefinedSettings(WeakSettings(model))
     return refined.fit([lambda: [unloaded]], [lambda: [loaded]], settings)
 
 

@@ -23,7 +23,6 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "progress": room(),
     "significance": room(),
     "ros2": room("errors", "numpy"),
-    "runtime": room("errors", "threadpoolctl"),
     "units": room(),
     "words": room(),
     "text": room(),
@@ -41,6 +40,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "methods": room("estimators progress"),
     "files": room("construction errors limits", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
+    "runtime": room("errors", "threadpoolctl"),
     "profile": room("errors files limits units", "pydantic"),
     "settings": room("errors limits methods model physics signals"),
     "results": room("errors files limits log model notices settings significance text verdict "

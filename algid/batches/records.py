@@ -13,8 +13,7 @@ from typing import Any, Literal
 
 from algid.batches.jobs import COLUMNS, TABLE, Job, kept_path, name_fault, utc_of
 from algid.errors import LogError, OutputError
-from algid.files import refuse_links, writing
-from algid.identification.source import sha256_of
+from algid.files import refuse_links, sha256_of, writing
 from algid.limits import LIMITS
 from algid.results import Result
 from algid.stores import Store, is_url, object_stat

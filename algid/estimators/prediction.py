@@ -29,6 +29,7 @@ from algid.estimators.weak import Source
 from algid.model import Model, Motion, regressor, torque
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Cutter, Segment
+from algid.signals.shift import AT_ONCE, TorqueShift
 
 _PIECE_SECONDS = 60.0
 _PER_CUTOFF = 12.5
@@ -36,8 +37,6 @@ _PER_CUTOFF = 12.5
 _SHARPER = 5.0
 _SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12  # of fourth order (Fornberg 1988)
 _BEND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12
-
-Shift = float | Callable[[float], float]
 
 
 @dataclass(frozen=True)
@@ -127,8 +126,8 @@ class PredictionSums:
     Parameters
     ----------
     model : Model
-    shift : float, s, or a callable that gives it for the time between samples
-        After how long a logged torque acts: hold and delay together.
+    shift : TorqueShift
+        After how long a logged torque acts.
     by : PredictionFilter
     at : (q,)
         The coefficients that are to be scored, and no others, where the model is not linear in
@@ -138,7 +137,7 @@ class PredictionSums:
     def __init__(
         self,
         model: Model,
-        shift: Shift = 0.0,
+        shift: TorqueShift = AT_ONCE,
         by: PredictionFilter | None = None,
         at: FloatArray | None = None,
     ) -> None:
@@ -173,7 +172,7 @@ class PredictionSums:
         )
 
     def _add(self, piece: Segment) -> None:
-        shift = seconds(self._shift, piece.dt)
+        shift = self._shift.at(piece.dt)
         if self._at is not None:
             shift -= self._model.lag(self._at)
         _, X = _filtered(self._rows, piece, shift, self._by)
@@ -190,11 +189,6 @@ class PredictionSums:
         """The regressor (2, q, n), and the velocities if one set of coefficients is scored."""
         Y = regressor(self._model, motion, self._at)
         return Y if self._at is None else np.concatenate([Y, motion.omega[:, None]], axis=1)
-
-
-def seconds(shift: Shift, dt: float) -> float:
-    """The time in s after which a torque that is logged every `dt` s acts."""
-    return shift(dt) if callable(shift) else shift
 
 
 def _filtered(
@@ -245,7 +239,7 @@ def scored_torque(
     model: Model,
     c: FloatArray,
     segments: Iterable[Segment],
-    shift: Shift = 0.0,
+    shift: TorqueShift = AT_ONCE,
     by: PredictionFilter | None = None,
 ) -> Iterator[ScoredTorque]:
     """What `score` scores, piece by piece: both torques as the filters leave them.
@@ -256,7 +250,7 @@ def scored_torque(
     cutter: Cutter | None = None
 
     def scored(piece: Segment) -> Iterator[ScoredTorque]:
-        lag = seconds(shift, piece.dt) - model.lag(c)
+        lag = shift.at(piece.dt) - model.lag(c)
         t, X = _filtered(lambda motion: torque(model, c, motion)[:, None], piece, lag, by)
         if X.size:
             yield ScoredTorque(t, X[:, 1], X[:, 0])
@@ -287,7 +281,7 @@ def score(
     model: Model,
     c: FloatArray,
     segments: Iterable[Segment],
-    shift: Shift = 0.0,
+    shift: TorqueShift = AT_ONCE,
     by: PredictionFilter | None = None,
 ) -> PredictionScore:
     """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
@@ -299,7 +293,10 @@ def score(
 
 
 def cross_validate(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source] = (), shift: Shift = 0.0
+    fit: Fit,
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    shift: TorqueShift = AT_ONCE,
 ) -> PredictionScore | None:
     """Score of each log predicted from all the others; None where a kind of log has only one.
 
@@ -324,6 +321,6 @@ def cross_validate(
             fit.shared.model,
             c[:columns],
             source(),
-            lambda dt, delay=delay: seconds(shift, dt) + delay,  # type: ignore[misc]
+            shift.later(delay),
         )
     return total

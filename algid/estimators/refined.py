@@ -28,10 +28,10 @@ from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
-from algid.model import Model
 from algid.notices import Notice
 from algid.progress import Progress
 from algid.signals.differences import Stencil
+from algid.signals.shift import TorqueShift
 
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
@@ -50,35 +50,20 @@ class RefinedSettings:
 
     Parameters
     ----------
-    model : Model
-    hold : "foh" or "zoh"
-        Whether the torque moved evenly from sample to sample, or was held from each sample to the
-        next.
-    delay : float, s
-        After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
-    estimate_delay : bool
+    weak : WeakSettings
+        Model, hold and delay; window and bandwidth are of the weak estimate that it starts from.
     noise : NoiseLevels or None
         Known noise levels; None estimates them log by log.
     lengths : dict
         Known link lengths "l1", "l2" in m.
     prior : Prior or None
         What an earlier result knows of the arm; unloaded logs are not needed then.
-    weak : WeakSettings
-        Window and bandwidth of the weak estimate that it starts from.
     """
 
-    model: Model = field(default_factory=Model)
-    hold: Literal["foh", "zoh"] = "foh"
-    delay: float = 0.0
-    estimate_delay: bool = False
+    weak: WeakSettings = field(default_factory=WeakSettings)
     noise: NoiseLevels | None = None
     lengths: dict[str, float] = field(default_factory=dict)
     prior: Prior | None = None
-    weak: WeakSettings = field(default_factory=WeakSettings)
-
-    def shift(self, dt: float) -> float:
-        """Time in s by which the hold delays a torque."""
-        return 0.5 * dt if self.hold == "zoh" else 0.0
 
 
 End = Literal["settled", "refuted", "unsettled"]
@@ -119,10 +104,7 @@ def fit(
         raise ValueError(
             f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m"
         )
-    same = {name: getattr(settings, name) for name in ("model", "hold", "delay", "estimate_delay")}
-    start = weak_fit(
-        unloaded, loaded, replace(settings.weak, **same), settings.lengths, settings.prior
-    )
+    start = weak_fit(unloaded, loaded, settings.weak, settings.lengths, settings.prior)
     shared = start.shared
     settings, prior = replace(settings, prior=_anchored(start)), settings.prior
     logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
@@ -201,9 +183,10 @@ def _opened(
     sources: Sequence[Source], loaded: bool, shared: Shared, settings: RefinedSettings
 ) -> Iterator[LogEvidence]:
     def stencil(dt: float, c: FloatArray) -> Stencil:
-        delay = float(c[-1]) if shared.delay else settings.delay
-        shift = settings.shift(dt) + delay - shared.model.lag(c)
-        return Stencil(dt, shift, held=settings.hold == "zoh")
+        held = settings.weak.hold == "zoh"
+        delay = float(c[-1]) if shared.delay else settings.weak.delay
+        shift = TorqueShift(held, delay).at(dt) - shared.model.lag(c)
+        return Stencil(dt, shift, held=held)
 
     for source in sources:
         log = LogEvidence(source, loaded, shared, stencil, settings.noise)

@@ -21,10 +21,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionFilter, Shift, motion_of, seconds
+from algid.estimators.prediction import PredictionFilter, motion_of
 from algid.model import Model, acceleration, damping, inertia
 from algid.signals.filters import butterworth
 from algid.signals.segments import Cutter, Segment
+from algid.signals.shift import AT_ONCE, TorqueShift
 
 HORIZONS = (0.1, 0.5, 2.0)
 """s after which the angles are compared."""
@@ -71,7 +72,11 @@ class RolloutScore:
 
 
 def rollouts(
-    model: Model, c: FloatArray, segments: Iterable[Segment], duration: float, shift: Shift = 0.0
+    model: Model,
+    c: FloatArray,
+    segments: Iterable[Segment],
+    duration: float,
+    shift: TorqueShift = AT_ONCE,
 ) -> RolloutScore:
     """Simulate forward from states of a log of `duration` s by the coefficients `c` (q,).
 
@@ -118,7 +123,7 @@ def time_step(model: Model, c: FloatArray) -> float:
 
 
 def _starts(
-    model: Model, c: FloatArray, piece: Segment, spacing: float, step: float, shift: Shift
+    model: Model, c: FloatArray, piece: Segment, spacing: float, step: float, shift: TorqueShift
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """x, u and y of the starts in a piece of a log.
 
@@ -131,7 +136,7 @@ def _starts(
     if n <= 6 * (by.order + 1) or not at.size:
         return np.zeros((4, 0)), np.zeros((halves, 2, 0)), np.zeros((len(HORIZONS), 2, 0))
     motion = motion_of(butterworth(piece.theta, dt, min(by.motion, 0.45 / dt), by.order), dt)
-    late = seconds(shift, dt) - model.lag(c)
+    late = shift.at(dt) - model.lag(c)
     when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late
     t = np.arange(n) * dt
     width = max(1, round(step / dt))

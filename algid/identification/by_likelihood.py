@@ -401,7 +401,7 @@ def _scored(
     if log in sums:
         yield from moving()
         return
-    gathered = PredictionSums(model, settings.torque_shift)
+    gathered = PredictionSums(model, settings.torque_shift())
     yield from beside(moving(), gathered.push)
     gathered.finish()
     sums[log] = gathered

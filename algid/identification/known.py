@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from algid.physics.effort import absent
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.results import Result
 from algid.settings import Settings
+from algid.signals.shift import TorqueShift
 from algid.significance import CERTAIN, sigmas
 
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
@@ -35,11 +35,11 @@ def model_of(result: Result) -> Model:
     return Model(tuple(found.terms), settings.gravity, found.coulomb_speed, found.stribeck_speed)
 
 
-def shift_of(result: Result) -> Callable[[float], float]:
-    """Time in s after which a logged torque acts, by sampling period: hold, and delay."""
+def shift_of(result: Result) -> TorqueShift:
+    """After how long a logged torque acts: hold, and delay."""
     delay = result.parameters.get("delay")
     found = None if delay is None else delay.estimate
-    return partial(Settings.of(result.settings).torque_shift, found_delay=found)
+    return Settings.of(result.settings).torque_shift(found)
 
 
 def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:

@@ -295,7 +295,7 @@ def _predicted(
     unloaded, loaded = (
         [partial(survey.segments, log) for log in kind] for kind in (survey.unloaded, survey.loaded)
     )
-    return own, cross_validate(fit, unloaded, loaded, settings.torque_shift)
+    return own, cross_validate(fit, unloaded, loaded, settings.torque_shift())
 
 
 def _expected(fit: Fit, chosen: Selection) -> list[str]:

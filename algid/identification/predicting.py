@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import seconds
 from algid.identification.identify import reused
 from algid.identification.series import torque_blocks
 from algid.identification.source import LogLike, Role, open_source
@@ -26,8 +24,7 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
     known = predictor_of(result, result.log.path)
     source = open_source(log, role, reused(profile, result), known.model.gravity)
     coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
-    shift = partial(seconds, known.shift)
-    blocks = list(torque_blocks(Survey([source]), known.model, coefficients, shift))
+    blocks = list(torque_blocks(Survey([source]), known.model, coefficients, known.shift))
     names = [name for name in blocks[0] if name != "log"] if blocks else []
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in names}
     return pl.DataFrame(columns)

@@ -6,8 +6,7 @@ Time series of a result folder, written block by block.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +23,7 @@ from algid.model import Model, Motion, inertia, torque
 from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
 from algid.signals.segments import Segment, pieces
+from algid.signals.shift import TorqueShift
 
 PREDICTED_ROWS = 1 << 17
 NOISE_SHARE = 0.05  # of the torque's RMS: what the angles' noise may add to the prediction
@@ -34,11 +34,11 @@ def torque_blocks(
     survey: Survey,
     model: Model,
     coefficients: Mapping[str, FloatArray],
-    shift: Callable[[float], float],
+    shift: TorqueShift,
 ) -> Iterator[dict[str, FloatArray]]:
     """Motion, measured and predicted torque of every log; by role its coefficients.
 
-    `shift` gives the time in s after which a logged torque acts, for the time between samples.
+    `shift` says after how long a logged torque acts.
 
     Angles are smoothed without phase; the prediction is NaN where the smoother reaches past a
     stretch's end.
@@ -47,7 +47,7 @@ def torque_blocks(
         for piece in pieces(survey.segments(log), PREDICTED_ROWS):
             yield {
                 "log": np.full(len(piece), number, dtype=np.int32),
-                **_torques(piece, model, coefficients[log.role], shift(piece.dt)),
+                **_torques(piece, model, coefficients[log.role], shift.at(piece.dt)),
             }
 
 
@@ -108,7 +108,7 @@ def scored_blocks(
     survey: Survey,
     model: Model,
     coefficients: Mapping[str, FloatArray],
-    shift: Callable[[float], float],
+    shift: TorqueShift,
 ) -> Iterator[dict[str, FloatArray]]:
     """The torque that is scored and its prediction, of every log; arguments as `torque_blocks`."""
     by = PredictionFilter()
@@ -287,10 +287,7 @@ def torque_coefficients(fit: Fit, role: str) -> FloatArray:
     return fit.shared.coefficients(fit.values, role == "loaded")[: len(fit.shared.model.names)]
 
 
-def torque_shift(settings: Settings, fit: Fit) -> Callable[[float], float]:
-    """Time in s after which a logged torque acts, for the time between samples.
-
-    With the delay of the fit, if any.
-    """
+def torque_shift(settings: Settings, fit: Fit) -> TorqueShift:
+    """After how long a logged torque acts, with the delay of the fit, if any."""
     found = float(fit.values[fit.names.index("delay")]) if "delay" in fit.names else None
-    return partial(settings.torque_shift, found_delay=found)
+    return settings.torque_shift(found)

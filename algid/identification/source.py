@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
 
 from algid.errors import LogError
+from algid.files import sha256_of
 from algid.log import Log, Origin
 from algid.notices import Notice
 from algid.readers.memory import Columns, is_columns
@@ -241,19 +242,6 @@ def _hash_of_arrays(log: Log) -> str:
     digest = hashlib.sha256()
     for array in (log.stamp_ns, *log.theta, *log.tau):
         digest.update(array.tobytes())
-    return digest.hexdigest()
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, or of a folder's files in the order of their names."""
-    digest = hashlib.sha256()
-    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-        if (
-            file.is_file() and file.stat().st_size
-        ):  # one of none is empty, or waits for ever, as /proc/kmsg does
-            with file.open("rb") as opened:
-                while chunk := opened.read(1 << 20):
-                    digest.update(chunk)
     return digest.hexdigest()
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionScore, Shift, score
+from algid.estimators.prediction import PredictionScore, score
 from algid.estimators.rollout import RolloutScore, rollouts
 from algid.identification.known import model_of, shift_of, torque_constants
 from algid.identification.predicted import prediction
@@ -14,6 +14,7 @@ from algid.identification.source import Role
 from algid.identification.survey import Survey
 from algid.model import Model
 from algid.results import Result, TorquePrediction
+from algid.signals.shift import AT_ONCE, TorqueShift
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Predictor:
 
     model: Model
     coefficients: Callable[[Role], FloatArray]
-    shift: Shift = 0.0
+    shift: TorqueShift = AT_ONCE
 
 
 @dataclass(frozen=True)

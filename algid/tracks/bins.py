@@ -265,7 +265,7 @@ def arm_of(
         NoiseLevels(np.array(noise[:2]), np.array(noise[2:]))
         if min(noise) > 0
         else first_guess(first.theta, first.tau),
-        shift_of(result)(first.dt),
+        shift_of(result).at(first.dt),
         y,
         gyration,
         body,

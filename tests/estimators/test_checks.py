@@ -32,6 +32,7 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.identification.remarks import fit_warnings
 from algid.model import Model
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from tests.intervals import holds_95
 
@@ -103,7 +104,7 @@ def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
     late = replace(
         log, theta=log.theta[:, :-20], tau=log.tau[:, 20:]
     )  # a torque acts 20 ms after its stamp
-    assert np.all(score(Model(), k, [late], 0.02).r2 > 0.9999)
+    assert np.all(score(Model(), k, [late], TorqueShift(delay=0.02)).r2 > 0.9999)
     assert np.all(score(Model(), k, [late]).r2 < 0.99)
 
 

@@ -45,7 +45,7 @@ def _run(path: Path) -> Segment:
 
 
 def test_prediction_beats_the_published_parameters(sources: list[Source]) -> None:
-    fit = refined.fit(sources, settings=RefinedSettings(model=Model(("coulomb", "rotor"))))
+    fit = refined.fit(sources, settings=RefinedSettings(WeakSettings(Model(("coulomb", "rotor")))))
     assert fit.refuted  # an arm's torque error is no white noise
     assert fit.unidentifiable == ()
     found = cross_validate(fit, sources)

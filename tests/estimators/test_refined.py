@@ -10,6 +10,7 @@ from algid.estimators import log_likelihood as evidence
 from algid.estimators import refined, weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.refined import RefinedSettings
+from algid.estimators.weak import WeakSettings
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
 from algid.signals.differences import POINTS
@@ -99,7 +100,7 @@ def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
 def test_a_delay_is_recovered_with_its_error_bar(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     late = replace(log, theta=log.theta[:, :-5], tau=log.tau[:, 5:], omega=None)
-    fit = refined.fit([lambda: [late]], settings=RefinedSettings(estimate_delay=True))
+    fit = refined.fit([lambda: [late]], settings=RefinedSettings(WeakSettings(estimate_delay=True)))
     assert fit.names[-1] == "delay"
     assert (fit.estimator, fit.converged) == ("refined", True)
     assert abs(fit.values[-1] - 5e-3) < 1e-4
@@ -111,7 +112,7 @@ def test_a_held_torque_does_not_bias_friction(bench: Bench) -> None:
     t, k = np.arange(1501) * DT, bench.arm.constants()
     torque = SampledTorque(t, bench.bare.tau[:, :1501], "zoh")
     log = Segment(0.0, DT, simulate(k, torque, t).theta, torque.tau)
-    held = refined.fit([lambda: [log]], settings=RefinedSettings(hold="zoh")).values
+    held = refined.fit([lambda: [log]], settings=RefinedSettings(WeakSettings(hold="zoh"))).values
     assert np.allclose(held[5:7], k[5:7], rtol=5e-4)
     smooth = refined.fit([lambda: [log]]).values
     assert np.abs(smooth[5:7] / k[5:7] - 1).max() > 2e-3  # what half a sample does
@@ -191,7 +192,7 @@ def test_a_horizontal_arm_has_five_constants(bench: Bench) -> None:
     motion = simulate(k, lambda now: np.stack([np.sin(9 * now), 0.6 * np.cos(14 * now)]), t)
     fit = refined.fit(
         [lambda: [Segment(0.0, DT, motion.theta, motion.tau)]],
-        settings=RefinedSettings(model=Model(gravity=0)),
+        settings=RefinedSettings(WeakSettings(Model(gravity=0))),
     )
     assert fit.names == ("k1", "k3", "k5", "k6", "k7")
     assert np.allclose(fit.values, k[[0, 2, 4, 5, 6]], rtol=1e-4)

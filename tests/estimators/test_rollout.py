@@ -16,6 +16,7 @@ from algid.estimators.rollout import (
 )
 from algid.model import Model
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 from algid.synth.simulator import simulate
 from tests.exports.arms import ODD
 
@@ -80,7 +81,10 @@ def test_a_delay_that_is_known_is_made_up_for(segment: Segment) -> None:
     )  # torques that act 8 samples before their stamp
     good = rollouts(Model(), K, [late], 8.0).rmse
     np.testing.assert_allclose(
-        rollouts(Model(), K, [early], 8.0, -8 * DT).rmse, good, rtol=0.1, atol=1e-4
+        rollouts(Model(), K, [early], 8.0, TorqueShift(delay=-8 * DT)).rmse,
+        good,
+        rtol=0.1,
+        atol=1e-4,
     )
     assert rollouts(Model(), K, [early], 8.0).rmse[1].min() > 10 * good[1].max()
 
@@ -134,7 +138,9 @@ def test_the_torque_of_a_start_is_what_acts_from_there_on(dt: float) -> None:
     t = np.arange(round(4 / dt)) * dt
     theta = np.stack([0.4 * np.sin(2 * t), 0.5 * np.cos(3 * t)])
     step, shift = 2e-3, 0.013
-    x, u, y = _starts(Model(), K, Segment(0.0, dt, theta, push(t)), 0.1, step, shift)
+    x, u, y = _starts(
+        Model(), K, Segment(0.0, dt, theta, push(t)), 0.1, step, TorqueShift(delay=shift)
+    )
     edge = round(0.3 / dt)  # where filters ring
     at = np.arange(edge, t.size - edge - round(0.1 / dt), round(0.1 / dt)) * dt
     assert u.shape == (2 * round(HORIZONS[-1] / step) + 1, 2, at.size)

@@ -22,6 +22,7 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.model import TERMS as MODEL_TERMS
 from algid.model import Model
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 
@@ -104,11 +105,10 @@ def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source
     model = Model(tuple(term for term in terms.split() if term in MODEL_TERMS))
     hold: Literal["foh", "zoh"] = "zoh" if "hold" in terms else "foh"
     delay = "delay" in terms
+    settings = WeakSettings(model, hold=hold, estimate_delay=delay)
     if estimator != "refined":
-        return (weak if estimator == "weak" else instruments).fit(
-            unloaded, loaded, WeakSettings(model, hold=hold, estimate_delay=delay)
-        )
-    return refined.fit(unloaded, loaded, RefinedSettings(model, hold=hold, estimate_delay=delay))
+        return (weak if estimator == "weak" else instruments).fit(unloaded, loaded, settings)
+    return refined.fit(unloaded, loaded, RefinedSettings(settings))
 
 
 def _truth(fit: Fit) -> np.ndarray:
@@ -158,7 +158,8 @@ def test_cross_validation_counts_a_found_delay_once(cases: dict[tuple[str, bool]
     found = cross_validate(fit, sources)
     assert found is not None
     exact = [
-        score(Model(), _truth(fit)[:7], source(), TRUE["delay"]).residual for source in sources
+        score(Model(), _truth(fit)[:7], source(), TorqueShift(delay=TRUE["delay"])).residual
+        for source in sources
     ]
     assert np.allclose(found.residual, np.sum(exact, axis=0), rtol=0.05)
 

@@ -68,17 +68,17 @@ def test_a_torque_acts_after_half_its_hold_and_the_delay_found_or_else_set(
 ) -> None:
     settings = {"torque_hold": hold, "delay": 0.004}
     result = weighed.model_copy(update={"settings": weighed.settings | settings})
-    assert shift_of(result)(2e-3) == pytest.approx(0.004 + share * 2e-3, abs=1e-15)
+    assert shift_of(result).at(2e-3) == pytest.approx(0.004 + share * 2e-3, abs=1e-15)
     found = Estimate(estimate=0.0061, unit="s")
     parameters = {**result.parameters, "delay": found}
-    assert shift_of(result.model_copy(update={"parameters": parameters}))(0.01) == pytest.approx(
+    assert shift_of(result.model_copy(update={"parameters": parameters})).at(0.01) == pytest.approx(
         0.0061 + share * 0.01
     )
     lost = {
         **result.parameters,
         "delay": Estimate(estimate=None, unit="s", status=Status.NOT_IDENTIFIABLE),
     }
-    assert shift_of(result.model_copy(update={"parameters": lost}))(0.01) == pytest.approx(
+    assert shift_of(result.model_copy(update={"parameters": lost})).at(0.01) == pytest.approx(
         0.004 + share * 0.01
     )
 

@@ -37,6 +37,7 @@ from algid.identification.survey import Survey
 from algid.log import Log, Origin
 from algid.model import Model
 from algid.settings import Settings
+from algid.signals.shift import AT_ONCE, TorqueShift
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from tests.identification.fits import CASE, K, fit_of
@@ -125,9 +126,7 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
     over an end.
     """
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
-    blocks = list(
-        torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, lambda _: 0.0)
-    )
+    blocks = list(torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, AT_ONCE))
     for number, (log, omega) in enumerate(both):
         own = [block for block in blocks if block["log"][0] == number]
         column = {name: np.concatenate([block[name] for block in own]) for name in own[0]}
@@ -164,12 +163,7 @@ def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
         np.concatenate(
             [
                 b["tau1_predicted"]
-                for b in torque_blocks(
-                    survey,
-                    Model(),
-                    {"unloaded": K},
-                    lambda _, s=s: s,  # type: ignore[misc]
-                )
+                for b in torque_blocks(survey, Model(), {"unloaded": K}, TorqueShift(delay=s))
             ]
         )
         for s in (5 * DT, 0.0)
@@ -186,7 +180,7 @@ def test_a_stretch_of_a_few_samples_has_no_prediction(
         Survey([open_source(both[0][0].part(0, 15), "unloaded")]),
         Model(),
         {"unloaded": K},
-        lambda _: 0.0,
+        AT_ONCE,
     )
     assert np.isnan(block["tau1_predicted"]).all()
     assert np.isnan(block["omega2"]).all()
@@ -204,7 +198,7 @@ def test_noise_narrows_what_is_shown_of_the_torque(
     sigma = 3e-3
     noise = np.random.default_rng(0).normal(0, sigma, log.theta.shape)
     survey = Survey([open_source(replace(log, theta=log.theta + noise), "unloaded")])
-    (block,) = torque_blocks(survey, Model(), {"unloaded": K}, lambda _: 0.0)
+    (block,) = torque_blocks(survey, Model(), {"unloaded": K}, AT_ONCE)
     band = []
     for inertia, tau in zip((K[4] + K[2] + 2 * K[0], K[2]), log.tau, strict=True):
         allowed = 0.05 * np.sqrt(np.mean(tau**2))
@@ -250,8 +244,8 @@ def test_coefficients_of_a_loaded_log_hold_the_payload_and_no_delay() -> None:
         status=tuple("OK" for _ in values),
     )
     assert torque_coefficients(with_delay, "loaded").size == 7
-    assert torque_shift(Settings(torque_hold="zoh"), with_delay)(0.01) == pytest.approx(0.008)
-    assert torque_shift(Settings(delay=0.002), fit)(0.01) == 0.002
+    assert torque_shift(Settings(torque_hold="zoh"), with_delay).at(0.01) == pytest.approx(0.008)
+    assert torque_shift(Settings(delay=0.002), fit).at(0.01) == 0.002
 
 
 def test_a_fits_series_stand_in_its_folder(
@@ -301,7 +295,7 @@ def test_the_torque_in_the_file_is_the_one_that_is_scored(
     """
     survey = Survey([open_source(both[0][0], "unloaded")])
     wrong = K * np.array([1, 1, 1.1, 0.9, 1, 1, 1.05])
-    (block,) = scored_blocks(survey, Model(), {"unloaded": wrong}, lambda _: 0.0)
+    (block,) = scored_blocks(survey, Model(), {"unloaded": wrong}, AT_ONCE)
     found = score(Model(), wrong, survey.segments(survey.logs[0]))
     for joint in (1, 2):
         residual = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]

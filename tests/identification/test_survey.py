@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from algid.errors import LogError
+from algid.files import sha256_of
 from algid.identification import source
 from algid.identification.source import (
     LogSource,
     Staged,
     open_source,
     open_sources,
-    sha256_of,
     with_twins_marked,
 )
 from algid.identification.survey import Survey

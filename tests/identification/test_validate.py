@@ -21,6 +21,7 @@ from algid.log import Log, Origin
 from algid.model import Model
 from algid.results import Result
 from algid.settings import Settings
+from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion
@@ -65,7 +66,7 @@ def columns(motion: SimulatedMotion, k: FloatArray = K) -> FloatArray:
 
 
 def known(k: FloatArray, shift: float = 0.0) -> Predictor:
-    return Predictor(Model(), lambda _: k, shift)
+    return Predictor(Model(), lambda _: k, TorqueShift(delay=shift))
 
 
 def survey(*logs: tuple[Log, Role]) -> Survey:

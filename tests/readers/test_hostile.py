@@ -31,8 +31,7 @@ from pyarrow.parquet import encryption
 
 from algid.batches.manifest import is_manifest
 from algid.errors import LogError
-from algid.files import read_whole
-from algid.identification.source import sha256_of
+from algid.files import read_whole, sha256_of
 from algid.readers import read_log
 from algid.readers.mcap.framing import DamagedError, unpack
 from algid.writers import write_log
