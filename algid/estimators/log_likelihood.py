@@ -72,11 +72,15 @@ class _Innovations:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one pass over pieces of a log gives."""
+    """What one pass over pieces of a log gives.
+
+    `deviance` is minus twice the log-likelihood at the pass's coefficients, but for a constant.
+    """
 
     information: LogInformation
     noise_score: VarianceScore | None
     pieces: tuple[_Innovations, ...]
+    deviance: float
 
     @cached_property
     def innovations(self) -> Correlations:
@@ -129,7 +133,7 @@ class LogEvidence:
             np.median([getattr(level, name) for level in guesses], axis=0)
             for name in ("theta", "tau")
         )
-        guess = floored(NoiseLevels(theta, tau), floor)
+        self._guess = guess = floored(NoiseLevels(theta, tau), floor)
         self.noise = known or guess
         squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)
         self._rough = np.maximum(guess.tau, np.sqrt(squares))
@@ -165,21 +169,34 @@ class LogEvidence:
         gathered, scores = _Gathered(), []
         for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
             linear = self._linearise(c, theta, piece)
-            gathered.take(linear, piece.dt)
+            gathered.take(linear, piece.dt, self.noise)
             multiplier = linear.solve_transposed(linear.columns[-1:])[0]
             self._trajectories[seed] = trajectory(piece, linear, multiplier, self.noise)
             if self._known is None:
                 scores.append(variance_score(linear, len(piece), seed))
         return gathered.outcome(self.loaded, c, reduce(add, scores) if scores else None)
 
+    def shaped(self, shared: Shared, c: FloatArray) -> Outcome:
+        """Pass over the training set at `c` with friction of another shape; trajectories stay."""
+        gathered = _Gathered()
+        for piece, theta in zip(self.kept, self._trajectories, strict=True):
+            gathered.take(self._linearise(c, theta, piece, shared), piece.dt, self.noise)
+        return gathered.outcome(self.loaded, c)
+
+    def reshape(self, shared: Shared) -> None:
+        """From here on friction has the shape of `shared`; noise levels start where they did."""
+        self._shared = shared
+        self.noise = self._known or self._guess
+
     def run(self, c: FloatArray) -> Outcome:
         """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""
         gathered = _Gathered()
         for piece in self._pieces():
-            first = self._linearise(c, _first_trajectory(piece), piece, residual_only=True)
+            start = _first_trajectory(piece)
+            first = self._linearise(c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
-            gathered.take(self._linearise(c, theta, piece), piece.dt).summed()
+            gathered.take(self._linearise(c, theta, piece), piece.dt, self.noise).summed()
         return gathered.outcome(self.loaded, c)
 
     def improve_noise(self, outcome: Outcome) -> float:
@@ -196,9 +213,15 @@ class LogEvidence:
         return change
 
     def _linearise(
-        self, c: FloatArray, theta: FloatArray, piece: Segment, *, residual_only: bool = False
+        self,
+        c: FloatArray,
+        theta: FloatArray,
+        piece: Segment,
+        shared: Shared | None = None,
+        *,
+        residual_only: bool = False,
     ) -> Linearised:
-        shared = self._shared
+        shared = self._shared if shared is None else shared
         return linearise(
             shared.model,
             c[: len(shared.model.names)],
@@ -230,10 +253,13 @@ class _Gathered:
     def __init__(self) -> None:
         self._S, self._g = BlockSums(), BlockSums()
         self._pieces: list[_Innovations] = []
+        self._deviance = 0.0
 
-    def take(self, linear: Linearised, dt: float) -> _Innovations:
-        """Add a piece, its samples `dt` s apart; gives its innovations."""
+    def take(self, linear: Linearised, dt: float, noise: NoiseLevels) -> _Innovations:
+        """Add a piece, its samples `dt` s apart, whitened by such noise; gives its innovations."""
         Z, w = linear.columns[:-1], linear.columns[-1]
+        own = w @ w + 2 * np.log(linear.factor[0]).sum() + w.size * np.log(noise.tau).sum()
+        self._deviance += float(own)
         rows = 2 * _STRETCH
         count = -(-w.size // rows)
         padded = np.zeros((Z.shape[0] + 1, count * rows))
@@ -248,4 +274,4 @@ class _Gathered:
     def outcome(self, loaded: bool, c: FloatArray, score: VarianceScore | None = None) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        return Outcome(information, score, tuple(self._pieces))
+        return Outcome(information, score, tuple(self._pieces), self._deviance)

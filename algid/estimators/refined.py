@@ -28,6 +28,7 @@ from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
+from algid.estimators.widths import Width, has_width, likeliest_width
 from algid.notices import Notice
 from algid.progress import Progress
 from algid.signals.differences import Stencil
@@ -41,6 +42,9 @@ _FAR = 3.0  # standard deviations of the training set beyond which the last step
 _PASSES = 4
 _MANY = 4  # logs of which one is tried alone before all of them are
 _GROWING = 1.5  # factor of a torque's error in a step: a step makes at most e of it
+_WIDTHS = 4  # times that the width of friction's step is looked for
+_WIDTH_SETTLED = 0.05  # change of its logarithm
+_WIDTH_FAR = 0.5  # the same where the likelihood was refuted: no less would mend that
 _ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without information is held
 
 
@@ -122,6 +126,11 @@ def fit(
         ):
             return replace(refuted, iterations=steps)
         beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)
+        width = None
+        if end != "unsettled" and has_width(shared.model):
+            shared, beta, outcomes, end, width = _settled_width(
+                shared, logs, (beta, outcomes, end), settings, progress
+            )
         if end == "refuted":
             return replace(refuted, iterations=iterations)
         settled = end == "settled" and bool(np.all(np.isfinite(beta)))
@@ -145,6 +154,8 @@ def fit(
         coloured=coloured,
         samples=samples,
     )
+    if width is not None:
+        fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     pairs = zip(fitted.status, start.status, strict=True)
     return with_body(
@@ -248,6 +259,43 @@ def _refuted_alone(
     finally:
         log.restore(untrained)
     return 0
+
+
+def _settled_width(
+    shared: Shared,
+    logs: Sequence[LogEvidence],
+    trained: tuple[FloatArray, list[Outcome], End],
+    settings: RefinedSettings,
+    progress: Progress | None,
+) -> tuple[Shared, FloatArray, list[Outcome], End, Width | None]:
+    """What was `trained`, at the likeliest width of friction's step, and that width.
+
+    The weak form sees friction through a differentiator whose noise blurs the step: what it takes
+    for the width may be several times the true one. The likelihood may be refuted by that alone.
+    """
+    beta, outcomes, end = trained
+
+    def profile(width: float) -> tuple[float, FloatArray]:
+        other = replace(shared, model=replace(shared.model, coulomb_speed=width))
+        seen = [log.shaped(other, other.coefficients(beta, log.loaded)) for log in logs]
+        informations = [outcome.information for outcome in seen]
+        better, _, value = combine(other, informations, beta, settings.prior)
+        return sum(outcome.deviance for outcome in seen) - 2 * value, better
+
+    width = None
+    for _ in range(_WIDTHS):
+        now = shared.model.coulomb_speed
+        width = likeliest_width(profile, now)
+        moved = abs(np.log(width.value / now))
+        if moved < (_WIDTH_SETTLED if end == "settled" else _WIDTH_FAR):
+            break
+        shared = replace(shared, model=replace(shared.model, coulomb_speed=width.value))
+        for log in logs:
+            log.reshape(shared)
+        beta, outcomes, _, end = _train(shared, logs, beta, settings, progress)
+        if end != "settled":
+            break
+    return shared, beta, outcomes, end, width
 
 
 def _finish(

@@ -210,7 +210,10 @@ def run_fit(
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
-        elif fit.estimator == "instruments":
+        elif fit.shared.model != chosen.model:  # the fit has found the width of friction's step
+            chosen = replace(chosen, model=fit.shared.model)
+            sums.clear()
+        if fit.estimator == "instruments" and not chosen.shrunk:
             fit = exogeneity.watched(fit, unloaded, loaded, ours)
     except TooShortError as error:
         raise LogError(

@@ -1,0 +1,89 @@
+"""The width of dry friction's step: found by the likelihood, and part of the error bars."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.estimators import refined, weak
+from algid.estimators.refined import RefinedSettings
+from algid.estimators.widths import NARROWEST, likeliest_width
+from algid.model import Model
+from algid.signals.segments import Segment
+from pipelines.accuracy_scenes import random_arm
+from pipelines.controlled import WIDTH, Controller, Plan, controlled
+
+SEED = 415  # an arm that nothing was tuned on
+
+
+def rubbing() -> tuple[Segment, FloatArray]:
+    """Three seconds behind a PD controller, friction of a tenth of the weight; k1 … k7, f1, f2."""
+    arm = random_arm(SEED)[0]
+    k, count, rng = arm.constants(), 3001, np.random.default_rng(SEED)
+    fine = np.arange(2 * count - 1) / 2000.0
+    theta, omega = np.zeros((2, fine.size)), np.zeros((2, fine.size))
+    theta[0] = -np.pi / 2
+    for joint, frequencies in enumerate(([0.5, 1.3], [0.7, 1.9])):
+        for w in 2 * np.pi * np.array(frequencies):
+            theta[joint] += 0.4 * np.sin(w * fine)
+            omega[joint] += 0.4 * w * np.cos(w * fine)
+    inertia, friction = (
+        np.array([k[4] + k[2] + 2 * k[0], k[2]]),
+        0.1 * np.array([k[3] + k[1], k[1]]),
+    )
+    law = Controller(np.diag(600 * inertia), np.diag(35 * inertia))
+    plan = Plan(theta, omega, np.zeros_like(theta))
+    moved = controlled(arm, plan, law, np.zeros((count, 1)), friction[None, :, None], 1000.0, rng)
+    angles, torques = moved.theta[:, :, 0], moved.tau[:, :, 0]
+    noise = rng.standard_normal((2, 2, count))
+    log = Segment(0.0, 1e-3, angles + 1e-3 * noise[0], torques + 1e-2 * noise[1])
+    return log, np.append(k, friction)
+
+
+def test_the_width_that_starts_the_fit_does_not_stay_in_it() -> None:
+    """What the weak form takes for it is several times the true one: friction was 5 σ off."""
+    log, truth = rubbing()
+    found = []
+    for start in (0.02, 0.2):
+        model = Model(("coulomb",), coulomb_speed=start)
+        settings = RefinedSettings(weak.WeakSettings(model=model, bandwidth=60.0))
+        found.append(refined.fit([lambda: [log]], settings=settings))
+    for fit in found:
+        assert (fit.estimator, fit.converged) == ("refined", True)
+        # three seconds with a dozen reversals tell it to a factor of two
+        assert 0.5 * WIDTH < fit.shared.model.coulomb_speed < 2 * WIDTH
+        assert np.abs((fit.values - truth) / fit.std).max() < 3.6
+    near, far = found
+    assert np.all(np.abs(near.values - far.values) < 0.2 * near.std)
+
+
+@pytest.mark.parametrize("start", [0.006, 0.03, 0.4])
+def test_the_parabola_through_the_lowest_values_has_the_widths_variance(start: float) -> None:
+    """D = (log ω - log 0.03)² / 0.2² has a deviation of 0.2; β grows by (3, -1) a unit."""
+
+    def profile(width: float) -> tuple[float, FloatArray]:
+        x = np.log(width / 0.03)
+        return float((x / 0.2) ** 2), np.array([3.0, -1.0]) * x
+
+    found = likeliest_width(profile, start)
+    assert found.value == pytest.approx(0.03)
+    np.testing.assert_allclose(found.covariance, 0.2**2 * np.outer([3, -1], [3, -1]))
+
+
+def test_a_width_at_the_end_of_what_joints_have_stays_there() -> None:
+    found = likeliest_width(lambda width: (width, np.zeros(2)), 0.02)
+    assert NARROWEST <= found.value < 1.5 * NARROWEST  # steps of half an octave
+    assert not found.covariance.any()
+
+
+def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> None:
+    log, truth = rubbing()
+    still = replace(log, theta=log.theta[:, :400], tau=log.tau[:, :400])
+    model = Model(("coulomb",), coulomb_speed=0.2)
+    settings = RefinedSettings(weak.WeakSettings(model=model, bandwidth=60.0))
+    fit = refined.fit([lambda: [still]], settings=settings)
+    assert np.all(np.isfinite(fit.covariance))
+    assert fit.covariance.shape == (truth.size, truth.size)
