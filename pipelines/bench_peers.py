@@ -22,11 +22,12 @@ from algid.arm import FloatArray, regressor
 COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2"]
 _CUTOFF = 20.0  # Hz
 _WINDOW = 0.4  # s
+_END = 1.0  # s, and a tenth of a log at most, at both ends: where the filter rings
 
 
 def _filtered(path: Path) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]:
-    """Angles, velocities, accelerations and torques (2, N) after a zero-phase filter, and the
-    period in s.
+    """Angles, velocities, accelerations and torques (2, N) after a zero-phase filter, without its
+    ends, and the period in s.
     """
     import polars as pl
     from scipy.signal import butter, sosfiltfilt
@@ -38,7 +39,10 @@ def _filtered(path: Path) -> tuple[FloatArray, FloatArray, FloatArray, FloatArra
     signals = sosfiltfilt(butter(4, _CUTOFF, fs=1 / dt, output="sos"), signals, axis=1)
     theta, tau = signals[:2], signals[2:]
     omega = np.gradient(theta, dt, axis=1)
-    return theta, omega, np.gradient(omega, dt, axis=1), tau, dt
+    alpha = np.gradient(omega, dt, axis=1)
+    end = min(round(_END / dt), theta.shape[1] // 10)
+    inner = slice(end, theta.shape[1] - end)
+    return theta[:, inner], omega[:, inner], alpha[:, inner], tau[:, inner], dt
 
 
 def least_squares(path: Path) -> FloatArray:
@@ -118,6 +122,13 @@ def polars(path: Path) -> float:
     return _seconds(lambda: pl.read_parquet(path, columns=COLUMNS), 9)
 
 
+def polars_processor(path: Path) -> float:
+    """Processor seconds of the same, of all its threads."""
+    import polars as pl
+
+    return _seconds(lambda: pl.read_parquet(path, columns=COLUMNS), 9, time.process_time)
+
+
 def algid_reader(path: Path) -> float:
     """Seconds in which algid reads a log in blocks."""
     from algid.readers import open_log
@@ -158,18 +169,29 @@ def rosbags(path: Path) -> float:
     return _seconds(read, 1)
 
 
-def _seconds(work: Callable[[], object], times: int) -> float:
+def _seconds(
+    work: Callable[[], object], times: int, clock: Callable[[], float] = time.perf_counter
+) -> float:
     found = []
     for _ in range(times):
-        start = time.perf_counter()
+        start = clock()
         work()
-        found.append(time.perf_counter() - start)
+        found.append(clock() - start)
     return median(found)
 
 
 PEERS: dict[str, Callable[[Path], Any]] = {
     peer.__name__: peer
-    for peer in (least_squares, pinocchio, pysindy, polars, algid_reader, mcap_ros2, rosbags)
+    for peer in (
+        least_squares,
+        pinocchio,
+        pysindy,
+        polars,
+        polars_processor,
+        algid_reader,
+        mcap_ros2,
+        rosbags,
+    )
 }
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def commands(folder: Path, data: Path) -> dict[str, Timed]:
         "second": Timed(identify(second, out, *bare)),
         "pair": Timed(identify(ten, out, *pair, *bare)),
         "pair, page": Timed(identify(ten, out, *pair)),
-        "polars": Timed(peer("polars", million)),
+        "polars": Timed(peer("polars_processor", million)),
         "weak second": Timed(identify(second, out, *weak)),
         "weak million": Timed(identify(million, out, *weak)),
         "hour": Timed(identify(hour, out, *bare), 2),
