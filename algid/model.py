@@ -247,6 +247,21 @@ class Compiled:
         }
         return {product: pairs for product, pairs in kept.items() if pairs}
 
+    @cached_property
+    def of_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
+        """`inertia`, entry by entry, and `rest`, joint by joint, of the columns that are the joints' load."""
+        return self._parts(self.loads)
+
+    @cached_property
+    def beside_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
+        """The same of the other columns."""
+        return self._parts([place for place in range(len(self.names)) if place not in self.loads])
+
+    def _parts(self, places: Iterable[int]) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
+        own = tuple(places)
+        inertia = tuple(self.only(weighted, own) for weighted in self.inertia.values())
+        return inertia, tuple(self.only(weighted, own) for weighted in self.rest)
+
 
 @cache
 def _whole(column: TorqueColumn, joint: int) -> Expression:
@@ -511,18 +526,16 @@ def acceleration(
             left[joint] -= summed(compiled.rest[joint], c, values)
         a, b, d, e = (summed(weighted, c, values) for weighted in compiled.inertia.values())
         return _solved(a, b, d, e, left)
-    others = [place for place in range(len(compiled.names)) if place not in compiled.loads]
-    M, R = (
-        [
-            summed(compiled.only(weighted, places), c, values)
-            for weighted in compiled.inertia.values()
-        ]
-        for places in (compiled.loads, others)
+    (inertia_of_load, rest_of_load), (inertia_beside, rest_beside) = (
+        compiled.of_load,
+        compiled.beside_load,
     )
+    M = [summed(weighted, c, values) for weighted in inertia_of_load]
+    R = [summed(weighted, c, values) for weighted in inertia_beside]
     n = np.zeros_like(left)
     for joint in range(2):
-        left[joint] -= summed(compiled.only(compiled.rest[joint], others), c, values)
-        n[joint] = summed(compiled.only(compiled.rest[joint], compiled.loads), c, values)
+        left[joint] -= summed(rest_beside[joint], c, values)
+        n[joint] = summed(rest_of_load[joint], c, values)
     share = np.zeros_like(left)
     for name, joint in by_load:
         share[joint] = c[compiled.place[name]] * _sign(model, omega[joint])

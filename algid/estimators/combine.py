@@ -141,6 +141,7 @@ def combine(
     coefficients c0
     """
     damping = 0.0
+    logs, offset = _by_kind(logs)
     value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
         step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
@@ -155,7 +156,27 @@ def combine(
         value, gradient, S = trial
         if gain < _DONE and damping == 0.0:
             break
-    return beta, S, value
+    return beta, S, value + offset
+
+
+def _by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
+    """Unloaded and loaded logs in one sum each, and what their likelihoods at each other's coefficients add to it."""
+    found, offset = [], 0.0
+    for loaded in (False, True):
+        own = [log for log in logs if log.loaded is loaded]
+        if len(own) < 2:
+            found += own
+            continue
+        c0, size = own[0].c0, own[0].c0.size
+        S, g = np.zeros((size, size)), np.zeros(size)
+        for log in own:
+            log_S, log_g = log.total
+            change = c0 - log.c0
+            S += log_S
+            g += log_g - log_S @ change
+            offset += float(log_g @ change - 0.5 * change @ log_S @ change)
+        found.append(LogInformation(loaded, c0, S[None], g[None]))
+    return found, offset
 
 
 def likelihood(
