@@ -249,7 +249,7 @@ class Compiled:
 
     @cached_property
     def of_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
-        """`inertia`, entry by entry, and `rest`, joint by joint, of the columns that are the joints' load."""
+        """Entries of `inertia` and joints of `rest`, of the columns that are the joints' load."""
         return self._parts(self.loads)
 
     @cached_property

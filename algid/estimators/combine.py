@@ -160,7 +160,7 @@ def combine(
 
 
 def _by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
-    """Unloaded and loaded logs in one sum each, and what their likelihoods at each other's coefficients add to it."""
+    """Unloaded and loaded logs in one sum each, and what that adds to their likelihood."""
     found, offset = [], 0.0
     for loaded in (False, True):
         own = [log for log in logs if log.loaded is loaded]

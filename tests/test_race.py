@@ -1,0 +1,39 @@
+"""The contenders of the race: each reproduces an example whose answer is known, where it is
+installed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipelines.race_examples import EXAMPLES, example_table, reproduced
+
+NEEDS = {
+    "MuJoCo sysid": "mujoco",
+    "PySINDy weak form": "pysindy",
+    "pinocchio regressors": "pinocchio",
+}
+SLOW = {"MuJoCo sysid", "output error", "IDIM-IV"}  # above 5 s on a busy machine
+
+
+@pytest.mark.parametrize(
+    "peer",
+    [pytest.param(peer, marks=pytest.mark.slow if peer in SLOW else ()) for peer in EXAMPLES],
+)
+def test_a_contender_reproduces_its_example(peer: str) -> None:
+    if peer in NEEDS:
+        pytest.importorskip(NEEDS[peer])
+    example = EXAMPLES[peer]
+    assert example.run() <= example.limit
+
+
+def test_a_contender_that_falls_is_infinitely_far_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fall() -> float:
+        raise RuntimeError("it ran away")
+
+    algid = EXAMPLES["algid"]
+    monkeypatch.setitem(EXAMPLES, "algid", type(algid)(algid.what, algid.limit, fall))
+    found = reproduced(["algid"])
+    assert found == {"algid": np.inf}
+    assert example_table(found).endswith("| inf | no |")
