@@ -22,6 +22,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "faults": room("errors"),
     "progress": room(),
     "significance": room(),
+    "criteria": room(),
     "ros2": room("errors", "numpy"),
     "units": room(),
     "words": room(),
@@ -33,9 +34,10 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "physics": room("arm", "numpy", PURE),
     "model": room("arm physics", "numpy", PURE),
     "log": room("arm notices", "numpy"),
-    "signals": room("arm compiled log", "numpy scipy", PURE),
+    "signals": room("arm compiled criteria log", "numpy scipy", PURE),
     "estimators": room(
-        "arm compiled model notices physics progress significance signals", "numpy scipy", PURE
+        "arm compiled criteria model notices physics progress signals significance",
+        "numpy scipy", PURE
     ),
     "methods": room("estimators progress"),
     "files": room("construction errors limits", "pydantic"),
@@ -50,14 +52,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
-        "arm errors faults files limits log notices profile ros2 runtime units words",
+        "arm criteria errors faults files limits log notices profile ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
-    "inspection": room("arm errors estimators faults log notices profile readers signals units "
-                       "words", "numpy"),
+    "inspection": room("arm criteria errors estimators faults log notices profile readers signals "
+                       "units words", "numpy"),
     "report": room(
-        "arm errors files inspection methods model notices progress results ros2 significance "
-        "text verdict words",
+        "arm criteria errors files inspection methods model notices progress results ros2 "
+        "significance text verdict words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
     "check": room("errors files results", "pydantic"),
@@ -72,13 +74,13 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm errors estimators files identification model notices profile report results runtime "
-        "significance signals text verdict words",
+        "arm criteria errors estimators files identification model notices profile report results "
+        "runtime significance signals text verdict words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled errors estimators files identification log model notices progress report "
-        "significance results signals synth text verdict writers",
+        "arm compiled criteria errors estimators files identification log model notices progress "
+        "report significance results signals synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
     "exports": room(

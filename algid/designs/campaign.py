@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import UNDETERMINED
 from algid.designs.belief import Asked, Belief
 from algid.designs.information import Experiment, Slopes, informations
 from algid.designs.limits import HANGING, Limits, Row, Usage, resting, usage
@@ -25,7 +26,6 @@ MARGIN = (
     0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
 )
 ARMS = 20  # of the belief, of which the worst is reported
-OPEN = 0.5  # relative bound from which on an estimate would be called not identifiable
 SECOND = 1.0  # s: for how long each stretch of the motion is, of which it is said what it teaches
 
 
@@ -111,7 +111,7 @@ class Design:
     @property
     def open_parameters(self) -> list[str]:
         """Names of those asked for whose error bar is as large as they are."""
-        lost = self.campaign.asked.wanted & (self.relative > OPEN)
+        lost = self.campaign.asked.wanted & (self.relative > UNDETERMINED)
         return [name for name, yes in zip(self.names, lost, strict=True) if yes]
 
     @property

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.criteria import AT_REST
 from algid.estimators.conventions import Convention
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.model import sine_cosine
@@ -48,7 +49,6 @@ ZEROED = tuple(name for name in COLUMNS if not name.endswith("'"))
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
 _COULOMB_SPEED = 0.1  # rad/s
-AT_REST = 0.1  # of a joint's RMS speed
 _REWEIGHTINGS = 4
 _LEAST_POWER = 1e-280  # (N m)²: the square of a torque of denormal numbers is zero
 _FLOOR = 1e-9  # of a torque's power: a residual below it is rounding

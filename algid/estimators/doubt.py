@@ -11,11 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from algid.criteria import STILL
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import joints_apart
 from algid.estimators.fit import Fit
-from algid.estimators.identifiability import STILL
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import RIGID, UNITS
 from algid.notices import Notice

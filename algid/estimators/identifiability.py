@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays
 from algid.compiled import chi2_tail
+from algid.criteria import STILL, UNDETERMINED
 from algid.model import PARAMETERS, RIGID
 from algid.notices import Notice
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
@@ -41,13 +42,11 @@ _SCALES = tuple(
     (scale, tuple(name for name, one in PARAMETERS.items() if one.scale is scale))
     for scale in dict.fromkeys(one.scale for one in PARAMETERS.values())
 )
-_UNDETERMINED = 0.5  # standard deviation of a direction, in sizes of its parameters
 # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be
 # known
 _DAMPING = 0.1
 _NOTHING = 1e-14  # of the largest eigenvalue: rounding
 _SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
-STILL = 0.01  # rad: a joint that moves less has not moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     return (
         eigenvalues,
         vectors,
-        eigenvalues < max(1 / _UNDETERMINED**2, _NOTHING * float(eigenvalues[-1])),
+        eigenvalues < max(1 / UNDETERMINED**2, _NOTHING * float(eigenvalues[-1])),
     )
 
 

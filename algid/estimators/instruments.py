@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.criteria import SETTLED_SIMULATED
 from algid.estimators import weak
 from algid.estimators.combine import (
     BlockSums,
@@ -51,7 +52,6 @@ from algid.signals.filters import correlate, differentiator, half_length, smooth
 from algid.signals.segments import Segment
 
 _ROUNDS = 4
-_SETTLED = 0.05  # change of every coefficient in its standard deviations
 _STRIDE = 2  # windows overlap four-fold: more tell hardly more, and each is simulated
 _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarter of a radian
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
@@ -150,7 +150,7 @@ def _solved(
         S = np.sum([log.total[0] for log in logs], axis=0)
         step = better - c
         c = better
-        if float(step @ S @ step) < _SETTLED**2:
+        if float(step @ S @ step) < SETTLED_SIMULATED**2:
             break
     return logs
 

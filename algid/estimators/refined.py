@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import SETTLED
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
@@ -36,7 +37,6 @@ from algid.signals.shift import TorqueShift
 
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
-_SETTLED = 0.02  # change of every parameter in its standard deviations
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
@@ -231,7 +231,7 @@ def _train(
         beta = better
         if settings.noise is None and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
-        if iteration > 1 and moved < _SETTLED and improved < _NOISE_SETTLED:
+        if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     return beta, outcomes, _STEPS, "unsettled"
 

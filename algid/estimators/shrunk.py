@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import AT_REST
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.fit import Fit
@@ -25,8 +26,6 @@ from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Normal, Source, WeakSettings
 from algid.model import DELAYS, SINES, TERMS
 
-AT_REST = 0.1
-"""Of a joint's RMS speed over all logs: slower windows are of a joint that stands."""
 _ROUNDS = 3
 _REWEIGHTINGS = 4
 

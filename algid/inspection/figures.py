@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import GAP
 from algid.log import Log
 from algid.signals.spacing import near_stamps, spaced
 
-GAP_PERIODS = 2.5
-"""A step of this many periods is a gap: jitter stays below it, two lost samples exceed it."""
 ENOUGH = 1 << 18
 """Values that tell a quantile of any number of them: a median to 0.25 % of the deviation."""
 
@@ -116,7 +115,7 @@ def clock_figures(log: Log) -> ClockFigures:
     if near_stamps(stamp_ns, period):
         stamp_ns = np.concatenate([block.stamp_ns for block in spaced([log], period)])
     steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
-    gaps = steps > GAP_PERIODS * period
+    gaps = steps > GAP * period
     return ClockFigures(
         rows=len(log),
         duration=log.duration,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from algid.criteria import BESIDE_STILL
 from algid.errors import LogError
 from algid.log import Reading
 from algid.notices import Notice, Remedy
@@ -122,8 +123,6 @@ def _words(name: str) -> list[str]:
     return re.findall(r"[^\W\d_]+|\d+", spaced.lower())
 
 
-_STILL = 0.02
-"""In rad, or m: how far a joint that is held may creep."""
 _NAMED = 4
 Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
 """Tables of a topic's fields, whose paths are given by the columns' names."""
@@ -154,7 +153,7 @@ def moving_joints(
     moved: dict[str, float] = {}
     for name, values in table.columns.items():
         finite = values[np.isfinite(values)]
-        if finite.size and unit * np.ptp(finite) > _STILL:
+        if finite.size and unit * np.ptp(finite) > BESIDE_STILL:
             moved[joints[name]] = unit * float(np.ptp(finite))
     if not moved:
         return ()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.criteria import BRIDGED
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray
@@ -25,8 +26,6 @@ BACKWARD_SHARE = 0.25
 REPEATED_SHARE = 0.5
 _RUN = 8
 """Samples in a row that come late: fewer are jitter."""
-_GAP = 3.0
-"""Samples of the other topic this many of its periods apart are not interpolated between."""
 
 
 def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
@@ -184,7 +183,7 @@ class Series:
         if own.size < 2:
             return np.zeros(stamps.size, np.bool_)
         after = np.clip(np.searchsorted(own, stamps, side="left"), 1, own.size - 1)
-        bridged = own[after] - own[after - 1] <= _GAP * self.period
+        bridged = own[after] - own[after - 1] <= BRIDGED * self.period
         at_sample = (own[after] == stamps) | (own[after - 1] == stamps)
         return (bridged | at_sample) & (stamps >= own[0]) & (stamps <= own[-1])
 

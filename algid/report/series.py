@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import CUT
 from algid.errors import ResultError
 from algid.methods import settles
 from algid.progress import Progress
@@ -178,7 +179,6 @@ SCORED = ("tau1", "tau2", "tau1_predicted", "tau2_predicted")
 SCORED_POINTS = 1_200  # of a curve without anything fast in it
 POINTS = 2_400  # a series; twice what the page is wide
 DOTS = 2_000
-LONGEST_GAP = 5  # sampling periods; longer breaks the line
 
 
 @dataclass
@@ -285,12 +285,12 @@ class _Gathering:
         span.samples += t.size
         span.last = float(t[-1])
         span.largest_gap = max(span.largest_gap, float(steps.max()))
-        span.gaps += int(np.count_nonzero(steps > LONGEST_GAP * span.period))
+        span.gaps += int(np.count_nonzero(steps > CUT * span.period))
 
     def result(self) -> TorqueLog:
         """What was gathered."""
         rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
-        longest = {log: LONGEST_GAP * self.size * span.period for log, span in self.ranges.items()}
+        longest = {log: CUT * self.size * span.period for log, span in self.ranges.items()}
         return TorqueLog(
             ranges=self.ranges,
             series={
@@ -329,7 +329,7 @@ def read_scored(path: Path) -> dict[int, dict[str, Series]]:
             steps.setdefault(log, float(np.median(np.diff(block["t"]))))
     return {
         log: {
-            name: broken_at_gaps(*reducer.result(), LONGEST_GAP * size * steps.get(log, np.inf))
+            name: broken_at_gaps(*reducer.result(), CUT * size * steps.get(log, np.inf))
             for name, reducer in own.items()
         }
         for log, own in reducers.items()

@@ -15,11 +15,11 @@ from itertools import chain, pairwise
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
+from algid.criteria import CUT
 from algid.log import IntArray, Log, join, usual_period
 from algid.signals.spacing import spaced
 
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
-LONGEST_GAP = 5.0  # periods: a longer gap cuts the log
 _BRIDGE = 8  # samples of a block that are joined to those held back from the one before
 EVEN = 1e-3  # periods: stamps this close to the time base are taken as lying on it
 
@@ -74,7 +74,7 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     """Uniform segments of the log that comes in `blocks`, in time order.
 
     The period is the mean over the log's first samples, gaps left out. A gap of more than
-    `LONGEST_GAP` periods starts a new stretch; shorter ones are filled by interpolation.
+    `CUT` periods starts a new stretch; shorter ones are filled by interpolation.
     """
     source = (block for block in blocks if len(block))
     first: list[Log] = []
@@ -124,7 +124,7 @@ class _Sampler:
             yield from self._settle(block.part(_BRIDGE - len(self._pending), len(block)))
 
     def _settle(self, held: Log) -> Iterator[Segment]:
-        gaps = np.flatnonzero(np.diff(held.stamp_ns) * 1e-9 > LONGEST_GAP * self._dt) + 1
+        gaps = np.flatnonzero(np.diff(held.stamp_ns) * 1e-9 > CUT * self._dt) + 1
         edges = [0, *gaps.tolist(), len(held)]
         for first, last in pairwise(edges[:-1]):
             yield from self._stretch(held.part(first, last), ends=True)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import HOLE
 from algid.report.figures.base import (
     Figure,
     Layout,
@@ -24,7 +25,7 @@ from algid.report.reduce import MinMax, broken_at_gaps, bucket_size
 from algid.significance import NORMAL
 from algid.text import joined
 from algid.tracks.bins import CELL
-from algid.tracks.payload import HALF_BAND, HOLE, Track
+from algid.tracks.payload import HALF_BAND, Track
 from algid.tracks.result import TrackResult
 from algid.tracks.tables import mass_text
 

@@ -18,6 +18,7 @@ from operator import itemgetter
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.criteria import HOLE
 from algid.estimators.too_short import TooShortError
 from algid.signals.segments import Segment
 from algid.significance import NORMAL
@@ -36,7 +37,6 @@ from algid.tracks.drift import Drift, drift_of
 from algid.tracks.placing import Changes, Place, confirmed, cut_to
 
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
-HOLE = 0.3  # s: cells this far apart have no log between them
 FEWEST = 4  # cells that weigh a stretch
 CALM = 1  # cells more on both sides of the times at which a payload may be changing
 HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t

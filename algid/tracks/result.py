@@ -8,13 +8,13 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from algid.criteria import UNDETERMINED
 from algid.notices import Notice
 from algid.results import LogSummary
 from algid.significance import SURE
 from algid.tracks.payload import Stretch, Track
 
 SCHEMA_VERSION = 2
-UNDETERMINED = 0.5  # standard deviation over the payload or link 2, whichever is heavier
 
 
 class StretchStatus(StrEnum):

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from algid.criteria import AT_REST
 from algid.estimators import shrunk, weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.parametrisation import Shared
@@ -135,7 +136,7 @@ def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
     settings = WeakSettings(bandwidth=60.0)
     found = shrunk.fit(sources, settings=settings)
     assert found.shrinkage is not None
-    still = shrunk.AT_REST * weak.speeds(sources, settings)
+    still = AT_REST * weak.speeds(sources, settings)
     same = WeakSettings(
         found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1])
     )

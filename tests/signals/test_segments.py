@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from algid.criteria import CUT
 from algid.log import Log, Origin
-from algid.signals.segments import LONGEST_GAP, Segment, pieces, segments
+from algid.signals.segments import Segment, pieces, segments
 
 
 def log_at(stamp_ns: np.ndarray) -> Log:
@@ -62,7 +63,7 @@ def test_jittered_samples_are_put_on_the_time_base() -> None:
 def test_a_long_gap_cuts_and_a_short_one_does_not() -> None:
     starts = [part.start for part in segments([log_at(HOLED)]) if not part.continues]
     assert len(starts) == 2
-    assert starts[1] == pytest.approx(5.020, abs=1e-3 * LONGEST_GAP)
+    assert starts[1] == pytest.approx(5.020, abs=1e-3 * CUT)
 
 
 @settings(max_examples=60, deadline=None)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import with_payload
+from algid.criteria import HOLE
 from algid.errors import LogError
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
@@ -23,7 +24,7 @@ from algid.significance import NORMAL
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from algid.tracks.bins import CELL, SUMS, Cells, IdentifiedArm, cells_of, joined
-from algid.tracks.payload import HALF_BAND, HOLE, Stretch, Track, track
+from algid.tracks.payload import HALF_BAND, Stretch, Track, track
 from algid.tracks.result import StretchStatus, TrackResult, track_json
 from algid.tracks.run import track_log
 from tests.tracks.folders import CASE, noisy
