@@ -2,8 +2,8 @@
 
 Usage: python -m pipelines.bench_long [FOLDER] [SAMPLES]
 
-Processor time and wall time of each, and of a track how they grow from half the gaps to all of
-them.
+Processor time and wall time of each, beside what polars takes to read the same CSV and do nothing
+else, and of a track how they grow from half the gaps to all of them.
 """
 
 from __future__ import annotations
@@ -28,10 +28,16 @@ def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/bench-long")
     samples = int(sys.argv[2]) if len(sys.argv) > 2 else SAMPLES
     folder.mkdir(parents=True, exist_ok=True)
-    log = folder / "long.parquet"
-    write_log(log, moving(samples, GAPS, 1000.0))
+    log, text = folder / "long.parquet", folder / "long.csv"
+    long = moving(samples, GAPS, 1000.0)
+    for path in (log, text):
+        write_log(path, long)
+    del long
+    read = f"import polars; print(polars.read_csv({str(text)!r}).height)"
+    print(f"polars.read_csv {samples:.0e} rows: {spent_by('-c', read)}", flush=True)
     for name, arguments in (
-        (f"inspect {samples:.0e} rows, {GAPS} gaps", ("inspect", log)),
+        (f"inspect {samples:.0e} rows of CSV, {GAPS} gaps", ("inspect", text)),
+        (f"inspect {samples:.0e} rows of Parquet, {GAPS} gaps", ("inspect", log)),
         (
             f"convert {samples:.0e} rows to MCAP",
             ("convert", log, "-o", folder / "long.mcap", "--force"),
@@ -99,9 +105,15 @@ def moving(samples: int, gaps: int, rate: float) -> Log:
 
 
 def timed(*arguments: object) -> str:
-    """Wall time, processor time and memory of an algid command."""
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    command = [sys.executable, "-m", "algid", *map(str, arguments)]
+    """Wall and processor time of a call of algid."""
+    return spent_by("-m", "algid", *map(str, arguments))
+
+
+def spent_by(*arguments: str) -> str:
+    """Wall and processor time of a call of Python."""
+    command = [sys.executable, *arguments]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    start = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 3, 4):
         raise RuntimeError(f"{command}: {done.returncode}: {done.stderr[-500:]}")

@@ -35,7 +35,7 @@ from algid.batches.job import failed_record
 from algid.batches.records import End, stat_of
 from algid.batches.run import Batch, Recipe, sweep
 from algid.errors import AlgidError
-from algid.files import whole_folder
+from algid.files import refuse_links, whole_folder
 from algid.settings import Settings
 from algid.stores import open_store
 from pipelines.hostile.batches import furnish_output, grow, manifest, record
@@ -58,6 +58,7 @@ class AtOnce(Executor):
         status = End.OK if len(task.job.name) % 2 else End.FAILED
         future: Future[Any] = Future()
         try:
+            refuse_links(Path(task.out), task.job.name)  # as `run_task` does
             if status is End.OK:
                 with whole_folder(Path(task.out, f"{task.job.name}.algid"), force=True) as folder:
                     (folder / "result.json").touch()

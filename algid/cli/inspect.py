@@ -37,7 +37,9 @@ def inspect(
     from algid.api.inspect import inspect as run
     from algid.report.document import Table
     from algid.report.terminal import print_table
+    from algid.runtime import keep_freed
 
+    keep_freed()
     found = run(log, profile=choice.profile())
     if not quiet and form == "json":
         say(as_json(found), end="")

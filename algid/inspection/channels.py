@@ -66,9 +66,11 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
     as often.
     """
     for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
-        changes = np.flatnonzero(np.diff(tau))
-        if changes.size < _DEAD_RUNS or changes.size == tau.size - 1:  # all runs are of one sample
+        changed = tau[1:] != tau[:-1]
+        count = np.count_nonzero(changed)
+        if count < _DEAD_RUNS or count == changed.size:  # all runs are of one sample
             continue
+        changes = np.flatnonzero(changed)
         runs = np.diff(changes)
         longest = int(np.argmax(runs))
         first, length = int(changes[longest]) + 1, int(runs[longest])
@@ -86,14 +88,15 @@ def held_efforts(log: Log) -> Iterator[Notice]:
     are of every length. A log whose angles are held as well was recorded slowly as a whole.
     """
     for joint, (theta, tau) in enumerate(zip(log.theta, log.tau, strict=True), start=1):
-        changes = np.flatnonzero(np.diff(tau))
-        if not _HELD_RUNS <= changes.size < (len(log) - 1) * _HELD_SHARE:
+        changed = tau[1:] != tau[:-1]
+        count = np.count_nonzero(changed)
+        if not _HELD_RUNS <= count < changed.size * _HELD_SHARE:
             continue
-        runs = np.diff(changes)
+        runs = np.diff(np.flatnonzero(changed))
         usual = float(np.median(thinned(runs)))
         off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
         in_step = float(np.mean(off <= _OFF_STEP * usual))
-        moves = np.count_nonzero(np.diff(theta)) > 1.5 * changes.size
+        moves = np.count_nonzero(theta[1:] != theta[:-1]) > 1.5 * count
         if usual >= 2 and in_step >= _IN_STEP and moves:
             seen = {"held": 1e3 * usual * log.period, "late": 5e2 * (usual - 1) * log.period}
             yield Notice("HELD_EFFORT", numbers={"channel": _source(log, f"tau{joint}"), **seen})
@@ -103,12 +106,13 @@ def angles(log: Log) -> Iterator[Notice]:
     """Angles that never change, jump by a turn, or freeze until they jump."""
     for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
         steps, what = np.diff(theta), _source(log, name)
-        moving = np.flatnonzero(steps)
-        if not moving.size:
+        sizes = np.abs(steps, out=steps)
+        largest = sizes.max()
+        if not largest:
             yield Notice("ANGLE_CONSTANT", numbers={"channel": what, "value": float(theta[0])})
             continue
-        sizes = np.abs(steps)
-        wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
+        near = largest > 0.8 * _TURN  # of most logs no step is, and none has to be looked at
+        wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN)) if near else 0
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and np.median(thinned(sizes)) < 0.5:
             yield Notice(
@@ -117,8 +121,9 @@ def angles(log: Log) -> Iterator[Notice]:
                 refuse=True,
                 remedies=(Remedy({f"{name}.unwrap": True}),),
             )
-        if moving.size == steps.size:  # it never stands still
+        if np.count_nonzero(sizes) == sizes.size:  # it never stands still
             continue
+        moving = np.flatnonzero(sizes)
         runs, usual = np.diff(moving), float(np.quantile(thinned(sizes[moving]), 0.99))
         long_enough = max(10, round(0.02 / log.period))
         frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
@@ -199,9 +204,12 @@ def spikes(log: Log) -> Iterator[Notice]:
         return
     channels = zip(("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True)
     for name, values in channels:
-        off = values[1:-1] - (values[:-2] + values[2:]) / 2
-        size = np.abs(off)
-        limit = _SPIKE * max(robust_deviation(off), float(np.quantile(thinned(size), 0.9)))
+        off = values[:-2] + values[2:]  # in place: a long log's arrays cost more than the sums
+        off *= -0.5
+        off += values[1:-1]
+        deviation = robust_deviation(off)
+        size = np.abs(off, out=off)
+        limit = _SPIKE * max(deviation, float(np.quantile(thinned(size), 0.9)))
         if limit == 0:
             continue
         places = np.flatnonzero(size > limit) + 1

@@ -10,6 +10,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from algid.errors import LogError
 from algid.files import read_whole
 from algid.limits import LIMITS
@@ -18,7 +20,7 @@ from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.dialect import Dialect, detect
 from algid.readers.frames import NO_COMPANION, beyond, flat_reader
-from algid.readers.text import head_of, pieces, whole_lines
+from algid.readers.text import ending_with_lines, head_of, pieces, whole_lines
 
 if TYPE_CHECKING:
     import polars as pl
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 _EXCESS = "excess"
 
 _SPLIT = 1 << 20
+_LINE_END = ord("\n")
 
 
 def sidecar(path: Path) -> Path:
@@ -72,13 +75,26 @@ def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
     LogError
         If compressed text is damaged, or a line is no table's.
     """
-    comment = dialect.comment.encode() if dialect.comment else b"\n"  # which no line begins with
     rows, skip = 0, dialect.skip
-    for text in whole_lines(path, kind):
-        lines = text.split(b"\n")
-        rows += sum(1 for line in lines[skip:] if line.strip() and not line.startswith(comment))
-        skip = max(0, skip - len(lines))
+    for text in ending_with_lines(path, _small(pieces(path, kind, _SPLIT))):
+        while skip and text:
+            text = text.partition(b"\n")[2]
+            skip -= 1
+        rows += _rows_in(text, dialect.comment)
     return rows
+
+
+def _rows_in(text: bytes, comment: str | None) -> int:
+    """Lines of a text that are neither blank nor comments."""
+    letters = np.frombuffer(text, np.uint8)
+    ends = np.flatnonzero(letters == _LINE_END)
+    starts = ends[:-1] + 1 if text.endswith(b"\n") else ends + 1
+    odd = b" \t\r\v\f\n" + (comment or "").encode()[:1]
+    # only a line that begins oddly may be blank or a comment
+    if text[:1] not in odd and not np.isin(letters[starts], list(odd)).any():
+        return starts.size + 1
+    marks = (comment.encode(),) if comment else ()
+    return sum(1 for line in text.split(b"\n") if line.strip() and not line.startswith(marks))
 
 
 def _frames(

@@ -122,10 +122,28 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
     LogError
         As `pieces`, and if a line is no table's.
     """
-    rest, head = b"", LIMITS.head_bytes
-    for piece in pieces(path, name):
-        text = rest + piece[:head] + _EMPTY_LINES.sub(b"\n", piece[head:])
+    return ending_with_lines(path, _with_few_empty_lines(pieces(path, name)))
+
+
+def _with_few_empty_lines(found: Iterator[bytes]) -> Iterator[bytes]:
+    """The same text without the empty lines behind its head, but for those where two pieces meet."""
+    head = LIMITS.head_bytes
+    for piece in found:
+        yield piece[:head] + _EMPTY_LINES.sub(b"\n", piece[head:])
         head = max(0, head - len(piece))
+
+
+def ending_with_lines(path: Path, found: Iterator[bytes]) -> Iterator[bytes]:
+    """The same text in pieces that end with a line, but for the last.
+
+    Raises
+    ------
+    LogError
+        If a line is no table's.
+    """
+    rest = b""
+    for piece in found:
+        text = rest + piece
         end = text.rfind(b"\n") + 1
         rest = text[end:]
         if len(rest) > LIMITS.line_bytes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
+import random
 import tempfile
 import zipfile
 from pathlib import Path
@@ -238,3 +239,21 @@ def test_the_guide_lists_every_format() -> None:
     for form in FORMATS:
         ends = ", ".join(f"`{suffix}`" for suffix in form.suffixes) or "a folder"
         assert f"| {form.title} | {ends} |" in guide
+
+
+@pytest.mark.parametrize("comment", [None, "#", "//"])
+def test_rows_are_counted_as_line_by_line(comment: str | None, tmp_path: Path) -> None:
+    """Blank lines and comments are none, wherever they stand."""
+    parts = ["1,2", "3", "\n", "\n", "\n\n", "\r\n", " \n", "\t", "#", "//", "/1", "\n#x", "\v\n"]
+    path = tmp_path / "log.csv"
+    for seed in range(300):
+        draw = random.Random(seed)
+        text = "".join(draw.choices(parts, k=draw.randrange(12)))
+        skip = draw.randrange(3)
+        path.write_bytes(text.encode())
+        lines = text.split("\n")[skip:]
+        counted = sum(
+            1 for one in lines if one.strip() and not (comment and one.startswith(comment))
+        )
+        dialect = Dialect(("t", "q1"), ",", False, skip, comment, frozenset(), False)
+        assert counted_rows(path, "csv", dialect) == counted, (text, skip)
