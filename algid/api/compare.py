@@ -74,7 +74,7 @@ def compare(
     if out is not None:
         from algid.report.comparison_page import write_comparison
 
-        write_comparison(found, read, Path(out))
+        write_comparison(found, read, Path(out), force)
     return found
 
 

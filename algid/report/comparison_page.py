@@ -38,10 +38,18 @@ ROW, FRAME = 24, 90  # pixels of a parameter, and of what stands around them
 READING = "a difference inside the blue band is one that chance explains 19 times of 20"
 
 
-def write_comparison(found: Comparison, results: Sequence[Result], folder: Path) -> Path:
-    """Write `compare.html` into `folder`. Raises `OutputError`."""
+def write_comparison(
+    found: Comparison, results: Sequence[Result], folder: Path, force: bool
+) -> Path:
+    """Write `compare.html` into `folder`.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, or exists and `force` is not set.
+    """
     path = folder / NAME
-    with whole_file(path) as temporary:
+    with whole_file(path, force=force) as temporary:
         temporary.write_text(page(comparison_document(found, results)), encoding="utf-8")
     return path
 

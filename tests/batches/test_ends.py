@@ -121,20 +121,74 @@ def test_where_nothing_can_be_written_every_command_says_so_in_a_line(tmp_path: 
         assert str(place) in last
 
 
+LENGTHS = ("--l1", "0.1626", "--l2", "0.1232")
+PLAN = (
+    *("--range", "1.2", "--speed", "3", "--torque", "1.5", "--duration", "1", "--rate", "50"),
+    *("--position-noise", "1e-3", "--torque-noise", "1e-2"),
+)
+FOLDER = Path()
+WRITERS = {
+    "identify": (("LOG", "--estimator", "weak", "--model", "plain"), FOLDER, {"d0-unloaded.algid"}),
+    "track": (("LOG", "--parameters", "RESULT", *LENGTHS), FOLDER, {"d0-unloaded.track"}),
+    "design": (("case1", *PLAN), FOLDER, {"case1.design"}),
+    "synth": (
+        ("case1", "--duration", "2"),
+        FOLDER,
+        {"case1-unloaded.mcap", "case1-loaded.mcap"},
+    ),
+    "compare": (("RESULT", "RESULT"), FOLDER, {"compare.html"}),
+    "export": (("RESULT", "--to", "urdf"), Path("a.urdf"), {"a.urdf"}),
+    "convert": (("LOG",), Path("a.mcap"), {"a.mcap"}),
+    "convert to CSV": (("LOG",), Path("a.csv"), {"a.csv"}),
+}
+"""By command its arguments, what `-o` names, and what then stands there."""
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A log and its result."""
+    place = tmp_path_factory.mktemp("arm")
+    log = next(write_logs(place / "logs", 1).iterdir())
+    algid.identify([log], estimator="weak", model="plain", out=place, report=False)
+    return {"LOG": log, "RESULT": place / "d0-unloaded.algid"}
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_of_two_processes_that_write_one_output_one_is_refused(
+    writer: str, tmp_path: Path, arm: dict[str, Path]
+) -> None:
+    """The refused one leaves nothing, and what stands there is one's alone, whole."""
+    words, name, wanted = WRITERS[writer]
+    arguments = [arm.get(word, word) for word in words]
+    out, alone = tmp_path / "out", tmp_path / "alone"
+    command = [writer.partition(" ")[0], *arguments, "-o"]
+    for place in (out, alone):
+        place.mkdir()
+    ends = [ended(one) for one in [started(*command, out / name) for _ in range(2)]]
+    assert sorted(code for code, _ in ends) in ([0, 2], [2, 3]), ends
+    assert all("exists already" in told for code, told in ends if code == 2)
+    assert {path.name for path in out.iterdir()} == wanted
+    ended(started(*command, alone / name))
+    assert files(out) == files(alone)
+
+
+def files(folder: Path) -> dict[str, int]:
+    """By path the lines of each file; what was written at another time has as many."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes().count(b"\n") if path.suffix in TEXT else 0
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+TEXT = (".csv", ".urdf", ".json", ".md", ".yaml")
+
+
 @pytest.mark.parametrize("kind", ["csv", "mcap"])
-def test_of_two_writers_of_one_log_one_is_refused(tmp_path: Path, kind: str) -> None:
+def test_the_log_of_the_writer_that_was_first_is_whole(tmp_path: Path, kind: str) -> None:
     log = next(write_logs(tmp_path / "logs", 1).iterdir())
     target = tmp_path / f"a.{kind}"
     ends = [ended(one) for one in [started("convert", log, "-o", target) for _ in range(2)]]
     assert sorted(code for code, _ in ends) == [0, 2], ends
-    assert all("exists already" in told for code, told in ends if code == 2)
     assert len(read_log(target)) == len(read_log(log))
     assert left(tmp_path) == []
-
-
-def test_of_two_synths_one_is_refused(tmp_path: Path) -> None:
-    flags = ("synth", "case1", "--duration", "2", "-o", tmp_path)
-    ends = [ended(one) for one in [started(*flags) for _ in range(2)]]
-    assert sorted(code for code, _ in ends) == [0, 2], ends
-    assert len(list(tmp_path.iterdir())) == 2
-    assert all(len(read_log(path)) == 2001 for path in tmp_path.iterdir())
