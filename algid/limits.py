@@ -118,6 +118,8 @@ class FileLimits:
     """Of a length in a definition: 32 bits have so many."""
     json_bytes: int = 1 << 20
     """Of one JSON message."""
+    json_depth: int = 8
+    """Lists and objects within one another in a JSON line."""
     joints: int = 256
     """Names of joints in one message."""
     other_joints: int = 32

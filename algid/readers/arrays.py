@@ -166,6 +166,9 @@ def _npy(path: Path) -> dict[str, NDArray[Any]]:
 def _npz(path: Path) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
+        twice = [name for name, count in Counter(archive.namelist()).items() if count > 1]
+    if twice:
+        raise LogError(f"{path}: the array {twice[0]!r} stands in the archive twice; save it again")
     if claimed > LIMITS.whole_bytes:
         raise LogError(
             f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as Parquet"

@@ -164,8 +164,10 @@ def number(name: str, cell: pl.Expr, kind: pl.DataType) -> pl.Expr:
             .otherwise(beyond(units))
             .alias(name)
         )
-    if kind == pl.UInt64:
-        return pl.when(cell < 1 << 63).then(cell).otherwise(beyond(cell)).cast(pl.Int64).alias(name)
+    if kind in (pl.UInt64, pl.Int128, pl.UInt128):
+        most = (1 << 63) - 1
+        within = cell <= most if kind.is_unsigned_integer() else cell.is_between(-most, most)
+        return pl.when(within).then(cell).otherwise(beyond(cell)).cast(pl.Int64).alias(name)
     return cell.cast(pl.Int64 if kind.is_integer() or kind.is_temporal() else pl.Float64).alias(
         name
     )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import json
+import math
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NoReturn, cast
 
 from algid.errors import LogError
 from algid.limits import LIMITS
@@ -34,14 +36,20 @@ def frame_of_lines(path: Path) -> pl.DataFrame:
     Raises
     ------
     LogError
-        If another line is no JSON object.
+        If another line is no JSON object, or one lies too deep within itself.
     """
     import polars as pl
 
+    _refuse_depth(path)
     end = _end_of_whole_lines(path)
     try:
         with path.open("rb") as stream:
-            source = stream if end is None else io.BytesIO(stream.read(end))
+            marked = stream.read(len(BOM_UTF8)) == BOM_UTF8
+            start = stream.seek(len(BOM_UTF8) if marked else 0)
+            whole = end is None and not marked
+            source = (
+                stream if whole else io.BytesIO(stream.read(-1 if end is None else end - start))
+            )
             frame = pl.read_ndjson(source, infer_schema_length=None)
     except pl.exceptions.PolarsError as error:
         reason = str(error).split("\n", maxsplit=1)[0][:200]
@@ -61,6 +69,45 @@ def frame_of_lines(path: Path) -> pl.DataFrame:
     return found if end is None else pl.concat([found, found.clear(1)])
 
 
+_OTHER_THAN_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
+_AS_ONE_KIND = bytes.maketrans(b"{}", b"[]")
+
+
+def _refuse_depth(path: Path) -> None:
+    """Raises `LogError` where lists and objects lie deep: polars takes the cube of their depth."""
+    with path.open("rb") as stream:
+        for number, line in enumerate(stream, start=1):
+            if line.count(b"[") + line.count(b"{") > LIMITS.json_depth and _is_deep(line):
+                raise LogError(
+                    f"{path}: line {number}: lists and objects within one another, more than "
+                    f"{LIMITS.json_depth} deep; expected a sample of an arm in every line"
+                )
+
+
+def _is_deep(line: bytes) -> bool:
+    """Whether something stays of the brackets once the innermost ones are gone so many times."""
+    brackets = line.translate(_AS_ONE_KIND, _OTHER_THAN_BRACKETS)
+    for _ in range(LIMITS.json_depth):
+        brackets = brackets.replace(b"[]", b"")
+    return bool(brackets) and _depth_of(line) > LIMITS.json_depth
+
+
+def _depth_of(line: bytes) -> float:
+    """How deep lists and objects lie in a line; 0 where it is no JSON."""
+    try:
+        level, deepest = [json.loads(line)], 0
+    except RecursionError:
+        return math.inf
+    except ValueError:
+        return 0
+    while level := [one for one in level if isinstance(one, list | dict)]:
+        deepest += 1
+        level = [
+            inner for one in level for inner in (one.values() if isinstance(one, dict) else one)
+        ]
+    return deepest
+
+
 def _end_of_whole_lines(path: Path) -> int | None:
     """Where the last line begins if it breaks off: it has no line end, and is no JSON object."""
     with path.open("rb") as stream:
@@ -76,9 +123,14 @@ def _end_of_whole_lines(path: Path) -> int | None:
 def _is_object(line: bytes) -> bool:
     """Whether a line is a JSON object, or nothing."""
     try:
-        return not line.strip() or isinstance(json.loads(line), dict)
+        return not line.strip() or isinstance(json.loads(line, parse_constant=_no_number), dict)
     except (ValueError, RecursionError):
         return False
+
+
+def _no_number(word: str) -> NoReturn:
+    """JSON has no NaN and no Infinity, and polars reads none."""
+    raise ValueError(f"{word} is no JSON")
 
 
 def _wrong_line(path: Path) -> str:

@@ -126,7 +126,7 @@ def whole_lines(path: Path, name: str) -> Iterator[bytes]:
 
 
 def _with_few_empty_lines(found: Iterator[bytes]) -> Iterator[bytes]:
-    """The same text without the empty lines behind its head, but for those where two pieces meet."""
+    """The same text without empty lines behind its head, but for those where two pieces meet."""
     head = LIMITS.head_bytes
     for piece in found:
         yield piece[:head] + _EMPTY_LINES.sub(b"\n", piece[head:])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,9 @@ def test_a_line_that_lacks_a_number_is_counted(tmp_path: Path) -> None:
     assert notice.code == "EMPTY_CELLS"
 
 
-@pytest.mark.parametrize("wrong", ['{"t": 1, "motor_state": [', "[1, 2]", "nan", '{"t": 1,}'])
+@pytest.mark.parametrize(
+    "wrong", ['{"t": 1, "motor_state": [', "[1, 2]", "nan", '{"t": 1,}', '{"t": NaN}']
+)
 def test_a_line_that_is_no_object_is_refused_with_its_number(wrong: str, tmp_path: Path) -> None:
     path = lines(tmp_path / "a.jsonl", nested())
     kept = path.read_text().splitlines()
@@ -107,6 +110,51 @@ def test_a_last_line_that_ends_and_is_no_object_is_refused(tmp_path: Path) -> No
     path.write_text(path.read_text().rstrip("\n")[:-1] + "\n")
     with pytest.raises(LogError, match=r"a\.jsonl: line 60: expected a JSON object"):
         read_log(path)
+
+
+@pytest.mark.parametrize("opened", ["[", '{"a":'])
+def test_lines_that_lie_deep_within_themselves_are_refused(opened: str, tmp_path: Path) -> None:
+    """polars takes minutes for a thousand lists within one another."""
+    closed = {"[": "]", '{"a":': "}"}[opened]
+    for depth, refused in ((7, False), (8, True), (1000, True), (100_000, True)):
+        path = lines(tmp_path / "a.jsonl", nested())
+        kept = path.read_text().splitlines()
+        kept[30] = kept[30][:-1] + ', "x": ' + opened * depth + "1" + closed * depth + "}"
+        path.write_text("\n".join(kept))
+        if refused:
+            with pytest.raises(LogError, match=r"a\.jsonl: line 31: lists and objects within"):
+                read_log(path)
+        else:
+            assert len(read_log(path)) == 60
+
+
+def test_a_mark_of_byte_order_is_none_of_the_first_line(tmp_path: Path) -> None:
+    path = lines(tmp_path / "a.jsonl", nested())
+    whole = b"\xef\xbb\xbf" + path.read_bytes()
+    path.write_bytes(whole)
+    assert len(read_log(path)) == 60
+    path.write_bytes(whole[:-9])
+    assert len(read_log(path)) == 59
+
+
+def test_times_beyond_64_bits_are_refused(tmp_path: Path) -> None:
+    rows = [{**row, "t": 10**30} for row in nested()]
+    with pytest.raises(LogError, match="a time beyond 292 years"):
+        read_log(lines(tmp_path / "a.jsonl", rows))
+
+
+def test_an_array_that_stands_twice_in_an_archive_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, t=LOG.t, theta=LOG.theta.T, tau=LOG.tau.T)
+    with zipfile.ZipFile(path, "a") as archive, pytest.warns(UserWarning, match="Duplicate name"):
+        archive.writestr("tau.npy", b"")
+    with pytest.raises(LogError, match=r"a\.npz: the array 'tau\.npy' stands in the archive twice"):
+        read_log(path)
+
+
+def test_brackets_within_texts_are_none(tmp_path: Path) -> None:
+    rows = [{**row, "text": "[{" * 40, "many": [[1]] * 40} for row in nested()]
+    assert len(read_log(lines(tmp_path / "a.jsonl", rows))) == 60
 
 
 def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
