@@ -82,7 +82,7 @@ def validate(
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
         from algid.exports.read_urdf import read_urdf
 
-        model, warnings = read_urdf(Path(result))
+        model = read_urdf(Path(result))
     else:
         known = result if isinstance(result, Result) else read_result(result)
         model, said = predictor_of(known, file), reused(said, known)

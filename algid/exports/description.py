@@ -4,12 +4,14 @@ k1 = m2 l1 lc2 and k2 = m2 g lc2 leave l1 = g k1 / k2 to a model made of links. 
 the estimates are conditioned on it: with their covariance C and a the gradient of g k1 - l1 k2,
 
     c' = c - C a (g k1 - l1 k2) / (aᵀ C a),   C' = C - C a aᵀ C / (aᵀ C a)
+
+Of moments off the links' lines k1 and k2 are the sizes |K1| and |K2|, and the step is repeated.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +19,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import ResultError, SettingError
-from algid.exports.links import Knowns, Link, links_of
+from algid.exports.links import Knowns, Link, links_of, phasor_of, turn_of
 from algid.identification.known import (
     contradictions,
     first_length,
@@ -26,7 +28,7 @@ from algid.identification.known import (
     payload_length,
     torque_constants,
 )
-from algid.model import TERMS, UNITS, Model
+from algid.model import SINES, TERMS, UNITS, Model, phasor
 from algid.notices import Notice
 from algid.results import Estimate, Result
 from algid.text import joined
@@ -69,7 +71,7 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
         c, C = _conditioned(model, c, C, l1)
     value = model.values(c)
     spread = dict(zip(model.names, np.sqrt(np.maximum(np.diag(C), 0.0)).tolist(), strict=True))
-    k1, k3, k5 = value["k1"], value["k3"], value["k5"]
+    k1, k3, k5 = abs(phasor_of(value, "k1")), value["k3"], value["k5"]
     if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
         raise ResultError(
             f"{file}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 "
@@ -83,17 +85,39 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
 def _conditioned(
     model: Model, c: FloatArray, C: FloatArray, l1: float
 ) -> tuple[FloatArray, FloatArray]:
-    first, second = model.names.index("k1"), model.names.index("k2")
+    """Coefficients and covariance under g |K1| = l1 |K2|, which is linear without sine parts."""
+    for _ in range(_STEPS):
+        wrong, a = _mismatch(model, c, l1)
+        if abs(wrong) <= _ROUNDING * l1 * abs(phasor(model, c, "k2")):
+            break
+        # without error bars, the moments are taken as equally wrong for their size
+        toward = C @ a if a @ C @ a > 0 else c**2 * a
+        c = c - toward * wrong / (a @ toward)
+    _, a = _mismatch(model, c, l1)
+    spread = a @ C @ a
+    return c, C - np.outer(C @ a, a @ C) / spread if spread > 0 else C
+
+
+_STEPS, _ROUNDING = 20, 1e-15
+"""Newton's, of which a plane needs one, and what of l1 |K2| is rounding."""
+
+
+def _mismatch(model: Model, c: FloatArray, l1: float) -> tuple[float, FloatArray]:
+    """How far g |K1| is from l1 |K2|, and the gradient of their difference (q,)."""
     a = np.zeros(c.size)
-    a[first], a[second] = model.gravity, -l1
-    if a @ C @ a > 0:
-        gain = C @ a / (a @ C @ a)
-        return c - gain * (a @ c), C - np.outer(gain, a @ C)
-    equally = np.zeros(
-        c.size
-    )  # without error bars, k1 and k2 are taken as equally wrong for their size
-    equally[[first, second]] = c[[first, second]] ** 2 * a[[first, second]]
-    return c - equally * (a @ c) / (a @ equally), C
+    wrong = 0.0
+    sines = {of: own for own, of in SINES.items() if own in model.names}
+    for name, factor in (("k1", model.gravity), ("k2", -l1)):
+        K = phasor(model, c, name)
+        if name not in sines:
+            wrong += factor * K.real
+            a[model.names.index(name)] = factor
+            continue
+        size = max(abs(K), 1e-300)
+        wrong += factor * size
+        a[model.names.index(name)] = factor * K.real / size
+        a[model.names.index(sines[name])] = factor * K.imag / size
+    return wrong, a
 
 
 @dataclass(frozen=True)
@@ -121,6 +145,7 @@ class Description:
     delay : float or None, s, estimated between torque and angle
     links : two of Link, or None where the format needs none
     rotor1 : float, kg m^2
+    turn : float, rad, what is added to θ1 so that it counts from the horizontal
     numbers : where each number comes from
     warnings : what does not fit
     """
@@ -131,6 +156,7 @@ class Description:
     delay: float | None
     links: tuple[Link, Link] | None
     rotor1: float
+    turn: float
     numbers: tuple[Number, ...]
     warnings: tuple[Notice, ...]
 
@@ -172,6 +198,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         delay=None if delay is None else delay.estimate,
         links=chosen,
         rotor1=knowns.rotor1 or 0.0,
+        turn=turn_of(coefficients.value, coefficients.model.gravity),
         numbers=numbers,
         warnings=contradictions(result, given),
     )
@@ -195,8 +222,7 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
             "give --l1, or identify it from logs that tell more"
         )
     # of moments off the links' lines, the sizes
-    K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
-    return gravity * abs(K1) / abs(K2)
+    return gravity * abs(phasor_of(value, "k1")) / abs(phasor_of(value, "k2"))
 
 
 def _of_first_length(result: Result) -> str:
@@ -257,6 +283,21 @@ def _chosen(
             f"{by2}: k2 = g m2 lc2" if not horizontal else f"{by2}: k1 = m2 l1 lc2",
         ),
         Number("I2", second.inertia, "kg m^2", f"{by2}: k3 = I2 + m2 lc2^2"),
+        *_aside(links, coefficients),
+    )
+
+
+def _aside(links: tuple[Link, Link], coefficients: Coefficients) -> Iterator[Number]:
+    """What the sine parts of the moments mean; nothing of an arm whose links are straight."""
+    if not set(SINES) & set(coefficients.model.names):
+        return
+    for number, link in enumerate(links, start=1):
+        line = f"identified: link {number}'s centre of mass beside its line"
+        by = line if number == 1 else f"{line}, or theta2's zero"
+        yield Number(f"e{number}", link.aside, "m", by)
+    turn = turn_of(coefficients.value, coefficients.model.gravity)
+    yield Number(
+        "turn1", turn, "rad", "identified: added to theta1, which counts from gravity then"
     )
 
 

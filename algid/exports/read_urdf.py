@@ -20,12 +20,12 @@ from algid.errors import ResultError
 from algid.files import read_text
 from algid.identification.source import Role
 from algid.identification.validate import Predictor
-from algid.model import TERMS, Model
+from algid.model import SINES, TERMS, Model
 from algid.words import counted
 
 GRAVITY = 9.81
 _PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
-_BESIDE = 0.02  # of a link's length: a centre farther beside its line is warned of
+_BESIDE = 1e-9  # rad: a centre of mass less off its link's line is on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +54,8 @@ class _Body:
 _NOTHING = _Body(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
-def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
-    """The model of a URDF file for logs without payload, and remarks on what it cannot hold.
+def read_urdf(path: Path) -> Predictor:
+    """The model of a URDF file for logs of the arm without payload.
 
     Raises
     ------
@@ -71,14 +71,17 @@ def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
     except (ET.ParseError, UnicodeDecodeError) as error:
         raise ResultError(f"{path}: not XML ({error}); expected a URDF file") from error
     try:
-        arm, friction, warnings = _Robot(robot).arm()
+        arm, friction = _Robot(robot).arm()
     except (ValueError, KeyError, AttributeError) as error:
         raise ResultError(
             f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
         ) from error
     jump = next(term for term in TERMS.values() if term.friction)
-    model = Model((jump.name,) if any(friction) else (), gravity=arm.g)
+    straight = max(abs(arm.delta1), abs(arm.delta2)) < _BESIDE
+    bent = () if straight else tuple(name for name, term in TERMS.items() if term.sines)
+    model = Model((*((jump.name,) if any(friction) else ()), *bent), gravity=arm.g)
     value = {f"k{number}": float(k) for number, k in enumerate(arm.constants(), start=1)}
+    value |= dict(zip(SINES, map(float, arm.sines()), strict=True))
     value |= dict(zip(jump.names, friction, strict=True))
     c = np.array([value[name] for name in model.names])
 
@@ -89,7 +92,7 @@ def read_urdf(path: Path) -> tuple[Predictor, tuple[str, ...]]:
             )
         return c
 
-    return Predictor(model, coefficients), tuple(f"{path}: {warning}" for warning in warnings)
+    return Predictor(model, coefficients)
 
 
 class _Robot:
@@ -108,8 +111,8 @@ class _Robot:
             )
         self._parent = {_linked(joint, "child"): joint for joint in self._joints}
 
-    def arm(self) -> tuple[Arm, tuple[float, float], list[str]]:
-        """The arm, its joints' Coulomb friction in N m, and what it does not take over."""
+    def arm(self) -> tuple[Arm, tuple[float, float]]:
+        """The arm, and its joints' Coulomb friction in N m."""
         first, second = self._moving
         base, place = self._frame(first)
         if base in {self._child(first), self._child(second)} or self._frame(second)[
@@ -123,17 +126,17 @@ class _Robot:
         turn, at = self._frame(second)[1]
         if np.linalg.norm(np.cross(_axis(first), turn @ _axis(second))) > _PARALLEL:
             raise ValueError("the joints' axes are not parallel")
-        warnings: list[str] = []
-        length, one = self._planar(self._child(first), _axis(first), at, warnings, "1")
+        length, one = self._planar(self._child(first), _axis(first), at)
         tip = self._tip(self._child(second))
-        reach, two = self._planar(self._child(second), _axis(second), tip, warnings, "2")
+        reach, two = self._planar(self._child(second), _axis(second), tip)
         tilt = math.sqrt(max(0.0, 1 - float(about[2]) ** 2))
         g = GRAVITY * tilt if tilt > _PARALLEL else 0.0
         arm = Arm(
-            m1=one[0], lc1=one[1], I1=one[2], l1=length, b1=_loss(first, "damping"),
-            m2=two[0], lc2=two[1], I2=two[2], l2=reach, b2=_loss(second, "damping"), g=g,
+            m1=one[0], lc1=one[1], I1=one[2], delta1=one[3], l1=length, b1=_loss(first, "damping"),
+            m2=two[0], lc2=two[1], I2=two[2], delta2=two[3], l2=reach, b2=_loss(second, "damping"),
+            g=g,
         )  # fmt: skip
-        return arm, (_loss(first, "friction"), _loss(second, "friction")), warnings
+        return arm, (_loss(first, "friction"), _loss(second, "friction"))
 
     def _child(self, joint: ET.Element) -> str:
         return _linked(joint, "child")
@@ -182,9 +185,17 @@ class _Robot:
         return at if np.linalg.norm(at) > 0 else body.moment / max(body.mass, 1e-300)
 
     def _planar(
-        self, link: str, about: FloatArray, end: FloatArray, warnings: list[str], number: str
-    ) -> tuple[float, tuple[float, float, float]]:
-        """Length of a link in the plane; mass, centre on its line, inertia about the centre."""
+        self, link: str, about: FloatArray, end: FloatArray
+    ) -> tuple[float, tuple[float, float, float, float]]:
+        """Length of a link in the plane, its mass, and its centre, inertia about it and angle.
+
+        The centre is so far from the joint, and so turned off the link's line, in rad.
+
+        Raises
+        ------
+        ValueError
+            If the link has no mass, or no length across its axis.
+        """
         body = self._body(link)
         if body.mass <= 0:
             raise ValueError(f"link {link} has no mass")
@@ -194,15 +205,11 @@ class _Robot:
             raise ValueError(f"link {link} has no length across its axis")
         line = line / length
         centre = body.moment / body.mass
-        beside = float(np.cross(about, line) @ centre)
-        if abs(beside) > _BESIDE * length:
-            warnings.append(
-                f"the centre of link {number} lies {abs(beside):.3g} m beside its line, which is "
-                "left out"
-            )
-        along = float(line @ centre)
+        along, beside = float(line @ centre), float(np.cross(about, line) @ centre)
         second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint
-        return length, (body.mass, along, second - body.mass * along**2)
+        far = math.copysign(math.hypot(along, beside), along)  # behind the joint it is negative
+        turned = math.atan2(beside * math.copysign(1.0, along), abs(along))
+        return length, (body.mass, far, second - body.mass * far**2, turned)
 
 
 def _linked(joint: ET.Element, side: Literal["parent", "child"]) -> str:

@@ -7,6 +7,7 @@ x-y plane about z.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from algid.exports.description import Description, header, lacking
@@ -38,10 +39,11 @@ def urdf(arm: Description) -> str:
     """
     (first, second), joints, remarks = _rotorless(arm, "URDF")
 
-    def joint(one: Joint, parent: str, child: str, at: float) -> str:
+    def joint(one: Joint, parent: str, child: str, at: float, turn: float = 0.0) -> str:
+        turned = f' rpy="{_numbers(0, -turn, 0)}"' if turn else ""
         return (
             f'  <joint name="{one.name}" type="continuous">\n    <parent link="{parent}"/>\n'
-            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"/>\n    <axis '
+            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"{turned}/>\n    <axis '
             f'xyz="{_axis(arm)}"/>\n'
             f'    <dynamics damping="{_numbers(one.damping)}" '
             f'friction="{_numbers(one.friction)}"/>\n  </joint>\n'
@@ -51,7 +53,7 @@ def urdf(arm: Description) -> str:
         xx, yy, zz = map(_numbers, one.tensor)
         return (
             f'  <link name="{name}">\n    <inertial>\n      <origin '
-            f'xyz="{_numbers(one.centre, 0, 0)}"/>\n'
+            f'xyz="{_centre(arm, one)}"/>\n'
             f'      <mass value="{_numbers(one.mass)}"/>\n'
             f'      <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/>\n'
             "    </inertial>\n    <visual>\n      <origin "
@@ -62,7 +64,7 @@ def urdf(arm: Description) -> str:
     return (
         f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<robot name="{arm.name}">\n  <link '
         'name="base"/>\n'
-        + joint(joints[0], "base", "link1", 0.0)
+        + joint(joints[0], "base", "link1", 0.0, arm.turn)
         + link("link1", first)
         + joint(joints[1], "link1", "link2", first.length)
         + link("link2", second)
@@ -86,15 +88,15 @@ def sdf(arm: Description) -> str:
             "</joint>\n"
         )
 
-    def link(name: str, base: str, at: float, one: Link) -> str:
+    def link(name: str, base: str, at: float, one: Link, turn: float = 0.0) -> str:
         xx, yy, zz = map(_numbers, one.tensor)
         inertia = (
             f"<ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
         )
         return (
             f'    <link name="{name}">\n      <pose '
-            f'relative_to="{base}">{_numbers(at, 0, 0, 0, 0, 0)}</pose>\n'
-            f"      <inertial>\n        <pose>{_numbers(one.centre, 0, 0, 0, 0, 0)}</pose>\n"
+            f'relative_to="{base}">{_numbers(at, 0, 0, 0, -turn, 0)}</pose>\n'
+            f"      <inertial>\n        <pose>{_centre(arm, one)} {_numbers(0, 0, 0)}</pose>\n"
             f"        <mass>{_numbers(one.mass)}</mass>\n        <inertia>{inertia}</inertia>\n   "
             "   </inertial>\n"
             f'      <visual name="{name}">\n        '
@@ -106,7 +108,7 @@ def sdf(arm: Description) -> str:
     return (
         f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<sdf version="1.9">\n  <model '
         f'name="{arm.name}">\n'
-        + link("link1", "__model__", 0.0, first)
+        + link("link1", "__model__", 0.0, first, arm.turn)
         + link("link2", "link1", first.length, second)
         + '    <frame name="tip" '
         f'attached_to="link2"><pose>{_numbers(second.length, 0, 0, 0, 0, 0)}</pose></frame>\n'
@@ -130,7 +132,7 @@ def mjcf(arm: Description) -> str:
 
     def link(one: Link, indent: str) -> str:
         return (
-            f'{indent}<inertial pos="{_numbers(one.centre, 0, 0)}" mass="{_numbers(one.mass)}" '
+            f'{indent}<inertial pos="{_centre(arm, one)}" mass="{_numbers(one.mass)}" '
             f'diaginertia="{_numbers(*one.tensor)}"/>\n'
             f'{indent}<geom type="capsule" fromto="{_numbers(0, 0, 0, one.length, 0, 0)}" '
             f'size="{_numbers(0.03 * one.length)}" contype="0" conaffinity="0"/>\n'
@@ -139,7 +141,7 @@ def mjcf(arm: Description) -> str:
     return (
         f'{_comment(arm, remarks)}\n<mujoco model="{arm.name}">\n  <compiler angle="radian"/>\n'
         f'  <option gravity="{_numbers(0, 0, -arm.coefficients.model.gravity)}" integrator="RK4" '
-        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    <body name="link1">\n      '
+        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    <body name="link1"{_turned(arm)}>\n      '
         f"{joint(joints[0])}\n"
         f'{link(first, "      ")}      <body name="link2" pos="{_numbers(first.length, 0, 0)}">\n'
         f"        {joint(joints[1])}\n"
@@ -156,7 +158,8 @@ def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], lis
     value, model = arm.coefficients.value, arm.coefficients.model
     kinds = ("damping", "friction", "rotor") if rotors else ("damping", "friction")
     held = [term for term in EVERY_TERM.values() if any(getattr(term, kind) for kind in kinds)]
-    remarks = lacking(arm, frozenset(term.name for term in held))
+    bent = [term.name for term in EVERY_TERM.values() if term.sines]  # where the links' centres are
+    remarks = lacking(arm, frozenset([*(term.name for term in held), *bent]))
     if any(term.friction and term.name in model.terms for term in held):
         remarks.insert(0, JUMP.format(width=model.coulomb_speed))
     of_joints: list[dict[str, float]] = [{}, {}]
@@ -189,6 +192,19 @@ def _rotorless(
 def _axis(arm: Description) -> str:
     """The joints' axis in the world."""
     return "0 -1 0" if arm.coefficients.model.gravity else "0 0 1"
+
+
+def _centre(arm: Description, link: Link) -> str:
+    """A link's centre of mass in its frame: to the left of its line is up, or on the plane."""
+    if arm.coefficients.model.gravity:
+        return _numbers(link.centre, 0, link.aside)
+    return _numbers(link.centre, link.aside, 0)
+
+
+def _turned(arm: Description) -> str:
+    """The attribute that turns an MJCF body as θ1's zero is turned; nothing where it is not."""
+    half = 0.5 * arm.turn
+    return f' quat="{_numbers(math.cos(half), 0, -math.sin(half), 0)}"' if arm.turn else ""
 
 
 def _box(link: Link) -> str:

@@ -6,6 +6,7 @@ moves it. While it plays, the document hears an event ``arm-time`` whose detail 
 
 from __future__ import annotations
 
+import cmath
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ FRAMES = 30.0  # a second
 MOST_FRAMES = 6_000
 MARGIN = 0.12  # of the reach, around the drawing
 DIGITS = 4
+LOAD = 0.7  # of a link: how long the line is drawn that points to its load
 READING = (
     "Play it: does this arm move as yours did? Hanging must look like hanging, and the links must "
     "turn the right way; "
@@ -42,6 +44,10 @@ class ArmDrawing:
         What hangs at the tip, in words; empty where nothing does.
     height : float, m, or None
         Below which the tip may not come.
+    loads : two angles, rad, or None
+        How far off its line each link's load lies, seen from its joint; nothing of straight links.
+    aside : float, m
+        How far beside link 2's line the payload's centre of mass lies.
     """
 
     l1: float
@@ -51,6 +57,8 @@ class ArmDrawing:
     reading: str
     payload: str = ""
     height: float | None = None
+    loads: tuple[float, float] | None = None
+    aside: float = 0.0
     key = "arm"
     title = "The arm"
 
@@ -72,8 +80,37 @@ def arm_of(result: Result, torque: TorqueLog | None) -> ArmDrawing | None:
         if l2 is not None
         else " Link 2's length is not known: it is drawn as long as link 1 (give --l2)."
     )
-    reading = f"{READING} l1 is {significant(l1, 3)} m.{unknown}"
-    return ArmDrawing(l1, l1 if l2 is None else l2, *motion, reading, payload)
+    turn, loads = _phases(result)
+    bent = "" if loads is None else " Dashed: where each joint's load lies, by gravity and inertia."
+    reading = f"{READING} l1 is {significant(l1, 3)} m.{unknown}{bent}"
+    t, theta = motion
+    aside = result.payload["y_p"].estimate if "y_p" in result.payload else None
+    return ArmDrawing(
+        l1,
+        l1 if l2 is None else l2,
+        t,
+        theta + np.array([[turn], [0.0]]),
+        reading,
+        payload,
+        loads=loads,
+        aside=aside or 0.0,
+    )
+
+
+def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
+    """θ1's zero against gravity, and how far the joints' loads are off the links' lines, in rad.
+
+    Without gravity only that of joint 2 is known.
+    """
+    value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
+    if not {"k1", "k1s"} <= set(value):
+        return 0.0, None
+    K1, K2, K4 = (
+        complex(value.get(name, 0.0), value.get(f"{name}s", 0.0)) for name in ("k1", "k2", "k4")
+    )
+    second = cmath.phase(K1)
+    turn = cmath.phase(K2 / K1) if K1 and K2 else 0.0
+    return turn, (cmath.phase(K4 * cmath.exp(-1j * turn)) if K4 else 0.0, second)
 
 
 def _length(result: Result, name: str) -> float | None:
@@ -172,7 +209,7 @@ def _links(arm: ArmDrawing, first: float, second: float) -> str:
     """Link 2 stands in link 1's frame, both turned by SVG, in degrees, whose y points down."""
     radius = 0.028 * (arm.l1 + arm.l2)
     payload = (
-        f'<circle class="payload" cx="{arm.l2:.5g}" cy="0" '
+        f'<circle class="payload" cx="{arm.l2:.5g}" cy="{-arm.aside:.5g}" '
         f'r="{1.6 * radius:.4g}"><title>{escaped(arm.payload)}</title>'
         "</circle>"
         if arm.payload
@@ -180,10 +217,22 @@ def _links(arm: ArmDrawing, first: float, second: float) -> str:
     )
     return (
         f'<g class="link1" transform="rotate({first:.4f})"><line class="link" x1="0" y1="0" '
-        f'x2="{arm.l1:.5g}" y2="0"/>'
+        f'x2="{arm.l1:.5g}" y2="0"/>{_load(arm, 0)}'
         f'<g class="link2" transform="translate({arm.l1:.5g} 0) rotate({second:.4f})" '
         f'data-at="{arm.l1:.5g}"><line class="link second" x1="0" y1="0" x2="{arm.l2:.5g}" '
-        f'y2="0"/>{payload}'
+        f'y2="0"/>{_load(arm, 1)}{payload}'
         f'<circle class="joint" cx="0" cy="0" r="{radius:.4g}"/></g></g>'
         f'<circle class="joint" cx="0" cy="0" r="{1.2 * radius:.4g}"/>\n'
+    )
+
+
+def _load(arm: ArmDrawing, joint: int) -> str:
+    """The direction of a joint's load in its link's frame, as a dashed line; nothing of straight links."""
+    if arm.loads is None:
+        return ""
+    angle, length = arm.loads[joint], LOAD * (arm.l1, arm.l2)[joint]
+    says = f"the load of joint {joint + 1} lies {significant(float(np.degrees(angle)), 3)}° off its line"
+    return (
+        f'<line class="load" x1="0" y1="0" x2="{length * np.cos(angle):.5g}" '
+        f'y2="{-length * np.sin(angle):.5g}"><title>{escaped(says)}</title></line>'
     )

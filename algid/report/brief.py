@@ -7,8 +7,9 @@ import textwrap
 from collections.abc import Iterable, Iterator
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.model import PARAMETERS
+from algid.model import PARAMETERS, SINES
 from algid.notices import Notice
+from algid.report.phasors import Moment, moments
 from algid.results import Estimate, Result, Status
 from algid.results.verdict import share_text
 from algid.text import ABSENT, resolved, significant, unit_text, visible
@@ -84,11 +85,14 @@ def _reasons(judged: Verdict, room: int) -> Iterator[str]:
 
 def _estimates(result: Result) -> Iterator[str]:
     """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning."""
-    errors = _errors(result)
+    errors, phasors = _errors(result), moments(result)
     for name, found in {
         **{k: v for k, v in result.parameters.items() if k in ARM},
         **result.payload,
     }.items():
+        if name in phasors:
+            yield from _moment(name, phasors[name], found)
+            continue
         number = (
             f"{resolved(found.estimate, found.std)} ± {_half(found)}"
             if found.estimate is not None
@@ -102,6 +106,15 @@ def _estimates(result: Result) -> Iterator[str]:
             len(line) + len(words) <= WIDTH or not errors
         )  # beside errors there is no room for a second line
         yield from _wrapped(f"{line}{status or (words if fits else '')}", rest=" " * len(line))
+
+
+def _moment(name: str, one: Moment, found: Estimate) -> list[str]:
+    """A moment's size with its angle in place of its meaning."""
+    half = ABSENT if one.std is None else significant(one.quantile * one.std, 2)
+    number = f"{resolved(one.size, one.std)} ± {half}"
+    status = "" if found.status is Status.OK else f" {found.status.value}"
+    line = f"{f'|{name.upper()}|':<4}{number:>19} {unit_text(one.unit):<10} "
+    return _wrapped(f"{line}at {one.angle_text}{status}", rest=" " * len(line))
 
 
 def _half(found: Estimate) -> str:
@@ -124,7 +137,8 @@ def _errors(result: Result) -> dict[str, str]:
 def _terms(result: Result) -> list[str]:
     """The terms of the torque beside eq. (1), and their coefficients."""
     terms = [] if result.fit is None or result.fit.model is None else result.fit.model.terms
-    others = {name: found for name, found in result.parameters.items() if name not in ARM}
+    told = {sine for sine, name in SINES.items() if name in moments(result)}  # beside k1, k2, k4
+    others = {name: found for name, found in result.parameters.items() if name not in {*ARM, *told}}
     if not terms and not others:
         return ["Terms kept: none"] if result.fit is not None else []
     numbers = [
@@ -132,7 +146,8 @@ def _terms(result: Result) -> list[str]:
         for name, found in others.items()
     ]
     kept = [*terms, *(name for name in TIMED if name in others and name not in terms)]
-    return _at_most(2, f"Terms kept: {', '.join(kept)} ({', '.join(numbers)})")
+    beside = f" ({', '.join(numbers)})" if numbers else ""
+    return _at_most(2, f"Terms kept: {', '.join(kept)}{beside}")
 
 
 def _at_most(lines: int, text: str) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any
 from algid.methods import settles
 from algid.model import PARAMETERS
 from algid.report.document import Column, Depth, Table, filled
+from algid.report.phasors import moments
 from algid.report.series import TorqueLog
 from algid.results import Estimate, FitSummary, LogSummary, Result, Table4Row
 from algid.results.verdict import replaced_estimator
@@ -331,6 +332,7 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
         )
         for title, group in groups.items()
     ]
+    tables.insert(1, _moments_table(result))
     if any(row.truth is not None for row in result.table4):
         known = [row for row in result.table4 if row.estimate is not None or row.truth is not None]
         rows = tuple(
@@ -350,6 +352,32 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
     if result.verdict.failed:
         shown = tuple(table.doubted() for table in shown)
     return shown + filled(_prediction(result.fit))
+
+
+def _moments_table(result: Result) -> Table:
+    """The moments of a bent arm as sizes and angles; empty of a straight one."""
+    columns = (
+        Column("Moment", "name"),
+        Column("Size", "number"),
+        Column("± std", "number"),
+        Column("Unit", "text"),
+        Column("Angle, 95 %", "number"),
+    )
+    rows = tuple(
+        (
+            f"|{name.upper()}|",
+            resolved(one.size, one.std),
+            significant(one.std, 2),
+            unit_text(one.unit),
+            one.angle_text,
+        )
+        for name, one in moments(result).items()
+    )
+    note = (
+        "K = k + i k_s: the angle of K1 is θ2's zero or link 2's centre of mass, that of K2 less "
+        "it θ1's zero, that of K4 less θ1's zero the load of joint 1 off link 1's line."
+    )
+    return Table("Moments off the links' lines", columns, rows, note)
 
 
 def _estimate_row(name: str, found: Estimate, result: Result) -> tuple[str, ...]:

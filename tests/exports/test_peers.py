@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
+from algid.exports.description import coefficients_of
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.model import TERMS, Model, Motion, acceleration, torque
@@ -103,6 +104,69 @@ def by_pinocchio(text: str) -> FloatArray:
         q = np.stack([np.cos(theta), np.sin(theta)], axis=1).ravel()  # joints without limits
         found.append(pin.rnea(model, data, q, omega, alpha) + damping * omega)
     return np.array(found).T
+
+
+BENT = Model(("phases",))
+
+
+def bent(turn: float = 0.0, **more: float) -> dict[str, float]:
+    """Coefficients of `ODD` with centres of mass 10° and -25° off the lines, θ1's zero off by `turn`.
+
+    Zeros turn K1 by θ2's, K2 and K4 by θ1's too.
+    """
+    arm = Arm(**{**vars(ODD), "delta1": np.radians(10), "delta2": np.radians(-25)})
+    k = arm.phasors()
+    moments = {name: complex(k[place], k[7 + sine]) for sine, (name, place) in enumerate(PLACES)}
+    moments["k2"] *= np.exp(1j * turn)
+    moments["k4"] *= np.exp(1j * turn)
+    value = values_of(ODD) | {name: K.real for name, K in moments.items()}
+    return value | {f"{name}s": K.imag for name, K in moments.items()} | more
+
+
+PLACES = (("k1", 0), ("k2", 1), ("k4", 3))
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=str)
+@pytest.mark.parametrize("turn", [0.0, 0.2, -0.6])
+def test_bent_links_give_algids_torque(turn: float, known: dict[str, float]) -> None:
+    """In MuJoCo and Pinocchio, whatever the zero of θ1 against gravity."""
+    value = bent(turn)
+    assert_close(by_mujoco(text_of("mjcf", value, BENT, **known)), wanted(value, BENT), CLOSE)
+    assert_close(by_pinocchio(text_of("urdf", value, BENT, **known)), wanted(value, BENT), CLOSE)
+
+
+def test_bent_links_in_a_plane_and_of_a_length_that_is_given() -> None:
+    model = Model(("phases",), gravity=0.0)
+    value = bent() | {"k2": 0.0, "k2s": 0.0, "k4": 0.0, "k4s": 0.0}
+    assert_close(by_mujoco(text_of("mjcf", value, model, l1=0.4)), wanted(value, model), CLOSE)
+    assert_close(by_pinocchio(text_of("urdf", value, model, l1=0.4)), wanted(value, model), CLOSE)
+    value = bent(0.1)
+    found = coefficients_of(result_of(value, BENT), "arm", 0.41)
+    K1, K2 = (complex(found.value[name], found.value[f"{name}s"]) for name in ("k1", "k2"))
+    assert 9.81 * abs(K1) == pytest.approx(0.41 * abs(K2), rel=1e-14)
+    text = text_of("mjcf", value, BENT, l1=0.41)
+    assert_close(by_mujoco(text), wanted(dict(found.value), BENT), CLOSE)
+
+
+def test_sdf_stands_as_urdf_and_mjcf_do() -> None:
+    """No library here computes with it: the same places, turns and inertias as URDF's."""
+    value = bent(0.2)
+    sdf = ET.fromstring(text_of("sdf", value, BENT))
+    urdf = ET.fromstring(text_of("urdf", value, BENT))
+    for name in ("link1", "link2"):
+        ours = sdf.find(f".//link[@name='{name}']/inertial/pose")
+        theirs = urdf.find(f".//link[@name='{name}']/inertial/origin")
+        assert ours is not None
+        assert theirs is not None
+        assert (ours.text or "").split()[:3] == theirs.attrib["xyz"].split()
+    turned, joint = (
+        sdf.find(".//link[@name='link1']/pose"),
+        urdf.find("joint[@name='joint1']/origin"),
+    )
+    assert turned is not None
+    assert joint is not None
+    assert (turned.text or "").split()[3:] == joint.attrib["rpy"].split()
+    assert list(map(float, joint.attrib["rpy"].split())) == pytest.approx([0, -0.2, 0])
 
 
 def test_mujocos_simulation_follows_algids() -> None:
@@ -272,9 +336,9 @@ def test_sdf_tells_the_same_links() -> None:
 )
 def test_a_file_says_which_terms_it_lacks(to: str, term: str) -> None:
     held = {
-        "urdf": {"coulomb"},
-        "sdf": {"coulomb"},
-        "mjcf": {"coulomb", "rotor"},
+        "urdf": {"coulomb", "phases"},
+        "sdf": {"coulomb", "phases"},
+        "mjcf": {"coulomb", "rotor", "phases"},
         "python": set(TERMS) - {"lag"},
         "c": set(TERMS) - {"lag"},
     }[to]

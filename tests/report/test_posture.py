@@ -74,3 +74,36 @@ def test_the_drawing_holds_the_arm_all_along_its_motion_and_its_limit_and_little
     assert left < x.min() < x.max() < left + width
     assert top < 0 < y.max() < 0.6 < top + height
     assert top > -0.1  # nothing but the margin above the base of an arm that hangs
+
+
+def test_a_bent_arm_shows_where_its_loads_lie_and_stands_by_gravity(
+    result: Result, case_folder: Path
+) -> None:
+    """K1 at 20°, K2 at 25°, K4 at 15°: θ1's zero is off by 5°, joint 1's load by 10°."""
+    torque = read_torque(case_folder / "torque.parquet")
+    moments = {"k1": (0.2, 20.0), "k2": (7.0, 25.0), "k4": (20.0, 15.0)}
+    parameters = dict(result.parameters)
+    for name, (size, angle) in moments.items():
+        K = size * np.exp(1j * np.radians(angle))
+        parameters |= {
+            name: Estimate(estimate=float(K.real), unit=""),
+            f"{name}s": Estimate(estimate=float(K.imag), unit=""),
+        }
+    payload = {
+        name: Estimate(estimate=value, unit="m")
+        for name, value in (("l1", 0.5), ("l2", 0.4), ("y_p", 0.05))
+    }
+    payload["m_p"] = Estimate(estimate=1.0, unit="kg")
+    bent = result.model_copy(update={"parameters": parameters, "payload": payload})
+    drawing = drawn(bent, torque)
+    assert [float(angle) for angle in re.findall(r"joint \d lies ([-\d.]+)° off", drawing)] == [
+        10.0,
+        20.0,
+    ]
+    assert 'class="payload" cx="0.4" cy="-0.05"' in drawing  # SVG's y points down
+    turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
+    assert turned is not None
+    first = torque.series[0]["theta1"][1]
+    start = np.degrees(first[np.isfinite(first)][0])
+    assert float(turned[1]) == pytest.approx(-start - 5, abs=1e-3)
+    assert 'class="load"' not in drawn(result.model_copy(update={"payload": payload}), torque)

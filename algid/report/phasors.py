@@ -1,0 +1,108 @@
+"""Moments whose centres of mass lie off the links' lines, as size and angle: K = |K| exp(i a).
+
+======  =====================  ======  =======
+symbol  name                   shape   unit
+======  =====================  ======  =======
+K       moment, k + i k_s      scalar  its own
+a       its angle              scalar  rad
+C       covariance of k, k_s   (2, 2)  own²
+======  =====================  ======  =======
+
+To first order the size's variance is uᵀ C u and the angle's vᵀ C v / |K|², with u along K and v
+across it.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.model import SINES
+from algid.results import Estimate, Result
+from algid.significance import NORMAL
+from algid.text import ABSENT, resolved, significant
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment as size and angle in degrees, each with its standard deviation, None where not known.
+
+    `quantile` is half a 95 % interval in standard deviations.
+    """
+
+    size: float
+    std: float | None
+    angle: float
+    angle_std: float | None
+    unit: str
+    quantile: float
+
+    @property
+    def half(self) -> float | None:
+        """Half the 95 % interval of the angle in degrees."""
+        return None if self.angle_std is None else self.quantile * self.angle_std
+
+    @property
+    def angle_text(self) -> str:
+        """The angle with its ±, in degrees."""
+        half = ABSENT if self.half is None else significant(self.half, 2)
+        return f"{resolved(self.angle, self.angle_std)}° ± {half}°"
+
+
+def moments(result: Result) -> dict[str, Moment]:
+    """By name of its cosine part each moment that has a phase.
+
+    None of straight arms, nor where the phases are shrunk to nothing.
+    """
+    model = None if result.fit is None else result.fit.model
+    shrunk = () if model is None else model.shrunk
+    found = {}
+    for sine, name in SINES.items():
+        both = [result.parameters.get(one) for one in (name, sine)]
+        if None in both or sine in shrunk:
+            continue
+        moment = _moment(result, name, sine, *both)  # type: ignore[arg-type]
+        if moment is not None:
+            found[name] = moment
+    return found
+
+
+def _moment(
+    result: Result, name: str, sine: str, cosine_part: Estimate, sine_part: Estimate
+) -> Moment | None:
+    if cosine_part.estimate is None or sine_part.estimate is None:
+        return None
+    K = complex(cosine_part.estimate, sine_part.estimate)
+    C = _covariance(result, name, sine)
+    std = angle_std = None
+    if C is not None and K:
+        along = np.array([K.real, K.imag]) / abs(K)
+        across = np.array([-K.imag, K.real]) / abs(K)
+        std = math.sqrt(max(float(along @ C @ along), 0.0))
+        angle_std = math.degrees(math.sqrt(max(float(across @ C @ across), 0.0)) / abs(K))
+    angle = math.degrees(cmath.phase(K))
+    return Moment(abs(K), std, angle, angle_std, cosine_part.unit, _quantile(cosine_part))
+
+
+def _covariance(result: Result, *names: str) -> FloatArray | None:
+    """Their covariance (2, 2); None where one has no error bar."""
+    fit = result.fit
+    if fit is None or not set(names) <= set(fit.covariance_names):
+        return None
+    places = [fit.covariance_names.index(name) for name in names]
+    rows = [[fit.covariance[row][column] for column in places] for row in places]
+    if any(value is None for row in rows for value in row):
+        return None
+    C = np.array(rows, dtype=np.float64)
+    return C if np.all(np.isfinite(C)) else None
+
+
+def _quantile(found: Estimate) -> float:
+    low, high = found.ci95 or (None, None)
+    if low is None or high is None or not found.std:
+        return NORMAL
+    return (high - low) / (2 * found.std)
