@@ -23,7 +23,7 @@ from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.signals.filters import correlate
 from algid.synth.excitation import SampledTorque, wide_multi_sine
-from algid.synth.simulator import simulate
+from algid.synth.simulator import HANGING, Driven, steered
 from pipelines.accuracy_scenes import case_of
 
 ARMS = ("case1", "arm21", "arm22", "arm23")
@@ -31,6 +31,7 @@ RATE, DURATION = 250.0, 10.0
 SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
 CABLES = 0.02  # of the driven joint's torque, RMS
 BEARING = 0.01  # of it: Coulomb friction of the passive joint
+WIDTH = 0.05  # rad/s, of that friction
 SLOW = 0.5  # s: how long cables keep their pull
 
 
@@ -42,14 +43,23 @@ def log_of(name: str, passive: int, seed: int) -> Log:
     arm = case_of(name).arm
     rng = np.random.default_rng([seed, passive, sum(name.encode())])
     t = np.arange(round(DURATION * RATE) + 1) / RATE
-    driven = wide_multi_sine(arm, seed)(t) * np.array([[passive != 1], [passive != 2]])
-    size = float(np.sqrt(np.mean(driven[2 - passive] ** 2)))
-    pull = CABLES * size * _slow(rng, t.size)
-    motion = simulate(arm.constants(), SampledTorque(t, driven + pull, "foh"), t)
-    for _ in range(3):  # friction of the motion that it makes itself
-        friction = np.zeros_like(pull)
-        friction[passive - 1] = BEARING * size * np.tanh(motion.omega[passive - 1] / 0.05)
-        motion = simulate(arm.constants(), SampledTorque(t, driven + pull - friction, "foh"), t)
+    wide = wide_multi_sine(arm, seed)
+    motors = np.array([[float(passive != 1)], [float(passive != 2)]])
+    size = float(np.sqrt(np.mean(wide(t)[2 - passive] ** 2)))
+    pull = SampledTorque(t, CABLES * size * _slow(rng, t.size), "foh")
+
+    def controller(times: FloatArray) -> Driven:
+        acting = wide(times) * motors + pull(times)
+
+        def torque(_theta: FloatArray, omega: FloatArray) -> FloatArray:
+            rubbed = acting.copy()
+            rubbed[passive - 1] -= BEARING * size * np.tanh(omega[passive - 1] / WIDTH)
+            return rubbed
+
+        return torque
+
+    motion = steered(arm.constants(), controller, t, HANGING, corners=t)
+    driven = wide(t) * motors
     reading = Reading(passive=passive, accepted=("DEGREES",))
     logged = driven + SIGMA_TAU * rng.standard_normal(driven.shape)
     logged[passive - 1] = 0.0

@@ -17,11 +17,10 @@ from algid.estimators.fit import Fit, conclude
 from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
 from algid.physics.parameters import BODY
+from algid.significance import sigmas
 
-WORTH = 2.0
-"""Wald statistic per parameter above which the parameter is kept (Akaike 1974).
-
-A stricter limit would bias the mass of bodies whose inertia is of the size of its own error."""
+FALSE = 0.05
+"""Chance of an offset or an inertia being chosen for a payload that is a point on link 2's line."""
 
 
 def with_body(fit: Fit) -> Fit:
@@ -40,14 +39,77 @@ def with_body(fit: Fit) -> Fit:
     """
     if not fit.shared.payload or not fit.converged:
         return fit
-    across = bool(set(SINES) & set(fit.shared.log_names))  # an offset shows in the sine parts alone
-    names = [one.name for one in BODY if across or one.sign == "+"]
+    names, worth = _candidates(fit)
     for count in range(len(names), 0, -1):
         found = [with_body_of(fit, chosen) for chosen in combinations(names, count)]
-        worthy = [one for one in found if _least_worth(one) > WORTH]
+        worthy = [one for one in found if _least_worth(one) > worth]
         if worthy:
             return max(worthy, key=_likelihood)
     return with_body_of(fit, ()) if fit.shared.body else fit
+
+
+def averaged_over_bodies(fit: Fit) -> Fit:
+    """The fit with what the payload may have beside the chosen, where that is not told from nothing.
+
+    What is left out biases mass and lengths by up to its own error, which no interval of the
+    smaller model holds. The models that have more of the body are therefore averaged with it, each
+    with its weight by Akaike's criterion, and the variance is that of the mixture:
+
+        w ∝ exp(W / 2 - n),   C = Σ w (C_i + (β_i - β) (β_i - β)ᵀ)
+
+    with W the Wald statistic of the n parameters more (Buckland, Burnham & Augustin 1997).
+
+    Parameters
+    ----------
+    fit : Fit
+        From `with_body`; one without loaded logs is returned as it is.
+    """
+    if not fit.shared.payload or not fit.converged:
+        return fit
+    others = [name for name in _candidates(fit)[0] if name not in fit.shared.body]
+    values, covariances, weights = [fit.values], [fit.covariance], [1.0]
+    for count in range(1, len(others) + 1):
+        for more in combinations(others, count):
+            body = [one.name for one in BODY if one.name in (*fit.shared.body, *more)]
+            found = with_body_of(fit, body)
+            weight = _weight(found, more)
+            if weight > 0:
+                places = [found.names.index(name) for name in fit.names]
+                values.append(found.values[places])
+                covariances.append(found.covariance[np.ix_(places, places)])
+                weights.append(weight)
+    w = np.array(weights) / sum(weights)
+    beta = w @ np.array(values)
+    apart = np.array(values) - beta
+    mixed = np.einsum("i,iab->ab", w, np.array(covariances)) + np.einsum(
+        "i,ia,ib->ab", w, apart, apart
+    )
+    return replace(fit, values=beta, covariance=mixed)
+
+
+_MOST = 100.0  # W / 2, beyond which a weight is all there is
+
+
+def _weight(fit: Fit, more: Sequence[str]) -> float:
+    """exp(W / 2 - n) of the parameters `more`; 0 of what no object has, or the logs leave open."""
+    if not fit.converged or not all(_worths(fit)):
+        return 0.0
+    places = [fit.names.index(name) for name in more]
+    value, C = fit.values[places], fit.covariance[np.ix_(places, places)]
+    wald = float(value @ np.linalg.solve(C, value))
+    return float(np.exp(min(0.5 * wald, _MOST) - len(more)))
+
+
+def _candidates(fit: Fit) -> tuple[list[str], float]:
+    """The parameters of the body that a fit may have, and the Wald statistic that each has to pass.
+
+    An offset shows in the sine parts alone. `FALSE` is shared evenly by the tails: an offset has
+    two, an inertia, which is positive, has one.
+    """
+    across = bool(set(SINES) & set(fit.shared.log_names))
+    names = [one.name for one in BODY if across or one.sign == "+"]
+    tails = sum(1 if one.sign == "+" else 2 for one in BODY if one.name in names)
+    return names, sigmas(FALSE, tails, sides=1) ** 2
 
 
 def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:

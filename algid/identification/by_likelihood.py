@@ -10,7 +10,7 @@ import numpy as np
 
 from algid.errors import LogError
 from algid.estimators import exogeneity, instruments, shrunk, weak
-from algid.estimators.body import with_body
+from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.doubt import doubted, untold
@@ -219,7 +219,7 @@ def run_fit(
         raise LogError(
             f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
         ) from error
-    fit = with_body(fit)
+    fit = averaged_over_bodies(with_body(fit))
     return constrained(fit) if settings.constrain else fit, sums, chosen
 
 
