@@ -49,7 +49,7 @@ def with_body(fit: Fit) -> Fit:
 
 
 def averaged_over_bodies(fit: Fit) -> Fit:
-    """The fit with what the payload may have beside the chosen, where that is not told from nothing.
+    """The fit with what the payload may have beside the chosen, where logs hardly tell that.
 
     What is left out biases mass and lengths by up to its own error, which no interval of the
     smaller model holds. The models that have more of the body are therefore averaged with it, each

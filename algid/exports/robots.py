@@ -43,7 +43,8 @@ def urdf(arm: Description) -> str:
         turned = f' rpy="{_numbers(0, -turn, 0)}"' if turn else ""
         return (
             f'  <joint name="{one.name}" type="continuous">\n    <parent link="{parent}"/>\n'
-            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"{turned}/>\n    <axis '
+            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"{turned}/>\n    '
+            f"<axis "
             f'xyz="{_axis(arm)}"/>\n'
             f'    <dynamics damping="{_numbers(one.damping)}" '
             f'friction="{_numbers(one.friction)}"/>\n  </joint>\n'
@@ -141,7 +142,8 @@ def mjcf(arm: Description) -> str:
     return (
         f'{_comment(arm, remarks)}\n<mujoco model="{arm.name}">\n  <compiler angle="radian"/>\n'
         f'  <option gravity="{_numbers(0, 0, -arm.coefficients.model.gravity)}" integrator="RK4" '
-        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    <body name="link1"{_turned(arm)}>\n      '
+        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    '
+        f'<body name="link1"{_turned(arm)}>\n      '
         f"{joint(joints[0])}\n"
         f'{link(first, "      ")}      <body name="link2" pos="{_numbers(first.length, 0, 0)}">\n'
         f"        {joint(joints[1])}\n"

@@ -227,11 +227,12 @@ def _links(arm: ArmDrawing, first: float, second: float) -> str:
 
 
 def _load(arm: ArmDrawing, joint: int) -> str:
-    """The direction of a joint's load in its link's frame, as a dashed line; nothing of straight links."""
+    """The direction of a joint's load in its link's frame, dashed; nothing of straight links."""
     if arm.loads is None:
         return ""
     angle, length = arm.loads[joint], LOAD * (arm.l1, arm.l2)[joint]
-    says = f"the load of joint {joint + 1} lies {significant(float(np.degrees(angle)), 3)}° off its line"
+    degrees = significant(float(np.degrees(angle)), 3)
+    says = f"the load of joint {joint + 1} lies {degrees}° off its line"
     return (
         f'<line class="load" x1="0" y1="0" x2="{length * np.cos(angle):.5g}" '
         f'y2="{-length * np.sin(angle):.5g}"><title>{escaped(says)}</title></line>'

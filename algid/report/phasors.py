@@ -29,7 +29,7 @@ from algid.text import ABSENT, resolved, significant
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment as size and angle in degrees, each with its standard deviation, None where not known.
+    """A moment as size and angle in degrees, with standard deviations, None where not known.
 
     `quantile` is half a 95 % interval in standard deviations.
     """

@@ -56,7 +56,7 @@ def test_a_point_is_called_a_body_once_in_twenty_at_most(bench: Fit) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [0.0, 1.0, 2.0, 3.0])
 def test_intervals_hold_where_the_logs_hardly_tell_a_body(bench: Fit, size: float) -> None:
-    """Offset and inertia of up to three of their own errors: chosen or not, m_p and lengths hold."""
+    """Offset and inertia of up to three of their own errors: chosen or not, all others hold."""
     held: dict[str, list[bool]] = {name: [] for name in ("m_p", "l1", "l2", "k1", "k3")}
     for true, fit in drawn(bench, {"y_p": size, "J_p": size}):
         found = averaged_over_bodies(with_body(fit))

@@ -110,7 +110,7 @@ BENT = Model(("phases",))
 
 
 def bent(turn: float = 0.0, **more: float) -> dict[str, float]:
-    """Coefficients of `ODD` with centres of mass 10° and -25° off the lines, θ1's zero off by `turn`.
+    """Coefficients of `ODD` with centres 10° and -25° off the lines, θ1's zero off by `turn`.
 
     Zeros turn K1 by θ2's, K2 and K4 by θ1's too.
     """
