@@ -17,6 +17,7 @@ F, B, E  derivatives of ẋ by x, by the torque, by p           (N, 4, 4), (N, 4
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,29 @@ class Truth:
     tau: FloatArray
 
 
+Constants = Callable[[FloatArray], FloatArray]
+"""The arm's constants of parameters p, which may be complex."""
+
+
 def information(
     truth: Truth, p: FloatArray, gravity: float, sigma_theta: float, sigma_tau: float, loaded: bool
 ) -> FloatArray:
     """Fisher's information on p (len(p), len(p)) of one log, its initial state unknown."""
+
+    def constants(q: FloatArray) -> FloatArray:
+        if loaded:
+            return with_payload(q[:7], payload_constants(q[7], q[8], q[9], gravity))
+        return q[:7]
+
+    return information_on(truth, p, constants, sigma_theta, sigma_tau)
+
+
+def information_on(
+    truth: Truth, p: FloatArray, constants: Constants, sigma_theta: float, sigma_tau: float
+) -> FloatArray:
+    """The same on parameters p of which `constants` makes those of the arm that moves."""
     dt = float(truth.t[1] - truth.t[0])
-    F, B, E = _linear(truth, p, gravity, loaded)
+    F, B, E = _linear(truth, p, constants)
     A, Bd, Ed = _discrete(F, B, E, dt)
     count = 4 + p.size
     V = np.hstack([np.eye(4), np.zeros((4, p.size))])
@@ -62,7 +80,7 @@ def information(
 
 
 def _linear(
-    truth: Truth, p: FloatArray, gravity: float, loaded: bool
+    truth: Truth, p: FloatArray, constants: Constants
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """F, B, E at the middle of each interval, by complex steps."""
     middle = [
@@ -71,8 +89,7 @@ def _linear(
     n = middle[0].shape[1]
 
     def rate(theta: FloatArray, omega: FloatArray, tau: FloatArray, q: FloatArray) -> FloatArray:
-        k = with_payload(q[:7], payload_constants(q[7], q[8], q[9], gravity)) if loaded else q[:7]
-        return np.concatenate([omega, forward_dynamics(k, theta, omega, tau)])
+        return np.concatenate([omega, forward_dynamics(constants(q), theta, omega, tau)])
 
     def slope(group: int, row: int) -> FloatArray:
         moved = [signal.astype(complex) for signal in middle]
