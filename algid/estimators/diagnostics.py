@@ -32,7 +32,7 @@ from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
-from algid.model import CHOICES, EVERY_TERM, PARAMETERS, Model, inertia, phasor
+from algid.model import CHOICES, EVERY_TERM, PARAMETERS, SINES, Model, inertia, phasor
 from algid.notices import Notice
 from algid.significance import sigmas
 
@@ -314,6 +314,19 @@ def term_worths(fit: Fit) -> list[TermWorth]:
         wald = float(values @ scaled_pinv(fit.covariance[np.ix_(places, places)]) @ values)
         worths.append(TermWorth(term, len(places) * float(np.log(max(2, fit.freedom))) - wald))
     return worths
+
+
+def bent(fit: Fit) -> bool:
+    """Whether the moments' sine parts are together more than what chance makes one time in twenty."""
+    places = [fit.names.index(name) for name in SINES if name in fit.names]
+    told = [place for place in places if fit.covariance[place, place] > 0]
+    if not told:
+        return False
+    s, C = fit.values[told], fit.covariance[np.ix_(told, told)]
+    scale = np.sqrt(np.diag(C))
+    correlation = C / np.outer(scale, scale)
+    distance = (s / scale) @ np.linalg.pinv(correlation, hermitian=True) @ (s / scale)
+    return float(chi2_tail(len(told), float(distance))) < 0.05
 
 
 def payload_distance(fit: Fit) -> float | None:

@@ -16,9 +16,9 @@ turns with link 1.
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtri
 
 from algid.arm import FloatArray
+from algid.estimators.diagnostics import bent
 from algid.estimators.fit import Fit
 from algid.model import SINES, phasor
 from algid.notices import Notice
@@ -30,7 +30,7 @@ def phase_note(fit: Fit) -> Notice | None:
     A shrunk fit has every term: there the links are straight where the sine parts are together
     consistent with nothing.
     """
-    if not set(SINES) & set(fit.names) or (fit.shrinkage is not None and not _significant(fit)):
+    if not set(SINES) & set(fit.names) or (fit.shrinkage is not None and not bent(fit)):
         return None
     second, of_second = _argument(fit, "k1")
     numbers = {"second": _told(fit, second, of_second)}
@@ -42,22 +42,6 @@ def phase_note(fit: Fit) -> Notice | None:
         numbers["load"] = _told(fit, load - first, of_load - of_first)
     code = "PHASES" if "first" in numbers else "PHASE"
     return Notice(code, numbers=numbers, note=True)
-
-
-def _significant(fit: Fit) -> bool:
-    """Whether the sine parts are together further from nothing than chance puts one in twenty."""
-    places = [fit.names.index(name) for name in SINES if name in fit.names]
-    told = [place for place in places if fit.covariance[place, place] > 0]
-    if not told:
-        return False
-    s, C = fit.values[told], fit.covariance[np.ix_(told, told)]
-    scale = np.sqrt(np.diag(C))
-    correlation = C / np.outer(scale, scale)
-    distance = (s / scale) @ np.linalg.pinv(correlation, hermitian=True) @ (s / scale)
-    return float(distance) > float(chdtri(len(told), 1 - _CONFIDENCE))
-
-
-_CONFIDENCE = 0.95
 
 
 def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
