@@ -317,7 +317,7 @@ def term_worths(fit: Fit) -> list[TermWorth]:
 
 
 def bent(fit: Fit) -> bool:
-    """Whether the moments' sine parts are together more than what chance makes one time in twenty."""
+    """Whether the moments' sine parts are together more than chance makes one time in twenty."""
     places = [fit.names.index(name) for name in SINES if name in fit.names]
     told = [place for place in places if fit.covariance[place, place] > 0]
     if not told:
