@@ -32,7 +32,8 @@ def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) 
         title=f"Design for {name}",
         verdict=verdict(design, doubts),
         sections=(
-            Section((bound_table(design), limit_table(design), *_arm(design), *figures(design))),
+            Section((bound_table(design), limit_table(design)), beside=_arm(design)),
+            Section(tuple(figures(design))),
         ),
         kicker="a planned identification",
         name=name,
@@ -43,15 +44,15 @@ def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) 
     )
 
 
-def _arm(design: Design) -> list[ArmDrawing]:
+def _arm(design: Design) -> ArmDrawing | None:
     """The arm's drawing; nothing where its lengths are not known."""
     limits = design.campaign.limits
     if not np.all(np.isfinite(limits.lengths)):
-        return []
+        return None
     l1, l2 = limits.lengths.tolist()
     payload = ""
     if design.campaign.experiment.runs[1]:
         mass = float(design.campaign.belief.mean[list(design.names).index("m_p")])
         payload = f"payload of {significant(mass, 3)} kg"
     reading = _READING.format(_LIMIT if np.isfinite(limits.height) else "")
-    return [ArmDrawing(l1, l2, design.t, design.motion.theta, reading, payload, limits.height)]
+    return ArmDrawing(l1, l2, design.t, design.motion.theta, reading, payload, limits.height)

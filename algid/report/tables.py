@@ -92,7 +92,7 @@ def terms_tables(result: Result) -> tuple[Table, ...]:
         (
             visible(term.term),
             ABSENT if term.delta_bic is None else f"{term.delta_bic:+.1f}",
-            ABSENT if term.gain_heldout is None else f"{-100 * term.gain_heldout:+.2f}",
+            ABSENT if term.gain_heldout is None else f"{-100 * term.gain_heldout or 0.0:+.2f}",
             ABSENT if term.evidence is None else f"{term.evidence:+.1f}",
             "yes" if term.kept else "no",
             visible(term.why),
@@ -107,7 +107,8 @@ def terms_tables(result: Result) -> tuple[Table, ...]:
         Column("Kept", "text"),
         Column("Why", "text"),
     )
-    note = "A negative change says that the term earns its place."
+    weighed = any(term.delta_bic is not None for term in fit.terms)
+    note = "A negative change says that the term earns its place." if weighed else ""
     if fit.model is not None and fit.model.held_out is not None:
         note = (
             f"Held-out error: squared, of whole {fit.model.held_out}, each predicted from the "

@@ -23,7 +23,14 @@ from algid.report.figures.correlation import correlation, correlation_matrix
 from algid.report.figures.coverage import coverage
 from algid.report.figures.inertia import inertia
 from algid.report.figures.information import information
-from algid.report.figures.innovations import CORRELATION, SPECTRUM, TORQUE, innovations
+from algid.report.figures.innovations import (
+    CORRELATION,
+    SPECTRUM,
+    TORQUE,
+    Curve,
+    _round_ticks,
+    innovations,
+)
 from algid.report.figures.running import running
 from algid.report.figures.timeline import chained, offsets, separators, short, views
 from algid.report.figures.torque import Scored, closeup, signals, torque
@@ -539,3 +546,13 @@ def test_numbers_too_large_to_draw_are_left_out_of_figures_alone(result: Result)
     assert kept.fit is not None
     assert kept.fit.covariance == [[None, 1.0], [1.0, None]]
     assert kept.table4 == result.table4
+
+
+@pytest.mark.parametrize("lowest", [0.3, 1e-2, 1e-6, 1e-13])
+def test_ticks_of_a_spectrum_stand_apart_however_wide_it_is(lowest: float) -> None:
+    value = np.geomspace(lowest, 20.0, 50)
+    ticks = _round_ticks(Curve(value, value, np.full(50, 0.5), np.full(50, 2.0)))
+    low, high = ticks["range"]
+    shown = [at for at in np.log10(ticks["tickvals"]) if low <= at <= high]
+    assert len(shown) >= 3
+    assert np.diff(shown).min() > (high - low) / 12

@@ -283,6 +283,7 @@ def test_a_term_that_lowers_the_error_has_a_minus(result: Result) -> None:
     assert result.fit is not None
     terms = [
         TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept"),
+        TermCriterion(term="load", kept=False, gain_heldout=0.0, evidence=0.0, why="no meaning"),
         TermCriterion(term="offset", kept=False, delta_bic=3.25, why="left out"),
     ]
     (table,) = terms_tables(
@@ -290,6 +291,7 @@ def test_a_term_that_lowers_the_error_has_a_minus(result: Result) -> None:
     )
     assert table.rows == (
         ("coulomb", "–", "-50.00", "+40.0", "yes", "kept"),
+        ("load", "–", "+0.00", "+0.0", "no", "no meaning"),
         ("offset", "+3.2", "–", "–", "no", "left out"),
     )
     assert terms_tables(result.model_copy(update={"fit": None})) == ()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ WHITENED, SPECTRUM, TORQUE, CORRELATION = (
 COLUMNS = ("quantity", "joint", "x", "value", "low", "high")
 FAINT = 0.02  # a correlation below which the estimator's test takes colour not to matter
 HEIGHT = 260
+_FEW_DECADES = 4
 MILLI = 0.5  # s: lags that end before are shown in milliseconds
 WHITE_READING = (
     "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the "
@@ -154,12 +156,18 @@ def _layout(x: FloatArray, y: dict[str, object]) -> dict[str, object]:
     return {"xaxis": axis("frequency, Hz", type="log", **shown), "yaxis": y, "hovermode": "closest"}
 
 
-def _round_ticks(white: Curve) -> dict[str, object]:
+def _round_ticks(white: Curve) -> dict[str, Any]:
     """Ticks and a range that holds the band and the values, in shares of white noise."""
     positive = white.value[white.value > 0]
     low = min(0.25, float(white.low.min()), *positive.tolist())
     high = max(4.0, float(white.high.max()), float(white.value.max()))
-    ticks = [0.001, 0.01, 0.1, 0.3, 1, 3, 10, 100, 1000, 10_000, 100_000]
+    decades = np.log10(high / low)
+    if decades > _FEW_DECADES:  # ticks of their own would stand on one another
+        step = int(np.ceil(decades / _FEW_DECADES))
+        first = step * int(np.floor(np.log10(low) / step))
+        ticks = [10.0**power for power in range(first, int(np.ceil(np.log10(high))) + 1, step)]
+    else:
+        ticks = [0.001, 0.01, 0.1, 0.3, 1, 3, 10, 100, 1000, 10_000, 100_000]
     return {
         "tickvals": ticks,
         "ticktext": [f"{tick:,g}" for tick in ticks],
