@@ -17,13 +17,14 @@ from algid.designs.campaign import Campaign, Design
 from algid.designs.figures import figures
 from algid.designs.information import Experiment
 from algid.designs.limits import Limits, Row, Usage
-from algid.designs.page import page_html
+from algid.designs.page import design_document, page_html
 from algid.designs.tables import limit_table
 from algid.designs.write import Provenance, design_json, joint_trajectory, trajectory
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion
 from algid.notices import Notice
+from tests.terminals import shown
 
 RATE, COUNT = 120.0, 61
 T = np.arange(COUNT) / RATE
@@ -258,3 +259,9 @@ def test_a_page_speaks_of_limits_that_are_drawn_alone() -> None:
         campaign = replace(one.campaign, limits=limits, experiment=bare)
         text = page_html(replace(one, campaign=campaign), "arm")
         assert ("the red one its limit" in text) is said
+
+
+def test_a_design_fits_a_terminal_of_eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("algid.designs.page._arm", lambda _: None)  # made up without a payload
+    lines = shown(design_document(made_up(), "a/long/path/to/the/arm-of-cell-12.toml"))
+    assert len(lines) <= 40  # two tables: what it will tell, and what limits bind

@@ -21,10 +21,11 @@ from algid.batches.table import write_jobs
 from algid.errors import ResultError
 from algid.fleet.figures import overview, robot_figure
 from algid.fleet.history import history_of
-from algid.fleet.page import verdict
+from algid.fleet.page import fleet_document, verdict
 from algid.fleet.tables import drift_table, finding_table, robot_table
 from algid.stores import open_store
 from tests.cli.commands import app
+from tests.terminals import shown
 
 TABLES = (robot_table, drift_table, finding_table)
 
@@ -249,3 +250,9 @@ def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:
     page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
     assert 'href="./javascript%3Aalert%281%29.algid/report.html"' in page
     assert "<b>r</b>" not in page
+
+
+@pytest.mark.parametrize("robots", [1, 3])
+def test_a_fleet_fits_a_terminal_of_eighty_columns(robots: int, tmp_path: Path) -> None:
+    lines = shown(fleet_document(history_of(_batch(tmp_path, robots) / "jobs.parquet")))
+    assert len(lines) <= 25 + robots

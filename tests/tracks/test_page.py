@@ -40,6 +40,7 @@ from tests.cli.commands import app
 from tests.report.browser import DRIVER, Browser
 from tests.report.folders import HOSTILE
 from tests.report.test_browser import assert_sound
+from tests.terminals import shown
 from tests.tracks.folders import CASE, noisy
 
 START_NS = 1_700_000_000_000_000_000
@@ -390,3 +391,7 @@ def test_one_stretch_and_many_are_told_in_words(result: TrackResult) -> None:
     assert light.sentence.startswith(
         "Failed: the payload weighs less than nothing: the arm's constants do not fit"
     )
+
+
+def test_a_track_fits_a_terminal_of_eighty_columns(result: TrackResult) -> None:
+    assert len(shown(track_document(result))) <= 25
