@@ -200,13 +200,26 @@ def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
     """Where each job's report is, as seen from `out`; jobs without one are left out."""
     if history.jobs is None:
         return {}
-    found = {}
+    found, listed = {}, dict[str, frozenset[str]]()
     for job in history.jobs["job"].to_list():
+        above = job.rpartition("/")[0]
+        if above not in listed:  # a folder is looked into once, not once a job
+            listed[above] = _names_in(batch / above)
+        if f"{job.rpartition('/')[2]}.algid" not in listed[above]:
+            continue
         page = batch / f"{job}.algid" / "report.html"
         if page.is_file():
             there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
             found[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
     return found
+
+
+def _names_in(folder: Path) -> frozenset[str]:
+    """Names of what a folder holds; none where it cannot be read."""
+    try:
+        return frozenset(path.name for path in folder.iterdir())
+    except (OSError, ValueError):
+        return frozenset()
 
 
 def verdict(history: History) -> Verdict:
