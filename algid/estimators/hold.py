@@ -54,7 +54,7 @@ class Lateness:
     @property
     def odds(self) -> float:
         """Log of the odds for a torque that is held against one that is not."""
-        return self.half * (self.late - 0.5 * self.half) / max(self.std, 1e-300) ** 2
+        return self.half * (self.late - 0.5 * self.half) / max(self.std, 1e-150) ** 2
 
     @property
     def share(self) -> float:
