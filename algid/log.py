@@ -7,6 +7,7 @@ stamp_ns   time stamps                     (N,)      ns, int64
 theta      joint angles θ1, θ2             (2, N)    rad
 tau        joint torques τ1, τ2            (2, N)    N m
 omega      joint velocities, if recorded   (2, N)    rad/s
+reference  angles asked of the controller  (2, N)    rad
 =========  ==============================  ========  =======
 
 Time runs along the last axis, here and everywhere in algid.
@@ -22,7 +23,7 @@ from __future__ import annotations
 import json
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal
@@ -37,6 +38,7 @@ IntArray = NDArray[np.int64]
 
 CANONICAL_COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
 VELOCITY_COLUMNS = ("omega1", "omega2")
+REFERENCE_COLUMNS = ("q_des1", "q_des2")
 
 
 @dataclass(frozen=True)
@@ -179,6 +181,9 @@ class Log:
         Joint velocities; None where they were not recorded.
     notices : tuple of Notice
         What a reader saw that its user should know.
+    reference : (2, N) float64, rad
+        Angles that a controller was to follow, as `theta`; None where they were not recorded, NaN
+        where there were none.
 
     Raises
     ------
@@ -192,10 +197,12 @@ class Log:
     origin: Origin
     omega: FloatArray | None = None
     notices: tuple[Notice, ...] = ()
+    reference: FloatArray | None = None
 
     def __post_init__(self) -> None:
         rows = self.stamp_ns.size
-        for name, channel in (("theta", self.theta), ("tau", self.tau), ("omega", self.omega)):
+        for name in ("theta", "tau", "omega", "reference"):
+            channel = getattr(self, name)
             if channel is not None and channel.shape != (2, rows):
                 raise ValueError(f"{name} must have shape (2, {rows}), got {channel.shape}")
 
@@ -206,6 +213,7 @@ class Log:
         theta: ArrayLike,
         tau: ArrayLike,
         omega: ArrayLike | None = None,
+        reference: ArrayLike | None = None,
         *,
         name: str = "log",
     ) -> Log:
@@ -220,6 +228,8 @@ class Log:
         tau : like `theta`, N m
         omega : like `theta`, rad/s
             Velocities, where they were recorded.
+        reference : like `theta`, rad
+            Angles that a controller was to follow, where they were recorded.
         name : what the result calls it
 
         Raises
@@ -239,11 +249,20 @@ class Log:
             raise ValueError(f"t must have shape (N,) with two samples or more, got {times.shape}")
         if not np.all(np.diff(times) > 0):
             raise ValueError("t must be finite and strictly increasing")
-        signals = {"theta": theta, "tau": tau} | ({} if omega is None else {"omega": omega})
-        rows = {key: _two_rows(key, value, times.size) for key, value in signals.items()}
+        signals = {"theta": theta, "tau": tau, "omega": omega, "reference": reference}
+        rows = {
+            key: _two_rows(key, value, times.size)
+            for key, value in signals.items()
+            if value is not None
+        }
         stamps = np.round(times * 1e9).astype(np.int64)
         return cls(
-            stamps, rows["theta"], rows["tau"], Origin(name, "arrays", {}), rows.get("omega")
+            stamps,
+            rows["theta"],
+            rows["tau"],
+            Origin(name, "arrays", {}),
+            rows.get("omega"),
+            reference=rows.get("reference"),
         )
 
     def __len__(self) -> int:
@@ -272,6 +291,7 @@ class Log:
             theta=self.theta[:, first:last],
             tau=self.tau[:, first:last],
             omega=None if self.omega is None else self.omega[:, first:last],
+            reference=None if self.reference is None else self.reference[:, first:last],
         )
 
 
@@ -316,15 +336,21 @@ def join(blocks: Iterable[Log]) -> Log:
         raise ValueError("a log needs at least one block, got none")
     if len(parts) == 1:
         return parts[0]
-    omegas = [part.omega for part in parts if part.omega is not None]
     return replace(
         parts[0],
         stamp_ns=np.concatenate([part.stamp_ns for part in parts]),
         theta=np.concatenate([part.theta for part in parts], axis=1),
         tau=np.concatenate([part.tau for part in parts], axis=1),
-        omega=np.concatenate(omegas, axis=1) if omegas else None,
+        omega=joined([part.omega for part in parts]),
+        reference=joined([part.reference for part in parts]),
         notices=tuple(notice for part in parts for notice in part.notices),
     )
+
+
+def joined(parts: Sequence[FloatArray | None]) -> FloatArray | None:
+    """A signal that not every log has, (2, N), out of its parts; None where one lacks it."""
+    known = [part for part in parts if part is not None]
+    return np.concatenate(known, axis=1) if known and len(known) == len(parts) else None
 
 
 KEY = "algid"

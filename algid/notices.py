@@ -291,12 +291,17 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "off), and the logged torque does not answer it: instruments stand in place of least "
         "squares"
     ),
+    "REFERENCE_STANDS": (
+        "torque that the model lacks drives the motion (least squares is {distance:.1f} of its "
+        "standard deviations off): the motion that the logged reference explains is the "
+        "instrument, in place of least squares"
+    ),
     "FEEDBACK": (
         "the logged torque answers torque that the model lacks (feedback, p = {p_value:.1g}): "
         "neither least squares "
         "nor the logged torque as an instrument is right, and constants may be off by more than "
         "their intervals; "
-        "record with the torque commanded in open loop"
+        "log the reference (q_des1, q_des2), or record with the torque commanded in open loop"
     ),
     "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at "
     "95 %",

@@ -1,7 +1,7 @@
 """Six logs of an arm that a torque which no model holds drives too: open loop, and under a PD
-controller.
+controller, without and with its reference in the logs.
 
-    python -m pipelines.disturbed --arms 4
+    python -m pipelines.disturbed --arms 3
 
 The disturbance is an Ornstein-Uhlenbeck torque of 0.1 s and 30 % of the drive's RMS on each joint.
 In open loop the logged torque is a multi-sine; under feedback it is kp (q_des - θ) + kd (q̇_des -
@@ -143,24 +143,26 @@ def _with_noise(
     return Scene(arm, angles.swapaxes(0, 1), torques.swapaxes(0, 1), wanted)
 
 
-def logs_of(made: Scene) -> list[Log]:
-    """The scene's logs."""
+def logs_of(made: Scene, *, reference: bool = False) -> list[Log]:
+    """The scene's logs, with the reference if they shall hold it."""
     stamps = np.round(np.arange(made.theta.shape[2]) * DT * 1e9).astype(np.int64)
-    pairs = zip(made.theta, made.tau, strict=True)
-    return [
-        Log(stamps, theta, tau, Origin(f"run {n}", "csv", {}))
-        for n, (theta, tau) in enumerate(pairs)
-    ]
+    found = []
+    for n, (theta, tau) in enumerate(zip(made.theta, made.tau, strict=True)):
+        asked = made.reference[n] if reference and made.reference is not None else None
+        found.append(Log(stamps, theta, tau, Origin(f"run {n}", "csv", {}), reference=asked))
+    return found
 
 
-def evaluate(arms: int, *, feedback: bool, share: float = SHARE) -> list[dict[str, object]]:
+def evaluate(
+    arms: int, *, feedback: bool, reference: bool = False, share: float = SHARE
+) -> list[dict[str, object]]:
     """Coverage and mean bias of k1 … k5, and how often a warning says that the torque is
     endogenous.
     """
     inside, errors, warned, estimators = [], [], 0, []
     for number in range(arms):
         made = scene(number, feedback=feedback, share=share)
-        result = identify(logs_of(made), report=False)
+        result = identify(logs_of(made, reference=reference), report=False)
         truth = dict(zip(NAMES, made.arm.constants()[:5].tolist(), strict=True))
         warned += any(one.code in WARNINGS for one in result.notices if not one.note)
         estimators.append(result.estimator)
@@ -170,14 +172,21 @@ def evaluate(arms: int, *, feedback: bool, share: float = SHARE) -> list[dict[st
             if found.estimate is not None and low is not None and high is not None:
                 inside.append(low <= truth[name] <= high)
                 errors.append(100 * (found.estimate / truth[name] - 1))
-    where = "PD" if feedback else "open loop"
+    where = "PD + reference" if reference else "PD" if feedback else "open loop"
     return [
         {"what": f"{where}, {100 * share:g} %: coverage, %", "value": 100 * float(np.mean(inside))},
         {"what": f"{where}: mean bias, %", "value": float(np.mean(errors))},
+        {"what": f"{where}: its error from arm to arm, %", "value": _error_of_mean(errors, arms)},
         {"what": f"{where}: RMS error, %", "value": float(np.sqrt(np.mean(np.square(errors))))},
         {"what": f"{where}: warned, of {arms}", "value": warned},
         {"what": f"{where}: estimators", "value": ", ".join(estimators)},
     ]
+
+
+def _error_of_mean(errors: list[float], arms: int) -> float:
+    """Standard error of the mean over arms, whose five constants err together."""
+    by_arm = [float(np.mean(part)) for part in np.array_split(errors, arms)]
+    return float(np.std(by_arm, ddof=1) / np.sqrt(arms)) if arms > 1 else float("nan")
 
 
 def main() -> None:
@@ -188,8 +197,8 @@ def main() -> None:
     parser.add_argument("--arms", type=int, default=4)
     parser.add_argument("--share", type=float, default=SHARE)
     given = parser.parse_args()
-    for feedback in (False, True):
-        for row in evaluate(given.arms, feedback=feedback, share=given.share):
+    for feedback, reference in ((False, False), (True, False), (True, True)):
+        for row in evaluate(given.arms, feedback=feedback, reference=reference, share=given.share):
             value = row["value"]
             shown = format(value, ".3g") if isinstance(value, float) else value
             print(f"{row['what']}: {shown}", flush=True)

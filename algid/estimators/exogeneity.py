@@ -1,9 +1,9 @@
 """Whether least squares is valid: tests for endogenous torque and for feedback from the motion.
 
 Torque that the model lacks drives the motion, and least squares is attenuated by it. Instruments
-(`algid.estimators.instruments`) are not, as long as the measured torque does not answer that
-torque. Both are compared with the same terms and the same prior, and the residual with the torque
-after it:
+(`algid.estimators.instruments`) are not, as long as they do not answer that torque: the logged
+reference of a controller never does, the measured torque does not in open loop. Both are compared
+with the same terms and the same prior, and the residual with the torque after it:
 
     h  = dᵀ V⁻¹ d,   d = β_instruments − β_least squares          χ² of the number of constants
     r_l = Σ e(t) y(t + l) / (Σ_k N γ_e(k) γ_y(k))^½               normal, where no torque answers
@@ -11,8 +11,8 @@ after it:
 V is the long-run variance of the difference of both estimates' influences, window by window
 (Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1); the
 variance of a cross-correlation is Bartlett's 1946. Instruments stand in place of least squares
-where h tells that they differ, no torque answers, and a constant moves by its own standard
-deviation: below that an interval loses less than 5 points of its coverage.
+where h tells that they differ, the instrument does not answer, and a constant moves by its own
+standard deviation: below that an interval loses less than 5 points of its coverage.
 
 ======  =======================================================  ==========  =================
 symbol  name                                                     shape       unit
@@ -34,6 +34,7 @@ from algid.compiled import chi2_tail
 from algid.estimators import instruments, weak
 from algid.estimators.combine import combine, long_run_variance, scaled_pinv
 from algid.estimators.fit import Fit
+from algid.estimators.references import Following, followed
 from algid.estimators.repeats import merged, shared_out
 from algid.estimators.shrinkage import dispersion, divided
 from algid.estimators.shrunk import resting
@@ -82,7 +83,9 @@ class Exogeneity:
 def settled(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Fit:
-    """The fit of shrunk terms, by instruments where the torque is endogenous and answers nothing.
+    """The fit of shrunk terms, by instruments where the torque is endogenous and there is one.
+
+    A reference that the logs hold and the arm follows is one, else a torque that answers nothing.
 
     Parameters
     ----------
@@ -94,25 +97,30 @@ def settled(
         Of the fit: window, bandwidth and hold; model and delay are the fit's.
     """
     settings = resting(unloaded, loaded, settings)
-    found = instrumented(fit, fit.values, unloaded, loaded, settings)
+    following = followed([*unloaded, *loaded], settings)
+    found = instrumented(fit, fit.values, unloaded, loaded, settings, following)
     if found is None:
         return fit
     if _moved(found, fit) > _NEAR:
-        found = instrumented(fit, found.values, unloaded, loaded, settings) or found
+        better = instrumented(fit, found.values, unloaded, loaded, settings, following)
+        found = better or found
     tests = examined(found, fit, unloaded, loaded, settings)
     fit = replace(fit, endogeneity=tests.distance)
     if not tests.endogenous:
         return fit
-    if tests.answers:
+    if following is None and tests.answers:
         return fit.noted(feedback(tests.silent))
-    note = Notice("INSTRUMENTS_STAND", numbers={"distance": tests.moved}, note=True)
+    code = "INSTRUMENTS_STAND" if following is None else "REFERENCE_STANDS"
+    note = Notice(code, numbers={"distance": tests.moved}, note=True)
     return replace(found, endogeneity=tests.distance, notes=fit.notes).noted(note)
 
 
 def watched(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Fit:
-    """A fit by instruments, with a warning where the torque answers the motion and is none."""
+    """A fit by instruments, with a warning where it is the torque and answers the motion."""
+    if followed([*unloaded, *loaded], settings) is not None:
+        return fit
     silent = _silent(fit, unloaded, loaded, settings)
     return fit.noted(feedback(silent)) if silent < LEVEL else fit
 
@@ -129,10 +137,12 @@ def instrumented(
     unloaded: Sequence[Source],
     loaded: Sequence[Source],
     settings: WeakSettings,
+    following: Following | None = None,
 ) -> Fit | None:
     """The fit's parameters by instruments simulated at `at` (Q,), with its terms and its prior.
 
-    None where the windows cannot be simulated.
+    Or along the motion that a reference explains, where the arm is `following` one. None where the
+    windows cannot be simulated.
     """
     shared = fit.shared
     settings, base = _of(fit, settings)
@@ -144,7 +154,7 @@ def instrumented(
         c = c0.copy()
         if shared.delay:  # the windows are shifted by it: its column tells a change
             c[-1] -= base
-        for sums in instruments.moments(sources, settings, c):
+        for sums in instruments.moments(sources, settings, c, following=following):
             if sums is None or instruments.gone_astray(sums):
                 return None
             if sums.rows:

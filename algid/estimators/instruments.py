@@ -4,7 +4,8 @@ On a real arm the torque that no model holds (friction, play, cogging) drives th
 columns X of the momentum form are then correlated with its residual, and least squares on them is
 attenuated, however they are weighed. Instruments Z are the same columns of a motion which that
 torque did not drive: simulated from each window's measured start with the measured torque and the
-present coefficients. The estimate solves
+present coefficients, or the motion that a logged reference explains (`references`): under feedback
+the torque answers, the reference does not. The estimate solves
 
     Σ w Z (y − Xᵀ c) = 0
 
@@ -29,6 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -46,6 +48,7 @@ from algid.estimators.combine import (
 )
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
+from algid.estimators.references import Following, followed
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, acceleration, inertia
 from algid.signals.filters import correlate, differentiator, half_length, smoother
@@ -86,8 +89,8 @@ def fit(
     Parameters
     ----------
     unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called up to
-        nine times.
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called up to ten
+        times.
     settings : WeakSettings
         Window, bandwidth, model, hold and delay, as for the weak estimator.
     lengths : dict
@@ -113,6 +116,7 @@ def fit(
     shared = start.shared
     base = float(start.values[len(settings.model.names)]) if shared.delay else settings.delay
     settings = replace(settings, delay=base)
+    following = followed([*unloaded, *loaded], settings)
     logs: list[LogInformation] = []
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:
@@ -122,7 +126,7 @@ def fit(
             shared.delay
         ):  # the windows are shifted by what is known of it: its column tells a change
             c[-1] = 0.0
-        found = _solved(sources, settings, c, kind)
+        found = _solved(sources, settings, c, kind, following)
         if found is None:
             return replace(start.marked("NOT_CONVERGED"), converged=False)
         logs += found
@@ -132,7 +136,11 @@ def fit(
 
 
 def _solved(
-    sources: Sequence[Source], settings: WeakSettings, c: FloatArray, loaded: bool
+    sources: Sequence[Source],
+    settings: WeakSettings,
+    c: FloatArray,
+    loaded: bool,
+    following: Following | None,
 ) -> list[LogInformation] | None:
     """Each log's projected likelihood, once coefficients and instruments agree.
 
@@ -140,7 +148,7 @@ def _solved(
     """
     logs: list[LogInformation] = []
     for _ in range(_ROUNDS):
-        found = moments(sources, settings, c)
+        found = moments(sources, settings, c, following=following)
         if any(one is None or gone_astray(one) for one in found):
             return None
         sums = [one for one in found if one is not None and one.rows]
@@ -196,19 +204,24 @@ def projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
 
 
 def moments(
-    sources: Sequence[Source], settings: WeakSettings, c: FloatArray, most: int | None = None
+    sources: Sequence[Source],
+    settings: WeakSettings,
+    c: FloatArray,
+    most: int | None = None,
+    following: Following | None = None,
 ) -> list[Moments | None]:
     """Sums over each log, the windows simulated with coefficients `c`.
 
-    None of those that these do not move.
+    None of those that these do not move. Where it is known how the arm is `following` a
+    reference, the motion that this explains stands in place of a simulated one.
 
     At most `most` pieces of a log are looked at. The windows of many pieces are simulated side by
     side: a step costs the same for few as for many.
     """
     found: list[_Sums | None] = [_Sums() for _ in sources]
     for batch in _batches(sources, settings, most):
-        simulated = _side_by_side(batch, settings, c)
-        for (number, _, _), (both, good, moves) in zip(batch, simulated, strict=True):
+        by = _side_by_side if following is None else partial(_explained, following)
+        for (number, _, _), (both, good, moves) in zip(batch, by(batch, settings, c), strict=True):
             sums = found[number]
             if not moves:
                 found[number] = None
@@ -294,6 +307,24 @@ def _side_by_side(
         both = np.concatenate([Z, columns[:, :, ::_STRIDE]], axis=1)
         both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
         yield both, moved.good[own], bool(np.all(moved.moves[own]))
+
+
+def _explained(
+    following: Following, batch: Sequence[_Piece], settings: WeakSettings, c: FloatArray
+) -> Iterator[tuple[FloatArray, NDArray[np.bool_], bool]]:
+    """As `_side_by_side`, along the motion that the reference explains."""
+    linear = c[: len(settings.model.names)]
+    for _, piece, windows in batch:
+
+        def equations(motion: Segment, windows: Windows = windows) -> FloatArray:
+            made = windows.equations(settings.model, motion, settings.estimate_delay, linear)
+            return made[:, :, ::_STRIDE]
+
+        X, motion = equations(piece), following.motion(piece)
+        Z = np.zeros_like(X) if motion is None else equations(motion)
+        both = np.concatenate([Z[:, :-1], X], axis=1)
+        both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
+        yield both, np.full(X.shape[2], motion is not None), True
 
 
 def _moving(windows: Windows, piece: Segment, settings: WeakSettings) -> NDArray[np.bool_]:
@@ -432,13 +463,14 @@ def endogeneity(
         settings = replace(
             settings, delay=float(fit.values[len(settings.model.names)]), estimate_delay=False
         )
+    following = followed([*unloaded, *loaded], settings)
     largest = None
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
         looked_at = sources[:: -(-len(sources) // _MOST_EXAMINED)]
-        found = moments(looked_at, settings, c, _EXAMINED)
+        found = moments(looked_at, settings, c, _EXAMINED, following)
         sums = [
             one
             for one in found

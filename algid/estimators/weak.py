@@ -435,11 +435,12 @@ def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
         np.concatenate([old[:, first:], new], axis=1)
         for old, new in ((before.theta, piece.theta), (before.tau, piece.tau))
     ]
-    omega = None
-    if before.omega is not None and piece.omega is not None:
-        omega = np.concatenate([before.omega[:, first:], piece.omega], axis=1)
+    omega, reference = (
+        None if old is None or new is None else np.concatenate([old[:, first:], new], axis=1)
+        for old, new in ((before.omega, piece.omega), (before.reference, piece.reference))
+    )
     start = piece.start - (len(before) - first) * piece.dt
-    return replace(piece, start=start, theta=both[0], tau=both[1], omega=omega)
+    return replace(piece, start=start, theta=both[0], tau=both[1], omega=omega, reference=reference)
 
 
 def grams(X: FloatArray, rows: int) -> FloatArray:

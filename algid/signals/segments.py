@@ -16,7 +16,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.criteria import CUT
-from algid.log import IntArray, Log, join, usual_period
+from algid.log import IntArray, Log, join, joined, usual_period
 from algid.signals.spacing import spaced
 
 PERIOD_SAMPLES = 4096  # the first samples, from which the period is taken
@@ -38,6 +38,8 @@ class Segment:
     omega : (2, N) float64, rad/s, or None where the log has no velocities
     continues : bool
         Whether the first sample follows the last one of the segment before by `dt`.
+    reference : (2, N) float64, rad, or None
+        Angles that a controller was to follow, where the log has them; NaN where there were none.
     """
 
     start: float
@@ -46,6 +48,7 @@ class Segment:
     tau: FloatArray
     omega: FloatArray | None = None
     continues: bool = False
+    reference: FloatArray | None = None
 
     def __post_init__(self) -> None:
         keep_arrays(self)
@@ -66,6 +69,7 @@ class Segment:
             theta=self.theta[:, first:last],
             tau=self.tau[:, first:last],
             omega=None if self.omega is None else self.omega[:, first:last],
+            reference=None if self.reference is None else self.reference[:, first:last],
             continues=self.continues or first > 0,
         )
 
@@ -167,6 +171,7 @@ class _Sampler:
             theta=take(log.theta),
             tau=take(log.tau),
             omega=None if log.omega is None else take(log.omega),
+            reference=None if log.reference is None else take(log.reference),
             continues=self._emitted > 0,
         )
         self._emitted += count
@@ -216,6 +221,7 @@ def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment],
         if index % stride:
             continue
         omega = None if piece.omega is None else piece.omega.copy()
+        reference = None if piece.reference is None else piece.reference.copy()
         continues = piece.continues and stride == 1
         kept.append(
             replace(
@@ -223,6 +229,7 @@ def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment],
                 theta=piece.theta.copy(),
                 tau=piece.tau.copy(),
                 omega=omega,
+                reference=reference,
                 continues=continues,
             )
         )
@@ -273,10 +280,10 @@ class Cutter:
 
 def append(first: Segment, second: Segment) -> Segment:
     """One segment out of two, the second of which continues the first."""
-    both_have_omega = first.omega is not None and second.omega is not None
     return replace(
         first,
         theta=np.concatenate([first.theta, second.theta], axis=1),
         tau=np.concatenate([first.tau, second.tau], axis=1),
-        omega=np.concatenate([first.omega, second.omega], axis=1) if both_have_omega else None,
+        omega=joined([first.omega, second.omega]),
+        reference=joined([first.reference, second.reference]),
     )

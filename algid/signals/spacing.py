@@ -148,4 +148,5 @@ def _merged(log: Log, starts: IntArray) -> Log:
         theta=mean(log.theta),
         tau=mean(log.tau),
         omega=None if log.omega is None else mean(log.omega),
+        reference=None if log.reference is None else mean(log.reference),
     )

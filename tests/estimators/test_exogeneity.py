@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators import exogeneity, shrunk
+from algid.estimators import exogeneity, instruments, shrunk
 from algid.estimators.exogeneity import ANSWERS, _crossed
 from algid.estimators.fit import Fit
 from algid.estimators.weak import Source, WeakSettings
@@ -42,8 +42,12 @@ def test_the_variance_of_a_cross_correlation_is_that_of_independent_series() -> 
     assert 0.8 < spread < 1.2  # 400 values of ± 4 %, and variances from 400 samples
 
 
-def sources_of(made: Scene) -> list[Source]:
-    logs = [Segment(0.0, DT, *pair) for pair in zip(made.theta, made.tau, strict=True)]
+def sources_of(made: Scene, *, reference: bool = False) -> list[Source]:
+    asked = made.reference if reference and made.reference is not None else [None] * len(made.tau)
+    logs = [
+        Segment(0.0, DT, theta, tau, reference=one)
+        for theta, tau, one in zip(made.theta, made.tau, asked, strict=True)
+    ]
 
     def source(log: Segment) -> Source:
         return lambda: [log]
@@ -51,9 +55,9 @@ def sources_of(made: Scene) -> list[Source]:
     return [source(log) for log in logs[:4]]
 
 
-def settled(made: Scene) -> tuple[Fit, Fit]:
+def settled(made: Scene, *, reference: bool = False) -> tuple[Fit, Fit]:
     """By least squares, and what stands in the end."""
-    sources = sources_of(made)
+    sources = sources_of(made, reference=reference)
     least = shrunk.fit(sources, (), SETTINGS)
     return least, exogeneity.settled(least, sources, (), SETTINGS)
 
@@ -86,6 +90,24 @@ def test_feedback_is_said_and_leaves_least_squares() -> None:
     assert by_instruments is not None
     watched = exogeneity.watched(by_instruments, sources_of(made), (), SETTINGS)
     assert [note.code for note in watched.notes] == ["FEEDBACK"]
+
+
+@pytest.mark.slow
+def test_a_reference_is_the_instrument_under_feedback() -> None:
+    """The same logs with the reference that the controller follows: no warning, and closer."""
+    made = scene(1, feedback=True)
+    least, found = settled(made, reference=True)
+    assert found.estimator == "instruments"
+    assert [note.code for note in found.notes] == ["REFERENCE_STANDS"]
+    assert off(found, made).max() < 1
+    assert off(found, made)[:2].max() < 0.5 * off(least, made)[:2].max()  # k1 and k2 are attenuated
+    sources = sources_of(made, reference=True)
+    assert exogeneity.watched(found, sources, (), SETTINGS).notes == found.notes  # no warning
+    asked = instruments.fit(sources_of(made, reference=True), settings=SETTINGS)
+    by_torque = instruments.fit(sources_of(made), settings=SETTINGS)
+    truth = made.arm.constants()[:5]
+    error, worse = (np.abs(fit.values[:5] / truth - 1).mean() for fit in (asked, by_torque))
+    assert error < 0.5 * worse
 
 
 @pytest.mark.slow

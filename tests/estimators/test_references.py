@@ -1,0 +1,119 @@
+"""What a reference explains of a motion is found again, and what explains nothing is no instrument."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from algid.arm import FloatArray
+from algid.estimators.references import followed
+from algid.estimators.weak import Source, WeakSettings
+from algid.log import Log, Origin, join
+from algid.signals.segments import Segment, segments
+
+DT = 0.004
+SETTINGS = WeakSettings()
+
+
+def log(seed: int, *, disturbance: float = 0.3) -> tuple[Segment, FloatArray]:
+    """Angles that lag behind their references by 0.1 s, and a slow disturbance; without it (2, N)."""
+    rng = np.random.default_rng(seed)
+    t = DT * np.arange(4000)
+    turn, phase = 2 * np.pi * np.array([0.4, 0.9, 1.7]), rng.uniform(0, 6, (2, 3, 1))
+    reference = np.sum(np.sin(turn[:, None] * t + phase), axis=1)
+    share = 1 - np.exp(-DT / 0.1)
+    steady = reference[:, :1]
+    clean = lfilter([share], [1, share - 1], reference - steady, axis=1) + steady
+    noise = lfilter([0.02], [1, -0.98], rng.standard_normal((2, t.size)), axis=1)
+    theta = clean + disturbance * noise / noise.std()
+    return Segment(0.0, DT, theta, theta - clean, reference=reference), clean
+
+
+def sources_of(*logs: Segment) -> list[Source]:
+    def source(one: Segment) -> Source:
+        return lambda: [one]
+
+    return [source(one) for one in logs]
+
+
+def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() -> None:
+    """Of six logs of 16 s: within a fifth of the disturbance, whose power leaks by the share of the
+    coefficients in the independent samples, some 30 in 6 × 16 s / 0.2 s.
+    """
+    made = [log(seed) for seed in range(6)]
+    found = followed(sources_of(*(one for one, _ in made)), SETTINGS)
+    assert found is not None
+    piece, clean = made[0]
+    motion = found.motion(piece)
+    assert motion is not None
+    settled = slice(250, None)  # the longest lag: what was before the log nobody knows
+    off = np.std(motion.theta[:, settled] - clean[:, settled], axis=1)
+    disturbance = np.std(piece.theta[:, settled] - clean[:, settled], axis=1)
+    assert np.all(off < 0.35 * disturbance)
+    assert np.std(motion.tau[:, settled]) < 0.35 * np.std(piece.tau[:, settled])
+
+
+def test_velocities_are_those_of_the_explained_motion() -> None:
+    piece, _ = log(0, disturbance=0.0)
+    piece = replace(piece, omega=np.gradient(piece.theta, DT, axis=1))
+    found = followed(sources_of(piece), SETTINGS)
+    assert found is not None
+    motion = found.motion(piece)
+    assert motion is not None
+    assert motion.omega is not None
+    assert motion.omega[:, 300:-300] == pytest.approx(
+        np.gradient(motion.theta, DT, axis=1)[:, 300:-300]
+    )
+
+
+def test_what_the_arm_does_not_follow_is_no_instrument() -> None:
+    piece, _ = log(0)
+    assert followed(sources_of(piece), SETTINGS) is not None
+    other = np.sin(2 * np.pi * 2.9 * piece.t + np.array([[0.0], [1.0]]))
+    assert followed(sources_of(replace(piece, reference=other)), SETTINGS) is None
+    held = replace(piece, reference=np.zeros_like(piece.theta))
+    assert followed(sources_of(held), SETTINGS) is None
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+def test_where_a_reference_is_missing_it_stands_still(value: float) -> None:
+    piece, _ = log(0)
+    assert piece.reference is not None
+    holed = piece.reference.copy()
+    holed[1, :300] = value  # the controller had not begun
+    held = piece.reference.copy()
+    held[:, :300] = held[:, 300:301]
+    found, same = (
+        followed(sources_of(replace(piece, reference=one)), SETTINGS) for one in (holed, held)
+    )
+    assert found is not None
+    assert same is not None
+    assert np.array_equal(found.B, same.B)
+    holed[:, : len(piece) // 2 + 1] = value
+    assert followed(sources_of(piece, replace(piece, reference=holed)), SETTINGS) is None
+
+
+def test_logs_without_a_reference_have_no_such_instrument() -> None:
+    piece, _ = log(0)
+    assert followed(sources_of(piece, replace(piece, reference=None)), SETTINGS) is None
+    assert followed([], SETTINGS) is None
+
+
+def test_a_reference_goes_where_its_samples_go() -> None:
+    """Cut, joined, and put on the time base with them: a line stays the line."""
+    rng = np.random.default_rng(0)
+    stamps = (np.arange(5000) * 2_000_000 + rng.integers(0, 400_000, 5000)).astype(np.int64)
+    line = np.outer([1.0, -2.0], stamps * 1e-9)
+    whole = Log(stamps, line, line, Origin("", "", {}), reference=line + 1)
+    blocks = [whole.part(first, first + 700) for first in range(0, 5000, 700)]
+    again = join(blocks)
+    assert again.reference is not None
+    assert np.array_equal(again.reference, line + 1)
+    for segment in segments(blocks):
+        assert segment.reference is not None
+        assert segment.reference == pytest.approx(segment.theta + 1)
+    none = replace(blocks[1], reference=None)
+    assert join([blocks[0], none]).reference is None
