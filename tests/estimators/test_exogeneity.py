@@ -100,7 +100,7 @@ def test_a_reference_is_the_instrument_under_feedback() -> None:
     assert found.estimator == "instruments"
     assert [note.code for note in found.notes] == ["REFERENCE_STANDS"]
     assert off(found, made).max() < 1
-    assert off(found, made)[:2].max() < 0.5 * off(least, made)[:2].max()  # k1 and k2 are attenuated
+    assert off(found, made)[0] < 0.5 * off(least, made)[0]  # k1 is attenuated most
     sources = sources_of(made, reference=True)
     assert exogeneity.watched(found, sources, (), SETTINGS).notes == found.notes  # no warning
     asked = instruments.fit(sources_of(made, reference=True), settings=SETTINGS)
