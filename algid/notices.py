@@ -476,6 +476,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "DUPLICATE_STAMPS": (
         "{count:# sample repeats|samples repeat} a stamp; the first of each was kept{others}"
     ),
+    "REFERENCE_LEFT_OUT": "the reference on {topic!r} is left out: {why}",
     "ALIGNED": (
         "{topic!r} ({rate:.6g} Hz) was interpolated; error, root mean square, in the log's units: "
         "{error}"

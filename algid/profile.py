@@ -50,7 +50,9 @@ Check = Literal[
 """Checks of a log that refuse it, or its result, unless they are accepted."""
 
 
-ALL_CHANNELS = ("theta1", "theta2", "tau1", "tau2", "omega1", "omega2")
+ALL_CHANNELS = (
+    "theta1", "theta2", "tau1", "tau2", "omega1", "omega2", "q_des1", "q_des2",
+)  # fmt: skip
 
 
 OF_ONE_LOG = ("torque_file", "segment")
@@ -180,9 +182,10 @@ class Profile(_Strict):
         The run that is read alone, from 1, of a log whose clock starts again.
     accept : codes of checks
         Which may warn but not refuse.
-    theta1, theta2, tau1, tau2, omega1, omega2 : dict
+    theta1, theta2, tau1, tau2, omega1, omega2, q_des1, q_des2 : dict
         Of one channel its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind
-        has.
+        has. The reference that a controller follows, q_des, is recorded as its angle is, where
+        nothing else is said.
 
     Raises
     ------
@@ -217,6 +220,8 @@ class Profile(_Strict):
     tau2: Torque = Torque()
     omega1: Velocity = Velocity()
     omega2: Velocity = Velocity()
+    q_des1: Angle = Angle()
+    q_des2: Angle = Angle()
 
     _flags: frozenset[str] = PrivateAttr(frozenset())
     _channels: tuple[str, ...] = PrivateAttr(ALL_CHANNELS)
@@ -229,7 +234,7 @@ class Profile(_Strict):
     @property
     def needed(self) -> tuple[str, ...]:
         """Those of them without which there is no log."""
-        return tuple(name for name in self._channels if not name.startswith("omega"))
+        return tuple(name for name in self._channels if name.startswith(("theta", "tau")))
 
     def half(self, *quantities: str) -> Profile:
         """The same for a file that holds only these quantities, as ``"tau"``, and is read whole."""

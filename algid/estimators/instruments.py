@@ -463,13 +463,13 @@ def endogeneity(
         settings = replace(
             settings, delay=float(fit.values[len(settings.model.names)]), estimate_delay=False
         )
-    following = followed([*unloaded, *loaded], settings)
     largest = None
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
         looked_at = sources[:: -(-len(sources) // _MOST_EXAMINED)]
+        following = followed(looked_at, settings)
         found = moments(looked_at, settings, c, _EXAMINED, following)
         sums = [
             one

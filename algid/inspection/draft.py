@@ -43,6 +43,7 @@ _UNITS = {
     "theta": f'# unit = "deg"  # {_ANGLES}\n{_ENCODER}# unwrap = true  # where it jumps by a '
     "turn\n",
     "omega": f'# unit = "deg"  # {_VELOCITIES}; angles a second\n{_ENCODER}',
+    "q_des": f'# unit = "deg"  # {_ANGLES}; as the angle, where nothing is said\n',
     "tau": f'# unit = "N m"  # {_TORQUES}\n'
     "# torque_constant = 0.1  # N m/A at the motor, of a current\n"
     "# gear_ratio = 1.0  # turns of the motor in one of the joint\n"

@@ -18,7 +18,7 @@ from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
 from algid.readers.runs import one_after_another
-from algid.readers.table import BLOCK_ROWS, SampleTable, cut
+from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut
 from algid.readers.timebase import in_order
 from algid.words import counted
 
@@ -84,19 +84,31 @@ class TableReader:
                 gatherer, notices = None, ()
             if gatherer is None:
                 gatherer = Gatherer(
-                    min(most, self.rows or len(table)), velocity=table.has_velocities
+                    min(most, self.rows or len(table)),
+                    velocity=table.has_velocities,
+                    reference=table.has_references,
                 )
             room = gatherer.more(len(table))
             room.stamp_ns[:] = table.stamp_ns
             self.conversion.apply(table, room)
             unwrapper.run(room.theta)
+            if room.reference is not None:
+                unwrapper.follow(room.reference, room.theta)
             notices += said
         if gatherer is not None:
             yield self._log(gatherer, notices)
 
     def _log(self, gatherer: Gatherer, notices: tuple[Notice, ...]) -> Log:
         room = gatherer.filled()
-        return Log(room.stamp_ns, room.theta, room.tau, self.origin, room.omega, notices)
+        return Log(
+            room.stamp_ns,
+            room.theta,
+            room.tau,
+            self.origin,
+            room.omega,
+            notices,
+            room.reference,
+        )
 
     def _samples(self, rows: int) -> Iterator[tuple[SampleTable, tuple[Notice, ...]]]:
         """Checked and sorted tables that are not empty, with what is to be said of each."""
@@ -179,9 +191,12 @@ class TableReader:
             yield held
 
     def _measured(self, table: SampleTable) -> Mapping[str, FloatArray]:
-        """The columns of a table without the torque of a joint that has no motor."""
-        without = f"tau{self.origin.reading.passive}"
-        return {name: values for name, values in table.columns.items() if name != without}
+        """The columns of a table without the torque of a joint that has no motor, and references.
+
+        Nobody need follow a reference all the time.
+        """
+        without = (f"tau{self.origin.reading.passive}", *REFERENCES)
+        return {name: values for name, values in table.columns.items() if name not in without}
 
     def _of_passive(self, table: SampleTable) -> tuple[Notice, ...]:
         """Notice of a torque in the column of a joint that is called passive."""
@@ -298,3 +313,9 @@ class Unwrapper:
                 turns = self._turns[joint] - np.cumsum(np.rint(np.diff(raw) / _TURN))
                 self._last[joint], self._turns[joint] = raw[-1], turns[-1]
                 theta[joint] += _TURN * turns
+
+    def follow(self, reference: FloatArray, theta: FloatArray) -> None:
+        """Bring references (2, N) within half a turn of the unwrapped angles, in place."""
+        for joint in (0, 1):
+            if self._joints[joint]:
+                reference[joint] += _TURN * np.rint((theta[joint] - reference[joint]) / _TURN)

@@ -19,7 +19,7 @@ from algid.readers.names import (
     other_joints,
     take_apart,
 )
-from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES
+from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES
 from algid.units import CURRENT, TORQUE, unit_of
 
 if TYPE_CHECKING:
@@ -150,6 +150,11 @@ def _sources(
         # a joint without a motor needs no torque of its own: what stands in its place is not
         # looked at
         sources.setdefault(f"tau{profile.passive}", sources[f"tau{3 - profile.passive}"])
+    for name, law in (("q_des1", profile.tau1.q_des), ("q_des2", profile.tau2.q_des)):
+        if law and {name, "tau1"} <= set(read):  # what the controller follows makes the torque
+            sources.setdefault(name, law)
+    if not sources.keys() >= set(REFERENCES):
+        sources = {name: column for name, column in sources.items() if name not in REFERENCES}
     if not (profile.velocity and sources.keys() >= set(VELOCITIES)):
         sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
     if profile.rate is not None:
@@ -200,7 +205,8 @@ def _of_foreign_units(
     LogError
         Where the user names no unit of a joint for them.
     """
-    for name in [name for name in foreign if name in CHANNELS]:
+    # a reference may be in any unit: it is an instrument, of which the scale says nothing
+    for name in [name for name in foreign if name in CHANNELS and name not in REFERENCES]:
         given = profile.channel(name).unit
         if given is None:
             usual = "N m" if name.startswith("tau") else "rad"

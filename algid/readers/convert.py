@@ -17,7 +17,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import ChannelReading, IntArray
 from algid.notices import Remedy
-from algid.readers.table import CHANNELS, JOINT_CHANNELS, VELOCITIES, SampleTable
+from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
 
 if TYPE_CHECKING:
@@ -31,29 +31,38 @@ ROWS = 1 << 16
 class Room:
     """Samples to be filled in: stamps (N,) in ns.
 
-    Angles, torques and, where recorded, velocities (2, N).
+    Angles, torques and, where recorded, velocities and references (2, N).
     """
 
     stamp_ns: IntArray
     theta: FloatArray
     tau: FloatArray
     omega: FloatArray | None
+    reference: FloatArray | None = None
 
     @classmethod
-    def empty(cls, rows: int, *, velocity: bool) -> Room:
+    def empty(cls, rows: int, *, velocity: bool, reference: bool = False) -> Room:
         """Room for `rows` samples in one piece of memory, which the system maps in large pages."""
-        signals = np.empty((7 if velocity else 5, rows))
+        signals = np.empty((5 + 2 * velocity + 2 * reference, rows))
         stamps = signals[-1].view(np.int64)
-        return cls(stamps, signals[0:2], signals[2:4], signals[4:6] if velocity else None)
+        omega = signals[4:6] if velocity else None
+        return cls(stamps, signals[0:2], signals[2:4], omega, signals[-3:-1] if reference else None)
 
     def __len__(self) -> int:
         return int(self.stamp_ns.size)
 
     def part(self, first: int, last: int) -> Room:
         """Samples `first` to `last` - 1 as views."""
-        omega = None if self.omega is None else self.omega[:, first:last]
+        omega, reference = (
+            None if signal is None else signal[:, first:last]
+            for signal in (self.omega, self.reference)
+        )
         return Room(
-            self.stamp_ns[first:last], self.theta[:, first:last], self.tau[:, first:last], omega
+            self.stamp_ns[first:last],
+            self.theta[:, first:last],
+            self.tau[:, first:last],
+            omega,
+            reference,
         )
 
 
@@ -64,11 +73,13 @@ class Gatherer:
     ----------
     rows : int
         How many samples to expect; 0 where nobody knows. A wrong number costs time, nothing else.
-    velocity : bool
+    velocity, reference : bool
+        What is recorded beside angles and torques.
     """
 
-    def __init__(self, rows: int, *, velocity: bool) -> None:
-        self._room = Room.empty(min(rows, LIMITS.reserved_rows), velocity=velocity)
+    def __init__(self, rows: int, *, velocity: bool, reference: bool = False) -> None:
+        reserved = min(rows, LIMITS.reserved_rows)
+        self._room = Room.empty(reserved, velocity=velocity, reference=reference)
         self._used = 0
 
     def __len__(self) -> int:
@@ -80,12 +91,15 @@ class Gatherer:
         if self._used > len(self._room):
             old = self._room.part(0, first)
             self._room = Room.empty(
-                max(self._used, 2 * len(self._room)), velocity=old.omega is not None
+                max(self._used, 2 * len(self._room)),
+                velocity=old.omega is not None,
+                reference=old.reference is not None,
             )
             new = self._room.part(0, first)
             new.stamp_ns[:], new.theta[:], new.tau[:] = old.stamp_ns, old.theta, old.tau
-            if old.omega is not None and new.omega is not None:
-                new.omega[:] = old.omega
+            for there, here in ((old.omega, new.omega), (old.reference, new.reference)):
+                if there is not None and here is not None:
+                    here[:] = there
         return self._room.part(first, self._used)
 
     def filled(self) -> Room:
@@ -153,8 +167,11 @@ class Conversion:
     laws: tuple[Law | None, Law | None] = (None, None)
 
     def apply(self, table: SampleTable, room: Room) -> None:
-        """Fill in a table's angles, torques and, where recorded, velocities in rad, N m, rad/s."""
-        theta, omega = room.theta, room.omega
+        """Fill in a table's angles, torques and, where recorded, velocities and references.
+
+        In rad, N m, rad/s.
+        """
+        theta, omega, reference = room.theta, room.omega, room.reference
         self._joint_pair(table, JOINT_CHANNELS[:2], theta)
         self._joint_pair(table, JOINT_CHANNELS[2:], room.tau)
         if omega is not None:
@@ -169,6 +186,11 @@ class Conversion:
                 omega[1] -= omega[0]
         if self.zero:
             theta[0] += self.zero
+        if reference is not None:
+            self._joint_pair(table, REFERENCES, reference)
+            if self.absolute:
+                reference[1] -= reference[0]
+            reference[0] += self.zero
         if self.passive is not None:
             room.tau[self.passive - 1] = 0.0
         if self.base:
@@ -201,8 +223,16 @@ def channel_readings(
     for name in [name for name in CHANNELS if name in mapping]:
         joint = int(name[-1]) - 1
         like = f"theta{joint + 1}" if _is_desired(name, profile) else name
-        channel, own = profile.channel(like), stated.get(like)
+        channel, own = _channel(like, profile), stated.get(like)
         unit = channel.unit or own or _usual_unit(like, profile)
+        if name in REFERENCES:  # recorded as the angle is, where nothing says otherwise
+            unit = (
+                profile.channel(name).unit
+                or own
+                or channel.unit
+                or stated.get(f"theta{joint + 1}")
+                or "rad"
+            )
         told = profile.told_by(f"{like}.unit") if channel.unit else "names" if own else "assumed"
         if name == f"tau{profile.passive}":
             found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
@@ -210,9 +240,19 @@ def channel_readings(
         factor = (
             channel.sign * profile.signs[joint] * _factor(path, like, mapping[name], channel, unit)
         )
-        offset = channel.offset + (profile.offsets[joint] if like.startswith("theta") else 0.0)
+        angle = like.startswith(("theta", "q_des"))
+        offset = channel.offset + (profile.offsets[joint] if angle else 0.0)
         found[name] = ChannelReading(mapping[name], unit, told, factor, offset)
     return found
+
+
+def _channel(name: str, profile: Profile) -> Angle | Velocity | Torque:
+    """The profile of a channel; a reference's is its angle's where it says nothing itself."""
+    own = profile.channel(name)
+    if name not in REFERENCES:
+        return own
+    said = {key: getattr(own, key) for key in own.model_fields_set}
+    return profile.channel(f"theta{name[-1]}").model_copy(update=said)
 
 
 def _is_desired(name: str, profile: Profile) -> bool:

@@ -44,7 +44,7 @@ def open_halves(log: Any, profile: Profile, open_one: Opener) -> TableReader:
         If one of the two cannot be read, lacks its channels, or they do not overlap in time.
     """
     other = _beside(log, profile.torque_file or "")
-    angles = open_one(log, profile.half("theta", "omega"))
+    angles = open_one(log, profile.half("theta", "omega", "q_des"))
     torques = _torques(other, profile, angles.origin, open_one)
     path = angles.origin.path
 

@@ -2,7 +2,7 @@
 
 A name is taken apart into a stem, a joint and a unit, ``pos_meas1 [deg]`` → ``pos_meas``, 1,
 ``deg``. The stems of each quantity are ranked: measured before unspecified before filtered,
-commanded torque last and commanded angles never.
+commanded torque last. Commanded angles are the reference, and never angles.
 """
 
 from __future__ import annotations
@@ -97,6 +97,13 @@ STEMS: dict[str, tuple[str, ...]] = {
         ),
         *("motor_torque", "observation_effort", "observation_torque"),
         *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
+    ),
+    "q_des": (
+        *("q_des", "q_desired", "q_d", "q_ref", "q_reference", "q_cmd", "q_target", "target_q"),
+        *("theta_des", "theta_desired", "theta_d", "theta_ref", "theta_cmd", "theta_target"),
+        *("pos_des", "pos_desired", "pos_ref", "pos_cmd", "pos_target", "target_pos"),
+        *("position_desired", "desired_position", "position_reference", "reference_position"),
+        *("position_command", "commanded_position", "target_position", "position_target"),
     ),
 }
 COMMANDED = frozenset(
@@ -341,7 +348,10 @@ def choose(
             ),
             None,
         )
-        if twin is not None:  # another column of the same name but for its writing or its unit
+        if twin is not None and channel not in (
+            "q_des1",
+            "q_des2",
+        ):  # another column of the same name but for its writing or its unit
             raise LookupError(f"{column!r} and {twin!r} are both {stem} of joint {joint}")
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
     foreign = {
@@ -353,7 +363,7 @@ def choose(
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
     """Columns by canonical channel, of quantities present for two joints, or for the given two."""
     chosen: dict[str, str] = {}
-    for quantity in ("theta", "tau", "omega"):
+    for quantity in STEMS:
         for stem in STEMS[quantity]:
             of_stem = {
                 name.joint: column
@@ -361,6 +371,8 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
                 if name.stem == stem and name.joint
             }
             pair = _two(of_stem, joints)
+            if len(of_stem) > 2 and not joints and quantity == "q_des":
+                continue  # the log is read without it
             if len(of_stem) > 2 and not joints:
                 there = ", ".join(list(of_stem)[:8])
                 raise LookupError(

@@ -13,7 +13,8 @@ from algid.notices import Notice
 
 JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
-CHANNELS = JOINT_CHANNELS + VELOCITIES
+REFERENCES = ("q_des1", "q_des2")
+CHANNELS = JOINT_CHANNELS + VELOCITIES + REFERENCES
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,11 @@ class SampleTable:
     def has_velocities(self) -> bool:
         """Whether velocities were recorded."""
         return VELOCITIES[0] in self.columns
+
+    @property
+    def has_references(self) -> bool:
+        """Whether the angles that a controller was to follow were recorded."""
+        return REFERENCES[0] in self.columns
 
     def part(self, first: int, last: int) -> SampleTable:
         """Rows `first` to `last` - 1 as views; the notices stay with the first part."""

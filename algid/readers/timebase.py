@@ -127,9 +127,16 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
         )
     kept = order[fresh]
     gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
-    same = np.all([values[gone] == values[instead] for values in table.columns.values()], axis=0)
+    same = np.all(
+        [_equal(values[gone], values[instead]) for values in table.columns.values()], axis=0
+    )
     late, lost = np.count_nonzero(moved > 0), gone.size - np.count_nonzero(same)
     return table.take(kept), (int(late), repeated, int(lost))
+
+
+def _equal(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
+    """Which values are the same; what is missing in both is."""
+    return np.asarray((one == other) | (np.isnan(one) & np.isnan(other)))
 
 
 def set_back(table: SampleTable) -> int | None:
@@ -158,7 +165,7 @@ def set_back(table: SampleTable) -> int | None:
         nearest = np.where(nearer, left, nearest)
         crowded = np.abs(stamps[nearest] - stamps[run]) <= period / 2
         again = np.all(
-            [values[nearest] == values[run] for values in table.columns.values()], axis=0
+            [_equal(values[nearest], values[run]) for values in table.columns.values()], axis=0
         )
         if np.count_nonzero(crowded & ~again) > run.size / 2:
             return int(run[0]) - 1
@@ -229,11 +236,18 @@ def whole_topic(
     return Series(topic, stack(found))
 
 
-def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[SampleTable]:
-    """The main topic's tables with the other topics' channels, where all cover it.
+def aligned(
+    main: Iterator[SampleTable],
+    others: Sequence[Series],
+    beside: Sequence[Series] = (),
+    notices: Sequence[Notice] = (),
+) -> Iterator[SampleTable]:
+    """The main topic's tables with the other topics' channels, where all `others` cover it.
+
+    Where those `beside` do not, their channels are NaN.
 
     The last table tells how many were dropped and what the interpolation costs, in the log's own
-    units.
+    units, and has the `notices`.
     """
     lost, held = 0, None
     between = dict.fromkeys((other.topic for other in others), False)
@@ -250,6 +264,10 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
         for other in others:
             columns |= other.at(kept.stamp_ns)
             between[other.topic] |= not other.holds(kept.stamp_ns)
+        for other in beside:
+            known = other.covers(kept.stamp_ns)
+            found = other.at(kept.stamp_ns)
+            columns |= {name: np.where(known, values, np.nan) for name, values in found.items()}
         held = SampleTable(kept.stamp_ns, columns, kept.notices)
     said = [
         Notice(
@@ -266,4 +284,6 @@ def aligned(main: Iterator[SampleTable], others: Sequence[Series]) -> Iterator[S
     if lost:
         said.append(Notice("NOT_COVERED", numbers={"count": lost}, lossy=True))
     if held is not None:
-        yield held.noting(*said, *(notice for other in others for notice in other.table.notices))
+        yield held.noting(
+            *notices, *said, *(notice for other in others for notice in other.table.notices)
+        )

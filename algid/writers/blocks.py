@@ -23,6 +23,7 @@ def columns(block: Log) -> dict[str, NDArray[Any]]:
     found: dict[str, NDArray[Any]] = {"t": seconds(block)}
     pairs = [("theta", block.theta), ("tau", block.tau)]
     pairs += [("omega", block.omega)] if block.omega is not None else []
+    pairs += [("q_des", block.reference)] if block.reference is not None else []
     for name, (first, second) in pairs:
         found |= {f"{name}1": first, f"{name}2": second}
     return found | {"stamp_ns": block.stamp_ns}

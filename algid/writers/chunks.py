@@ -1,4 +1,4 @@
-"""MCAP files of one channel, written by chunks: all messages of a chunk are rows of one array.
+"""MCAP files of one schema, written by chunks: all messages of a chunk are rows of one array.
 
 Messages that are alike but for their numbers and stamps have one length, so that a chunk and its
 index are laid out at once. Every other record is written by the mcap library.
@@ -60,15 +60,15 @@ class ChunkedFile:
     stream : binary file, at its start
     profile, library : str
         As the header states them.
-    schema, channel : records of the mcap library
+    schema, channels : records of the mcap library
     """
 
     stream: IO[bytes]
     profile: str
     library: str
     schema: Schema
-    channel: Channel
-    _messages: int = 0
+    channels: tuple[Channel, ...]
+    _messages: dict[int, int] = field(default_factory=dict)
     _times: tuple[int, int] | None = None
     _chunks: list[ChunkIndex] = field(default_factory=list)
     _metadata: list[MetadataIndex] = field(default_factory=list)
@@ -77,13 +77,18 @@ class ChunkedFile:
         self.stream.write(MCAP0_MAGIC)
         self._write(Header(self.profile, self.library))
 
-    def add(self, stamp_ns: IntArray, content: NDArray[np.void]) -> None:
-        """Write a chunk of messages: their stamps (N,), none negative, and contents (N,)."""
-        before = b"" if self._chunks else _bytes_of(self.schema, self.channel)
+    def add(self, stamp_ns: IntArray, content: NDArray[np.void], place: int = 0) -> None:
+        """Write a chunk of messages on the channel at a `place`.
+
+        Their stamps (N,), none negative, and contents (N,).
+        """
+        channel = self.channels[place].id
+        sent = self._messages.get(channel, 0)
+        before = b"" if self._chunks else _bytes_of(self.schema, *self.channels)
         rows = np.zeros(len(content), np.dtype([*_MESSAGE, ("content", content.dtype)]))
         rows["code"], rows["length"] = Opcode.MESSAGE, rows.itemsize - _PREFIX
-        rows["channel"] = self.channel.id
-        rows["sequence"] = self._messages + np.arange(len(rows))
+        rows["channel"] = channel
+        rows["sequence"] = sent + np.arange(len(rows))
         rows["log_time"] = rows["publish_time"] = stamp_ns
         rows["content"] = content
         data = before + rows.tobytes()
@@ -95,7 +100,7 @@ class ChunkedFile:
         index["offset"] = len(before) + rows.itemsize * np.arange(len(rows))
         entries = index.tobytes()
         self.stream.write(_prefix(Opcode.MESSAGE_INDEX, 6 + len(entries)))
-        self.stream.write(self.channel.id.to_bytes(2, "little"))
+        self.stream.write(channel.to_bytes(2, "little"))
         self.stream.write(len(entries).to_bytes(4, "little") + entries)
         self._chunks.append(
             ChunkIndex(
@@ -105,12 +110,12 @@ class ChunkedFile:
                 compressed_size=len(packed),
                 message_end_time=last,
                 message_index_length=_PREFIX + 6 + len(entries),
-                message_index_offsets={self.channel.id: start + length},
+                message_index_offsets={channel: start + length},
                 message_start_time=first,
                 uncompressed_size=len(data),
             )
         )
-        self._messages += len(rows)
+        self._messages[channel] = sent + len(rows)
         known = self._times or (first, last)
         self._times = min(first, known[0]), max(last, known[1])
 
@@ -125,7 +130,7 @@ class ChunkedFile:
         start = self.stream.tell()
         groups: tuple[tuple[Opcode, list[Any]], ...] = (
             (Opcode.SCHEMA, [self.schema]),
-            (Opcode.CHANNEL, [self.channel]),
+            (Opcode.CHANNEL, list(self.channels)),
             (Opcode.STATISTICS, [self._statistics()]),
             (Opcode.CHUNK_INDEX, self._chunks),
             (Opcode.METADATA_INDEX, self._metadata),
@@ -147,10 +152,10 @@ class ChunkedFile:
         first, last = self._times or (0, 0)
         return Statistics(
             attachment_count=0,
-            channel_count=1,
-            channel_message_counts={self.channel.id: self._messages},
+            channel_count=len(self.channels),
+            channel_message_counts=self._messages,
             chunk_count=len(self._chunks),
-            message_count=self._messages,
+            message_count=sum(self._messages.values()),
             message_end_time=last,
             message_start_time=first,
             metadata_count=len(self._metadata),

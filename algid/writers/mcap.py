@@ -1,12 +1,15 @@
 """MCAP logs as of a ROS 2 recorder: sensor_msgs/msg/JointState, /joint_states, CDR, zstd.
 
+The angles that a controller was to follow are the positions of /joint_references.
+
 All messages of a chunk are laid out at once as rows of one structured array, since only the stamp
 and the numbers differ between them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,7 @@ from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 from algid.writers.blocks import as_blocks
 
 TOPIC = "/joint_states"
+REFERENCES = "/joint_references"
 JOINTS = ("joint1", "joint2")
 _CHUNK = 768 * 1024
 _QOS = """\
@@ -55,20 +59,30 @@ def write(
 
     from algid.writers.chunks import ChunkedFile, message_bytes
 
+    blocks = as_blocks(log)
+    first_block = next(blocks, None)
+    blocks = chain([] if first_block is None else [first_block], blocks)
+    followed = first_block is not None and first_block.reference is not None
+    topics = (TOPIC, REFERENCES) if followed else (TOPIC,)
     with whole_file(path, force=force) as temporary, temporary.open("wb") as stream:
         file = ChunkedFile(
             stream,
             profile="ros2",
             library="algid",
             schema=Schema(1, JOINT_STATE_DEFINITION.encode(), "ros2msg", JOINT_STATE),
-            channel=Channel(1, TOPIC, "cdr", {"offered_qos_profiles": _QOS}, 1),
+            channels=tuple(
+                Channel(number, topic, "cdr", {"offered_qos_profiles": _QOS}, 1)
+                for number, topic in enumerate(topics, start=1)
+            ),
         )
-        for block in as_blocks(log):
+        for block in blocks:
             check_stamps(path, block.stamp_ns)
             rows = max(1, chunk_size // message_bytes(_layout(block.omega is not None)))
             for first in range(0, len(block), rows):
                 part = block.part(first, min(first + rows, len(block)))
                 file.add(part.stamp_ns, messages(part))
+                if part.reference is not None:
+                    file.add(part.stamp_ns, references(part), 1)
         if truth is not None:
             file.add_metadata(KEY, {KEY: Companion(truth, {}).dumps()})
         file.finish()
@@ -76,7 +90,18 @@ def write(
 
 def messages(block: Log) -> NDArray[np.void]:
     """The samples of a block as JointState messages in CDR (N,); `check_stamps` must hold."""
-    rows = np.zeros(len(block), _layout(block.omega is not None))
+    signals = {"position": block.theta, "velocity": block.omega, "effort": block.tau}
+    return _filled(block, signals)
+
+
+def references(block: Log) -> NDArray[np.void]:
+    """The angles to follow of a block that has them, as messages of positions alone (N,)."""
+    return _filled(block, {"position": block.reference})
+
+
+def _filled(block: Log, signals: Mapping[str, NDArray[np.float64] | None]) -> NDArray[np.void]:
+    known = {name: values for name, values in signals.items() if values is not None}
+    rows = np.zeros(len(block), _layout("velocity" in known, "effort" in known))
     rows["encapsulation"] = (0, 1, 0, 0)
     rows["sec"] = block.stamp_ns // 10**9
     rows["nanosec"] = block.stamp_ns % 10**9
@@ -85,18 +110,13 @@ def messages(block: Log) -> NDArray[np.void]:
     for number, joint in enumerate(JOINTS, start=1):
         rows[f"length{number}"] = len(joint) + 1
         rows[f"joint{number}"] = joint.encode()
-    for name, values in (
-        ("position", block.theta),
-        ("velocity", block.omega),
-        ("effort", block.tau),
-    ):
-        if values is not None:
-            rows[f"{name}_count"] = 2
-            rows[name] = values.T
+    for name, values in known.items():
+        rows[f"{name}_count"] = 2
+        rows[name] = values.T
     return rows
 
 
-def _layout(velocity: bool) -> np.dtype[np.void]:
+def _layout(velocity: bool, effort: bool = True) -> np.dtype[np.void]:
     """The CDR layout: alignment counts from behind the four bytes of the encapsulation."""
     fields: list[tuple[str, object, int]] = [
         ("encapsulation", ("u1", 4), 4),
@@ -111,7 +131,7 @@ def _layout(velocity: bool) -> np.dtype[np.void]:
         ("joint2", "S7", 8),
     ]
     for name in ("position", "velocity", "effort"):
-        full = name != "velocity" or velocity
+        full = {"position": True, "velocity": velocity, "effort": effort}[name]
         fields.append((f"{name}_count", "<u4", 4))
         if full:
             place = sum(width for *_, width in fields) - 4

@@ -1,4 +1,4 @@
-"""What a reference explains of a motion is found again, and what explains nothing is no instrument."""
+"""What a reference explains of a motion is found again; what explains nothing is no instrument."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SETTINGS = WeakSettings()
 
 
 def log(seed: int, *, disturbance: float = 0.3) -> tuple[Segment, FloatArray]:
-    """Angles that lag behind their references by 0.1 s, and a slow disturbance; without it (2, N)."""
+    """Angles that lag behind references by 0.1 s, with a disturbance; and without it (2, N)."""
     rng = np.random.default_rng(seed)
     t = DT * np.arange(4000)
     turn, phase = 2 * np.pi * np.array([0.4, 0.9, 1.7]), rng.uniform(0, 6, (2, 3, 1))

@@ -87,6 +87,8 @@ def test_signs_and_offsets_of_channels_and_joints_add_up() -> None:
         "tau2": (-1, 2, -1),
         "omega1": (1, 0, 1),
         "omega2": (-1, 0, -1),
+        "q_des1": (1, 0.25, 1),
+        "q_des2": (1, 1.5, 1),
     }
 
 
@@ -127,12 +129,12 @@ def test_the_torque_of_a_joint_without_motor_needs_no_unit() -> None:
     assert (found["tau2"].source, found["tau2"].factor) == ("none: no motor", 0)
 
 
-SIGNALS = np.random.default_rng(7).normal(size=(6, 50))
+SIGNALS = np.random.default_rng(7).normal(size=(8, 50))
 
 
 def converted(**settings: Any) -> Room:
     samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
-    room = Room.empty(50, velocity=True)
+    room = Room.empty(50, velocity=True, reference=True)
     Conversion({name: ChannelReading(name, "") for name in CHANNELS}, **settings).apply(
         samples, room
     )
@@ -156,12 +158,16 @@ def test_zero_and_reference_of_the_angles() -> None:
     """The tip of an arm of two links of 1 m is where it was, whatever the angles are
     counted from.
     """
-    hanging, absolute = converted(zero=-math.pi / 2).theta, converted(absolute=True)
+    hanging, absolute = converted(zero=-math.pi / 2), converted(absolute=True)
     first, second = SIGNALS[:2]
-    assert np.allclose(np.exp(1j * hanging[0]) * 1j, np.exp(1j * first), atol=1e-14)
+    assert np.allclose(np.exp(1j * hanging.theta[0]) * 1j, np.exp(1j * first), atol=1e-14)
     assert np.allclose(np.exp(1j * absolute.theta.sum(axis=0)), np.exp(1j * second), atol=1e-14)
     assert absolute.omega is not None
     assert np.allclose(absolute.omega.sum(axis=0), SIGNALS[5], atol=1e-14)
+    assert hanging.reference is not None
+    assert hanging.reference - SIGNALS[6:] == pytest.approx(hanging.theta - SIGNALS[:2])
+    assert absolute.reference is not None
+    assert np.allclose(absolute.reference.sum(axis=0), SIGNALS[7], atol=1e-14)
     assert np.all(converted(passive=1).tau[0] == 0)
     assert np.all(converted(passive=1, base=True).tau == SIGNALS[3])
 
@@ -190,11 +196,15 @@ def test_a_file_is_not_believed_how_many_samples_it_holds() -> None:
     sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8),
     expected=st.integers(0, 60),
     velocity=st.booleans(),
+    reference=st.booleans(),
 )
-def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, velocity: bool) -> None:
+def test_a_gatherer_keeps_what_was_put_in(
+    sizes: list[int], expected: int, velocity: bool, reference: bool
+) -> None:
     """Whatever number of samples was expected, also none."""
-    gatherer, total = Gatherer(expected, velocity=velocity), sum(sizes)
-    signals = np.random.default_rng(total).normal(size=(3, 2, total))
+    gatherer = Gatherer(expected, velocity=velocity, reference=reference)
+    total = sum(sizes)
+    signals = np.random.default_rng(total).normal(size=(4, 2, total))
     done = 0
     for size in sizes:
         room, rows = gatherer.more(size), slice(done, done + size)
@@ -204,6 +214,8 @@ def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, veloc
         )
         if room.omega is not None:
             room.omega[:] = signals[2, :, rows]
+        if room.reference is not None:
+            room.reference[:] = signals[3, :, rows]
         done += size
         assert len(gatherer) == done
     found = gatherer.filled()
@@ -212,6 +224,8 @@ def test_a_gatherer_keeps_what_was_put_in(sizes: list[int], expected: int, veloc
     assert np.array_equal(found.tau, signals[1])
     assert (found.omega is not None) == velocity
     assert found.omega is None or np.array_equal(found.omega, signals[2])
+    assert (found.reference is not None) == reference
+    assert found.reference is None or np.array_equal(found.reference, signals[3])
 
 
 @settings(max_examples=40, deadline=None)

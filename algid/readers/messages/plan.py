@@ -16,18 +16,21 @@ from algid.readers.messages.columnar import MisfitError, Shape
 from algid.readers.messages.source import Source, channels_of, kinds, listed
 from algid.readers.messages.topic import (
     DYNAMIC_JOINT_STATE,
+    JOINT_REFERENCES,
     JOINT_STATE,
+    TRAJECTORY_STATE,
     Fields,
     Topic,
     joint_fields,
     joint_names,
     names_in,
     other_positions,
+    reference_fields,
     repeated_name,
     stamp_paths,
 )
 from algid.readers.names import CURRENTS, choose, take_apart
-from algid.readers.table import JOINT_CHANNELS, VELOCITIES
+from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -81,7 +84,7 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     read, needed = _channels(profile)
     places = {name: profile.place(name) for name in read} if profile else {}
     named = {name: (topic, source) for name, (topic, source) in places.items() if source}
-    usual = _usual_topic(source, profile) if len(named) < len(needed) else None
+    usual = _usual_topic(source, profile) if not set(needed) <= named.keys() else None
     sources: dict[str, tuple[str, str]] = {}
     reading = Reading(joints_told="profile")
     notices: tuple[Notice, ...] = ()
@@ -96,6 +99,8 @@ def plan(source: Source, profile: Profile | None) -> Plan:
             reading = Reading(joints=joints, joints_told=told)
             notices = order_notice(usual.joints, joints, told) if usual.named else ()
         notices += _choice_notice(usual)
+    if usual is not None and not set(REFERENCES) & named.keys():
+        sources |= _reference(source, reading.joints) if usual.named and reading.joints else {}
     for channel, (topic, path) in named.items():
         home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
         if home is None:
@@ -105,6 +110,8 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         sources[channel] = (home, path)
     if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
         sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
+    if not all(name in sources for name in REFERENCES):
+        sources = {name: source for name, source in sources.items() if name not in REFERENCES}
     mapping = {channel: f"{topic}: {path}" for channel, (topic, path) in sources.items()}
     homes = list(dict.fromkeys(sources[name][0] for name in sources))
     topics = tuple(_topic(source, home, sources, profile) for home in homes)
@@ -123,8 +130,24 @@ def plan(source: Source, profile: Profile | None) -> Plan:
 def _channels(profile: Profile | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The channels to read, and those of them without which there is no log."""
     if profile is None:
-        return (*JOINT_CHANNELS, *VELOCITIES), JOINT_CHANNELS
+        return CHANNELS, JOINT_CHANNELS
     return profile.channels, profile.needed
+
+
+def _reference(source: Source, joints: tuple[str, str]) -> dict[str, tuple[str, str]]:
+    """By reference channel topic and path of what joints follow, if one topic alone tells it."""
+    found = {}
+    for topic, kind in kinds(source):
+        if kind not in TRAJECTORY_STATE and (topic != JOINT_REFERENCES or kind not in JOINT_STATE):
+            continue
+        try:
+            shape = next(_shapes(source, topic, kind), None)
+        except LogError:  # the log is read without it
+            continue
+        paths = {} if shape is None else reference_fields(shape, joints)
+        if paths:
+            found[topic] = {name: (topic, path) for name, path in paths.items()}
+    return next(iter(found.values())) if len(found) == 1 else {}
 
 
 def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
@@ -272,8 +295,9 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     except LookupError:
         return None
     found = {name: path for name, path in choice.columns.items() if name != "t"}
-    if not all(name in found for name in VELOCITIES):
-        found = {name: path for name, path in found.items() if name not in VELOCITIES}
+    for both in (VELOCITIES, REFERENCES):
+        if not all(name in found and shape.find(found[name]) for name in both):
+            found = {name: path for name, path in found.items() if name not in both}
     if not set(needed) <= found.keys() or not all(shape.find(path) for path in found.values()):
         return None
     currents = {name: "A" for name, path in found.items() if take_apart(path).stem in CURRENTS}

@@ -13,7 +13,7 @@ from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import moving_joints
 from algid.readers.messages.source import Source
 from algid.readers.messages.topic import Fields, Topic
-from algid.readers.table import BLOCK_ROWS, SampleTable
+from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable
 from algid.readers.timebase import aligned, in_order, whole_topic
 
 if TYPE_CHECKING:
@@ -86,9 +86,18 @@ def open_messages(
         samples, others = read(main, rows), wanted.topics[1:]
         if not others:
             return samples
-        series = [
-            whole_topic(name, one.name, one.fields.paths, read(one, BLOCK_ROWS)) for one in others
-        ]
-        return aligned(in_order(name, samples), series)
+        needed, followed, left_out = [], [], []
+        for one in others:
+            paths = one.fields.paths
+            try:
+                series = whole_topic(name, one.name, paths, read(one, BLOCK_ROWS))
+            except LogError as error:
+                if set(paths) - set(REFERENCES):
+                    raise
+                numbers = {"topic": one.name, "why": str(error).removeprefix(f"{name}: ")}
+                left_out.append(Notice("REFERENCE_LEFT_OUT", numbers=numbers, note=True))
+                continue
+            (needed if set(paths) - set(REFERENCES) else followed).append(series)
+        return aligned(in_order(name, samples), needed, followed, left_out)
 
     return reader_of(origin, tables, profile, wanted.units, (*said, *wanted.notices, *beside), rows)

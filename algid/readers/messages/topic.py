@@ -20,10 +20,18 @@ from algid.readers.messages.batch import Account
 from algid.readers.messages.codec import decoder_for
 from algid.readers.messages.columnar import Decoder, ExcessError, Shape
 from algid.readers.messages.source import Source, channels_of
-from algid.readers.table import VELOCITIES, SampleTable, stack
+from algid.readers.table import REFERENCES, VELOCITIES, SampleTable, stack
 
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
 DYNAMIC_JOINT_STATE = ("control_msgs/msg/DynamicJointState", "control_msgs/DynamicJointState")
+TRAJECTORY_STATE = (
+    "control_msgs/msg/JointTrajectoryControllerState",
+    "control_msgs/JointTrajectoryControllerState",
+)
+JOINT_REFERENCES = "/joint_references"
+"""The topic of joint states that algid writes what the joints are to follow to."""
+_REFERENCES = ("reference.positions", "desired.positions", "position")
+"""In the state of a trajectory controller (ROS 2 since Iron, and before), and in joint states."""
 _QUANTITIES = {"theta": "position", "tau": "effort", "omega": "velocity"}
 _STAMPS = ("header.stamp", "stamp", "timestamp", "time", "header.timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "nsecs"))
@@ -91,6 +99,21 @@ def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
     if not all(name in found for name in VELOCITIES):
         found = {name: path for name, path in found.items() if name not in VELOCITIES}
     return found
+
+
+def reference_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
+    """By reference channel the path of its number; none where a message of this shape lacks one.
+
+    In a trajectory controller's state, or in the positions of joints to follow.
+    """
+    names = names_in(shape)
+    if not set(joints) <= set(names):
+        return {}
+    for positions in _REFERENCES:
+        paths = [f"{positions}[{names.index(joint)}]" for joint in joints]
+        if all(shape.find(path) is not None for path in paths):
+            return dict(zip(REFERENCES, paths, strict=True))
+    return {}
 
 
 def _path(shape: Shape, joint: str, quantity: str) -> str | None:

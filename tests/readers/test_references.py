@@ -1,0 +1,198 @@
+"""The angles that a controller was to follow are read from every format, and kept by `convert`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.log import Log, Origin
+from algid.profile import Profile, with_settings
+from algid.readers import read_log
+from algid.ros2 import HEADER
+from algid.writers import FORMATS, write_log
+from tests.readers.mcaps import Cdr, joint_state, write_mcap
+
+T = 0.01 * np.arange(300)
+THETA = np.stack([np.sin(T), np.cos(2 * T)])
+TAU = np.stack([np.cos(T), np.sin(T)])
+REFERENCE = THETA + 0.1
+POINT = """\
+float64[] positions
+float64[] velocities
+float64[] accelerations
+float64[] effort
+builtin_interfaces/Duration time_from_start
+"""
+LINE = 80 * "="
+
+
+def state_definition(field: str) -> bytes:
+    """The controller's state, with what it follows in `field`."""
+    return f"""\
+std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint {field}
+{LINE}
+MSG: trajectory_msgs/JointTrajectoryPoint
+{POINT}{LINE}
+MSG: builtin_interfaces/Duration
+int32 sec
+uint32 nanosec
+{HEADER}""".encode()
+
+
+def controller_state(stamp_ns: int, names: list[str], positions: list[float]) -> bytes:
+    message = Cdr().put("i", stamp_ns // 10**9).put("I", stamp_ns % 10**9).text("")
+    message.put("I", len(names))
+    for name in names:
+        message.text(name)
+    message.list("d", positions)
+    for _ in ("velocities", "accelerations", "effort"):
+        message.put("I", 0)
+    return message.put("i", 0).put("I", 0).done()
+
+
+def table(folder: Path, **columns: FloatArray) -> Path:
+    path = folder / "log.csv"
+    body = np.transpose(list(columns.values()))
+    np.savetxt(path, body, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+    return path
+
+
+def columns(names: str, *signals: FloatArray) -> dict[str, FloatArray]:
+    rows = [row for signal in signals for row in np.atleast_2d(signal)]
+    return dict(zip(names.split(), rows, strict=True))
+
+
+PLAIN = columns("t theta1 theta2 tau1 tau2", T, THETA, TAU)
+
+
+@pytest.mark.parametrize("names", ["q_des1 q_des2", "q_ref1 q_ref2", "target_q_0 target_q_1"])
+def test_columns_are_found_by_their_names(names: str, tmp_path: Path) -> None:
+    found = read_log(table(tmp_path, **PLAIN, **columns(names, REFERENCE)))
+    assert found.reference is not None
+    assert np.array_equal(found.reference, REFERENCE)
+    assert np.array_equal(found.theta, THETA)  # a commanded angle is none
+
+
+def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are(tmp_path: Path) -> None:
+    angles = np.degrees([THETA[0], THETA.sum(axis=0)])
+    asked = np.degrees([REFERENCE[0], REFERENCE.sum(axis=0)])
+    path = table(tmp_path, **columns("t q1 q2 tau1 tau2 one two", T, angles, TAU, asked))
+    unit = {"unit": "deg"}
+    settings = {
+        "theta1": unit,
+        "theta2": unit,
+        "q_des1": {"source": "one"},
+        "q_des2": {"source": "two"},
+        "second_angle": "absolute",
+        "zero": "hanging",
+    }
+    found = read_log(path, with_settings(Profile(), settings))
+    assert found.reference is not None
+    assert found.reference == pytest.approx(REFERENCE - np.array([[math.pi / 2], [0.0]]))
+    in_radians = {**settings, "q_des1": {"source": "one", "unit": "rad"}}
+    read = read_log(path, with_settings(Profile(), in_radians)).reference
+    assert read is not None
+    assert read[0] == pytest.approx(asked[0] - math.pi / 2)
+
+
+def test_the_desired_angle_of_a_pd_law_is_one(tmp_path: Path) -> None:
+    path = table(tmp_path, **columns("t q1 q2 go1 go2", T, THETA, REFERENCE))
+    laws = {f"tau{joint}": {"q_des": f"go{joint}", "kp": 2.0} for joint in (1, 2)}
+    found = read_log(path, with_settings(Profile(), laws))
+    assert found.reference is not None
+    assert found.reference == pytest.approx(REFERENCE)
+    assert found.tau == pytest.approx(2 * (REFERENCE - THETA))
+
+
+def test_samples_may_lack_one(tmp_path: Path) -> None:
+    holed = REFERENCE.copy()
+    holed[:, :50] = np.nan
+    found = read_log(table(tmp_path, **PLAIN, **columns("q_des1 q_des2", holed)))
+    assert len(found) == len(T)
+    assert found.reference is not None
+    assert np.array_equal(found.reference, holed, equal_nan=True)
+    assert not any(notice.lossy for notice in found.notices)
+
+
+def test_one_joint_or_seven_are_no_reference(tmp_path: Path) -> None:
+    one = table(tmp_path, **PLAIN, **columns("q_des1", REFERENCE[0]))
+    assert read_log(one).reference is None
+    names = " ".join(f"q_des{joint}" for joint in range(1, 8))
+    seven = table(tmp_path, **PLAIN, **columns(names, np.tile(T, (7, 1))))
+    assert read_log(seven).reference is None
+
+
+def test_one_that_wraps_follows_its_angle(tmp_path: Path) -> None:
+    turning = np.stack([3 * T, THETA[1]])
+    wrapped = [np.mod(turning[0] + part, 2 * np.pi) for part in (0.0, 0.1)]
+    made = columns("t theta1 theta2 tau1 tau2", T, wrapped[0], THETA[1], TAU)
+    path = table(tmp_path, **made, **columns("q_des1 q_des2", wrapped[1], REFERENCE[1]))
+    found = read_log(path, with_settings(Profile(), {"theta1": {"unwrap": True}}))
+    assert found.reference is not None
+    assert found.reference[0] == pytest.approx(turning[0] + 0.1)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("velocity", [False, True])
+def test_writers_keep_it_to_the_last_bit(kind: str, velocity: bool, tmp_path: Path) -> None:
+    stamps = (1_700_000_000 * 10**9 + np.arange(300) * 10_000_000).astype(np.int64)
+    omega = TAU if velocity else None
+    log = Log(stamps, THETA, TAU, Origin("", "", {}), omega, reference=REFERENCE)
+    path = tmp_path / f"log.{kind}"
+    write_log(path, iter([log.part(0, 100), log.part(100, 300)]))
+    found = read_log(path)
+    assert found.reference is not None
+    assert np.array_equal(found.reference, REFERENCE)
+    assert np.array_equal(found.theta, THETA)
+    assert (found.omega is not None) == velocity
+    assert found.notices == ()
+
+
+@pytest.mark.parametrize("field", ["reference", "desired"])
+def test_a_trajectory_controller_tells_it(field: str, tmp_path: Path) -> None:
+    """At a rate of its own and for a part of the log; joints in another order; nothing is lost."""
+    messages = []
+    for step, t in enumerate(T):
+        stamp = 10**9 + step * 10_000_000
+        state = joint_state(stamp, ["hip", "knee"], THETA[:, step], (), TAU[:, step])
+        messages.append(("/joint_states", stamp, state.done()))
+        if step % 4 == 0 and 40 <= step <= 200:
+            asked = [float(REFERENCE[1, step]), t, float(REFERENCE[0, step])]
+            data = controller_state(stamp, ["knee", "wrist", "hip"], asked)
+            messages.append(("/arm_controller/state", stamp, data))
+    kind = "control_msgs/msg/JointTrajectoryControllerState"
+    schemas = {"/arm_controller/state": (kind, "ros2msg", state_definition(field))}
+    write_mcap(tmp_path / "log.mcap", messages, schemas)
+    found = read_log(tmp_path / "log.mcap")
+    assert len(found) == len(T)
+    assert found.reference is not None
+    inside = slice(40, 201)
+    # linear interpolation over 40 ms of cos 2t: at most 4 × 0.04² / 8
+    assert np.abs(found.reference[:, inside] - REFERENCE[:, inside]).max() < 8.1e-4
+    assert np.all(np.isnan(found.reference[:, :40]))
+    assert np.all(np.isnan(found.reference[:, 201:]))
+    assert not any(notice.lossy for notice in found.notices)
+    assert found.origin.mapping["q_des1"] == f"/arm_controller/state: {field}.positions[2]"
+
+
+def test_one_that_cannot_be_read_leaves_the_log(tmp_path: Path) -> None:
+    messages = []
+    for step in range(len(T)):
+        stamp = 10**9 + step * 10_000_000
+        state = joint_state(stamp, ["hip", "knee"], THETA[:, step], (), TAU[:, step])
+        messages.append(("/joint_states", stamp, state.done()))
+        back = stamp - (10**9 if step > 150 else 0)  # its clock is set back
+        data = controller_state(back, ["hip", "knee"], REFERENCE[:, step].tolist())
+        messages.append(("/state", stamp, data))
+    kind = "control_msgs/msg/JointTrajectoryControllerState"
+    schemas = {"/state": (kind, "ros2msg", state_definition("reference"))}
+    write_mcap(tmp_path / "log.mcap", messages, schemas)
+    found = read_log(tmp_path / "log.mcap")
+    assert found.reference is None
+    assert [notice.code for notice in found.notices] == ["REFERENCE_LEFT_OUT"]
