@@ -12,6 +12,7 @@ import numpy as np
 from algid.estimators.rollout import HORIZONS, RolloutScore
 from algid.identification.validate import Simulation
 from algid.report.document import Column, Table
+from algid.report.tables import by_state
 from algid.results import TorquePrediction
 from algid.text import ABSENT, file_name, significant, visible
 
@@ -97,6 +98,8 @@ class Validated:
             for joint, figures in enumerate(zip(one.rmse, one.nrmse, one.r2, strict=True), start=1):
                 rows.append((called[name], str(joint), *(significant(f, 4) for f in figures)))
         note = "" if self.total is None else f"Filter: {self.total.filter}."
+        if self.total is not None and (states := by_state(self.total)):
+            note += f" RMSE of all logs: {states}."
         return _table(
             "Torque prediction", ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²"), rows, note
         )

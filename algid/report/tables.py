@@ -13,7 +13,14 @@ from algid.model import PARAMETERS
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.phasors import moments
 from algid.report.series import TorqueLog
-from algid.results import Estimate, FitSummary, LogSummary, Result, Table4Row
+from algid.results import (
+    Estimate,
+    FitSummary,
+    LogSummary,
+    Result,
+    Table4Row,
+    TorquePrediction,
+)
 from algid.results.verdict import replaced_estimator
 from algid.text import (
     ABSENT,
@@ -448,4 +455,34 @@ def _prediction(fit: FitSummary | None) -> Table:
         for joint in range(2)
     )
     filters = dict.fromkeys(visible(found.filter) for _, found in pairs if found is not None)
-    return Table("Torque prediction", PREDICTION_COLUMNS, rows, f"Filter: {'; '.join(filters)}.")
+    states = [
+        f"{where}: {text}"
+        for where, found in pairs
+        if found is not None and (text := by_state(found))
+    ]
+    note = " ".join([f"Filter: {'; '.join(filters)}.", *(f"RMSE of {one}." for one in states)])
+    return Table("Torque prediction", PREDICTION_COLUMNS, rows, note)
+
+
+_STATES = (
+    ("rmse_moving", "moving"),
+    ("rmse_rest", "at rest"),
+    ("rmse_held", "at rest beyond ± f of dry friction"),
+)
+
+
+def by_state(found: TorquePrediction) -> str:
+    """The RMSE of joints that move and of joints that stand, in words; empty where none stands."""
+    if found.rmse_rest is None or found.rmse_rest == (None, None):
+        return ""
+    parts = []
+    for joint in range(2):
+        pairs = [(getattr(found, name), words) for name, words in _STATES]
+        known = [
+            f"{significant(pair[joint], 3)} {words}"
+            for pair, words in pairs
+            if pair is not None and pair[joint] is not None
+        ]
+        if known:
+            parts.append(f"joint {joint + 1} {', '.join(known)}")
+    return f"{'; '.join(parts)} (N m)" if parts else ""

@@ -14,6 +14,7 @@ from algid.report.document import Table
 from algid.report.markdown import escaped, markdown
 from algid.report.page import FIRST, TOLD_ELSEWHERE, page_html, result_document, write_report
 from algid.report.tables import (
+    by_state,
     estimate_tables,
     flat_settings,
     log_tables,
@@ -138,6 +139,27 @@ def test_cross_validation_stands_beside_the_residual_in_every_format(
     assert expected in from_terminal(terminal(changed), "Torque prediction")
     assert expected in from_markdown(markdown(result_document(changed)))
     assert expected in from_html(page_html(case_folder, changed))
+
+
+def test_rmse_moving_and_at_rest_stands_under_the_table(result: Result) -> None:
+    found = TorquePrediction(
+        rmse=(0.25, 0.125),
+        nrmse=(0.5, 0.0625),
+        r2=(0.75, 0.996),
+        filter="3 Hz",
+        rmse_moving=(0.5, 0.125),
+        rmse_rest=(0.0625, None),
+        rmse_held=(0.015, None),
+    )
+    words = "joint 1 0.500 moving, 0.0625 at rest, 0.0150 at rest beyond ± f of dry friction"
+    assert by_state(found) == f"{words}; joint 2 0.125 moving (N m)"
+    assert not by_state(found.model_copy(update={"rmse_rest": (None, None)}))
+    assert not by_state(found.model_copy(update={"rmse_rest": None}))
+    assert result.fit is not None
+    changed = result.model_copy(
+        update={"fit": result.fit.model_copy(update={"cross_validation": found})}
+    )
+    assert f"RMSE of each log by the others: {words}" in " ".join(terminal(changed).split())
 
 
 def test_the_error_belongs_to_the_estimate_beside_it(result: Result) -> None:
