@@ -29,6 +29,7 @@ from algid.estimators.selection import (
 )
 from algid.estimators.shrinkage import SCALES, joined
 from algid.estimators.too_short import TooShortError
+from algid.estimators.window_scatter import scattered
 from algid.identification.known import model_of
 from algid.identification.predicted import prediction
 from algid.identification.series import torque_coefficients, torque_shift
@@ -241,8 +242,10 @@ def _shrunk(
     shaped = replace(ours, model=chosen.shapes or chosen.model, hold=hold)
     every = replace(shaped.model, terms=tuple(term for term in TERMS if term in SCALES))
     nothing = absent(settings.effort, every.names)
-    fit = shrunk.fit(unloaded, loaded, shaped, settings.lengths, without(prior, nothing))
-    fit = exogeneity.settled(fit, unloaded, loaded, shaped)
+    known = without(prior, nothing)
+    least = shrunk.fit(unloaded, loaded, shaped, settings.lengths, known)
+    fit = exogeneity.settled(least, unloaded, loaded, shaped)
+    fit = scattered(fit, least, unloaded, loaded, shaped, settings.lengths, known)
     fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True), *fit.notes))
     terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
     trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)

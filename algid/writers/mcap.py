@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,9 @@ def references(block: Log) -> NDArray[np.void]:
     return _filled(block, {"position": block.reference})
 
 
-def _filled(block: Log, signals: Mapping[str, NDArray[np.float64] | None]) -> NDArray[np.void]:
+def _filled(
+    block: Log, signals: Mapping[str, NDArray[np.floating[Any]] | None]
+) -> NDArray[np.void]:
     known = {name: values for name, values in signals.items() if values is not None}
     rows = np.zeros(len(block), _layout("velocity" in known, "effort" in known))
     rows["encapsulation"] = (0, 1, 0, 0)

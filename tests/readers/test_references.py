@@ -160,7 +160,9 @@ def test_a_trajectory_controller_tells_it(field: str, tmp_path: Path) -> None:
     messages = []
     for step, t in enumerate(T):
         stamp = 10**9 + step * 10_000_000
-        state = joint_state(stamp, ["hip", "knee"], THETA[:, step], (), TAU[:, step])
+        state = joint_state(
+            stamp, ["hip", "knee"], THETA[:, step].tolist(), (), TAU[:, step].tolist()
+        )
         messages.append(("/joint_states", stamp, state.done()))
         if step % 4 == 0 and 40 <= step <= 200:
             asked = [float(REFERENCE[1, step]), t, float(REFERENCE[0, step])]
@@ -185,7 +187,9 @@ def test_one_that_cannot_be_read_leaves_the_log(tmp_path: Path) -> None:
     messages = []
     for step in range(len(T)):
         stamp = 10**9 + step * 10_000_000
-        state = joint_state(stamp, ["hip", "knee"], THETA[:, step], (), TAU[:, step])
+        state = joint_state(
+            stamp, ["hip", "knee"], THETA[:, step].tolist(), (), TAU[:, step].tolist()
+        )
         messages.append(("/joint_states", stamp, state.done()))
         back = stamp - (10**9 if step > 150 else 0)  # its clock is set back
         data = controller_state(back, ["hip", "knee"], REFERENCE[:, step].tolist())

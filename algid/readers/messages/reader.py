@@ -14,7 +14,7 @@ from algid.readers.joints import moving_joints
 from algid.readers.messages.source import Source
 from algid.readers.messages.topic import Fields, Topic
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable
-from algid.readers.timebase import aligned, in_order, whole_topic
+from algid.readers.timebase import Series, aligned, in_order, whole_topic
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -86,7 +86,9 @@ def open_messages(
         samples, others = read(main, rows), wanted.topics[1:]
         if not others:
             return samples
-        needed, followed, left_out = [], [], []
+        needed: list[Series] = []
+        followed: list[Series] = []
+        left_out: list[Notice] = []
         for one in others:
             paths = one.fields.paths
             try:
