@@ -43,7 +43,6 @@ _UNITS = {
     "theta": f'# unit = "deg"  # {_ANGLES}\n{_ENCODER}# unwrap = true  # where it jumps by a '
     "turn\n",
     "omega": f'# unit = "deg"  # {_VELOCITIES}; angles a second\n{_ENCODER}',
-    "q_des": f'# unit = "deg"  # {_ANGLES}; as the angle, where nothing is said\n',
     "tau": f'# unit = "N m"  # {_TORQUES}\n'
     "# torque_constant = 0.1  # N m/A at the motor, of a current\n"
     "# gear_ratio = 1.0  # turns of the motor in one of the joint\n"
@@ -52,6 +51,7 @@ _UNITS = {
     "# kp = 50.0  # N m/rad\n"
     "# kd = 2.0  # N m s/rad\n",
 }
+_UNITS["q_des"] = _UNITS["theta"]
 _ON_TOPICS = tuple(form.name for form in FORMATS if form.messages)
 
 

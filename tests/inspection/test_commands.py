@@ -220,7 +220,7 @@ def test_a_new_profile_writes_all_that_can_be_set(kind: str, tmp_path: Path) -> 
     head, *tables = re.split(r"^\[", text, flags=re.MULTILINE)
     assert keys(Profile) - set(re.findall(r"^(?:# )?(\w+) = ", head, re.MULTILINE)) == set()
     for table in tables:
-        models: dict[str, type[BaseModel]] = {"theta": Angle, "omega": Velocity}
+        models: dict[str, type[BaseModel]] = {"theta": Angle, "q_des": Angle, "omega": Velocity}
         model = models.get(table[:5], Torque)
         assert keys(model) - set(re.findall(r"^(?:# )?(\w+) = ", table, re.MULTILINE)) == set()
     plain = re.sub(r"^# (?=\w+ = )", "", text, flags=re.MULTILINE)

@@ -22,6 +22,7 @@ from algid.inspection.dynamics import DynamicFigures, dynamic_figures, gravity_f
 from algid.log import Log, Origin, Reading
 from algid.profile import load_profile
 from algid.readers import read_log
+from algid.readers.table import CHANNELS
 from tests.inspection.test_checks import moving_log
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
@@ -448,9 +449,7 @@ def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
 ) -> None:
     (tmp_path / "arm.csv").write_text("when,angle \u200ba,angle b\n0,1,2\n1,2,3\n")
     text = draft_profile(tmp_path / "arm.csv")
-    assert tomllib.loads(text) == {
-        name: {} for name in ("theta1", "theta2", "tau1", "tau2", "omega1", "omega2")
-    }
+    assert tomllib.loads(text) == {name: {} for name in CHANNELS}
     assert text.splitlines()[13].startswith("# ")
     assert str(tmp_path / "arm.csv") in text
     assert "# in the log: angle \ufffda (Int64)" in text
