@@ -201,7 +201,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--verbose", action="store_true")
     wanted = parser.parse_args(arguments)
     print(
-        "| motion | torque | taken as held | not told | of | coverage, % | over bound "
+        "| motion | torque | taken as held | not told or refuted | of | coverage, % | over bound "
         "| false terms |"
     )
     print("|---|---|---|---|---|---|---|---|")
