@@ -111,8 +111,7 @@ def batch(sound: Path, first: int, count: int) -> None:
         os.chdir(place)
         algid.cli.app.called = called_once()  # type: ignore[assignment]
         resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-        for number in (signal.SIGPROF, signal.SIGALRM):
-            signal.signal(number, _stop)
+        signal.signal(signal.SIGPROF, _stop)
         os.environ["ALGID_TRACEBACK"] = "1"  # a finding is told with its place
         for seed in range(first, first + count):
             shutil.rmtree("out", ignore_errors=True)
@@ -124,8 +123,28 @@ def batch(sound: Path, first: int, count: int) -> None:
 
 
 def _stop(_number: int, _frame: FrameType | None) -> NoReturn:
+    signal.signal(signal.SIGALRM, _stop)
     signal.alarm(5)  # again, should a library hold it back
     raise SystemExit(142)
+
+
+_seen: dict[str, float] = {}
+"""Under "used" the seconds of a processor at the last look."""
+_LOOK, _LEAST = 120, 0.5
+"""Seconds between two looks, and of a processor between them: a call that had fewer only waits."""
+
+
+def _look(_number: int, _frame: FrameType | None) -> None:
+    """Stop a call that has waited since the last look.
+
+    One that computes is stopped by the seconds it has had of a processor, however few a busy
+    machine gives it.
+    """
+    used = time.process_time()
+    if used - _seen.get("used", 0.0) < _LEAST:
+        _stop(_number, _frame)
+    _seen["used"] = used
+    signal.alarm(_LOOK)
 
 
 def outcome(call: Call, outer: Path) -> tuple[str, str, float]:
@@ -136,7 +155,9 @@ def outcome(call: Call, outer: Path) -> tuple[str, str, float]:
     before, own = _listing(outer), {path.name for path in Path().iterdir()}
     start = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
-    signal.alarm(6 * int(SECONDS))  # a busy machine is no hang; what only waits is one
+    _seen["used"] = start
+    signal.signal(signal.SIGALRM, _look)
+    signal.alarm(_LOOK)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         try:

@@ -414,6 +414,8 @@ SLOW_SIGNALS = (signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGQUIT, 
 def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
     sent: signal.Signals, code: int, logs: Path, tmp_path: Path
 ) -> None:
+    if signal.getsignal(sent) == signal.SIG_IGN:  # as by nohup, and children inherit it
+        pytest.skip(f"{sent.name} is ignored here")
     long = pl.concat([pl.read_csv(logs / "case1-unloaded.csv")] * 400)
     long = long.with_columns(t=pl.int_range(pl.len()) * 1e-3)
     long.write_csv(tmp_path / "long.csv")
