@@ -312,6 +312,7 @@ OWN = [
         ("--scheduler", "tcp://h:1", "--workers", "2"),
         "--scheduler: workers and their memory are the cluster's; set them where it is started",
     ),
+    ("batch", ("-o", ""), "-o: expected a folder or a URL, found none; name where results go"),
     ("identify", ("--name", ""), NAME),
     *(("identify", ("--name", text), PLAIN.format(text)) for text in ("../../evil", "..")),
     (
