@@ -5,5 +5,6 @@ conventions: setup ## every wrong convention of a log, on five arms, with and wi
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.advice -o build/conventions
 
 .PHONY: false-alarms
+LOGS ?= 300
 false-alarms: setup ## sound logs of 300 simulated arms: how many bring a warning, and which
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.false_alarms
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.false_alarms --logs $(LOGS)
