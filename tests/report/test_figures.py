@@ -528,6 +528,11 @@ def test_a_series_is_framed_by_what_is_known_of_it(result: Result, tmp_path: Pat
     words = [entry.words for entry in drawn(convergence(path, made)).legend]
     assert "result and its 95 % interval" in words
     assert "truth" in words
+    plain = made.model_copy(
+        update={"parameters": {"k1": found.model_copy(update={"ci95": None, "std": None})}}
+    )
+    words = [entry.words for entry in drawn(convergence(path, plain)).legend]
+    assert "result" in words
     bare = _parquet(tmp_path / "bare.parquet", t=t)
     assert isinstance(convergence(bare, made), Missing)
 

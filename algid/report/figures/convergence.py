@@ -185,8 +185,10 @@ def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...
             Legend("middle", "the paper's estimate, running median", "@blue"),
             Legend("series", "its extremes", "@blue/0.3"),
         ]
-    if any(target.found is not None for target in targets.values()):
-        entries.append(Legend("", "result and its 95 % interval", "@green"))
+    results = [target.found for target in targets.values() if target.found is not None]
+    if results:
+        spread = " and its 95 % interval" if any(found.ci95 for found in results) else ""
+        entries.append(Legend("", f"result{spread}", "@green"))
     if any(target.truth is not None for target in targets.values()):
         entries.append(Legend("", "truth", "@ink", "dash"))
     if _epsilons(read):
