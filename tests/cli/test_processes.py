@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import Outcome
+from tests.processes import FRESH, Outcome
 
 
 @pytest.mark.parametrize(
@@ -17,8 +17,9 @@ from tests.processes import Outcome
     [(["--version"], 0), (["inspect", "nowhere.csv"], 2), (["inspect", "--no-such-flag"], 2)],
 )
 def test_a_fork_prints_and_returns_what_a_fresh_process_does(
-    arguments: list[str], code: int, tmp_path: Path
+    arguments: list[str], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.delenv(FRESH, raising=False)  # it is the fork that is tried
     env = {**os.environ, "COLUMNS": "90"}
     program = Path(sys.executable).with_name("algid")
     fresh = subprocess.run(
