@@ -184,9 +184,9 @@ class Grams:
         rows = np.append(self._places(loaded), self.size)
         return rows[:, None], rows
 
-    def _columns(self, terms: Iterable[str]) -> IntArray:
-        """Places in p of eq. (1) and of `terms`."""
-        names = {name for term in terms for name in term_names(term)}
+    def _columns(self, terms: Iterable[str], *others: str) -> IntArray:
+        """Places in p of eq. (1), of `terms`, and of `others` by name."""
+        names = {name for term in terms for name in term_names(term)}.union(others)
         names |= {name for term in ALWAYS for name in term.names}
         return np.array(self._named(names))
 
@@ -246,7 +246,7 @@ class Grams:
 
         Its deviation is the larger of those by white noise and by the sandwich.
         """
-        columns = self._columns((*without_delay(terms), CHANGE))
+        columns = self._columns(without_delay(terms), CHANGE)
         value, covariances, _ = self._spread(columns)
         own = np.flatnonzero(columns == self.names.index(CHANGE))
         variance = max(float(covariance[own[0], own[0]]) for covariance in covariances)

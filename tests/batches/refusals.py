@@ -86,7 +86,7 @@ def _tables(folder: Path, log: Log) -> dict[str, str]:
         ),
         "text": (lambda t: t.with_columns(theta2=pl.lit("abc")), "."),
         "lists": (lambda t: t.with_columns(theta2=pl.concat_list("theta2", "theta1")), "."),
-        "still": (lambda t: t.with_columns(t=pl.lit(0.5)), "increasing stamps|stand"),
+        "still": (lambda t: t.with_columns(t=pl.lit(0.5)), "increasing stamps|stand|starts again"),
         "backwards": (
             lambda t: t.with_columns(t=-pl.col("t").cast(pl.Float64)),
             "increasing stamps|back",

@@ -382,7 +382,8 @@ def test_validate_predicts_another_log(tmp_path: Path) -> None:
     folder = tmp_path / "case1-unloaded.algid"
     good = Outcome("validate", folder, logs[1][0], "--loaded", logs[1][1], "--max-nrmse", "0.3")
     assert good.code == 0, good.err + good.out
-    assert [line.split()[2] for line in good.out.splitlines() if "all logs" in line] == ["1", "2"]
+    lines = [line.split() for line in good.out.splitlines() if line.startswith("all logs")]
+    assert [words[2] for words in lines] == ["1", "2"]
     assert "Filter: zero-phase Butterworth" in good.out
     assert Outcome("validate", folder, logs[1][0], "--max-nrmse", "1e-9").code == 1
 
