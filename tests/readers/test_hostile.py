@@ -289,12 +289,11 @@ def read_alone(*paths: Path) -> list[str]:
 
 
 KEYS: list[dict[str, Any]] = [
-    *(
-        {"column_keys": {"k": ["theta1"]}},
-        {"column_keys": {"k": ["note"]}},
-        {"uniform_encryption": True},
-    ),
+    {"column_keys": {"k": ["theta1"]}},
+    {"column_keys": {"k": ["note"]}},
 ]
+if hasattr(encryption.EncryptionConfiguration, "uniform_encryption"):  # not in older pyarrow
+    KEYS.append({"uniform_encryption": True})
 
 
 def test_encrypted_parquet_is_refused_and_ends_no_process(tmp_path: Path) -> None:
@@ -382,8 +381,10 @@ def test_statistics_that_contradict_their_column_do_not_end_the_process(tmp_path
     content = path.read_bytes()
     start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
     # SizeStatistics (field 16): a histogram of two repetition levels where a flat column has none
-    footer = content[start:-8].replace(b"<)\x06\x19&", b"<)&\x00\x00\x19&")
-    assert len(footer) > len(content[start:-8])
+    levels = b"<)\x06\x19&"
+    if levels not in content[start:-8]:
+        pytest.skip("this pyarrow writes no SizeStatistics")
+    footer = content[start:-8].replace(levels, b"<)&\x00\x00\x19&")
     path.write_bytes(content[:start] + footer + len(footer).to_bytes(4, "little") + b"PAR1")
     (told,) = read_alone(path)
     assert told == "2000" or told.startswith("LogError")
