@@ -38,8 +38,8 @@ test-processor: setup
 	  OPENBLAS_CORETYPE=$$kernel NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
 	  $(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth \
 	    $(addprefix tests/tracks/test_, track.py cells.py change_points.py) \
-	    $(addprefix tests/identification/test_, identify.py known.py outcome.py passive.py series.py streaming.py \
-	      torque_scale.py validate.py velocities.py) || exit; \
+	    $(addprefix tests/identification/test_, identify.py known.py outcome.py series.py streaming.py \
+	      validate.py velocities.py) || exit; \
 	done
 
 check: lint test
