@@ -33,7 +33,7 @@ test-slow: setup
 # Sums in another order, as other processors take them: two of OpenBLAS's kernels that are not the default here, and
 # NumPy without AVX2 and AVX-512.
 test-processor: setup
-	@for kernel in $$($(BIN)/python -m pipelines.kernels); do \
+	@for kernel in $${KERNELS:-$$($(BIN)/python -m pipelines.kernels)}; do \
 	  echo "== OpenBLAS's kernels for $$kernel"; \
 	  OPENBLAS_CORETYPE=$$kernel NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
 	  $(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth \
