@@ -20,41 +20,6 @@ from typing import Any
 from algid.text import joined
 from algid.words import counted
 
-OWN_FLAGS = (
-    *(
-        "zero",
-        "second_angle",
-        "drive",
-        "effort",
-        "passive",
-        "joints",
-        "angle_unit",
-        "torque_unit",
-        "topic",
-        "rate",
-        "columns",
-        "torque_hold",
-        "clock",
-        "start",
-    ),
-    *(
-        "end",
-        "segment",
-        "torque_file",
-        "accept",
-        "gravity",
-        "estimator",
-        "model",
-        "delay",
-        "l1",
-        "l2",
-        "range",
-        "speed",
-        "torque",
-        "runs",
-    ),
-)
-"""Settings with a flag of their own; any other is one of a profile, behind ``--set``."""
 NO_PROFILE = (
     "estimator",
     "model",
@@ -67,7 +32,29 @@ NO_PROFILE = (
     "torque",
     "runs",
 )
-"""Settings that no profile has."""
+"""Settings with a flag of their own that no profile has."""
+OWN_FLAGS = (
+    "zero",
+    "second_angle",
+    "drive",
+    "effort",
+    "passive",
+    "joints",
+    "angle_unit",
+    "torque_unit",
+    "topic",
+    "rate",
+    "columns",
+    "clock",
+    "start",
+    "end",
+    "segment",
+    "torque_file",
+    "accept",
+    "gravity",
+    *NO_PROFILE,
+)
+"""Settings with a flag of their own; any other is one of a profile, behind ``--set``."""
 UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [tau2]"}
 OPEN = {
     "l1": "M",

@@ -21,14 +21,16 @@ PAGES = ("lab", "campaign")
 FENCE = re.compile(r"^```(sh|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def run(command: str, folder: Path) -> str:
-    """What bash prints for a block, standard error last; a failure stops it."""
+def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a block as a person would type it: bash, the environment activated, stop at the first
+    failure.
+    """
     environment = {
         **os.environ,
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
         "COLUMNS": "80",
     }
-    done = subprocess.run(
+    return subprocess.run(
         ["bash", "-e", "-u", "-c", command],
         cwd=folder,
         env=environment,
@@ -36,6 +38,17 @@ def run(command: str, folder: Path) -> str:
         text=True,
         check=False,
     )
+
+
+def output(command: str, folder: Path) -> str:
+    """What bash prints for a block, standard error last.
+
+    Raises
+    ------
+    RuntimeError
+        If a command of it fails.
+    """
+    done = run(command, folder)
     if done.returncode:
         raise RuntimeError(f"{command}{done.stdout}{done.stderr}")
     return done.stdout + done.stderr
@@ -45,14 +58,14 @@ def typed(text: str, folder: Path) -> str:
     """The page with what its commands print in `folder`."""
     printed = ""
 
-    def block(found: re.Match[str]) -> str:
+    def block(fence: re.Match[str]) -> str:
         nonlocal printed
-        kind, inside = found[1], found[2]
+        kind, inside = fence[1], fence[2]
         if kind == "sh":
-            printed = run(inside, folder)
-            return found[0]
+            printed = output(inside, folder)
+            return fence[0]
         if inside.startswith("…\n"):  # lines that were chosen by hand
-            return found[0]
+            return fence[0]
         lines = [line.rstrip() for line in printed.strip("\n").splitlines()]
         return "```text\n" + "".join(f"{line}\n" for line in lines) + "```"
 

@@ -13,8 +13,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +20,7 @@ import pytest
 
 import algid
 from pipelines.docs import pages
+from pipelines.typed import run
 
 ROOT = Path(__file__).parents[1]
 PAGES = {"README": ROOT / "README.md"} | {
@@ -45,25 +44,6 @@ def blocks(text: str) -> list[Block]:
     """Every fence of a page, in order."""
     found = re.finditer(r"^```([^\n]*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     return [Block(one[1].strip(), one[2], text.count("\n", 0, one.start()) + 1) for one in found]
-
-
-def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a block as a person would type it: bash, the environment activated, stop at the first
-    failure.
-    """
-    environment = {
-        **os.environ,
-        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-        "COLUMNS": "80",
-    }
-    return subprocess.run(
-        ["bash", "-e", "-u", "-c", command],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def mismatch(shown: str, printed: str) -> str | None:

@@ -183,11 +183,7 @@ def select(
     ValueError
         If no log is long enough for a window.
     """
-    logs = [
-        Training.of(source, kind)
-        for kind, sources in ((False, unloaded), (True, loaded))
-        for source in sources[:: max(1, -(-len(sources) // MOST_LOGS))]
-    ]
+    logs = _training(unloaded, loaded)
     if not all(log.driven for log in logs):
         candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
     # At the constants, and at the shapes of friction, that a model of the most common terms gives.
@@ -245,12 +241,17 @@ def lateness(
     TooShortError
         If no log is long enough for a window.
     """
-    logs = [
-        Training.of(source, kind)
-        for kind, sources in ((False, unloaded), (True, loaded))
-        for source in sources[:: max(1, -(-len(sources) // MOST_LOGS))]
-    ]
+    logs = _training(unloaded, loaded)
     return Grams(logs, settings, {False: {}, True: {}}).lateness(settings.model.terms)
+
+
+def _training(unloaded: Sequence[Source], loaded: Sequence[Source]) -> list[Training]:
+    """Some logs of each kind, at most `MOST_LOGS` and evenly spread, ready for the choice."""
+    logs = []
+    for is_loaded, sources in ((False, unloaded), (True, loaded)):
+        step = max(1, -(-len(sources) // MOST_LOGS))  # rounded up
+        logs += [Training.of(source, is_loaded) for source in sources[::step]]
+    return logs
 
 
 def _lowest(x: FloatArray, y: Sequence[float]) -> float:
