@@ -9,7 +9,6 @@ import sqlite3
 import struct
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -525,18 +524,21 @@ def test_a_database_that_asks_for_much_ends_by_a_signal(tmp_path: Path) -> None:
         f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c "
         "LIMIT 3000000",
     )
+    opens = "lambda event, _: event == 'sqlite3.connect' and print(event, flush=True)"
     code = (
-        "import sys; from algid.cli import main; sys.argv = ['algid', 'inspect', sys.argv[1]]; "
-        "main()"
+        f"import sys; sys.addaudithook({opens}); from algid.cli import main; "
+        "sys.argv = ['algid', 'inspect', sys.argv[1]]; main()"
     )
-    process = subprocess.Popen(
+    with subprocess.Popen(
         [sys.executable, "-c", code, str(file)],
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-    )
-    time.sleep(1.5)
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(timeout=20) in (128 + signal.SIGTERM, 2, 3, 0)
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "sqlite3.connect\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=20) == 128 + signal.SIGTERM
 
 
 def test_channels_of_bags_are_listed(tmp_path: Path) -> None:
