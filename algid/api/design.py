@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -210,11 +211,11 @@ def design(
     )
     noise = noise_of(known, position_noise, torque_noise, noise_from)
     campaign = campaign_of(known, asked, noise, wanted, drive, margin, seed)
-    with one_blas_thread():
-        planned = plan(campaign, progress)
     origin = Provenance(source, command, names, known.doubts)
-    if folder is not None:
-        with whole_folder(folder, force) as temporary:
+    with nullcontext() if folder is None else whole_folder(folder, force) as temporary:
+        with one_blas_thread():
+            planned = plan(campaign, progress)
+        if temporary is not None:
             write_design(planned, temporary, origin)
     return Planned(planned, origin)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid.api.options import meaning
 from algid.api.ranges import check
-from algid.files import refuse_existing, whole_folder
+from algid.files import whole_folder
 
 if TYPE_CHECKING:
     from algid.api.options import ProfileLike
@@ -88,14 +89,12 @@ def track(
     check("track", l1=l1, l2=l2)
     said = meaning(profile, options)
     folder = None if out is None else track_folder(_name(log), Path(out))
-    if folder is not None:
-        refuse_existing(folder, force)
     if progress is not None:
         progress("weighing the payload", 0, 0)
     called = {} if command is None else {"command": command}
-    result = track_log(log, parameters, l1=l1, l2=l2, profile=said, settings=called)
-    if folder is not None:
-        with whole_folder(folder, force) as temporary:
+    with nullcontext() if folder is None else whole_folder(folder, force) as temporary:
+        result = track_log(log, parameters, l1=l1, l2=l2, profile=said, settings=called)
+        if temporary is not None:
             write_track(result, temporary, mcap=export)
     return result
 

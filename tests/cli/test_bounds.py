@@ -110,7 +110,9 @@ def test_a_limit_that_none_is_like_is_refused_in_a_file_as_in_a_flag(line: str) 
     )
 
 
-def test_a_name_that_is_too_long_is_called_that() -> None:
+def test_a_name_that_is_too_long_is_called_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before anything is computed: a search of minutes would be lost."""
+    monkeypatch.setattr("algid.designs.campaign.plan", lambda *_: pytest.fail("planned in vain"))
     name = "x" * 300
     long = "cannot write there (File name too long); give a shorter name"
     assert long in refused("synth", "case1", "-o", name, "--duration", "0.1")

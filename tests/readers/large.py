@@ -188,6 +188,13 @@ def write_bag(path: Path, rows: int) -> None:
         stream.write(head(index))
 
 
+CUT = """
+WITH RECURSIVE row(r) AS (SELECT 0 UNION ALL SELECT r + 1 FROM row WHERE r + 1 < :n)
+INSERT INTO messages(topic_id, timestamp, data)
+SELECT 1, (:first + r) * 1000000, substr(:bodies, 1 + r * :size, :size) FROM row
+"""
+
+
 def write_db3(path: Path, rows: int) -> None:
     """A SQLite file as older rosbag2 writes it, without definitions."""
     with closing(sqlite3.connect(path)) as base:
@@ -204,10 +211,8 @@ def write_db3(path: Path, rows: int) -> None:
         base.execute("INSERT INTO topics VALUES (1, ?, ?, 'cdr')", (TOPIC, JOINT_STATE))
         for first, count in _spans(rows):
             bodies = _bodies(first, count, ros1=False)
-            cells = ((1, (first + row) * 1_000_000, bodies[row].tobytes()) for row in range(count))
-            base.executemany(
-                "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", cells
-            )
+            spans = {"first": first, "n": count, "size": bodies.shape[1]}
+            base.execute(CUT, {"bodies": bodies.tobytes(), **spans})
         base.commit()
 
 
