@@ -13,7 +13,7 @@ from algid.designs.belief import Belief
 from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
-from algid.identification.known import contradictions, has_error_bar, model_of
+from algid.identification.known import contradictions, covariance_of, has_error_bar, model_of
 from algid.model import DELAYS, TERMS, Model
 from algid.notices import Notice
 from algid.results import Result, read_result
@@ -221,14 +221,8 @@ def _spread(
     ResultError
         Where a constant has no error bar and no `error` is given.
     """
-    covariance = np.zeros((len(names), len(names)))
     known = [name for name in names if name not in given and has_error_bar(result, name)]
-    if known and result.fit is not None:
-        places = [result.fit.covariance_names.index(name) for name in known]
-        rows = [names.index(name) for name in known]
-        covariance[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
-            np.ix_(places, places)
-        ]
+    covariance = covariance_of(result, names, known)
     bare = [name for name in names if name not in known]
     without = [name for name in bare if name not in given]
     if without and error is None:

@@ -22,6 +22,7 @@ from algid.errors import ResultError, SettingError
 from algid.exports.links import Knowns, Link, links_of, phasor_of, turn_of
 from algid.identification.known import (
     contradictions,
+    covariance_of,
     first_length,
     has_error_bar,
     model_of,
@@ -58,14 +59,8 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
     """
     model = model_of(result)
     c = torque_constants(result, model, "unloaded", file)
-    C: FloatArray = np.zeros((c.size, c.size))  # nothing where the result has no error bar
     known = [name for name in model.names if has_error_bar(result, name)]
-    if known and result.fit is not None:
-        places = [result.fit.covariance_names.index(name) for name in known]
-        rows = [model.names.index(name) for name in known]
-        C[np.ix_(rows, rows)] = np.array(result.fit.covariance, dtype=np.float64)[
-            np.ix_(places, places)
-        ]
+    C = covariance_of(result, model.names, known)
     conditioned = l1 is not None and model.gravity > 0
     if l1 is not None and conditioned:
         c, C = _conditioned(model, c, C, l1)

@@ -6,12 +6,14 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from algid.errors import ResultError, SettingError
 from algid.exports.description import Description, describe
 from algid.exports.links import Knowns
 from algid.exports.programs import c99, python_module
 from algid.exports.robots import mjcf, sdf, urdf
-from algid.identification.known import contradictions
+from algid.identification.known import contradictions, covariance_of
 from algid.notices import Notice
 from algid.results import Result
 
@@ -116,16 +118,9 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
 
 def _covariance(result: Result, shared: Sequence[str]) -> list[list[float]]:
     """Covariance (4, 4) of mass, x, y and inertia: nothing of what is given or was not told."""
-    fit = result.fit
-    places = {} if fit is None else {name: at for at, name in enumerate(fit.covariance_names)}
-
-    def entry(one: str, other: str) -> float:
-        if fit is None or not {one, other} <= set(shared) & set(places):
-            return 0.0
-        return float(fit.covariance[places[one]][places[other]] or 0.0)
-
-    names = ("m_p", "l2", "y_p", "J_p")
-    return [[entry(one, other) for other in names] for one in names]
+    covariance = covariance_of(result, ("m_p", "l2", "y_p", "J_p"), shared)
+    rows: list[list[float]] = np.nan_to_num(covariance).tolist()
+    return rows
 
 
 def _told(result: Result, name: str) -> tuple[float, float | None]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -66,8 +66,7 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
         raise ResultError(
             f"{file}: the result has no {', '.join(missing)}; use the flags it was made with"
         )
-    places = [result.fit.covariance_names.index(name) for name in names]
-    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    covariance = result.fit.covariance_of(names)
     mean = np.array([result.parameters[name].estimate for name in names], dtype=np.float64)
     if not (np.isfinite(covariance).all() and np.isfinite(mean).all()):
         raise ResultError(
@@ -112,6 +111,15 @@ def has_error_bar(result: Result, name: str) -> bool:
     return ok and result.fit is not None and name in result.fit.covariance_names
 
 
+def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[str]) -> FloatArray:
+    """Covariance (n, n) of the parameters `names`: zero for those that are not `uncertain`."""
+    covariance = np.zeros((len(names), len(names)))
+    rows = [row for row, name in enumerate(names) if name in uncertain]
+    if rows and result.fit is not None:
+        covariance[np.ix_(rows, rows)] = result.fit.covariance_of([names[row] for row in rows])
+    return covariance
+
+
 def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     """l1 = g |K1| / |K2| in m and its derivatives by the constants.
 
@@ -144,8 +152,7 @@ def first_length(result: Result) -> tuple[float, float] | None:
     if found is None or result.fit is None:
         return None
     l1, slopes = found
-    places = [result.fit.covariance_names.index(name) for name in slopes]
-    covariance = np.array(result.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
+    covariance = result.fit.covariance_of(list(slopes))
     slope = np.array(list(slopes.values()))
     return l1, float(np.sqrt(slope @ covariance @ slope))
 

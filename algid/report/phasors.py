@@ -90,15 +90,10 @@ def _moment(
 
 def _covariance(result: Result, *names: str) -> FloatArray | None:
     """Their covariance (2, 2); None where one has no error bar."""
-    fit = result.fit
-    if fit is None or not set(names) <= set(fit.covariance_names):
+    if result.fit is None:
         return None
-    places = [fit.covariance_names.index(name) for name in names]
-    rows = [[fit.covariance[row][column] for column in places] for row in places]
-    if any(value is None for row in rows for value in row):
-        return None
-    C = np.array(rows, dtype=np.float64)
-    return C if np.all(np.isfinite(C)) else None
+    C: FloatArray = result.fit.covariance_of(names)
+    return C if np.isfinite(C).all() else None
 
 
 def _quantile(found: Estimate) -> float:

@@ -10,7 +10,7 @@ settings give the same bytes.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
@@ -257,6 +257,20 @@ class FitSummary(_Model):
                 f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}"
             )
         return self
+
+    def covariance_of(self, names: Sequence[str]) -> Any:
+        """Covariance (n, n) of the parameters `names`, numpy.
+
+        NaN where it is not known, or the fit has no such parameter.
+        """
+        import numpy as np
+
+        size = len(self.covariance_names)
+        padded = np.full((size + 1, size + 1), np.nan)
+        padded[:size, :size] = np.array(self.covariance, dtype=np.float64).reshape(size, size)
+        place_of = {name: place for place, name in enumerate(self.covariance_names)}
+        places = [place_of.get(name, size) for name in names]
+        return padded[np.ix_(places, places)]
 
 
 class Result(_Model):

@@ -33,6 +33,7 @@ from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.identification.known import (
     by_constants,
+    covariance_of,
     has_error_bar,
     model_of,
     payload_length,
@@ -304,17 +305,16 @@ def _covariance_of(result: Result, names: Sequence[str], uncertain: Sequence[str
     J_p is that of each kilogram.
     """
     assert result.fit is not None
-    fitted, full = result.fit.covariance_names, np.array(result.fit.covariance, dtype=np.float64)
-    slopes = np.zeros((len(names), len(fitted)))
-    for name in uncertain:
-        slopes[names.index(name), fitted.index(name)] = 1.0
-    if "J_p" in uncertain:  # J_p / m_p
-        row = names.index("J_p")
-        J, m_p = (result.payload[name].estimate or 0.0 for name in ("J_p", "m_p"))
-        slopes[row, fitted.index("J_p")] = 1 / m_p
-        if "m_p" in fitted:
-            slopes[row, fitted.index("m_p")] = -J / m_p**2
-    return slopes @ full @ slopes.T
+    if "J_p" not in uncertain:
+        return covariance_of(result, names, uncertain)
+    weighed = "m_p" in result.fit.covariance_names
+    more = (*names, "m_p")
+    covariance = covariance_of(result, more, (*uncertain, "m_p") if weighed else uncertain)
+    J, m_p = (result.payload[name].estimate or 0.0 for name in ("J_p", "m_p"))
+    T = np.eye(len(names), len(more))
+    row = names.index("J_p")
+    T[row, [row, -1]] = 1 / m_p, -J / m_p**2  # of J_p / m_p
+    return T @ covariance @ T.T
 
 
 def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[IdentifiedArm, FloatArray]:

@@ -87,6 +87,29 @@ def test_a_length_that_is_given_goes_before_the_results_and_is_exact(
     assert (arm.l1, arm.l2) == (0.5, 0.3)
 
 
+def test_a_given_length_serves_where_the_logs_leave_it_undetermined(
+    result: Result, first: Segment
+) -> None:
+    assert result.fit is not None
+    names, covariance = result.fit.covariance_names, np.array(result.fit.covariance)
+    lost: list[list[float | None]] = covariance.tolist()
+    place = names.index("l2")
+    for other in range(len(names)):
+        lost[place][other] = lost[other][place] = None
+    undetermined = result.payload["l2"].model_copy(
+        update={"std": None, "status": "not identifiable"}
+    )
+    changed = result.model_copy(
+        update={
+            "payload": {**result.payload, "l2": undetermined},
+            "fit": result.fit.model_copy(update={"covariance": lost}),
+        }
+    )
+    _, expected = arm_of(result, first, l2=0.3)
+    _, found = arm_of(changed, first, l2=0.3)
+    np.testing.assert_array_equal(found, expected)
+
+
 def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Segment) -> None:
     with pytest.raises(ResultError, match=r"has no l2; give the link's length with --l2"):
         arm_of(result.model_copy(update={"payload": {}}), first)

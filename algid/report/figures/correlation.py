@@ -44,10 +44,7 @@ def correlation(result: Result) -> Figure | Missing:
 
 def correlation_matrix(covariance: list[list[float | None]]) -> FloatArray:
     """Correlations (n, n); NaN where a variance is unknown or not positive."""
-    known = np.array(
-        [[np.nan if value is None else value for value in row] for row in covariance],
-        dtype=np.float64,
-    )
+    known = np.array(covariance, dtype=np.float64)  # None becomes NaN
     variance = np.diag(known)
     scale = 1 / np.sqrt(np.where(variance > 0, variance, np.nan))
     scaled: FloatArray = known * scale[:, None] * scale

@@ -79,14 +79,9 @@ def _stds(result: Result, theta2: FloatArray) -> FloatArray | None:
 
     The parts are linear in the constants, so that a unit vector each gives their derivatives.
     """
-    fit = result.fit
-    if fit is None or any(name not in fit.covariance_names for name in NAMES):
+    if result.fit is None:
         return None
-    place = [fit.covariance_names.index(name) for name in NAMES]
-    chosen = [[fit.covariance[i][j] for j in place] for i in place]
-    covariance = np.array(
-        [[np.nan if value is None else value for value in row] for row in chosen], dtype=np.float64
-    )
+    covariance = result.fit.covariance_of(NAMES)
     if not np.isfinite(covariance).all():
         return None
     slopes = np.stack([_parts([float(i == j) for j in range(3)], theta2) for i in range(3)])
