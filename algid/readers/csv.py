@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _EXCESS = "excess"
 
-_SPLIT = 1 << 20
+_SPLIT = 1 << 16
 _LINE_END = ord("\n")
 
 
