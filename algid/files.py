@@ -15,10 +15,10 @@ import shutil
 import stat
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from algid.construction import (
     beside,
@@ -93,22 +93,40 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
     OutputError
         If the folder cannot be made or written to, or the file exists and `force` is not set.
     """
-    refuse_existing(path, force)
+    with _whole(path, new_file, _put_open_file, sweep=sweep, force=force) as temporary:
+        yield temporary
+
+
+@contextmanager
+def _whole(
+    place: Path, make: Callable[[Path], None], put: _Put, *, sweep: bool, force: bool
+) -> Iterator[Path]:
+    """A temporary file or folder by `make`; `put` gives it its place when the block ends well."""
+    refuse_existing(place, force)
     with ExitStack() as stack:
-        with writing(path, "cannot write there"):
-            path.parent.mkdir(parents=True, exist_ok=True)
+        with writing(place, "cannot write there"):
+            place.parent.mkdir(parents=True, exist_ok=True)
             if sweep:
-                remove_left(path.parent, path.name)
-            temporary = stack.enter_context(under_construction(path, new_file))
-        with writing(path):
+                remove_left(place.parent, place.name)
+            temporary = stack.enter_context(under_construction(place, make))
+        with writing(place):
             yield temporary
-            mask = os.umask(0)
-            os.umask(mask)
-            temporary.chmod(0o666 & ~mask)
             try:
-                put_file_in_place(temporary, path, replace=force)
+                put(temporary, place, replace=force)
             except FileExistsError as error:
-                raise OutputError(EXISTS.format(path)) from error
+                raise OutputError(EXISTS.format(place)) from error
+
+
+class _Put(Protocol):
+    def __call__(self, temporary: Path, target: Path, *, replace: bool) -> None: ...
+
+
+def _put_open_file(temporary: Path, target: Path, *, replace: bool) -> None:
+    """Put a file in its place, which others may read as far as the user's mask allows."""
+    mask = os.umask(0)
+    os.umask(mask)
+    temporary.chmod(0o666 & ~mask)
+    put_file_in_place(temporary, target, replace=replace)
 
 
 def sha256_of(path: Path) -> str:
@@ -311,19 +329,8 @@ def whole_folder(folder: Path, force: bool, *, sweep: bool = True) -> Iterator[P
         If the folder cannot be made or written to, or exists and `force` is not set, at the start
         or at the end.
     """
-    refuse_existing(folder, force)
-    with ExitStack() as stack:
-        with writing(folder, "cannot write there"):
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            if sweep:
-                remove_left(folder.parent, folder.name)
-            temporary = stack.enter_context(under_construction(folder, new_folder))
-        with writing(folder):
-            yield temporary
-            try:
-                put_in_place(temporary, folder, replace=force)
-            except FileExistsError as error:
-                raise OutputError(EXISTS.format(folder)) from error
+    with _whole(folder, new_folder, put_in_place, sweep=sweep, force=force) as temporary:
+        yield temporary
 
 
 def remove_whole(place: Path) -> None:

@@ -357,6 +357,21 @@ def phasor(model: Model, c: FloatArray, name: str) -> complex:
     return complex(c[place[name]], 0.0 if sine is None else c[place[sine]])
 
 
+def phasor_of(values: Mapping[str, float], name: str) -> complex:
+    """The moment `name` of coefficients by name as a phasor; what they lack is 0."""
+    return complex(values.get(name, 0.0), values.get(f"{name}s", 0.0))
+
+
+def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | None:
+    """l1 = g |K1| / |K2| in m (Table 1), by the coefficients by name; `gravity` in m/s².
+
+    It has the sign of k1 k2: an arm's is positive. None without gravity, k1 or k2.
+    """
+    K1, K2 = phasor_of(values, "k1"), phasor_of(values, "k2")
+    sign = np.sign(K1.real * K2.real)
+    return gravity * abs(K1) / abs(K2) * float(sign) if gravity and sign else None
+
+
 def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
     """Pairs of a parameter of the model's columns and the joint on which it acts as `kind`."""
     return [

@@ -13,7 +13,15 @@ from algid.designs.belief import Belief
 from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
-from algid.identification.known import contradictions, covariance_of, has_error_bar, model_of
+from algid.identification.known import (
+    contradictions,
+    covariance_of,
+    given_lengths,
+    has_error_bar,
+    model_of,
+    noise_of,
+    wrong_inertia,
+)
 from algid.model import DELAYS, TERMS, Model
 from algid.notices import Notice
 from algid.results import Result, read_result
@@ -24,7 +32,6 @@ PHASES = next(name for name, term in TERMS.items() if term.sines)
 WRONG = 0.2  # share by which masses and friction of a drawing may be wrong
 # the torque is not linear in them, or they are not of one instant
 _UNPLANNED = tuple(name for name, term in TERMS.items() if not term.linear or term.timing)
-NOISE = ("theta1", "theta2", "tau1", "tau2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +99,11 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
     else:
         prior = of_case(load_case(source), source, loaded, knowns)
     value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
-    k1, k3, k5 = abs(complex(value["k1"], value.get("k1s", 0.0))), value["k3"], value["k5"]
-    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+    wrong = wrong_inertia(value)
+    if wrong is not None:
         raise SettingError(
-            f"{source}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 "
-            f"{k5:.3g} "
-            "kg m²); no arm is like that: identify it anew, or describe the arm in a TOML file"
+            f"{source}: {wrong}; no arm is like that: identify it anew, or describe the arm in a "
+            "TOML file"
         )
     return prior
 
@@ -163,36 +169,42 @@ def _of_result(
     result: Result, source: str, loaded: bool | None, knowns: KnownBefore
 ) -> BelievedArm:
     model, left_out = _planned(model_of(result))
-    before = {
-        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
-    }
-    lengths = before | knowns.lengths
-    value = {name: found.estimate for name, found in result.estimates.items()} | lengths
-    mass = value.get("m_p") if knowns.payload is None else knowns.payload
+    lengths = given_lengths(result) | knowns.lengths
+    value = _estimates(result, knowns.payload) | lengths
     body = tuple(name for name in BODY_PARAMETERS if has_error_bar(result, name))
-    shared = _shared(model, mass, loaded, source, replace(knowns, **lengths), body)
+    shared = _shared(model, value.get("m_p"), loaded, source, replace(knowns, **lengths), body)
     # what is estimated with the constants takes of their precision
     shared = replace(shared, delay=all(has_error_bar(result, name) for name in DELAYS))
-    if mass is not None:  # an object of another mass is shaped like the one that was identified
-        share = mass / (value.get("m_p") or mass)
-        value |= {"m_p": mass} | ({"J_p": share * value["J_p"]} if "J_p" in body else {})
-    missing = next((name for name in shared.names if value.get(name) is None), None)
+    missing = next((name for name in shared.names if name not in value), None)
     if missing is not None:
         remedy = (
-            f"give --{missing}" if missing in ("l1", "l2") else "identify it from logs that tell it"
+            f"give --{missing}"
+            if missing in ("l1", "l2")
+            else "identify it from logs that determine it"
         )
         raise ResultError(f"{source}: the result has no {missing}; {remedy}")
-    mean = np.array([value[name] for name in shared.names], dtype=np.float64)
-    given = {"m_p"} if knowns.payload is not None else set()
-    spread = _spread(result, source, shared.names, mean, given, knowns.error)
-    reach = np.array(
-        [np.nan if value.get(name) is None else value[name] for name in ("l1", "l2")],
-        dtype=np.float64,
-    )
-    levels = [0.0 if result.fit is None else result.fit.noise.get(name) or 0.0 for name in NOISE]
-    noise = NoiseLevels(np.array(levels[:2]), np.array(levels[2:])) if min(levels) > 0 else None
+    mean = np.array([value[name] for name in shared.names])
+    exact = {"m_p"} if knowns.payload is not None else set()
+    spread = _spread(result, source, shared.names, mean, exact, knowns.error)
+    reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
     doubts = (*left_out, *contradictions(result, knowns.lengths))
-    return BelievedArm(source, Belief(shared, mean, spread, box=False), reach, noise, doubts)
+    belief = Belief(shared, mean, spread, box=False)
+    return BelievedArm(source, belief, reach, noise_of(result), doubts)
+
+
+def _estimates(result: Result, payload: float | None) -> dict[str, float]:
+    """The estimates by name, as far as there are any, with a payload of that mass in kg if given.
+
+    An object of another mass is shaped like the one that was identified.
+    """
+    value = {
+        name: one.estimate for name, one in result.estimates.items() if one.estimate is not None
+    }
+    if payload is None:
+        return value
+    if "J_p" in value:
+        value["J_p"] *= payload / (value.get("m_p") or payload)
+    return value | {"m_p": payload}
 
 
 def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
@@ -232,7 +244,7 @@ def _spread(
             else f"the result leaves {', '.join(without)} without error bars"
         )
         raise ResultError(
-            f"{source}: {why}; identify from logs that tell, or say how wrong it may be: "
+            f"{source}: {why}; identify from logs that determine them, or say how wrong it may be: "
             "--prior-error"
         )
     for name in bare:

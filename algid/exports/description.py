@@ -19,17 +19,19 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.errors import ResultError, SettingError
-from algid.exports.links import Knowns, Link, links_of, phasor_of, turn_of
+from algid.exports.links import Knowns, Link, links_of, turn_of
 from algid.identification.known import (
     contradictions,
     covariance_of,
     first_length,
+    given_lengths,
     has_error_bar,
     model_of,
     payload_length,
     torque_constants,
+    wrong_inertia,
 )
-from algid.model import SINES, TERMS, UNITS, Model, phasor
+from algid.model import SINES, TERMS, UNITS, Model, length_by_coupling, phasor
 from algid.notices import Notice
 from algid.results import Estimate, Result
 from algid.text import joined
@@ -66,13 +68,11 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
         c, C = _conditioned(model, c, C, l1)
     value = model.values(c)
     spread = dict(zip(model.names, np.sqrt(np.maximum(np.diag(C), 0.0)).tolist(), strict=True))
-    k1, k3, k5 = abs(phasor_of(value, "k1")), value["k3"], value["k5"]
-    if min(k3, k5) <= 0 or k3 * k5 <= k1**2:
+    wrong = wrong_inertia(value)
+    if wrong is not None:
         raise ResultError(
-            f"{file}: its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 "
-            f"{k5:.3g} kg m²), so "
-            "that masses would come out negative; "
-            + ("check --l1" if conditioned else "identify it from logs that tell more")
+            f"{file}: {wrong}, so that masses would come out negative; "
+            + ("check --l1" if conditioned else "identify it from more informative logs")
         )
     return Coefficients(model, value, {name: spread[name] for name in known}, conditioned)
 
@@ -166,10 +166,8 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     SettingError
         If what is known leaves no positive mass or inertia.
     """
-    before = {
-        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
-    }
-    given = before | {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
+    lengths = {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
+    given = given_lengths(result) | lengths
     told = None if not links or "l1" in given else payload_length(result)
     length = given.get("l1") if told is None else told[0]
     coefficients = coefficients_of(result, file, length)
@@ -211,13 +209,13 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
         )
     value = coefficients.value
     k1, k2 = value["k1"], value["k2"]
-    if k1 * k2 <= 0:
+    l1 = length_by_coupling(value, gravity)
+    if l1 is None or l1 <= 0:
         raise ResultError(
             f"{file}: k1 {k1:.4g} and k2 {k2:.4g} make l1 = g k1 / k2 no positive length; "
-            "give --l1, or identify it from logs that tell more"
+            "give --l1, or identify it from more informative logs"
         )
-    # of moments off the links' lines, the sizes
-    return gravity * abs(phasor_of(value, "k1")) / abs(phasor_of(value, "k2"))
+    return l1
 
 
 def _of_first_length(result: Result) -> str:

@@ -38,6 +38,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import expit
 
 from algid.errors import SettingError
+from algid.model import phasor_of
 
 ALONG = 0.05  # of a link's inertia across: that about its own line, as of a stout bar
 _ENDS = 25.0  # how near the ends of the masses' range the search goes, in logits
@@ -79,11 +80,6 @@ class Link:
     def tensor(self) -> tuple[float, float, float]:
         """Principal inertias about x, y, z at the centre, of an axially symmetric bar."""
         return ALONG * self.inertia, self.inertia, self.inertia
-
-
-def phasor_of(k: Mapping[str, float], name: str) -> complex:
-    """The moment `name` with its sine part, where it has one."""
-    return complex(k[name], k.get(f"{name}s", 0.0))
 
 
 def turn_of(k: Mapping[str, float], gravity: float) -> float:

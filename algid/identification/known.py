@@ -10,8 +10,9 @@ from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.estimators.combine import Prior
 from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
 from algid.identification.source import Role
-from algid.model import Model, without_delay
+from algid.model import Model, length_by_coupling, phasor_of, without_delay
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.physics.parameters import BODY, PAYLOAD
@@ -75,6 +76,16 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
     return Prior.of(names, mean, covariance)
 
 
+def noise_of(result: Result) -> NoiseLevels | None:
+    """Noise of the logs behind a result; None unless all four levels are known and above zero."""
+    if result.fit is None:
+        return None
+    levels = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
+    if min(levels) <= 0:
+        return None
+    return NoiseLevels(np.array(levels[:2]), np.array(levels[2:]))
+
+
 def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:
     """Coefficients of the model's columns for a log of that role, from the result of that file.
 
@@ -89,19 +100,33 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     for name in absent(Settings.of(result.settings).effort, model.names):
         values[name] = 0.0
     wanted = [*model.names, *((one.name for one in PAYLOAD) if role == "loaded" else ())]
-    values |= {
-        name: length for name in ("l1", "l2") if (length := result.settings.get(name)) is not None
-    }
+    values |= given_lengths(result)
     missing = next((name for name in wanted if values.get(name) is None), None)
     if missing is not None:
         raise ResultError(
-            f"{file}: the result has no {missing}; identify it from logs that tell it"
+            f"{file}: the result has no {missing}; identify it from logs that determine it"
         )
     known = {name: float(value) for name, value in values.items() if value is not None}
     if role != "loaded":
         return np.array([known[name] for name in model.names])
     shared = Shared(model, payload=True, body=tuple(one.name for one in BODY if one.name in known))
     return shared.coefficients(np.array([known[name] for name in shared.names]), loaded=True)
+
+
+def given_lengths(result: Result) -> dict[str, float]:
+    """The link lengths in m that the result was made with."""
+    lengths = {name: result.settings.get(name) for name in ("l1", "l2")}
+    return {name: value for name, value in lengths.items() if value is not None}
+
+
+def wrong_inertia(values: Mapping[str, float]) -> str | None:
+    """That no arm has the inertia matrix of these constants, in words; None where one has."""
+    k1, k3, k5 = abs(phasor_of(values, "k1")), values["k3"], values["k5"]
+    if min(k3, k5) > 0 and k3 * k5 > k1**2:
+        return None
+    return (
+        f"its inertia matrix is not positive definite (k1 {k1:.3g}, k3 {k3:.3g}, k5 {k5:.3g} kg m²)"
+    )
 
 
 def has_error_bar(result: Result, name: str) -> bool:
@@ -133,10 +158,10 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     if not gravity or not {"k1", "k2"} <= set(names):
         return None
     value = {name: result.parameters[name].estimate or 0.0 for name in names}
-    K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
-    if not (K1.real and K2.real):
+    l1 = length_by_coupling(value, gravity)
+    if l1 is None:
         return None
-    l1 = gravity * abs(K1) / abs(K2) * float(np.sign(K1.real * K2.real))
+    K1, K2 = phasor_of(value, "k1"), phasor_of(value, "k2")
     slopes = {
         "k1": l1 * K1.real / abs(K1) ** 2,
         "k1s": l1 * K1.imag / abs(K1) ** 2,

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.model import length_by_coupling, phasor_of
 from algid.report.series import TorqueLog
 from algid.report.text import escaped, script_json
 from algid.results import Result
@@ -105,9 +106,7 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
     value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
     if not {"k1", "k1s"} <= set(value):
         return 0.0, None
-    K1, K2, K4 = (
-        complex(value.get(name, 0.0), value.get(f"{name}s", 0.0)) for name in ("k1", "k2", "k4")
-    )
+    K1, K2, K4 = (phasor_of(value, name) for name in ("k1", "k2", "k4"))
     second = cmath.phase(K1)
     turn = cmath.phase(K2 / K1) if K1 and K2 else 0.0
     return turn, (cmath.phase(K4 * cmath.exp(-1j * turn)) if K4 else 0.0, second)
@@ -127,11 +126,8 @@ def _coupling_length(result: Result) -> float | None:
     """
     value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
     gravity = result.settings.get("gravity")
-    k1, k2 = (value.get(name, 0.0) for name in ("k1", "k2"))
-    if not k1 * k2 > 0 or not isinstance(gravity, int | float) or not gravity > 0:
-        return None
-    K1, K2 = (complex(value[name], value.get(f"{name}s", 0.0)) for name in ("k1", "k2"))
-    return gravity * abs(K1) / abs(K2)
+    l1 = length_by_coupling(value, gravity) if isinstance(gravity, int | float) else None
+    return l1 if l1 is not None and l1 > 0 else None
 
 
 def _motion(torque: TorqueLog) -> tuple[FloatArray, FloatArray] | None:

@@ -36,6 +36,7 @@ from algid.identification.known import (
     covariance_of,
     has_error_bar,
     model_of,
+    noise_of,
     payload_length,
     prior_of,
     shift_of,
@@ -254,7 +255,6 @@ def arm_of(
     covariance = _covariance_of(
         result, (*prior.names, "l1", "l2", *body), (*prior.names, *lengths, *body)
     )
-    noise = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
     constants = _by_constants(result, l1)
     if constants is not None:
         covariance = _with_first_length(covariance, prior.names, constants[1])
@@ -263,9 +263,7 @@ def arm_of(
         prior.mean,
         _length(result, "l1", l1) if constants is None else constants[0],
         _length(result, "l2", l2),
-        NoiseLevels(np.array(noise[:2]), np.array(noise[2:]))
-        if min(noise) > 0
-        else first_guess(first.theta, first.tau),
+        noise_of(result) or first_guess(first.theta, first.tau),
         shift_of(result).at(first.dt),
         y,
         gyration,

@@ -156,9 +156,8 @@ BARE = result_of(values_of(ODD))
 WEAK = BARE.model_copy(update={"fit": None, "estimator": "weak"})
 NO_PAYLOAD = "it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
 NO_BARS = (
-    "the result of --estimator weak has no error bars; identify from logs that tell, or say how "
-    "wrong it may be: "
-    "--prior-error"
+    "the result of --estimator weak has no error bars; identify from logs that determine them, "
+    "or say how wrong it may be: --prior-error"
 )
 IMPOSSIBLE = (
     "its inertia matrix is not positive definite (k1 0.5, k3 0.0145, k5 0.196 kg m²); no arm is "
@@ -177,7 +176,7 @@ IMPOSSIBLE = (
             BARE.model_copy(update={"parameters": {}}),
             None,
             {},
-            "the result has no k1; identify it from logs that tell it",
+            "the result has no k1; identify it from logs that determine it",
         ),
         (WEAK, None, {}, NO_BARS),
         (result_of(values_of(ODD) | {"k1": 0.5}), None, {}, IMPOSSIBLE),

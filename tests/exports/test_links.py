@@ -297,7 +297,7 @@ def test_the_command_warns_refuses_and_never_overwrites(
     code, said, files = run(bare, tmp_path, "--to", "mjcf")
     assert (code, said, files) == (
         2,
-        f"{tmp_path / 'arm.json'}: the result has no k1; identify it from logs that tell it",
+        f"{tmp_path / 'arm.json'}: the result has no k1; identify it from logs that determine it",
         {"arm.urdf"},
     )
 

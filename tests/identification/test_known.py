@@ -178,7 +178,7 @@ def test_a_constant_that_is_needed_and_open_is_named(
     result = changed(weighed, group, name, estimate=None, status=Status.NOT_IDENTIFIABLE)
     with pytest.raises(
         ResultError,
-        match=rf"^r\.json: the result has no {name}; identify it from logs that tell it$",
+        match=rf"^r\.json: the result has no {name}; identify it from logs that determine it$",
     ):
         torque_constants(result, model_of(result), role, "r.json")  # type: ignore[arg-type]
     if role == "loaded":
