@@ -18,7 +18,7 @@ setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install -q --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev]'
 	@touch $@
 
 # A test process a core: threads of BLAS beside it only wait for each other.
@@ -27,8 +27,9 @@ test test-slow test-processor test-pythons: export OPENBLAS_NUM_THREADS = 1
 test: setup
 	$(BIN)/python -m pytest
 
+# Many of them wait for other processes, hence one worker more than the two cores of CI.
 test-slow: setup
-	$(BIN)/python -m pytest -m slow
+	$(BIN)/python -m pytest -n 3 -m slow $$(grep -rl mark.slow tests --include='test_*.py')
 
 # Sums in another order, as other processors take them: two of OpenBLAS's kernels that are not the default here, and
 # NumPy without AVX2 and AVX-512.
