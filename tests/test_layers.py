@@ -65,7 +65,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "check": room("errors files results", "pydantic"),
     "identification": room(
         "arm errors estimators files inspection log methods model notices physics profile "
-        "significance progress readers report results runtime settings signals table4 text",
+        "significance progress readers report results runtime settings signals table4 text units",
         "numpy polars pyarrow",
     ),
     "batches": room(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -189,3 +190,42 @@ def test_every_notice_of_the_code_is_made_of_numbers() -> None:
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Notice":
                 own += [ast.literal_eval(node.args[0])] if len(node.args) > 1 else []
     assert set(own) == {"EARLIER", "EARLIER_CAUSE"}
+
+
+ASSERTED = {
+    ("identification/efforts.py", "effort"),  # see `algid.identification.trials`
+    ("inspection/channels.py", "unwrap"),  # the same angle, whatever the log holds
+    ("readers/messages/plan.py", "clock"),  # the other of two
+    ("inspection/sampling.py", ""),  # the rest that the notice is of
+    ("inspection/conventions.py", ""),  # found by the search, or tried
+    ("readers/convert.py", ""),  # all the user's own
+    ("results/verdict.py", ""),  # the call as it was
+    ("notices.py", ""),  # as an earlier result has it
+}
+"""By module the settings of remedies that name no case which they are for."""
+
+
+def test_a_remedy_is_tried_or_names_the_case_that_it_is_for() -> None:
+    """An untried remedy is a question: it says when it holds, or asks for the user's own value."""
+    found = set()
+    root = Path(algid.__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Remedy":
+                module = path.relative_to(root).as_posix()
+                found |= {(module, name) for name in _asserted(node)}
+    assert found == ASSERTED
+
+
+def _asserted(call: ast.Call) -> set[str]:
+    """Last parts of the names of settings that a remedy states for no case; empty if unknown."""
+    settings = call.args[0]
+    if len(call.args) > 1:
+        return set()
+    if isinstance(settings, ast.DictComp):
+        return set() if getattr(settings.value, "value", "") is None else {""}
+    if not isinstance(settings, ast.Dict):
+        return {""}
+    pairs = zip(settings.keys, settings.values, strict=True)
+    known = [key for key, value in pairs if getattr(value, "value", value) is not None]
+    return {re.split(r"[.']", ast.unparse(key).strip("'"))[-1] for key in known if key is not None}

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES
-from algid.errors import LogError, ResultError, SettingError
+from algid.errors import AlgidError, LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
 from algid.files import refuse_misleading, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
@@ -240,6 +241,7 @@ def _by_likelihood(
     from algid.identification.by_likelihood import residual_of, with_doubt, with_endogeneity
     from algid.identification.efforts import of_effort, told
     from algid.identification.outcome import outcome_of
+    from algid.identification.trials import advised
 
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
@@ -251,13 +253,28 @@ def _by_likelihood(
     fit = with_endogeneity(with_doubt(fit, survey, settings, chosen), survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
-    outcome = replace(outcome, notices=[*outcome.notices, *said])
+    again = partial(_again, earlier=earlier)
+    tried = replace(settings, torque_hold=asked.torque_hold)
+    notices = advised([*outcome.notices, *said], survey, tried, again)
+    outcome = replace(outcome, notices=notices)
     if folder is not None:
         survey.begin("series")
         write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
         if estimator_of(settings.estimator).beside_paper:
             outcome = _with_the_papers(outcome, survey, settings, folder)
     return outcome, settings
+
+
+def _again(survey: Survey, settings: Settings, earlier: Earlier | None) -> Identified | None:
+    """What logs tell by other settings; None where they cannot be used so."""
+    from algid.identification.outcome import outcome_of
+
+    try:
+        fit, predictions, chosen = _fitted(survey, settings, earlier)
+    except AlgidError:
+        return None
+    settings = replace(settings, torque_hold=chosen.hold)
+    return outcome_of(fit, predictions, survey, settings, chosen)
 
 
 def _fitted(

@@ -182,7 +182,10 @@ def _in_degrees(log: Log, name: str, seen: Mapping[str, Any]) -> Notice:
         unit = log.origin.reading.channels[name].unit
         return Notice("DEGREES", numbers={**seen, "unit": unit})
     remedies = [
-        Remedy({"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"})
+        Remedy(
+            {"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"},
+            "where they are in degrees",
+        )
     ]
     if name.startswith("theta"):
         remedies.append(

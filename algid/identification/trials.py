@@ -1,0 +1,108 @@
+"""Advice of a fit, tried before it is given: the logs are identified by it once more.
+
+A remedy stays where the result is physical, explains the torque, and asks for no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from algid.identification.outcome import Identified, is_implausible
+from algid.identification.source import LogSource
+from algid.identification.survey import Survey
+from algid.log import Log
+from algid.notices import Notice, Remedy
+from algid.results.verdict import CAUSES
+from algid.settings import Settings
+from algid.units import TORQUE
+
+TRIED = ("HEAVY_ARM", "EXTERNAL_EFFORT")
+"""Notices whose remedies are assertions, and not the result's own settings."""
+AIR = 1.2  # kg/m³
+
+Again = Callable[[Survey, Settings], Identified | None]
+"""Identifies logs; None where they cannot be."""
+
+
+def advised(
+    notices: Sequence[Notice], survey: Survey, settings: Settings, again: Again
+) -> list[Notice]:
+    """The notices of a result, those of `TRIED` with the remedies that end in one that stands.
+
+    Parameters
+    ----------
+    notices : of the result, with remedies yet to be tried
+    survey : of its logs
+    settings : that they were identified by
+    again : identifies logs by other settings
+    """
+    return [
+        replace(one, remedies=tuple(_standing(one, survey, settings, again)))
+        if one.code in TRIED
+        else one
+        for one in notices
+    ]
+
+
+def _standing(notice: Notice, survey: Survey, settings: Settings, again: Again) -> Iterator[Remedy]:
+    for remedy in notice.remedies:
+        said: dict[str, Any] = dict(remedy.settings)
+        unit = said.pop("torque_unit", None)
+        logs = [replace(log, effort=said.get("effort", log.effort)) for log in survey.logs]
+        if unit is not None:
+            ratio = _ratio(survey.logs, unit)
+            if ratio is None or _is_air(notice, ratio):
+                continue
+            logs = [_in_unit(log, ratio) for log in logs]
+        found = again(Survey(logs), replace(settings, **said))
+        if found is not None and _stands(found):
+            yield remedy
+
+
+def _stands(found: Identified) -> bool:
+    """Whether a result is physical, explains the torque, and names no cause of error."""
+    codes = {notice.code for notice in found.notices if not notice.note}
+    summary = found.fit
+    return (
+        summary is not None
+        and summary.converged
+        and not is_implausible(summary)
+        and not codes & {*CAUSES, *TRIED, "LOGS_APART"}
+    )
+
+
+def _ratio(logs: Sequence[LogSource], unit: str) -> float | None:
+    """What torques that are read in `unit` are of those that were read; None where it differs.
+
+    A current, a PD law and an offset in N m do not follow the unit of a torque.
+    """
+    units = set()
+    for log in logs:
+        reading = log.origin.reading
+        for joint in (1, 2):
+            channel = reading.channels.get(f"tau{joint}")
+            if joint == reading.passive:
+                continue
+            if channel is not None and channel.offset:
+                return None
+            units.add("N m" if channel is None else channel.unit)
+    own = TORQUE.get(units.pop()) if len(units) == 1 else None
+    return None if own is None else TORQUE[unit] / own
+
+
+def _is_air(notice: Notice, ratio: float) -> bool:
+    """Whether the arm would be lighter than the air of a cube of its link."""
+    mass, length = notice.numbers["mass"], notice.numbers["length"]
+    return bool(ratio * mass < AIR * length**3)
+
+
+def _in_unit(log: LogSource, ratio: float) -> LogSource:
+    """The log with its torques times `ratio`."""
+
+    def blocks() -> Iterator[Log]:
+        for block in log.blocks():
+            yield replace(block, tau=ratio * block.tau)
+
+    return replace(log, blocks=blocks, digest=None)
