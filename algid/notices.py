@@ -226,6 +226,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     ),
     "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is "
     "chosen",
+    "INTEGRATION": (
+        "the log has no noise: what its own integration and sampling leave, {samples:.2g} of a "
+        "sample, limits the intervals (up to {factor:.2g} times wider)"
+    ),
     "HELD_TORQUE": (
         "the torque is held from each sample to the next: it acts {late:.3g} ms after its stamp in "
         "the mean"

@@ -18,6 +18,7 @@ from algid.arm import FloatArray
 from algid.estimators.combine import BlockSums, LogInformation
 from algid.estimators.identifiability import Correlations, correlations
 from algid.estimators.innovations import ResidualSums, residual_sums
+from algid.estimators.integration import Imprint, deviations
 from algid.estimators.noise import (
     VarianceScore,
     first_guess,
@@ -31,6 +32,7 @@ from algid.estimators.noise import (
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
+from algid.model import Motion
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces
@@ -198,6 +200,25 @@ class LogEvidence:
             theta = trajectory(piece, first, multiplier, self.noise)
             gathered.take(self._linearise(c, theta, piece), piece.dt, self.noise).summed()
         return gathered.outcome(self.loaded, c)
+
+    @property
+    def noiseless(self) -> bool:
+        """Whether the torque's error is nothing that anybody need worry about."""
+        return bool(np.all(self.noise.tau <= self._least))
+
+    def imprint(self, c: FloatArray) -> Imprint:
+        """What integration and sampling leave in the training set at `c`; trajectories stay."""
+        gram = np.zeros(())
+        for piece, theta in zip(self.kept, self._trajectories, strict=True):
+            linear = self._linearise(c, theta, piece)
+            motion = Motion(*self._stencil(piece.dt, c).differences(theta))
+            model = self._shared.model
+            made = deviations(model, c[: len(model.names)], motion, piece.dt)
+            rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
+            rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
+            whitened = np.concatenate([linear.columns, linear.solve_in_place(rows)])
+            gram = gram + whitened @ whitened.T
+        return Imprint(self.loaded, gram)
 
     def improve_noise(self, outcome: Outcome) -> float:
         """Better noise levels from a training pass.

@@ -23,6 +23,7 @@ from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
+from algid.estimators.integration import widened_by_integration
 from algid.estimators.log_likelihood import SHORTEST, LogEvidence, Outcome
 from algid.estimators.parametrisation import Shared
 from algid.estimators.too_short import TooShortError
@@ -156,6 +157,9 @@ def fit(
     )
     if width is not None:
         fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
+    if all(log.noiseless for log in logs):
+        imprints = [log.imprint(shared.coefficients(beta, log.loaded)) for log in logs]
+        fitted = widened_by_integration(fitted, imprints, prior)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     pairs = zip(fitted.status, start.status, strict=True)
     return with_body(

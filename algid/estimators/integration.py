@@ -1,0 +1,172 @@
+"""What the integration and the sampling of a log without noise leave open in its estimates.
+
+A simulator of first order does not solve the equation of motion, but one near it. In its samples q
+at steps of dt, semi-implicit Euler's central difference is
+
+    (q[n+1] − 2 q[n] + q[n−1]) / dt² = a(q[n], (q[n] − q[n−1]) / dt, τ[n])
+
+so that velocities act half a step late; where a joint's damping is taken implicitly they act half
+a step early there (Hairer, Lubich & Wanner 2006, ch. IX, on modified equations). A torque that
+bends between two samples is not the straight line that it is taken for. Part of all this looks
+like another inertia, which no choice of terms can tell from the arm's own: where a log has no
+noise, this is its error.
+
+The log tells each deviation h from what is left of it beside the estimates,
+
+    h = (Gᵀ V⁻¹ P G)⁻¹ Gᵀ V⁻¹ P e,   P without what the parameters take up,
+
+and the estimates' covariance gains what h has moved them by:
+
+    W = V + D h hᵀ Dᵀ,   D = S⁻¹ Yᵀ V⁻¹ G
+
+======  =============================================  ===============  ===========
+symbol  name                                           shape            unit
+======  =============================================  ===============  ===========
+G       torque of one sample of each deviation         (m, 2, n)        N m
+h       deviations, in samples or shares               (m,)             1
+D       change of the estimates with a deviation       (Q, m)           parameter's
+======  =============================================  ===============  ===========
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.compiled import chi2_tail
+from algid.estimators.combine import Prior, scaled_pinv
+from algid.estimators.fit import Fit
+from algid.model import PARAMETERS, RIGID, SINES, Model, Motion, partials, torque
+from algid.notices import Notice
+from algid.physics.parameters import VISCOUS
+from algid.significance import LEVEL
+
+DEVIATIONS = ("velocity of friction", "velocity of inertia", "position", "bend", "stamps")
+"""Friction at another velocity, Coriolis' torque at another one, gravity and inertia at another
+position, a torque that bends between samples, and one that acts at another time."""
+_INERTIAL = frozenset({*(n for n in RIGID if PARAMETERS[n].scale is not VISCOUS), *SINES})
+_TOLD = 1e-6
+"""Share of a deviation's torque: with less beside the parameters, the log does not tell it."""
+_SURE = 0.05
+"""Samples: what the log tells no better, it does not tell."""
+_LARGEST = 1.5
+"""Samples: no integrator is further off; what is, is something else than integration."""
+_FELT = 1.1
+"""Factor of an interval from which it is said that integration limits it."""
+
+
+def deviations(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArray:
+    """Torques (m, 2, n) in N m that one sample of each of `DEVIATIONS` makes.
+
+    Parameters
+    ----------
+    model : Model
+    c : (q,), in `algid.model.UNITS`
+    motion : Motion of n samples
+    dt : float, s
+    """
+    by_motion = partials(model, c, motion)
+    rubbing = np.where([name in _INERTIAL for name in model.names], 0.0, c)
+    friction = partials(model, rubbing, motion)[1]
+
+    def along(P: FloatArray, change: FloatArray) -> FloatArray:
+        return dt * np.einsum("abn,bn->an", P, change)
+
+    slope = np.gradient(torque(model, c, motion), axis=1)
+    return np.stack(
+        [
+            along(friction, motion.alpha),
+            along(by_motion[1] - friction, motion.alpha),
+            along(by_motion[0], motion.omega),
+            np.gradient(slope, axis=1),
+            slope,
+        ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Imprint:
+    """Products of a log's whitened columns: derivatives by c, the residual, the deviations.
+
+    Parameters
+    ----------
+    loaded : bool
+    gram : (q + 1 + m, q + 1 + m)
+    """
+
+    loaded: bool
+    gram: FloatArray
+
+
+def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Fit:
+    """The fit with what integration and sampling may have moved in its covariance.
+
+    Parameters
+    ----------
+    fit : Fit
+    imprints : of logs without noise
+    prior : Prior, optional
+        What held the fit beside its logs.
+
+    Returns
+    -------
+    Fit
+        `fit` itself where the logs tell no deviation, or one that no integration makes.
+
+    Notes
+    -----
+    A deviation that the parameters take up whole, as a rotor's inertia does that of its joint's
+    friction, counts as large as the largest that the logs tell.
+    """
+    S, X, GG, Ye, Ge = _summed(fit, imprints, prior)
+    D = scaled_pinv(S) @ X
+    beside, right = GG - X.T @ D, Ge - D.T @ Ye
+    made = np.diag(GG) > 0
+    told = np.diag(beside) > _TOLD * np.diag(GG)
+    told[told] = np.sqrt(np.diag(scaled_pinv(beside[np.ix_(told, told)]))) < _SURE
+    if not told.any():
+        return fit
+    information = beside[np.ix_(told, told)]
+    h = np.zeros(made.size)
+    h[told] = scaled_pinv(information) @ right[told]
+    largest = float(np.abs(h).max())
+    by_chance = chi2_tail(int(told.sum()), float(h[told] @ information @ h[told])) >= LEVEL
+    if by_chance or largest > _LARGEST:
+        return fit
+    untold = made & ~told
+    untold[DEVIATIONS.index("stamps")] &= not _shifted(fit)
+    moved = np.column_stack([D @ h, largest * D[:, untold]])
+    wider = fit.covariance + moved @ moved.T
+    before, after = np.sqrt(np.diag(fit.covariance)), np.sqrt(np.diag(wider))
+    factor = float(np.max(np.divide(after, before, out=np.ones_like(after), where=before > 0)))
+    fit = replace(fit, covariance=wider)
+    if factor < _FELT:
+        return fit
+    numbers = {"samples": largest, "factor": factor}
+    return fit.noted(Notice("INTEGRATION", numbers=numbers, note=True))
+
+
+def _summed(
+    fit: Fit, imprints: Sequence[Imprint], prior: Prior | None
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """YᵀV⁻¹Y with the prior, YᵀV⁻¹G, GᵀV⁻¹G, YᵀV⁻¹e and GᵀV⁻¹e by the fit's parameters."""
+    size, count = len(fit.names), len(DEVIATIONS)
+    whole = np.zeros((size + 1 + count, size + 1 + count))
+    for one in imprints:
+        T = fit.shared.jacobian(fit.values, one.loaded)
+        by_shared = np.eye(T.shape[0] + 1 + count, size + 1 + count, size - T.shape[0])
+        by_shared[: T.shape[0], :size] = T
+        whole += by_shared.T @ one.gram @ by_shared
+    S, G = whole[:size, :size], slice(size + 1, None)
+    if prior is not None:
+        places = [fit.names.index(name) for name in prior.names]
+        S[np.ix_(places, places)] += prior.precision
+    return S, whole[:size, G], whole[G, G], whole[:size, size], whole[G, size]
+
+
+def _shifted(fit: Fit) -> bool:
+    """Whether a delay or a lag of the torque is estimated, which the stamps' deviation is."""
+    return fit.shared.delay or fit.shared.model.lag_name is not None
