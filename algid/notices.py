@@ -417,6 +417,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "MISSING_MESSAGES": "the file counts {promised:# message|messages} and holds {found}",
     "CUT_OFF": {
         "row": "the last row, row {row:,}, breaks off and was dropped",
+        "lines": (
+            "the file breaks off: {bytes:# byte|bytes} behind its last whole line, NUL bytes at "
+            "their end, left out"
+        ),
         "record": ("the file breaks off: an unfinished record of {bytes:# byte|bytes}, left out"),
         "chunk": (
             "the file breaks off: an unfinished chunk of {bytes:# byte|bytes}, read as far as it "

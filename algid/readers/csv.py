@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -16,11 +17,19 @@ from algid.errors import LogError
 from algid.files import read_whole
 from algid.limits import LIMITS
 from algid.log import loads
+from algid.notices import Notice
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.dialect import Dialect, detect
 from algid.readers.frames import NO_COMPANION, beyond, flat_reader
-from algid.readers.text import ending_with_lines, head_of, pieces, whole_lines
+from algid.readers.text import (
+    NUL_AMONG_ROWS,
+    end_of_lines,
+    ending_with_lines,
+    head_of,
+    pieces,
+    whole_lines,
+)
 
 if TYPE_CHECKING:
     import polars as pl
@@ -58,13 +67,18 @@ def open_csv(path: Path, profile: Profile, kind: str = "csv") -> TableReader:
     columns = assign(str(path), dialect.columns, profile, dialect.units, companion.sums)
     if columns.rate is None and columns.sources["t"] in dialect.dates:
         columns = columns.dated()
+    size = path.stat().st_size
+    end = end_of_lines(path) if kind == "csv" else None
     # rows to expect of plain text: from the length of its first lines, and a tenth more
-    rows = (
-        int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16 if kind == "csv" else 0
-    )
-    return flat_reader(
-        str(path), "csv", columns, partial(_frames, path, kind, dialect), profile, rows, companion
-    )
+    length = size if end is None else end
+    rows = int(1.1 * length * head.count(b"\n") / len(head)) + 16 if kind == "csv" else 0
+    frames = partial(_frames, path, kind, dialect)
+    reader = flat_reader(str(path), "csv", columns, frames, profile, rows, companion)
+    if end is None:
+        return reader
+    numbers = {"case": "lines", "bytes": size - end}
+    lost = Notice("CUT_OFF", numbers=numbers, lossy=True)
+    return replace(reader, notices=(lost, *reader.notices))
 
 
 def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
@@ -140,6 +154,8 @@ def _frames(
             raise LogError(
                 f"{path}: the table cannot be read past row {done}: {reason[:200]}"
             ) from error
+        if "\0" in found[1]:
+            raise LogError(f"{path}: past row {done}: {NUL_AMONG_ROWS}") from error
         raise LogError(
             f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a "
             "number, found "
@@ -225,7 +241,7 @@ def _parsed(
     path: Path, kind: str, dialect: Dialect, columns: Columns, rows: int, most: int | None
 ) -> Iterator[pl.DataFrame]:
     scan = partial(_scan, dialect, columns, most)
-    if kind == "csv" and dialect.separator:
+    if kind == "csv" and dialect.separator and end_of_lines(path) is None:
         yield from scan(path, dialect.skip).collect_batches(chunk_size=rows)
         return
     skip = dialect.skip

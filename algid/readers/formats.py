@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from algid.errors import LogError
 from algid.files import read_start
 from algid.limits import LIMITS
-from algid.readers.text import GZIP, MCAP, ZSTD, head_of, looks_like_text
+from algid.readers.text import GZIP, MCAP, NUL_AMONG_ROWS, ZSTD, head_of, looks_like_text
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -116,7 +116,8 @@ def _is_json_lines(_: Path, head: bytes) -> bool:
 
 
 def _is_text(_: Path, head: bytes) -> bool:
-    return bool(head) and looks_like_text(head)
+    text = head.rstrip(b"\0")  # of a log that breaks off
+    return bool(text) and looks_like_text(text)
 
 
 def _open_mcap(path: Path, profile: Profile) -> TableReader:
@@ -320,6 +321,13 @@ def format_of(path: Path) -> FileFormat:
             return form
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
+    if not head.strip(b"\0"):
+        raise LogError(
+            f"{path}: the file begins with NUL bytes alone, as a crash leaves them where nothing "
+            "was written; look for another copy, and at the recorder"
+        )
+    if looks_like_text(head.replace(b"\0", b"")):
+        raise LogError(f"{path}: {NUL_AMONG_ROWS}")
     raise LogError(
         f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or "
         "CSV"

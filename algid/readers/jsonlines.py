@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NoReturn, cast
 
 from algid.errors import LogError
 from algid.limits import LIMITS
+from algid.readers.text import end_of_lines
 
 if TYPE_CHECKING:
     import polars as pl
@@ -110,6 +111,9 @@ def _depth_of(line: bytes) -> float:
 
 def _end_of_whole_lines(path: Path) -> int | None:
     """Where the last line begins if it breaks off: it has no line end, and is no JSON object."""
+    before_nul = end_of_lines(path)
+    if before_nul is not None:
+        return before_nul
     with path.open("rb") as stream:
         size = stream.seek(0, io.SEEK_END)
         start = stream.seek(max(0, size - LIMITS.json_bytes))

@@ -34,6 +34,37 @@ def looks_like_text(head: bytes) -> bool:
     return True
 
 
+_BLOCK = 1 << 16
+_NOTHING = b"\0"
+NUL_AMONG_ROWS = (
+    "NUL bytes stand among the rows, as a crash leaves them; cut them out with the rest of their "
+    "line, or cut the file there"
+)
+
+
+def end_of_lines(path: Path) -> int | None:
+    """Where whole lines end in a text with NUL bytes behind it; None where none are behind it.
+
+    A file system that had made a file longer, and lost the power before it wrote what belongs
+    there, leaves NUL bytes: the line before them breaks off.
+    """
+    with path.open("rb") as stream:
+        start = stream.seek(0, os.SEEK_END)
+        block, behind = b"", start
+        while start and not block:
+            start = max(0, start - _BLOCK)
+            stream.seek(start)
+            block = stream.read(behind - start).rstrip(_NOTHING)
+            behind = behind if block else start
+        if start + len(block) == stream.seek(0, os.SEEK_END):
+            return None
+        while start and b"\n" not in block:
+            start = max(0, start - _BLOCK)
+            stream.seek(start)
+            block = stream.read(_BLOCK)
+    return start + block.rfind(b"\n") + 1
+
+
 _PIECE = 1 << 24
 _PACKED = 1 << 11
 """Bytes given to zstd at a time: at most 64 MiB unpacked, as a 4-byte block makes 128 KiB."""
@@ -41,6 +72,8 @@ _PACKED = 1 << 11
 
 def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
     """Bytes of a "csv" file, or unpacked ones of "csv.zst" or "csv.gz", `size` or more at a time.
+
+    A "csv" file ends at its last whole line where NUL bytes are behind it.
 
     Raises
     ------
@@ -51,7 +84,12 @@ def pieces(path: Path, name: str, size: int = _PIECE) -> Iterator[bytes]:
         with path.open("rb") as raw:
             most = LIMITS.free_text_bytes + LIMITS.text_a_byte * os.fstat(raw.fileno()).st_size
             if name == "csv":
-                yield from iter(lambda: raw.read(size), b"")
+                end = end_of_lines(path)
+                if end is None:
+                    yield from iter(lambda: raw.read(size), b"")
+                    return
+                for start in range(0, end, size):
+                    yield raw.read(min(size, end - start))
                 return
             stream = gzip.GzipFile(fileobj=raw)
             total = 0

@@ -1,0 +1,65 @@
+"""Text that ends in NUL bytes, as a file does that had grown when the power went."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.errors import LogError
+from algid.inspection.report import contents
+from algid.readers import read_log
+from tests.readers.logs import noise_log
+
+LOG = noise_log(400)
+NAMES = ("t", "theta1", "theta2", "tau1", "tau2")
+ROWS = np.column_stack([LOG.t, LOG.theta.T, LOG.tau.T])
+
+
+def text_of(kind: str) -> bytes:
+    if kind == "jsonl":
+        rows = [json.dumps(dict(zip(NAMES, row, strict=True))) for row in ROWS.tolist()]
+        return "".join(row + "\n" for row in rows).encode()
+    mark = {"csv": ",", "blanks": "  "}[kind]
+    rows = [mark.join(map(repr, row)) for row in ROWS.tolist()]
+    return "\n".join([mark.join(NAMES), *rows, ""]).encode()
+
+
+@pytest.mark.parametrize("nul", [1, 4096, 70_000, 1 << 21])
+@pytest.mark.parametrize("kind", ["csv", "blanks", "jsonl"])
+def test_rows_before_nul_bytes_are_kept_and_the_loss_is_counted(
+    kind: str, nul: int, tmp_path: Path
+) -> None:
+    whole = text_of(kind)
+    place = whole.rfind(b"\n", 0, len(whole) // 2) + 12  # in the midst of a row
+    kept = whole[:place].count(b"\n") - (kind != "jsonl")
+    path = tmp_path / f"log.{'jsonl' if kind == 'jsonl' else 'csv'}"
+    path.write_bytes(whole[:place] + bytes(nul))
+    log = read_log(path)
+    assert np.array_equal(log.theta, LOG.theta[:, :kept])
+    assert np.array_equal(log.tau, LOG.tau[:, :kept])
+    (notice,) = [one for one in log.notices if one.code == "CUT_OFF"]
+    assert notice.lossy
+    if kind != "jsonl":
+        assert notice.numbers["bytes"] == 11 + nul
+        assert {entry.count for entry in contents(path)[1]} == {kept}
+
+
+def test_a_file_of_nul_bytes_is_no_log(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(bytes(5000))
+    with pytest.raises(LogError, match="begins with NUL bytes alone"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("rows", [1, 40])  # within the first bytes, and behind them
+def test_nul_bytes_among_the_rows_are_named(rows: int, tmp_path: Path) -> None:
+    header, _, body = text_of("csv").partition(b"\n")
+    whole = header + b"\n" + rows * body
+    place = len(whole) // 2
+    path = tmp_path / "log.csv"
+    path.write_bytes(whole[:place] + bytes(500) + whole[place + 500 :])
+    with pytest.raises(LogError, match="NUL bytes stand among the rows"):
+        read_log(path)
