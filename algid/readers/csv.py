@@ -89,13 +89,23 @@ def counted_rows(path: Path, kind: str, dialect: Dialect) -> int:
     LogError
         If compressed text is damaged, or a line is no table's.
     """
-    rows, skip = 0, dialect.skip
+    return sum(_rows_in(text, dialect.comment) for text in _table(path, kind, dialect))
+
+
+def _table(path: Path, kind: str, dialect: Dialect) -> Iterator[bytes]:
+    """The text under the header, in pieces that end with a line, but for the last.
+
+    Raises
+    ------
+    LogError
+        If compressed text is damaged, or a line is no table's.
+    """
+    skip = dialect.skip
     for text in ending_with_lines(path, _small(pieces(path, kind, _SPLIT))):
         while skip and text:
             text = text.partition(b"\n")[2]
             skip -= 1
-        rows += _rows_in(text, dialect.comment)
-    return rows
+        yield text
 
 
 def _rows_in(text: bytes, comment: str | None) -> int:
@@ -205,13 +215,37 @@ def _without_values(path: Path, kind: str, dialect: Dialect, columns: Columns) -
     separator = dialect.separator.encode()
     if not separator:
         return 0
+    comment = dialect.comment.encode() if dialect.comment else b"\n"
     needed = [dialect.columns.index(column) for column in columns.sources.values()]
+    suspects = _lines_without(min(needed), separator)
     lost = 0
-    for _, line in _lines(path, kind, dialect):
-        if separator in line:
-            cells = line.split(separator)
-            lost += not any(cells[place].strip(b' \t\r"') for place in needed if place < len(cells))
+    for text in _table(path, kind, dialect):
+        for line in suspects.findall(text):
+            if separator in line and not line.startswith(comment):
+                cells = line.split(separator)
+                values = [cells[place] for place in needed if place < len(cells)]
+                lost += not any(value.strip(b' \t\r"') for value in values)
     return lost
+
+
+def _lines_without(place: int, separator: bytes) -> re.Pattern[bytes]:
+    """Lines whose cell at `place` is empty, or that have no such cell."""
+    mark = re.escape(separator)
+    cell = rb"[^\n%s]*" % mark
+    before = rb"(?:%s%s)" % (cell, mark)
+    empty = rb"%s{%d}[ \t\r\"]*(?:%s[^\n]*)?$" % (before, place, mark)
+    short = rb"%s{0,%d}%s$" % (before, place - 1, cell)
+    return re.compile(rb"^(?:%s)" % (empty if place == 0 else empty + b"|" + short), re.MULTILINE)
+
+
+def _leaves_quotes_open(text: bytes) -> bool:
+    """Whether some line of a text, which ends with a line, holds an odd number of quotes."""
+    letters = np.frombuffer(text, np.uint8)
+    quotes = np.flatnonzero(letters == ord('"'))
+    if quotes.size == 0:
+        return False
+    lines = np.searchsorted(np.flatnonzero(letters == _LINE_END), quotes)
+    return bool(np.any(np.bincount(lines) % 2))
 
 
 def _check_quotes(path: Path, kind: str, dialect: Dialect) -> None:
@@ -222,7 +256,7 @@ def _check_quotes(path: Path, kind: str, dialect: Dialect) -> None:
     LogError
         If a line that begins between quotes has the cells of a row.
     """
-    if not dialect.separator or not any(b'"' in piece for piece in pieces(path, kind)):
+    if not dialect.separator or not any(map(_leaves_quotes_open, _table(path, kind, dialect))):
         return
     inside = 0
     separators = len(dialect.columns) - 1
