@@ -380,13 +380,16 @@ class _Trials:
         c = self._free @ free[0][0]
         moments = [c[COLUMNS.index(name) :][:2] for name in ("k1", "k2", "k4")]
         turned = [np.arctan2(abs(sine), cosine) for cosine, sine in moments if cosine or sine]
-        return float(_sizes(free[1])[0]) if max(turned) <= LARGEST_PHASE else None
+        return float(_sizes(free[1])[0]) if max(turned, default=0.0) <= LARGEST_PHASE else None
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
         sums = self._sums(family, self._fine)
         c = self._free @ self._solved(sums, [family], self._free[None])[0][0]
-        start = np.array([np.arctan2(c[6], c[5]), np.arctan2(c[1], c[0])])
+        of_one, of_two = COLUMNS.index("k4"), COLUMNS.index("k1")  # each with its sine part next
+        start = np.array(
+            [np.arctan2(c[of_one + 1], c[of_one]), np.arctan2(c[of_two + 1], c[of_two])]
+        )
 
         def scores(zeros: FloatArray) -> FloatArray:
             T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])

@@ -103,10 +103,11 @@ def roughness(tau: FloatArray) -> FloatArray:
 
 
 def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
-    """Sixth differences of the torques (2, N - 6), less what the angles up to then tell of them.
+    """Sixth differences of the torques (2, n), less what the angles up to then explain of them.
 
-    A controller turns the noise of its encoders into torque, which moves the arm and is no noise of
-    the torque.
+    Those of the first `_MOST_SAMPLES`; of all, and with nothing left out, where the angles are too
+    few, or not all noise. A controller turns the noise of its encoders into torque, which moves the
+    arm and is no noise of the torque.
     """
     angles, torques = (np.diff(x[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1) for x in (theta, tau))
     n = angles.shape[1] - _LAGS

@@ -23,7 +23,7 @@ Profile = Callable[[float], tuple[float, FloatArray]]
 """By a width in rad/s the deviance, and the best parameters (Q,)."""
 NARROWEST, WIDEST = 0.004, 1.0
 """rad/s: no joint's friction turns in less, and none in more."""
-_STEPS = (np.log(2.0), 0.5 * np.log(2.0))
+_HALF_OCTAVE = 0.5 * np.log(2.0)
 _SHAPE = "coulomb_speed"
 
 
@@ -49,27 +49,35 @@ def likeliest_width(profile: Profile, start: float) -> Width:
     start : float, rad/s
     """
     low, high = np.log(NARROWEST), np.log(WIDEST)
-    seen: dict[float, tuple[float, FloatArray]] = {}
+    first = float(np.clip(np.log(start), low, high))
+    seen: dict[int, tuple[float, FloatArray]] = {}  # by half octaves from the first width
 
-    def at(x: float) -> float:
-        if x not in seen:
-            seen[x] = profile(float(np.exp(x)))
-        return seen[x][0]
+    def log_width(place: int) -> float:
+        return first + place * _HALF_OCTAVE
 
-    x = float(np.clip(np.log(start), low, high))
-    for step in _STEPS:
+    def deviance(place: int) -> float:
+        if place not in seen:
+            seen[place] = profile(float(np.exp(log_width(place))))
+        return seen[place][0]
+
+    place = 0
+    for step in (2, 1):
         while True:
-            beside = [one for one in (x - step, x + step) if low <= one <= high]
-            best = min(beside, key=at)
-            if at(best) >= at(x):
+            beside = [one for one in (place - step, place + step) if low <= log_width(one) <= high]
+            best = min(beside, key=deviance)
+            if not deviance(best) < deviance(place):  # so a deviance that is no number ends it too
                 break
-            x = best
-    before, after = x - step, x + step
-    if not low <= before < after <= high:
-        return Width(float(np.exp(x)), np.zeros((seen[x][1].size,) * 2))
-    curvature = (at(before) - 2 * at(x) + at(after)) / step**2
-    slope = (at(after) - at(before)) / (2 * step)
-    moved = float(np.clip(-slope / max(curvature, 1e-300), -step, step))
-    change = (seen[after][1] - seen[before][1]) / (2 * step)
-    variance = min(2.0 / max(curvature, 1e-300), (high - low) ** 2 / 12)
-    return Width(float(np.exp(x + moved)), variance * np.outer(change, change))
+            place = best
+    before, after = place - 1, place + 1
+    inside = low <= log_width(before) < log_width(after) <= high
+    if not (inside and np.isfinite(deviance(before)) and np.isfinite(deviance(after))):
+        unmoved = np.zeros((seen[place][1].size,) * 2)
+        return Width(float(np.exp(log_width(place))), unmoved)
+    h = _HALF_OCTAVE
+    slope = (deviance(after) - deviance(before)) / (2 * h)
+    curvature = (deviance(before) - 2 * deviance(place) + deviance(after)) / h**2
+    curvature = max(curvature, 1e-300)
+    bottom = log_width(place) + float(np.clip(-slope / curvature, -h, h))
+    change = (seen[after][1] - seen[before][1]) / (2 * h)
+    variance = min(2.0 / curvature, (high - low) ** 2 / 12)
+    return Width(float(np.exp(bottom)), variance * np.outer(change, change))

@@ -72,7 +72,7 @@ def read_urdf(path: Path) -> Predictor:
         raise ResultError(f"{path}: not XML ({error}); expected a URDF file") from error
     try:
         arm, friction = _Robot(robot).arm()
-    except (ValueError, KeyError, AttributeError) as error:
+    except ValueError as error:
         raise ResultError(
             f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
         ) from error
@@ -99,25 +99,35 @@ class _Robot:
     """The joints of a URDF file, by the link that they hang from."""
 
     def __init__(self, robot: ET.Element) -> None:
-        self._links = {link.attrib["name"]: link for link in robot.findall("link")}
+        self._links = {_attribute(link, "name"): link for link in robot.findall("link")}
         self._joints = robot.findall("joint")
-        self._moving = [joint for joint in self._joints if joint.attrib["type"] != "fixed"]
-        if len(self._moving) != 2 or {joint.attrib["type"] for joint in self._moving} - {
-            "revolute",
-            "continuous",
-        }:
+        self._moving = [joint for joint in self._joints if _attribute(joint, "type") != "fixed"]
+        kinds = {_attribute(joint, "type") for joint in self._moving}
+        if len(self._moving) != 2 or not kinds <= {"revolute", "continuous"}:
             raise ValueError(
                 f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn"
             )
         self._parent = {_linked(joint, "child"): joint for joint in self._joints}
+        self._refuse_circles()
+
+    def _refuse_circles(self) -> None:
+        """Raises `ValueError` where a link hangs from two joints, or from itself."""
+        if len(self._parent) < len(self._joints):
+            raise ValueError("a link hangs from two joints")
+        for link in self._parent:
+            passed, above = {link}, link
+            while above in self._parent:
+                above = _linked(self._parent[above], "parent")
+                if above in passed:
+                    raise ValueError(f"link {link!r} is fixed to itself")
+                passed.add(above)
 
     def arm(self) -> tuple[Arm, tuple[float, float]]:
         """The arm, and its joints' Coulomb friction in N m."""
         first, second = self._moving
         base, place = self._frame(first)
-        if base in {self._child(first), self._child(second)} or self._frame(second)[
-            0
-        ] != self._child(first):
+        follows = self._frame(second)[0] == self._child(first)
+        if base in {self._child(first), self._child(second)} or not follows:
             first, second = second, first
             base, place = self._frame(first)
         if self._frame(second)[0] != self._child(first):
@@ -161,12 +171,15 @@ class _Robot:
     def _body(self, link: str) -> _Body:
         """A link with all that is fixed to it, in its frame."""
         body = _NOTHING
+        if link not in self._links:
+            raise ValueError(f"there is no link {link}")
         inertial = self._links[link].find("inertial")
         if inertial is not None:
-            mass = float(inertial.find("mass").attrib["value"])  # type: ignore[union-attr]
-            moments = inertial.find("inertia").attrib  # type: ignore[union-attr]
+            mass = _number(_attribute(_part(inertial, "mass"), "value"))
+            moments = _part(inertial, "inertia")
             xx, yy, zz, xy, xz, yz = (
-                float(moments[name]) for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+                _number(_attribute(moments, name))
+                for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
             )
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
             second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
@@ -214,7 +227,23 @@ class _Robot:
 
 def _linked(joint: ET.Element, side: Literal["parent", "child"]) -> str:
     """The name of a joint's parent or child link."""
-    return joint.find(side).attrib["link"]  # type: ignore[union-attr]
+    return _attribute(_part(joint, side), "link")
+
+
+def _part(element: ET.Element, tag: str) -> ET.Element:
+    """The first element `tag` within another; raises `ValueError` where there is none."""
+    part = element.find(tag)
+    if part is None:
+        raise ValueError(f"<{element.tag}> has no <{tag}>")
+    return part
+
+
+def _attribute(element: ET.Element, name: str) -> str:
+    """An attribute's text; raises `ValueError` where there is none."""
+    text = element.get(name)
+    if text is None:
+        raise ValueError(f"<{element.tag}> has no attribute {name}")
+    return text
 
 
 def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:
@@ -231,17 +260,28 @@ def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:
 
 def _axis(joint: ET.Element) -> FloatArray:
     axis = joint.find("axis")
-    found = _three("1 0 0" if axis is None else axis.attrib["xyz"])
-    return found / np.linalg.norm(found)
+    direction = _three("1 0 0" if axis is None else _attribute(axis, "xyz"))
+    length = np.linalg.norm(direction)
+    if length == 0:
+        raise ValueError("a joint's axis has no direction")
+    return direction / length
 
 
 def _three(text: str) -> FloatArray:
-    numbers = np.array([float(part) for part in text.split()])
-    if numbers.shape != (3,) or not np.all(np.isfinite(numbers)):
-        raise ValueError(f"expected three numbers, found {text!r}")
+    numbers = np.array([_number(part) for part in text.split()])
+    if numbers.shape != (3,):
+        raise ValueError(f"expected three numbers, found {text!r:.60}")
     return numbers
+
+
+def _number(text: str) -> float:
+    """A finite number; raises `ValueError` where the text is none."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"expected a finite number, found {text!r:.60}")
+    return number
 
 
 def _loss(joint: ET.Element, name: str) -> float:
     dynamics = joint.find("dynamics")
-    return 0.0 if dynamics is None else float(dynamics.attrib.get(name, "0"))
+    return 0.0 if dynamics is None else _number(dynamics.get(name, "0"))

@@ -116,7 +116,7 @@ def _without_friction(fit: Fit) -> bool:
 def _size(known: Known, name: str) -> tuple[float, float]:
     """Size of a constant, with its sine part where it has one, and its standard deviation.
 
-    None without a column.
+    Both are 0 without a column.
     """
     value, std = known.get(name, (0.0, 0.0))
     sine = next((own for own, of in SINES.items() if of == name and own in known), None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from algid.units import CURRENT, TORQUE, VELOCITY
 if TYPE_CHECKING:
     from algid.profile import Angle, Profile, Torque, Velocity
 
+UnitSource = Literal["flag", "profile", "names", "assumed"]
+"""Who says a unit: a flag, a profile, the channel's own name, or nobody."""
 ROWS = 1 << 16
 """Rows a table: few enough to stay in a core's cache between decoding and copying."""
 
@@ -223,17 +225,8 @@ def channel_readings(
     for name in [name for name in CHANNELS if name in mapping]:
         joint = int(name[-1]) - 1
         like = f"theta{joint + 1}" if _is_desired(name, profile) else name
-        channel, own = _channel(like, profile), stated.get(like)
-        unit = channel.unit or own or _usual_unit(like, profile)
-        if name in REFERENCES:  # recorded as the angle is, where nothing says otherwise
-            unit = (
-                profile.channel(name).unit
-                or own
-                or channel.unit
-                or stated.get(f"theta{joint + 1}")
-                or "rad"
-            )
-        told = profile.told_by(f"{like}.unit") if channel.unit else "names" if own else "assumed"
+        channel = _channel(like, profile)
+        unit, told = _unit(like, profile, stated)
         if name == f"tau{profile.passive}":
             found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
             continue
@@ -253,6 +246,20 @@ def _channel(name: str, profile: Profile) -> Angle | Velocity | Torque:
         return own
     said = {key: getattr(own, key) for key in own.model_fields_set}
     return profile.channel(f"theta{name[-1]}").model_copy(update=said)
+
+
+def _unit(name: str, profile: Profile, stated: Mapping[str, str]) -> tuple[str, UnitSource]:
+    """The unit of a channel, and who says it.
+
+    A reference is recorded as its angle is, where nothing is said of it.
+    """
+    for place in (name, f"theta{name[-1]}") if name in REFERENCES else (name,):
+        unit = profile.channel(place).unit
+        if unit:
+            return unit, profile.told_by(f"{place}.unit")
+        if place in stated:
+            return stated[place], "names"
+    return _usual_unit(name, profile), "assumed"
 
 
 def _is_desired(name: str, profile: Profile) -> bool:

@@ -87,3 +87,19 @@ def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> 
     fit = refined.fit([lambda: [still]], settings=settings)
     assert np.all(np.isfinite(fit.covariance))
     assert fit.covariance.shape == (truth.size, truth.size)
+
+
+@pytest.mark.parametrize("lost_above", [0.0, 0.09])
+def test_a_deviance_that_is_no_number_ends_the_walk_where_it_is_known(lost_above: float) -> None:
+    """The likelihood may overflow at a width; the walk neither follows it nor goes on for ever."""
+    asked: list[float] = []
+
+    def profile(width: float) -> tuple[float, FloatArray]:
+        asked.append(width)
+        deviance = (np.log(width / 0.08)) ** 2 if width < lost_above else np.nan
+        return deviance, np.zeros(2)
+
+    found = likeliest_width(profile, 0.02)
+    assert found.value == pytest.approx(0.08 if lost_above else 0.02)
+    assert not found.covariance.any()
+    assert len(set(np.round(np.log(asked), 9))) == len(asked) < 10

@@ -101,6 +101,34 @@ def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are(tmp_path: 
     assert read[0] == pytest.approx(asked[0] - math.pi / 2)
 
 
+@pytest.mark.parametrize(
+    ("angle", "reference", "said", "unit", "by"),
+    [
+        ("theta{}", "q_des{}", {}, "rad", "assumed"),
+        ("theta{} [deg]", "q_des{}", {}, "deg", "names"),
+        ("theta{} [deg]", "q_des{} [rad]", {}, "rad", "names"),
+        ("theta{}", "q_des{}", {"theta{}": {"unit": "deg"}}, "deg", "flag"),
+        ("theta{}", "q_des{} [rad]", {"theta{}": {"unit": "deg"}}, "rad", "names"),
+        ("theta{} [deg]", "q_des{}", {"q_des{}": {"unit": "rad"}}, "rad", "flag"),
+    ],
+)
+def test_the_unit_is_the_angles_where_nothing_else_is_said(
+    angle: str,
+    reference: str,
+    said: dict[str, dict[str, str]],
+    unit: str,
+    by: str,
+    tmp_path: Path,
+) -> None:
+    of_angles = dict(zip((angle.format(1), angle.format(2)), THETA, strict=True))
+    asked = dict(zip((reference.format(1), reference.format(2)), REFERENCE, strict=True))
+    torques = dict(zip(("tau1", "tau2"), TAU, strict=True))
+    path = table(tmp_path, t=T, **of_angles, **torques, **asked)
+    own = {name.format(joint): one for name, one in said.items() for joint in (1, 2)}
+    read = read_log(path, with_settings(Profile(), own)).origin.reading.channels["q_des2"]
+    assert (read.unit, read.told) == (unit, by)
+
+
 def test_the_desired_angle_of_a_pd_law_is_one(tmp_path: Path) -> None:
     path = table(tmp_path, **columns("t q1 q2 go1 go2", T, THETA, REFERENCE))
     laws = {f"tau{joint}": {"q_des": f"go{joint}", "kp": 2.0} for joint in (1, 2)}
