@@ -250,6 +250,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "steel of that length: are "
         "its torques in N m?"
     ),
+    "MOTORLESS_INSTRUMENTS": (
+        "friction and cables pull nearly as hard as the load of the joint without a motor, which "
+        "draws least squares to constants near nothing: instruments stand in its place"
+    ),
     "MOTORLESS_UNTOLD": (
         "joint {joint} has no motor, and what else moves it (friction, cables) pulls as hard as "
         "its load: k1 … k5 are "

@@ -69,11 +69,13 @@ def judged(job: tuple[str, str, int]) -> Counter[str]:
         flagged = result
         if named and named[0].remedy is not None:
             flagged = identify(first, second, report=False, **named[0].remedy.keywords)
-        found.update(draws=1, named=bool(named), wrong=bool(others))
+        found.update(draws=1, named=int(bool(named)))
+        found.update(f"other {code}" for code in others)
         found[f"exit {_exit(result)}"] += 1
         found[f"then {_exit(flagged)}"] += 1
         low, high = flagged.payload["m_p"].ci95 or (None, None)
-        found["held"] += low is not None and high is not None and low <= payload[0] <= high
+        held = low is not None and high is not None and low <= payload[0] <= high
+        found["held"] += int(held)
     return found
 
 
@@ -94,8 +96,10 @@ def lines(draws: int, processes: int) -> Iterator[str]:
             total: Counter[str] = Counter()
             for found in pool.map(judged, [(effort, name, draws) for name in ARMS]):
                 total.update(found)
-            cells = ("draws", "named", "exit 0", "then 0", "held", "wrong")
-            yield f"| {effort} | {' | '.join(str(total[cell]) for cell in cells)} |"
+            cells = [str(total[cell]) for cell in ("draws", "named", "exit 0", "then 0", "held")]
+            others = sorted(cell for cell in total if cell.startswith("other "))
+            named = [f"{total[cell]} {cell.removeprefix('other ')}" for cell in others]
+            yield f"| {effort} | {' | '.join([*cells, ', '.join(named) or 'none'])} |"
 
 
 def main() -> None:

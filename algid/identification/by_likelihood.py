@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from algid.errors import LogError
-from algid.estimators import exogeneity, instruments, shrunk, weak
+from algid.estimators import exogeneity, instruments, motorless, shrunk, weak
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
@@ -214,6 +214,11 @@ def run_fit(
         elif fit.shared.model != chosen.model:  # the fit has found the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
             sums.clear()
+        told = _of_motorless(fit, survey, settings, chosen, prior)
+        if told is not None:
+            fit, chosen = told
+            ours = _weak_settings(settings, chosen)
+            sums.clear()
         if fit.estimator == "instruments" and not chosen.shrunk:
             fit = exogeneity.watched(fit, unloaded, loaded, ours)
     except TooShortError as error:
@@ -222,6 +227,40 @@ def run_fit(
         ) from error
     fit = averaged_over_bodies(with_body(fit))
     return constrained(fit) if settings.constrain else fit, sums, chosen
+
+
+_BY_NOTHING = "left out: it was judged beside constants near nothing"
+
+
+def _of_motorless(
+    fit: Fit, survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None
+) -> tuple[Fit, Selection] | None:
+    """The fit by instruments of an arm whose joint without a motor least squares does not tell.
+
+    It has the most common of the chosen terms: the others, and the hold, were judged beside
+    constants near nothing. None where least squares tells them, or instruments do not either.
+    """
+    unloaded, loaded = _passes(survey, settings)
+    passive = any(log.origin.reading.passive for log in survey.logs)
+    if settings.estimator != "refined" or loaded or not passive:
+        return None
+    if untold(fit, unloaded, loaded, _weak_settings(settings, chosen)) is fit:
+        return None
+    told = chosen.chosen_by == "logs"
+    terms = tuple(term for term in chosen.model.terms if not told or term in FIRST_TERMS)
+    trials = tuple(
+        replace(trial, kept=False, reason=_BY_NOTHING)
+        if trial.kept and trial.term not in terms
+        else trial
+        for trial in chosen.trials
+    )
+    hold: Hold = "foh" if chosen.hold_by == "logs" else chosen.hold
+    model = replace(chosen.model, terms=terms)
+    plainer = replace(chosen, model=model, delay=False, trials=trials, hold=hold, late=None)
+    ours = _weak_settings(settings, plainer)
+    known = without(prior, absent(settings.effort, model.names))
+    found = motorless.by_instruments(unloaded, ours, settings.lengths, known)
+    return None if found is None else (found, plainer)
 
 
 _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"

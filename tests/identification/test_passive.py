@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,22 +12,22 @@ from typer.testing import CliRunner
 
 from algid.arm import CONSTANT_NAMES
 from algid.errors import LogError
-from algid.estimators import instruments, refined, weak
-from algid.estimators.weak import Source
+from algid.estimators import instruments, motorless, refined, weak
+from algid.estimators.weak import Source, WeakSettings
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.profile import Profile
 from algid.readers import open_log
 from algid.results import Result
 from algid.settings import Settings
-from algid.signals.segments import Segment
+from algid.signals.segments import Segment, segments
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from algid.tracks.result import track_json
 from algid.tracks.run import track_log
+from pipelines import passive as scenes
 from pipelines.accuracy_scenes import case_of
-from pipelines.passive import log_of
 from tests.cli.commands import app
 from tests.intervals import holds_at_least_95, in_axes
 
@@ -50,6 +51,16 @@ def logged(motion: SimulatedMotion, seed: int, sigma: float = SIGMA) -> Segment:
     return Segment(
         0.0, DT, motion.theta + noise[0], np.where(motion.tau != 0, motion.tau + 10 * noise[1], 0.0)
     )
+
+
+@cache
+def log_of(name: str, passive: int, seed: int) -> Log:
+    """One draw of `make passive`."""
+    return scenes.log_of(name, passive, seed)
+
+
+def pieces_of(log: Log) -> list[Segment]:
+    return list(segments([log]))
 
 
 def source(log: Segment) -> Source:
@@ -170,13 +181,40 @@ def test_a_weak_result_tracks_and_designs_where_a_joint_has_no_motor(tmp_path: P
     assert done.exit_code in (0, 3), done.output
 
 
-def test_nothing_is_no_solution_where_cables_pull_as_hard_as_the_arm() -> None:
-    """An acrobot of much friction: constants near nothing solve the first joint's equation all but
-    exactly.
+@pytest.mark.parametrize("passive", [1, 2])
+def test_instruments_tell_what_least_squares_takes_for_nothing(passive: int) -> None:
+    """Cables pull as hard as the weight of the passive joint: constants near nothing solve its
+    equation all but exactly, and draw least squares.
     """
+    result = identify(log_of("case1", passive, 0), report=False)
+    assert result.estimator == "instruments"
+    assert result.verdict.grade == "reservations"
+    assert "MOTORLESS_INSTRUMENTS" in [notice.code for notice in result.notices]
+    for name, value in zip(CONSTANT_NAMES, case_of("case1").arm.constants().tolist(), strict=True):
+        found = result.parameters[name]
+        low, high = found.ci95 or (None, None)
+        assert low is not None
+        assert high is not None
+        assert low <= value <= high, name
+        assert found.estimate is not None
+        assert abs(found.estimate - value) < 0.5 * value, name  # nearer to it than to nothing
+
+
+def test_nothing_is_no_solution_where_instruments_do_not_tell_either(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(motorless, "by_instruments", lambda *_: None)
     result = identify(log_of("case1", 1, 0), report=False)
     assert not any(result.parameters[name].usable for name in ("k1", "k2", "k3", "k4", "k5"))
     assert "MOTORLESS_UNTOLD" in [notice.code for notice in result.notices]
+
+
+def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:
+    """A torque of the other sign turns the whole arm round, which no instrument makes physical."""
+    segments_of = pieces_of(log_of("case1", 2, 0))
+    turned = [replace(segment, tau=-segment.tau) for segment in segments_of]
+    assert motorless.by_instruments([lambda: segments_of], WeakSettings()) is not None
+    assert motorless.by_instruments([lambda: turned], WeakSettings()) is None
 
 
 def test_cables_of_two_percent_leave_the_constants_told() -> None:

@@ -1,0 +1,69 @@
+"""Arms with a joint that has no motor, where least squares ends at constants near nothing.
+
+The equation of such a joint has no torque that scales it: constants near nothing solve it, and
+where friction and cables pull nearly as hard as the arm's load, its residual draws least squares
+there. Instruments are not drawn: a motion simulated from the other joint's torque holds nothing of
+what pulls, so that at the true constants its products with the residual vanish in the mean, and
+the joint with a motor sets the scale. The constants that it is simulated with need the right
+ratios and no scale: least squares with equal weights has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.estimators import instruments, weak
+from algid.estimators.combine import Prior, scaled_pinv
+from algid.estimators.diagnostics import broken_bounds
+from algid.estimators.doubt import untold
+from algid.estimators.fit import Fit
+from algid.estimators.weak import Source, WeakSettings
+from algid.notices import Notice
+
+
+def by_instruments(
+    unloaded: Sequence[Source],
+    settings: WeakSettings,
+    lengths: dict[str, float] | None = None,
+    prior: Prior | None = None,
+) -> Fit | None:
+    """Parameters of the arm by windowed instruments, from least squares with equal weights.
+
+    Parameters
+    ----------
+    unloaded : sequence of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time.
+    settings : WeakSettings
+        A linear model and no delay to estimate.
+    lengths : dict
+        Known link lengths "l1", "l2" in m.
+    prior : Prior
+        What an earlier result knows of the arm.
+
+    Returns
+    -------
+    Fit or None
+        None where instruments do not converge, or end at constants near nothing or that physics
+        forbids.
+    """
+    start = weak.fit(unloaded, (), settings, lengths, prior)
+    start = replace(start, values=_equally_weighted(unloaded, settings))
+    found = instruments.fit(unloaded, (), settings, lengths, prior, start)
+    if not found.converged:
+        return None
+    broken = [one.distance for one in broken_bounds(found)]
+    if any(distance is None or distance > found.quantile for distance in broken):
+        return None
+    checked = untold(found, unloaded, (), settings)
+    return found.noted(Notice("MOTORLESS_INSTRUMENTS", note=True)) if checked is found else None
+
+
+def _equally_weighted(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
+    """Coefficients (q,) by least squares with the same weight for the rows of both joints."""
+    normals = [weak.normal_equations(source, settings) for source in sources]
+    total = np.sum([one.gram.sum(axis=(0, 1)) for one in normals if one is not None], axis=0)
+    return np.asarray(scaled_pinv(total[:-1, :-1]) @ total[:-1, -1])
