@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from algid.api.identify import identify
 from algid.arm import FloatArray, inverse_dynamics, passive_torque
 from algid.exits import exit_of
-from algid.identification.identify import identify
 from algid.results import Result
 from algid.synth.simulator import SimulatedMotion
 from pipelines.planar import ARMS, Row, motions, noisy, scene

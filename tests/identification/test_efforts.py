@@ -23,6 +23,7 @@ from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from pipelines.efforts import judged
 from tests.cli.commands import app
 
 RATE, DURATION = 250.0, 5.0
@@ -199,3 +200,8 @@ def test_a_current_is_in_amperes() -> None:
     with pytest.raises(LogError, match="torque_constant"):
         channel_readings("log.csv", {"tau1": "effort"}, profile, {})
     assert replace(Settings(), effort="command").effort == "command"
+
+
+def test_the_table_of_efforts_names_one_and_applies_its_flag() -> None:
+    found = judged(("external", "case1", 1))
+    assert found == {"draws": 1, "named": 1, "exit 3": 1, "then 0": 1, "held": 1}
