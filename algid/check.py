@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from algid.errors import ResultError, SettingError
 from algid.files import read_toml
+from algid.options import flag
 from algid.results import Result
 
 
@@ -82,7 +83,9 @@ def _limits(
     known = [row for row in result.table4 if row.truth is not None]
     if tolerance_file is not None:
         if max_error is not None:
-            raise SettingError("--max-error and --tolerance-file: give one of them")
+            raise SettingError(
+                f"{flag('max_error')} and {flag('tolerance_file')}: give one of them"
+            )
         limits = read_toml(tolerance_file, _Tolerances).max_error_percent
         names = [row.parameter for row in known]
         for name in limits:
@@ -99,10 +102,13 @@ def _limits(
             if row.paper_error_percent is not None
         }
         if not limits:
-            raise ResultError(f"{result.log.path}: not a case of the paper; check --against truth")
+            raise ResultError(
+                f"{result.log.path}: not a case of the paper; check {flag('against')} truth"
+            )
         return limits
     if max_error is None:
         raise SettingError(
-            "--against truth: give the largest error with --max-error or --tolerance-file"
+            f"{flag('against')} truth: give the largest error with {flag('max_error')} or "
+            f"{flag('tolerance_file')}"
         )
     return {row.parameter: max_error for row in known}

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 
 from algid.errors import AlgidError, text_of
+from algid.options import flag
 
 EXIT_USAGE = 2
 EXIT_INTERNAL = 70
@@ -60,8 +61,9 @@ def fault(error: BaseException) -> tuple[str, int]:
     reason = text_of(error).partition("\n")[0][:_LONGEST_REASON]
     trace = f"see where with {TRACEBACK}=1"
     if isinstance(error, MemoryError):
+        cut = f"{flag('start')} and {flag('end')}"
         return (
-            f"{place}not enough memory ({reason}); cut the log with --start and --end",
+            f"{place}not enough memory ({reason}); cut the log with {cut}",
             EXIT_USAGE,
         )
     if isinstance(error, OSError) and error.strerror:

@@ -32,6 +32,7 @@ from algid.construction import (
 )
 from algid.errors import OutputError, SettingError
 from algid.limits import LIMITS
+from algid.options import flag
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -48,7 +49,7 @@ def writing(place: Path | str, trouble: str = "cannot write") -> Iterator[None]:
         remedy = (
             "give a shorter name"
             if error.errno == errno.ENAMETOOLONG
-            else "choose another folder with -o"
+            else f"choose another folder with {flag('out')}"
         )
         raise OutputError(f"{place}: {trouble} ({reason_of(error)}); {remedy}") from error
 
@@ -72,7 +73,7 @@ def refuse_links(folder: Path, name: str) -> None:
         if place.is_symlink():
             raise OutputError(
                 f"{place}: a link, which is not followed; make it a folder, or choose another one "
-                "with -o"
+                f"with {flag('out')}"
             )
 
 
@@ -281,7 +282,10 @@ def misfit(error: ValidationError) -> tuple[str, str]:
     return place, f"{said}, found {reprlib.repr(first['input']):.60}{more}"
 
 
-EXISTS = "{}: exists already; choose another folder with -o, or replace it with --force"
+EXISTS = (
+    f"{{}}: exists already; choose another folder with {flag('out')}, "
+    f"or replace it with {flag('force')}"
+)
 TEMPORARY = "algid"
 """The name for which things are made in the system's temporary folder."""
 
@@ -295,12 +299,13 @@ def refuse_misleading(name: str | None) -> None:
     """Raise `SettingError` if the name of a result's folder is empty or leads elsewhere."""
     if name == "":
         raise SettingError(
-            "--name: expected a name for the result folder, found ''; leave it out for the log's "
+            f"{flag('name')}: expected a name for the result folder, found ''; leave it out for "
+            "the log's "
             "own"
         )
     if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
-        found = f"found {name!r:.60}; -o names the folder around it"
-        raise SettingError(f"--name: expected a name without slashes, {found}")
+        found = f"found {name!r:.60}; {flag('out')} names the folder around it"
+        raise SettingError(f"{flag('name')}: expected a name without slashes, {found}")
 
 
 def refuse_existing(folder: Path, force: bool) -> None:

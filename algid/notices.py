@@ -17,63 +17,34 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from algid.options import BY_TAKER, FLAGS, OPTIONS, PROFILE, flag
 from algid.text import joined
 from algid.words import counted
 
-NO_PROFILE = (
-    "estimator",
-    "model",
-    "torque_hold",
-    "delay",
-    "l1",
-    "l2",
-    "range",
-    "speed",
-    "torque",
-    "runs",
-)
-"""Settings with a flag of their own that no profile has."""
-OWN_FLAGS = (
-    "zero",
-    "second_angle",
-    "drive",
-    "effort",
-    "passive",
-    "joints",
-    "angle_unit",
-    "torque_unit",
-    "topic",
-    "rate",
-    "columns",
-    "clock",
-    "start",
-    "end",
-    "segment",
-    "torque_file",
-    "accept",
-    "gravity",
-    *NO_PROFILE,
-)
-"""Settings with a flag of their own; any other is one of a profile, behind ``--set``."""
-UNIT_OF = {"angle_unit": "[theta1] and [theta2]", "torque_unit": "[tau1] and [tau2]"}
-OPEN = {
-    "l1": "M",
+_OF_CHANNELS: Mapping[str, str | tuple[str, ...]] = {
     "source": "NAME",
     "q_des": "NAME",
-    "topic": "NAME",
     "time": "NAME",
-    "joints": ("A", "B"),
     "gear_ratio": "N",
     "counts": "N",
     "offset": "RAD",
     "torque_constant": "K",
-    "start": "S",
-    "rate": "HZ",
-    "segment": "N",
-    "torque_file": "FILE",
-    "end": "S",
 }
-"""What stands for a value that only the user knows, by the last part of a setting's name."""
+"""What stands for a value that only the user knows, by the last part of a setting's name, where
+`algid.options` has no such option."""
+
+
+def _own(name: str, value: object) -> bool:
+    """Whether a setting has a flag of its own; any other is one of a profile, behind ``--set``.
+
+    A profile's `velocity` is true or false and has none: the option says where velocities are from.
+    """
+    return name in FLAGS and not isinstance(value, bool)
+
+
+def _has_line(name: str, value: object) -> bool:
+    """Whether a profile has the setting."""
+    return not _own(name, value) or (PROFILE, name) in BY_TAKER
 
 
 @dataclass(frozen=True)
@@ -98,14 +69,14 @@ class Remedy:
         """As words of a command line."""
         words: list[str] = []
         for name, value in self.settings.items():
-            if name in OWN_FLAGS:
+            if _own(name, value):
                 shown = _shown(name, value)
                 listed = ",".join(map(str, shown if isinstance(shown, list | tuple) else [shown]))
-                words += ["--" + name.replace("_", "-"), listed]
+                words += [flag(name), listed]
             else:
                 shown = _shown(name, value)
                 plain = value is None or (isinstance(value, str) and value.isalpha())
-                words += ["--set", f"{name}={shown if plain else _toml(name, value)}"]
+                words += [flag("set"), f"{name}={shown if plain else _toml(name, value)}"]
         return tuple(words)
 
     @property
@@ -114,10 +85,12 @@ class Remedy:
         own: list[str] = []
         channels: list[str] = []
         for name, value in self.settings.items():
-            if name in NO_PROFILE:
+            if not _has_line(name, value):
                 continue
-            if name in UNIT_OF:
-                channels.append(f"unit = {_toml(name, value)} of {UNIT_OF[name]}")
+            option = BY_TAKER.get((PROFILE, name))
+            if option is not None and option.channels:
+                first, second = option.channels[:2]
+                channels.append(f"unit = {_toml(name, value)} of [{first}] and [{second}]")
                 continue
             channel, dot, key = name.partition(".")
             value = [value] if name == "accept" and isinstance(value, str) else value
@@ -153,7 +126,11 @@ _IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
 
 def _shown(name: str, value: Any) -> Any:
     """A value, or what stands for one that only the user knows."""
-    return OPEN.get(name.rpartition(".")[2], "VALUE") if value is None else value
+    if value is not None:
+        return value
+    last = name.rpartition(".")[2]
+    known = [one.open for one in OPTIONS if one.name == last and one.open]
+    return known[0] if known else _OF_CHANNELS.get(last, "VALUE")
 
 
 def _toml(name: str, value: Any) -> str:
@@ -270,8 +247,9 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "driven, and the friction that moves it makes the constants; give logs that drive both "
         "joints"
     ),
-    "CONSTRAINED": "--constrain enforces {bounds}, which the logs contradict",
-    "NOT_FEASIBLE": "--constrain cannot obey {bounds}: no estimates within the bounds were found",
+    "CONSTRAINED": "{flag[constrain]} enforces {bounds}, which the logs contradict",
+    "NOT_FEASIBLE": "{flag[constrain]} cannot obey {bounds}: no estimates within the bounds were "
+    "found",
     "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported "
     "instead",
     "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight",
@@ -300,8 +278,8 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     ),
     "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at "
     "95 %",
-    "LENGTHS_NEEDED": "without link lengths a payload near zero is not determined: give --l1 and "
-    "--l2",
+    "LENGTHS_NEEDED": "without link lengths a payload near zero is not determined: give "
+    "{flag[l1]} and {flag[l2]}",
     "LENGTH_MISMATCH": (
         "g k1 / k2 makes l1 {length:.4g} ± {half:.2g} m, given are {given:g} m: gravity is "
         "compensated in part, or a "
@@ -390,7 +368,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "PASSIVE_TORQUE": (
         "{column!r} holds a torque of {percent:.2g} % of the other joint's at joint {joint}, which "
         "is called passive: it is not used, and estimates lack it where a motor makes it; leave "
-        "out --passive then"
+        "out {flag[passive]} then"
     ),
     "MOTOR_SIDE": "{columns}: signals of motors, taken for those of joints",
     "OTHER_UNIT": (
@@ -604,7 +582,9 @@ def _text(code: str, numbers: Mapping[str, Any]) -> str:
     form = MESSAGES[code]
     if not isinstance(form, str):
         form = form[numbers["case"]]
-    return _Words().vformat(form + _ANYWHERE, (), {"accepted": False, "looked_at": 0, **numbers})
+    return _Words().vformat(
+        form + _ANYWHERE, (), {"flag": FLAGS, "accepted": False, "looked_at": 0, **numbers}
+    )
 
 
 @dataclass(frozen=True)
@@ -701,9 +681,9 @@ def merged(notices: Iterable[Notice]) -> list[Notice]:
 def from_flags(flags: Sequence[str]) -> Remedy:
     """The remedy that flags stand for, as results of an earlier schema hold them."""
     settings: dict[str, Any] = {}
-    for flag, value in zip(flags[::2], flags[1::2], strict=False):
+    for word, value in zip(flags[::2], flags[1::2], strict=False):
         name, text = (
-            (value.partition("=")[::2]) if flag == "--set" else (flag.removeprefix("--"), value)
+            value.partition("=")[::2] if word == flag("set") else (word.removeprefix("--"), value)
         )
         try:
             settings[name.replace("-", "_")] = json.loads(text)

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 
 from algid.errors import SettingError
 from algid.files import misfit, read_toml
-from algid.limits import PHYSICAL
+from algid.options import PROFILE, range_of
 from algid.units import names_of, unit_of
 
 
@@ -57,6 +57,9 @@ ALL_CHANNELS = (
 
 OF_ONE_LOG = ("torque_file", "segment")
 """Settings that no other log shares."""
+
+
+_RATE = range_of(PROFILE, "rate")
 
 
 def _parts(text: object) -> object:
@@ -198,7 +201,7 @@ class Profile(_Strict):
     clock: Literal["header", "log"] | None = None
     time: str | None = None
     time_unit: TimeUnit | None = None
-    rate: float | None = Field(default=None, ge=PHYSICAL.rate[0], le=PHYSICAL.rate[1])
+    rate: float | None = Field(default=None, ge=_RATE[0], le=_RATE[1])
     columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = None
     zero: Literal["horizontal", "hanging", "upright"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"

@@ -1,20 +1,21 @@
 """Everything that decides an identification, as one value that travels into its result.
 
-The command line derives its options from the fields: what one is called, what it may be, and its
-help stand here only.
+What each setting is called, its range and its help stand in `algid.options`, its type and its
+default here.
 """
 
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
 
 from algid.errors import SettingError
 from algid.limits import PHYSICAL, Range
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
+from algid.options import BY_TAKER, PROFILE, SETTINGS, flag, names_taken
 from algid.physics.effort import Effort, without_terms
 from algid.signals.shift import TorqueShift
 
@@ -25,12 +26,13 @@ else:
 
 
 EXTERNAL_GRAVITY = (
-    "--effort external: such a torque has nothing of the arm's weight; leave --gravity out, or say "
-    "--effort gravity-compensated"
+    f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
+    f"{flag('gravity')} out, or say "
+    f"{flag('effort')} gravity-compensated"
 )
 
 
-OF_BOTH = ("gravity", "effort")
+OF_BOTH = names_taken(SETTINGS, PROFILE)
 """Settings that a profile has too: there they are of its log's driver and arm."""
 
 
@@ -46,11 +48,6 @@ def refuse_contradictions(given: Mapping[str, Any]) -> None:
         raise SettingError(EXTERNAL_GRAVITY)
 
 
-def flag(name: str) -> str:
-    """The command line's option of a setting."""
-    return "--" + name.replace("_", "-")
-
-
 def _poles(text: str) -> tuple[complex, ...]:
     """Six poles out of text; complex ones like -80+20j."""
     from algid.signals.observers import observer_gain
@@ -59,14 +56,16 @@ def _poles(text: str) -> tuple[complex, ...]:
     try:
         poles = tuple(complex(part.strip()) for part in text.split(","))
     except ValueError:
-        raise SettingError(f"--poles {text}: expected numbers between commas; {like}") from None
+        raise SettingError(
+            f"{flag('poles')} {text}: expected numbers between commas; {like}"
+        ) from None
     low, high = PHYSICAL.pole
     try:
         if not all(low <= abs(pole) <= high for pole in poles):
             raise ValueError(f"each must be from {low:g} to {high:g} rad/s in size")
         observer_gain(poles)
     except ValueError as error:
-        raise SettingError(f"--poles {text:.200}: {error}; {like}") from None
+        raise SettingError(f"{flag('poles')} {text:.200}: {error}; {like}") from None
     return tuple(pole.real if pole.imag == 0 else pole for pole in poles)
 
 
@@ -89,6 +88,10 @@ def _expected(bounds: Range | None, kind: Any, value: object) -> str | None:
     if kind in (bool, str):
         return None if isinstance(value, kind) else "true or false" if kind is bool else "text"
     return None
+
+
+PARSERS: Mapping[str, Callable[[str], Any]] = {"poles": _poles}
+"""Of the settings that a command line gives as text which no annotation reads."""
 
 
 @dataclass(frozen=True)
@@ -134,88 +137,29 @@ class Settings:
         If a number has no meaning, or the paper's method lacks what is set.
     """
 
-    estimator: EstimatorName = field(default=NAMES[0], metadata={"help": "How to estimate."})
-    velocity: Literal["observer", "measured"] = field(
-        default="observer", metadata={"help": "Observe velocities, or use the log's own."}
-    )
-    observer: Literal["luenberger", "zero-phase"] | None = field(
-        default=None, metadata={"help": "The paper's observer, or the zero-phase differentiator."}
-    )
-    poles: tuple[complex, ...] | None = field(
-        default=None,
-        metadata={
-            "help": "Six poles of the paper's observer, rad/s, three a joint, like -80,-390,….",
-            "parse": _poles,
-        },
-    )
-    window: float | None = field(
-        default=None,
-        metadata={
-            "range": PHYSICAL.window,
-            "help": "Window, s: the paper's integrals restart after it (2), or the weak form's "
-            "(0.4).",
-        },
-    )
-    bandwidth: float = field(
-        default=60.0,
-        metadata={"range": PHYSICAL.bandwidth, "help": "Of the zero-phase differentiator, Hz."},
-    )
-    gravity: float = field(
-        default=9.81,
-        metadata={
-            "range": PHYSICAL.gravity,
-            "help": "m/s², 9.81 by default; 0 for an arm that moves in a horizontal plane.",
-            "profile": True,
-        },
-    )
-    effort: Effort | None = field(
-        default=None,
-        metadata={"help": "What the driver logs as torque; by default raw.", "profile": True},
-    )
-    model: str = field(
-        default="auto",
-        metadata={
-            "help": "Terms of the torque: auto (chosen by the logs), plain (none), or some of "
-            "<terms>, like coulomb,rotor.",
-        },
-    )
-    torque_hold: Literal["auto", "foh", "zoh"] = field(
-        default="auto",
-        metadata={"help": "Torque between samples: told by the logs, ramped or held."},
-    )
-    delay: float = field(
-        default=0.0,
-        metadata={
-            "range": PHYSICAL.delay,
-            "help": "From torque to angle, s, where known; --model delay estimates it.",
-        },
-    )
-    l1: float | None = field(
-        default=None,
-        metadata={"range": PHYSICAL.length, "help": "Length of link 1, m, where known."},
-    )
-    l2: float | None = field(
-        default=None,
-        metadata={"range": PHYSICAL.length, "help": "Length of link 2, m, where known."},
-    )
-    payload_mass: float | None = field(
-        default=None,
-        metadata={
-            "range": PHYSICAL.mass,
-            "help": "Mass of the payload, kg, where known: tells the gain of the torques.",
-        },
-    )
-    constrain: bool = field(default=False, metadata={"help": "Solve within the physical bounds."})
-    cross_validate: bool = field(
-        default=False, metadata={"help": "Predict each log from the others and report how well."}
-    )
+    estimator: EstimatorName = NAMES[0]
+    velocity: Literal["observer", "measured"] = "observer"
+    observer: Literal["luenberger", "zero-phase"] | None = None
+    poles: tuple[complex, ...] | None = None
+    window: float | None = None
+    bandwidth: float = 60.0
+    gravity: float = 9.81
+    effort: Effort | None = None
+    model: str = "auto"
+    torque_hold: Literal["auto", "foh", "zoh"] = "auto"
+    delay: float = 0.0
+    l1: float | None = None
+    l2: float | None = None
+    payload_mass: float | None = None
+    constrain: bool = False
+    cross_validate: bool = False
 
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
             if value is None and one.default is None:
                 continue
-            expected = _expected(one.metadata.get("range"), _kinds()[one.name], value)
+            expected = _expected(BY_TAKER[SETTINGS, one.name].range, _kinds()[one.name], value)
             if expected:
                 raise SettingError(
                     f"{flag(one.name)}: expected {expected}, found {reprlib.repr(value)}"
@@ -242,7 +186,9 @@ class Settings:
         poles = known.get("poles")
         if poles is not None:
             if not isinstance(poles, list | tuple):
-                raise SettingError(f"--poles: expected six numbers, found {reprlib.repr(poles)}")
+                raise SettingError(
+                    f"{flag('poles')}: expected six numbers, found {reprlib.repr(poles)}"
+                )
             known["poles"] = _poles(",".join(map(str, poles[:7])))
         return cls(**known)
 
@@ -290,22 +236,25 @@ class Settings:
         for term in self.terms:
             if term not in CHOICES:
                 raise SettingError(
-                    f"--model: expected auto, plain or some of {', '.join(CHOICES)}; found {term!r}"
+                    f"{flag('model')}: expected auto, plain or some of {', '.join(CHOICES)}; "
+                    f"found {term!r}"
                 )
             needed = EVERY_TERM[term].needs
             if needed is not None and needed not in self.terms:
                 raise SettingError(
-                    f"--model: {term} has no meaning without {needed}; add {needed} to the list"
+                    f"{flag('model')}: {term} has no meaning without {needed}; add {needed} to "
+                    "the list"
                 )
         gone = set(self.terms) - set(without_terms(self.effort, self.terms))
         if gone:
             raise SettingError(
-                f"--model: torque that is {self.effort} has no {min(gone)}; leave it out, or "
-                "--effort"
+                f"{flag('model')}: torque that is {self.effort} has no {min(gone)}; leave it "
+                "out, or "
+                f"{flag('effort')}"
             )
         if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
             raise SettingError(
-                "--model: no log tells a delay from a lag beside it; leave one of them out"
+                f"{flag('model')}: no log tells a delay from a lag beside it; leave one of them out"
             )
 
     def _refuse_what_it_lacks(self, estimator: Estimator) -> None:
@@ -313,11 +262,11 @@ class Settings:
         for name in estimator.lacks:
             value = getattr(self, name)
             others = [one.name for one in ESTIMATORS if name not in one.lacks]
-            use = f"use --estimator {' or '.join(others[:2])}"
+            use = f"use {flag('estimator')} {' or '.join(others[:2])}"
             if name == "model" and value not in ("auto", "plain"):
-                what = f"--model {value}: {estimator.title} has no such terms"
+                what = f"{flag('model')} {value}: {estimator.title} has no such terms"
             elif name == "gravity" and value == 0:
-                what = f"--gravity 0: without gravity {estimator.title} has no payload"
+                what = f"{flag('gravity')} 0: without gravity {estimator.title} has no payload"
             elif name not in ("model", "gravity") and value != default[name]:
                 what = f"{flag(name)}: {estimator.title} has no such term"
             else:

@@ -24,13 +24,15 @@ from types import FrameType
 from typing import Any
 
 from algid.cli import main
+from algid.options import OPTIONS, flag
 from algid.physics.terms import ALWAYS, OPTIONAL
 from pipelines import bench_logs
 from tests.test_layers import TABLE
 
 _SAMPLES = 4000  # of the traced log, at 1 kHz
 _COLUMNS = 100
-_FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+_FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]+")
+_FLAGS = {flag(one.name, off=off) for one in OPTIONS for off in (False, True)}
 
 
 def figures() -> Iterator[tuple[str, str]]:
@@ -135,8 +137,9 @@ def _literals() -> Iterator[tuple[str, str]]:
         ]
         if room != "physics":
             terms[str(path)] += sum(text in names for text in texts)
-        if room not in ("cli", "notices.py"):
-            flags[str(path)] += sum(len(_FLAG.findall(text)) for text in texts)
+        if room not in ("cli", "options.py"):
+            spelled = [word for text in texts for word in _FLAG.findall(text)]
+            flags[str(path)] += sum(word in _FLAGS for word in spelled)
     for name, counts in (("of terms and coefficients", terms), ("of flags outside cli", flags)):
         most = ", ".join(f"{Path(path).name} {count}" for path, count in counts.most_common(6))
         yield f"literals {name}", f"{counts.total()}, most in {most}"

@@ -19,15 +19,16 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "errors": room(),
     "exits": room(),
     "limits": room(),
-    "faults": room("errors"),
+    "units": room(),
+    "options": room("limits units"),
+    "faults": room("errors options"),
     "progress": room(),
     "significance": room(),
     "criteria": room(),
     "ros2": room("errors", "numpy"),
-    "units": room(),
     "words": room(),
     "text": room(),
-    "notices": room("text words"),
+    "notices": room("options text words"),
     "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
     "compiled": room("arm", "numpy scipy"),
@@ -40,62 +41,67 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy scipy", PURE
     ),
     "methods": room("estimators progress"),
-    "files": room("construction errors limits", "pydantic"),
+    "files": room("construction errors limits options", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
     "runtime": room("errors", "threadpoolctl"),
-    "profile": room("errors files limits units", "pydantic"),
-    "settings": room("errors limits methods model physics signals"),
-    "results": room("errors files limits log model notices settings significance text verdict "
-                    "words", "numpy polars pydantic"),
+    "profile": room("errors files options units", "pydantic"),
+    "settings": room("errors limits methods model options physics signals"),
+    "results": room(
+        "errors files limits log model notices options settings significance text verdict "
+        "words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm limits log model results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
-        "arm criteria errors faults files limits log notices profile ros2 runtime units words",
+        "arm criteria errors faults files limits log notices options profile ros2 runtime "
+        "units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log notices profile readers signals "
                        "units words", "numpy"),
     "report": room(
-        "arm criteria errors files inspection methods model notices progress results ros2 "
-        "significance text verdict words",
+        "arm criteria errors files inspection methods model notices options progress "
+        "results ros2 significance text verdict words",
         "matplotlib mcap numpy plotly polars pyarrow rich"
     ),
-    "check": room("errors files results", "pydantic"),
+    "check": room("errors files options results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log methods model notices physics profile "
-        "significance progress readers report results runtime settings signals table4 text units",
+        "arm errors estimators files inspection log methods model notices options physics "
+        "profile progress readers report results runtime settings signals significance "
+        "table4 text units",
         "numpy polars pyarrow",
     ),
     "batches": room(
-        "construction errors files identification limits profile readers results runtime settings "
-        "stores text verdict",
+        "construction errors files identification limits options profile readers results "
+        "runtime settings stores text verdict",
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm criteria errors estimators files identification model notices profile report results "
-        "runtime significance signals text verdict words",
+        "arm criteria errors estimators files identification model notices options profile "
+        "report results runtime signals significance text verdict words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled criteria errors estimators files identification log model notices progress "
-        "report significance results signals synth text verdict writers",
+        "arm compiled criteria errors estimators files identification log model notices "
+        "options progress report results signals significance synth text verdict writers",
         "numpy polars pydantic scipy",
     ),
     "exports": room(
-        "arm errors files identification model notices physics results text words", "numpy scipy"
+        "arm errors files identification model notices options physics results text words",
+        "numpy scipy",
     ),
     "fleet": room("errors files limits model notices physics progress report significance text "
                   "verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exports files fleet identification "
-        "inspection limits log methods model notices physics profile progress readers report "
-        "results runtime settings stores synth tracks units writers",
+        "inspection limits log methods model notices options physics profile progress "
+        "readers report results runtime settings stores synth tracks units writers",
         "matplotlib numpy polars",
     ),
     "cli": room(
-        "api errors exits faults files limits profile report runtime settings text units words",
+        "api errors exits faults files limits options profile report runtime settings text "
+        "words",
         "rich typer",
     ),
 }  # fmt: skip

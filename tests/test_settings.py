@@ -12,8 +12,13 @@ from typer.main import get_command
 
 from algid.cli.settings import Choice
 from algid.errors import SettingError
-from algid.settings import Settings, flag
+from algid.options import BY_TAKER, SETTINGS, flag, options_of
+from algid.settings import Settings
 from tests.cli.commands import app
+
+
+def test_every_setting_is_an_entry_of_the_options() -> None:
+    assert [one.name for one in options_of(SETTINGS)] == [field.name for field in fields(Settings)]
 
 
 def test_every_setting_is_an_option_with_its_default_and_help() -> None:
@@ -22,7 +27,7 @@ def test_every_setting_is_an_option_with_its_default_and_help() -> None:
         options = {option.name: option for option in called.params}
         for field in fields(Settings):
             assert options[field.name].opts == [flag(field.name)]
-            assert options[field.name].help == field.metadata["help"]
+            assert options[field.name].help == BY_TAKER[SETTINGS, field.name].help
         defaults = {field.name: options[field.name].default for field in fields(Settings)}
         assert Choice(defaults, {}).settings() == Settings()
 

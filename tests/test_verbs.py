@@ -19,8 +19,8 @@ import pytest
 import algid
 from algid.api.options import CHANNELS_OF
 from algid.cli.app import COMMANDS, SUMMARIES
-from algid.cli.settings import OF_PROFILE
 from algid.errors import ResultError, SettingError
+from algid.options import PROFILE, options_of
 from algid.profile import Profile
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
@@ -54,8 +54,9 @@ def test_every_setting_of_a_command_is_a_keyword_of_its_verb(command: str) -> No
     taken = set(inspect.signature(VERBS[command]).parameters)
     shown = set(inspect.signature(COMMANDS[command]()).parameters)
     if "options" in taken:
-        assert {*OF_PROFILE} - {"set", "profile"} <= {*Profile.model_fields, *CHANNELS_OF}
-        shown -= {*OF_PROFILE} - {"profile"}
+        of_logs = {one.name for one in options_of(PROFILE)}
+        assert of_logs - {"set", "profile"} <= {*Profile.model_fields, *CHANNELS_OF}
+        shown -= of_logs - {"profile"}
     if "settings" in taken:
         shown -= {*inspect.signature(Settings).parameters}
     wanted = {RENAMED.get((command, name), name) for name in shown - PRINTED}

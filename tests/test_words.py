@@ -69,7 +69,7 @@ def fixed(value: ast.FormattedValue) -> bool:
             if isinstance(inner.func, ast.Name)
             else ast.unparse(inner.func).rpartition(".")[2]
         )
-        if asked in ("counted", "significant", "join"):
+        if asked in ("counted", "significant", "join", "flag"):
             return True
     name = (
         inner.attr

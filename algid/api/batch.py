@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from algid.api.options import profile_of, with_options
 from algid.api.ranges import check
 from algid.errors import AlgidError, SettingError
+from algid.options import flag
 from algid.settings import Settings
 
 if TYPE_CHECKING:
@@ -165,7 +166,8 @@ def batch(
     bytes_each = None if memory_limit is None else bytes_of(memory_limit)
     if scheduler is not None and (workers is not None or memory_limit is not None):
         raise SettingError(
-            "--scheduler: workers and their memory are the cluster's; set them where it is started"
+            f"{flag('scheduler')}: workers and their memory are the cluster's; set them where "
+            "it is started"
         )
     asked, said = with_options(settings, profile, options)
     known = (
@@ -239,7 +241,7 @@ def bytes_of(text: str) -> int:
     """A size like ``2GB``; raises `SettingError` where it is none, or too small to work in."""
     if sys.platform == "darwin":
         raise SettingError(
-            "--memory-limit: macOS does not bound the memory of a process; leave it out"
+            f"{flag('memory_limit')}: macOS does not bound the memory of a process; leave it out"
         )
     units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
     number = text.strip().lower().removesuffix("b")
@@ -249,7 +251,9 @@ def bytes_of(text: str) -> int:
     except (ValueError, KeyError, OverflowError):
         size = 0
     if size < 1 << 29:
-        raise SettingError(f"--memory-limit: expected at least 512MiB, like 2GB, found {text!r}")
+        raise SettingError(
+            f"{flag('memory_limit')}: expected at least 512MiB, like 2GB, found {text!r}"
+        )
     return size
 
 

@@ -14,6 +14,7 @@ from algid.api.options import two_names
 from algid.api.ranges import check
 from algid.errors import SettingError
 from algid.files import refuse_existing, whole_folder
+from algid.options import flag
 
 if TYPE_CHECKING:
     import polars as pl
@@ -189,7 +190,9 @@ def design(
         seed=seed,
     )
     if drive not in DRIVES:
-        raise SettingError(f"--drive: expected one of {', '.join(DRIVES)}, found {drive!r:.60}")
+        raise SettingError(
+            f"{flag('drive')}: expected one of {', '.join(DRIVES)}, found {drive!r:.60}"
+        )
     of_flags = {
         "range": range,
         "speed": speed,
@@ -277,9 +280,9 @@ def noise_of(
         found = log if isinstance(log, Log) else read_log(log)
         measured = first_guess(found.theta, found.tau)
     levels = {}
-    for flag, given, name in (
-        ("--position-noise", position, "theta"),
-        ("--torque-noise", torque, "tau"),
+    for option, given, name in (
+        ("position_noise", position, "theta"),
+        ("torque_noise", torque, "tau"),
     ):
         if given is not None:
             levels[name] = np.full(2, given)
@@ -287,8 +290,9 @@ def noise_of(
             levels[name] = getattr(measured, name)
         else:
             raise SettingError(
-                f"{flag}: {prior.source} does not tell how noisy the sensors are; give it, or "
-                "--noise-from LOG"
+                f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give "
+                "it, or "
+                f"{flag('noise_from')} LOG"
             )
     return NoiseLevels(**levels)
 

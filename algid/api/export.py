@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 from algid.api.ranges import check
 from algid.errors import SettingError
 from algid.files import refuse_existing, whole_file
+from algid.options import flag
 from algid.results import Result, read_result
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def export(
     from algid.exports.links import Knowns
 
     if to not in FORMATS:
-        raise SettingError(f"--to: expected one of {', '.join(FORMATS)}, found {to!r:.60}")
+        raise SettingError(f"{flag('to')}: expected one of {', '.join(FORMATS)}, found {to!r:.60}")
     check("export", l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1)
     known = result if isinstance(result, Result) else read_result(result)
     file = known.log.path if isinstance(result, Result) else str(result)

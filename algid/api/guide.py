@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from importlib import resources
 
+from algid.options import flag
+
 
 class GuideTopic(StrEnum):
     """The pages of the guide."""
@@ -78,7 +80,7 @@ def _terms() -> Iterator[Sequence[str]]:
 def _estimators() -> Iterator[Sequence[str]]:
     from algid.methods import ESTIMATORS
 
-    yield "`--estimator`", "what it does", "when"
+    yield f"`{flag('estimator')}`", "what it does", "when"
     for one in ESTIMATORS:
         default = " (default)" if one is ESTIMATORS[0] else ""
         yield f"`{one.name}`{default}", one.does, one.when

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid.api.options import with_options
 from algid.api.result import Result
+from algid.options import flag
 from algid.settings import Settings
 
 if TYPE_CHECKING:
@@ -96,7 +97,10 @@ def identify(
     if export and not report:
         from algid.errors import SettingError
 
-        raise SettingError("--export: the log is made from the time series; leave --no-report out")
+        raise SettingError(
+            f"{flag('export')}: the log is made from the time series; leave "
+            f"{flag('report', off=True)} out"
+        )
     found = run(
         unloaded,
         loaded,

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid.errors import SettingError
-from algid.settings import OF_BOTH, Settings, flag, refuse_contradictions
+from algid.options import PROFILE, flag, options_of
+from algid.settings import OF_BOTH, PARSERS, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -17,10 +18,7 @@ if TYPE_CHECKING:
     ProfileLike = Profile | str | Path | Mapping[str, Any]
     """A profile, the path of its file, or what would stand in that."""
 
-CHANNELS_OF = {
-    "angle_unit": ("theta1", "theta2", "omega1", "omega2"),
-    "torque_unit": ("tau1", "tau2"),
-}
+CHANNELS_OF = {one.name: one.channels for one in options_of(PROFILE) if one.channels}
 """Options that set the unit of several channels."""
 
 
@@ -46,7 +44,7 @@ def with_options(
         return given, known
     from algid.profile import with_settings
 
-    own = {field.name: field.metadata.get("parse") for field in fields(Settings)}
+    own = {field.name: PARSERS.get(field.name) for field in fields(Settings)}
     _refuse_unknown(options, [*own, *_of_profile()])
     of_settings = {name: value for name, value in options.items() if name in own}
     for name, value in of_settings.items():

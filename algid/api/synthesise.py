@@ -15,6 +15,7 @@ from algid.errors import SettingError
 from algid.files import refuse_existing
 from algid.limits import PHYSICAL
 from algid.log import Log
+from algid.options import flag
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
@@ -171,8 +172,8 @@ def synthesise(
         "seed": seed,
     }
     check("synth", duration=duration, rate=rate, **given)
-    _among("--torque-hold", torque_hold, HOLDS)
-    _among("--format", kind, FORMATS)
+    _among(flag("torque_hold"), torque_hold, HOLDS)
+    _among(flag("format"), kind, FORMATS)
     described = load_case(case)
     wished = {name: value for name, value in given.items() if value is not None}
     measured = replace(sensors or Sensors(), **wished)  # type: ignore[arg-type]
@@ -233,13 +234,14 @@ class _Asked:
         most = PHYSICAL.samples[1]
         if self.rate * duration > most:
             raise SettingError(
-                f"--duration: {duration:g} s at --rate {self.rate:g} Hz are "
+                f"{flag('duration')}: {duration:g} s at {flag('rate')} {self.rate:g} Hz are "
                 f"{self.rate * duration:.3g} samples; expected at most {most:g}, more than a day "
                 "at 1 kHz"
             )
         if round(self.rate * duration) < 1:
             raise SettingError(
-                f"--duration: expected at least {1 / self.rate:g} s, two samples at --rate "
+                f"{flag('duration')}: expected at least {1 / self.rate:g} s, two samples at "
+                f"{flag('rate')} "
                 f"{self.rate:g}, "
                 f"found {duration:g}"
             )
@@ -247,11 +249,16 @@ class _Asked:
 
 
 def _refuse_beside_motion(initial: object, schedule: object, excitation: object) -> None:
-    given = {"--initial": initial, "--payload-schedule": schedule, "--torque": excitation}
-    for flag, value in given.items():
+    given = {
+        "initial": initial,
+        "payload_schedule": schedule,
+        "torque": excitation,
+    }
+    for option, value in given.items():
         if value is not None:
             raise SettingError(
-                f"{flag} {value}: a motion starts where it was planned and carries one payload; "
+                f"{flag(option)} {value}: a motion starts where it was planned and carries one "
+                "payload; "
                 "leave it out"
             )
 
@@ -300,7 +307,9 @@ def _start_ns(start: datetime) -> int:
     found = start if start.tzinfo is not None else start.replace(tzinfo=UTC)
     if not FIRST_YEAR <= found.year <= LAST_YEAR:
         span = f"from {FIRST_YEAR} to {LAST_YEAR}"
-        raise SettingError(f"--start-time: expected a date {span}, found {start.isoformat()}")
+        raise SettingError(
+            f"{flag('start_time')}: expected a date {span}, found {start.isoformat()}"
+        )
     return int(found.timestamp()) * 10**9
 
 
@@ -320,7 +329,7 @@ def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
         and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)
     ):
         raise SettingError(
-            "--payload-schedule: expected increasing times and payloads of 0 or more like "
+            f"{flag('payload_schedule')}: expected increasing times and payloads of 0 or more like "
             f"2=0.05,4=0, found {given!r}"
         )
     return schedule
@@ -334,11 +343,14 @@ def _state(given: State | str) -> tuple[float, float, float, float]:
     except (TypeError, ValueError):
         first = second = third = fourth = math.nan
     if not math.isfinite(first + second + third + fourth):
-        raise SettingError(f"--initial: expected four numbers like -1.57,0,0,0, found {given!r}")
+        raise SettingError(
+            f"{flag('initial')}: expected four numbers like -1.57,0,0,0, found {given!r}"
+        )
     turned, fast = PHYSICAL.angle[1], PHYSICAL.speed[1]
     if max(abs(first), abs(second)) > turned or max(abs(third), abs(fourth)) > fast:
         raise SettingError(
-            f"--initial: expected angles within {turned:g} rad and {fast:g} rad/s, found {given!r}"
+            f"{flag('initial')}: expected angles within {turned:g} rad and {fast:g} rad/s, "
+            f"found {given!r}"
         )
     return first, second, third, fourth
 
@@ -354,7 +366,8 @@ def _torque(case: Case, given: str | Path | Log, hold: str) -> Torque:
 
         if not str(given) or not Path(given).exists():
             raise SettingError(
-                f"--torque {given}: expected {', '.join(run.EXCITATIONS)} or a log, found neither"
+                f"{flag('torque')} {given}: expected {', '.join(run.EXCITATIONS)} or a log, "
+                "found neither"
             )
         given = read_log(given)
     return SampledTorque(given.t, given.tau, "foh" if hold == "foh" else "zoh")

@@ -41,6 +41,7 @@ from algid.batches.workers import (
     unpacked,
 )
 from algid.errors import SettingError, text_of
+from algid.options import flag
 from algid.stores import is_url, public, shown
 
 CONNECT_SECONDS = 10
@@ -75,7 +76,7 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         from distributed import Client
     except ImportError as error:
         raise SettingError(
-            "--scheduler: Dask is not installed; pip install 'algid[dask]'"
+            f"{flag('scheduler')}: Dask is not installed; pip install 'algid[dask]'"
         ) from error
     _reach(address)
     try:
@@ -84,7 +85,7 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         )
     except (OSError, ValueError) as error:
         raise SettingError(
-            f"--scheduler {address}: no scheduler answers ({error}); start dask scheduler"
+            f"{flag('scheduler')} {address}: no scheduler answers ({error}); start dask scheduler"
         ) from error
     made = None
     loggers = {
@@ -98,7 +99,7 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         threads = sum(client.nthreads().values())
         if not threads:
             raise SettingError(
-                f"--scheduler {address}: it has no workers; start dask worker {address}"
+                f"{flag('scheduler')} {address}: it has no workers; start dask worker {address}"
             )
         misfit = misfit_of(__version__, None if is_url(out) else str(lock_file(out)), shown(out))
         prefix = f"algid-{hashlib.sha256(public(out).encode()).hexdigest()[:16]}-"
@@ -131,14 +132,14 @@ def _reach(address: str) -> None:
     found = _ADDRESS.fullmatch(address)
     if found is None or not 0 < int(found["port"]) < 1 << 16:
         raise SettingError(
-            f"--scheduler: expected an address like tcp://HOST:8786, found {address!r:.60}"
+            f"{flag('scheduler')}: expected an address like tcp://HOST:8786, found {address!r:.60}"
         )
     try:
         asyncio.run(asyncio.wait_for(_greet(address), CONNECT_SECONDS))
     except Exception as error:  # whatever there is that answers something else
         reason = " ".join(str(error).split())[:200] or f"no word within {CONNECT_SECONDS} s"
         raise SettingError(
-            f"--scheduler {address}: no scheduler answers ({reason}); start dask scheduler"
+            f"{flag('scheduler')} {address}: no scheduler answers ({reason}); start dask scheduler"
         ) from error
 
 
@@ -171,7 +172,8 @@ def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | No
         # only what this function imports is certain to be there
         if mark is not None and not os.path.exists(mark):  # noqa: PTH110
             return (
-                f"{socket.gethostname()}: it does not see {out}; choose a place with -o that "
+                f"{socket.gethostname()}: it does not see {out}; choose a place with "
+                f"{flag('out')} that "
                 "all machines see"
             )
         return None
@@ -183,7 +185,7 @@ def _refuse_misfits(client: Any, misfit: Callable[[], str | None], address: str)
     found = client.run(misfit, on_error="return")
     wrong = sorted({str(answer) for answer in found.values() if answer is not None})
     if wrong:
-        raise SettingError(f"--scheduler {address}: worker on {'; worker on '.join(wrong)}")
+        raise SettingError(f"{flag('scheduler')} {address}: worker on {'; worker on '.join(wrong)}")
 
 
 def _wait_for_earlier(client: Any, prefix: str) -> None:
@@ -349,7 +351,7 @@ class _Cluster(Executor):
         with self._lock:
             if self._gone is not None:
                 return
-            self._gone = f"--scheduler {self._address}: {reason}"
+            self._gone = f"{flag('scheduler')} {self._address}: {reason}"
             calls = [call for _, sent in self._sent.values() for call in sent] + list(self._waiting)
             self._sent.clear()
             self._waiting.clear()

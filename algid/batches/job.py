@@ -23,6 +23,7 @@ from algid.errors import AlgidError, chain_of, text_of
 from algid.files import refuse_links, temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged
+from algid.options import flag
 from algid.results import Result
 from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
 NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own
-TOO_LARGE = "it needs more memory than a worker has; raise --memory-limit"
+TOO_LARGE = f"it needs more memory than a worker has; raise {flag('memory_limit')}"
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from algid.errors import OutputError
+from algid.options import flag
 from algid.stores import is_url, public
 
 LOCK = ".lock"
@@ -36,11 +37,12 @@ def locked(out: str) -> Iterator[None]:
         handle = _held(path)
     except BlockingIOError as error:
         raise OutputError(
-            f"{out}: another batch is at work there; wait for it or choose another -o"
+            f"{out}: another batch is at work there; wait for it or choose another {flag('out')}"
         ) from error
     except OSError as error:
         raise OutputError(
-            f"{out}: cannot write there ({error.strerror}); choose another folder with -o"
+            f"{out}: cannot write there ({error.strerror}); choose another folder with "
+            f"{flag('out')}"
         ) from error
     try:
         yield

@@ -15,6 +15,7 @@ from algid.batches.jobs import COLUMNS, TABLE, Job, kept_path, name_fault, utc_o
 from algid.errors import LogError, OutputError
 from algid.files import refuse_links, sha256_of, writing
 from algid.limits import LIMITS
+from algid.options import flag
 from algid.results import Result
 from algid.stores import Store, is_url, object_stat
 
@@ -175,7 +176,7 @@ def prepare(store: Store) -> None:
             kind = "folder" if wanted else "file"
             raise OutputError(
                 f"{path}: expected a {kind} of algid's own; move it, or choose another folder "
-                "with -o"
+                f"with {flag('out')}"
             )
     with writing(store.folder / FOLDER):
         (store.folder / FOLDER).mkdir(parents=True, exist_ok=True)

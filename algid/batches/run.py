@@ -32,6 +32,7 @@ from algid.batches.table import write_jobs
 from algid.batches.workers import CallFailedError, WorkerDiedError, WorkersGoneError
 from algid.construction import MARK, folders_below, remove_left
 from algid.errors import AlgidError, OutputError, SettingError, text_of
+from algid.options import flag
 from algid.profile import Profile
 from algid.results import Result
 from algid.runtime import ending_signals
@@ -69,7 +70,7 @@ class Recipe:
             raise SettingError(
                 f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without payload, "
                 "named "
-                f"{job.name}-unloaded.*, or give the arm's result as --parameters"
+                f"{job.name}-unloaded.*, or give the arm's result as {flag('parameters')}"
             )
         return self._task(job, self.profile(job.profile))
 

@@ -25,6 +25,7 @@ from typing import Any
 
 from algid.errors import text_of
 from algid.files import temporary_folder
+from algid.options import flag
 
 # One thread a worker: more would fight for the same cores.
 THREADS = (
@@ -34,7 +35,10 @@ THREADS = (
     "POLARS_MAX_THREADS",
     "ARROW_NUM_THREADS",
 )
-TOO_LONG = "it took longer than {:g} s; raise --timeout, and run it again with --retry-failed"
+TOO_LONG = (
+    f"it took longer than {{:g}} s; raise {flag('timeout')}, "
+    f"and run it again with {flag('retry_failed')}"
+)
 
 
 class WorkerDiedError(Exception):

@@ -27,92 +27,65 @@ from algid.cli.completion import (
 from algid.errors import SettingError
 from algid.files import parsed_toml
 from algid.limits import LIMITS
-from algid.settings import OF_BOTH, Settings, flag, refuse_contradictions
-from algid.units import names_of
+from algid.options import BY_TAKER, PROFILE, SETTINGS, Option, flag, options_of
+from algid.settings import OF_BOTH, PARSERS, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
 MODEL, METHOD, LOG = "The arm's model", "Method", "What the log means"
 """Panels of a command's help."""
-MODELLED = ("gravity", "effort", "model", "torque_hold", "delay", "l1", "l2")
-
-
-COMPLETED = {"model": listed(terms)}
-"""Settings that are text and take some words."""
-
-
-def _words(names: Sequence[str]) -> str:
-    """Names as a command line takes them, the last behind "or"."""
-    *most, last = (f'"{name}"' if " " in name else name for name in names)
-    return f"{', '.join(most)} or {last}"
-
-
-OF_PROFILE: Mapping[str, tuple[Any, str, Completion | None]] = {
-    "profile": (Path, "algid.toml that says what the log's names and units mean.", None),
-    "topic": (str, "Topic with the joint states.", None),
-    "joints": (str, "The two joints, as NAME,NAME.", None),
-    "rate": (str, "Samples a second, Hz, of a table without a time.", None),
-    "columns": (str, "Names of the columns of a CSV without a header, as t,theta1,….", None),
-    "angle_unit": (str, f"{_words(names_of('angle'))}.", of_profile("unit", "theta1")),
-    "torque_unit": (str, f"{_words(names_of('torque', 'current'))}.", of_profile("unit", "tau1")),
-    "zero": (str, "Where θ1 is zero: horizontal, hanging or upright.", of_profile("zero")),
-    "second_angle": (str, "θ2 is relative (to link 1) or absolute.", of_profile("second_angle")),
-    "drive": (
-        str,
-        "Where the second motor stands: in its joint, or at the base.",
-        of_profile("drive"),
-    ),
-    "passive": (
-        str,
-        "The joint without a motor, 1 or 2: its torque is zero.",
-        of_profile("passive"),
-    ),
-    "clock": (str, "Stamps of the messages' header, or of the log.", of_profile("clock")),
-    "start": (str, "Leave out what comes before, s since the log's first sample.", None),
-    "end": (str, "Leave out what comes after, s since the log's first sample.", None),
-    "torque_file": (Path, "File with the torques, where LOG has none: joined on the stamps.", None),
-    "segment": (str, "One run alone, 1 for the first, where the log's time starts again.", None),
-    "accept": (str, "Checks that may warn but not refuse, as CODE,CODE.", listed(refusing_checks)),
-    "set": (
-        list[str],
-        "Any setting of a profile, as tau1.sign=-1; may be repeated.",
-        settings_of_profile,
-    ),
+COMPLETED: dict[str, Completion] = {
+    "model": listed(terms),
+    "accept": listed(refusing_checks),
+    "set": settings_of_profile,
 }
-"""Type, help and completion of a profile's file, its settings with flags, and any other."""
+"""Options that are text and take some words, beside those whose words a profile knows."""
 
 
 def options_of_settings() -> Iterator[inspect.Parameter]:
     """An option for each field of `Settings`: a bool has no --no-; parsed fields are text."""
     hints = get_type_hints(Settings)
     for field in fields(Settings):
+        option = BY_TAKER[SETTINGS, field.name]
         kind, default = hints[field.name], field.default
-        if field.metadata.get(
-            "profile"
-        ):  # the profile may say it: what is not given is not known here
+        if field.name in OF_BOTH:  # the profile may say it: what is not given is not known here
             kind, default = kind | None, None
-        if "parse" in field.metadata:
+        if field.name in PARSERS:
             kind, default = str | None, None if default is None else f"{default:g}"
-        panel = MODEL if field.name in MODELLED else METHOD
-        yield _option(
-            field.name, kind, default, field.metadata["help"], panel, COMPLETED.get(field.name)
-        )
+        yield _parameter(option, kind, default, MODEL if option.model else METHOD)
 
 
 def options_of_profile() -> Iterator[inspect.Parameter]:
-    """An option for each row of `OF_PROFILE`."""
-    for name, (kind, text, completed) in OF_PROFILE.items():
-        yield _option(name, kind | None, None, text, LOG, completed)
+    """An option for each setting of a profile that has a flag of its own."""
+    for option in options_of(PROFILE):
+        if option.name not in OF_BOTH:
+            kind: Any = option.kind
+            yield _parameter(option, kind | None, None, LOG)
 
 
-def _option(
-    name: str, kind: Any, default: Any, text: str, panel: str, completed: Completion | None
-) -> inspect.Parameter:
-    option = typer.Option(flag(name), help=text, rich_help_panel=panel, autocompletion=completed)
-    return inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, option]
+def _parameter(option: Option, kind: Any, default: Any, panel: str) -> inspect.Parameter:
+    declared = typer.Option(
+        flag(option.name),
+        help=option.help,
+        rich_help_panel=panel,
+        autocompletion=_completion(option),
     )
+    return inspect.Parameter(
+        option.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=default,
+        annotation=Annotated[kind, declared],
+    )
+
+
+def _completion(option: Option) -> Completion | None:
+    """What completes an option: its own words, or those of the profile's annotation."""
+    if option.name in COMPLETED or PROFILE not in option.of or option.kind is not str:
+        return COMPLETED.get(option.name)
+    if option.channels:
+        return of_profile("unit", option.channels[0])
+    return None if option.name in OF_BOTH else of_profile(option.name)
 
 
 @dataclass(frozen=True)
@@ -122,7 +95,7 @@ class Choice:
     Parameters
     ----------
     settings_flags : by the names of `Settings`' fields
-    profile_flags : by the names of `OF_PROFILE`
+    profile_flags : by the names of the profile's options
     """
 
     settings_flags: Mapping[str, Any]
@@ -136,13 +109,14 @@ class Choice:
         SettingError
             If an option is wrong.
         """
-        parsers = {
-            field.name: field.metadata.get("parse", lambda given: given)
-            for field in fields(Settings)
-        }
         given = {name: value for name, value in self.settings_flags.items() if value is not None}
         refuse_contradictions(given)
-        return Settings(**{name: parsers[name](value) for name, value in given.items()})
+        return Settings(
+            **{
+                name: PARSERS[name](value) if name in PARSERS else value
+                for name, value in given.items()
+            }
+        )
 
     def profile(self, file: Path | None = None) -> Profile | None:
         """The profile of `file`, or of ``--profile``, with the flags over it.
@@ -167,7 +141,7 @@ class Choice:
 
 
 def profile_from(flags: Mapping[str, Any]) -> Profile | None:
-    """The profile of ``--profile``, with the other flags of `OF_PROFILE` over it, in their order.
+    """The profile of ``--profile``, with the other flags of the profile over it, in their order.
 
     Raises
     ------

@@ -33,6 +33,7 @@ from algid.errors import SettingError
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS, Shared
 from algid.model import DELAYS
+from algid.options import flag
 from algid.significance import SURE
 
 UNKNOWN = 1e3  # relative bound at which a parameter that the motion leaves open is held
@@ -162,13 +163,14 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
         if name not in every:
             hint = " (there are no loaded runs)" if name in PAYLOAD_PARAMETERS else ""
             raise SettingError(
-                f"--for {name}: expected some of {', '.join(every)}, found {name!r}{hint}; leave "
+                f"{flag('for')} {name}: expected some of {', '.join(every)}, found "
+                f"{name!r}{hint}; leave "
                 "it out"
             )
         place = every.index(name)
         if not known[place]:
             raise SettingError(
-                f"--for {name}: {source} cannot tell it from zero ({mean[place]:.3g} ± "
+                f"{flag('for')} {name}: {source} cannot tell it from zero ({mean[place]:.3g} ± "
                 f"{belief.std[place]:.2g}), so "
                 "that no error is large or small beside it; leave it out"
             )

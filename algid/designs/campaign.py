@@ -19,6 +19,7 @@ from algid.designs.swing import sampled
 from algid.designs.torque import TorqueProblem, search
 from algid.errors import SettingError
 from algid.model import Motion
+from algid.options import flag
 from algid.progress import Progress
 
 Drive = Literal["position", "torque"]
@@ -147,9 +148,10 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     except np.linalg.LinAlgError as error:
         # Torque noise below the rounding of the noise of twice differentiated angles.
         raise SettingError(
-            f"--rate: at {campaign.experiment.rate:g} Hz the noise of the angles, differentiated "
+            f"{flag('rate')}: at {campaign.experiment.rate:g} Hz the noise of the angles, "
+            "differentiated "
             f"twice, leaves nothing of the torque ({error}); ask for a lower rate or less "
-            "--position-noise"
+            f"{flag('position_noise')}"
         ) from error
 
 
@@ -158,8 +160,9 @@ def _driven_joints(limits: Limits) -> None:
     without = np.flatnonzero(limits.torque == 0)
     if without.size:
         raise SettingError(
-            "--torque: position control asks for a drive at either joint, found 0 for joint "
-            f"{without[0] + 1}; --drive torque plans for a joint without one"
+            f"{flag('torque')}: position control asks for a drive at either joint, found 0 for "
+            "joint "
+            f"{without[0] + 1}; {flag('drive')} torque plans for a joint without one"
         )
 
 

@@ -25,6 +25,7 @@ from algid.designs.belief import Load
 from algid.designs.information import COMPONENTS, Slopes
 from algid.errors import SettingError
 from algid.model import Model, Motion
+from algid.options import flag
 
 HANGING = (-np.pi / 2, 0.0)
 _STEPS = 41  # postures of each joint that are tried
@@ -210,16 +211,19 @@ def _missed(row: Row, limits: Limits, most: float) -> str:
         reach = float(limits.lengths.sum())
         lowest = reach - most * (reach - limits.height)
         return (
-            f"--tip-height: within the range the tip rises no higher than {lowest:.3g} m, the "
+            f"{flag('tip_height')}: within the range the tip rises no higher than {lowest:.3g} "
+            "m, the "
             "limit asks for "
-            f"{limits.height:.3g} m (margin included); lower it, or widen --range"
+            f"{limits.height:.3g} m (margin included); lower it, or widen {flag('range')}"
         )
     assert row.joint is not None
     limit = limits.torque[row.joint]
     with_load = "loaded " if row.loaded else ""
     return (
-        f"--torque: the {with_load}arm asks for {most * limit:.3g} N m at joint {row.joint + 1} "
+        f"{flag('torque')}: the {with_load}arm asks for {most * limit:.3g} N m at joint "
+        f"{row.joint + 1} "
         "even at rest, the "
-        f"limit is {limit:.3g} N m (margin included); raise it, or move --range to where gravity "
+        f"limit is {limit:.3g} N m (margin included); raise it, or move {flag('range')} to "
+        "where gravity "
         "pulls less"
     )

@@ -24,6 +24,7 @@ from algid.identification.known import (
 )
 from algid.model import DELAYS, TERMS, Model
 from algid.notices import Notice
+from algid.options import flag
 from algid.results import Result, read_result
 from algid.significance import SURE
 from algid.synth.cases import Case, load_case
@@ -149,7 +150,8 @@ def _shared(
 ) -> Shared:
     if loaded and not mass:
         raise SettingError(
-            f"{source}: it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
+            f"{source}: it knows no payload for the loaded runs; give {flag('payload')} KG, or "
+            f"{flag('runs')} 1,0"
         )
     payload = bool(mass) if loaded is None else loaded
     return Shared(model, payload=payload, lengths=knowns.lengths, body=body if payload else ())
@@ -239,13 +241,13 @@ def _spread(
     without = [name for name in bare if name not in given]
     if without and error is None:
         why = (
-            f"the result of --estimator {result.estimator} has no error bars"
+            f"the result of {flag('estimator')} {result.estimator} has no error bars"
             if result.fit is None
             else f"the result leaves {', '.join(without)} without error bars"
         )
         raise ResultError(
             f"{source}: {why}; identify from logs that determine them, or say how wrong it may be: "
-            "--prior-error"
+            f"{flag('prior_error')}"
         )
     for name in bare:
         row = names.index(name)

@@ -15,6 +15,7 @@ from algid.arm import FloatArray
 from algid.designs.limits import HANGING, Limits
 from algid.errors import SettingError
 from algid.files import read_toml
+from algid.options import flag, range_of
 
 Positive = Annotated[float, Field(gt=0)]  # inf is no limit
 NonNegative = Annotated[float, Field(ge=0)]  # nothing is a joint without a drive
@@ -24,6 +25,12 @@ MOST_RUNS = 1000
 Runs = Annotated[int, Field(ge=0, le=MOST_RUNS)]
 SMALLEST, LARGEST = 1e-6, 1e6
 """What a limit in rad, rad/s, rad/s² or N m may be, but for 0 and inf."""
+
+
+def _within(name: str) -> Any:
+    """What a number of the file may be: as the option of that name."""
+    low, high = range_of("design", name)
+    return Field(ge=low, le=high, allow_inf_nan=False)
 
 
 class LimitsFile(BaseModel):
@@ -36,8 +43,8 @@ class LimitsFile(BaseModel):
     acceleration: Pair | None = None
     torque: NonNegative | tuple[NonNegative, NonNegative] | None = None
     tip_height: float | None = None
-    duration: Annotated[float, Field(ge=0.5, le=120, allow_inf_nan=False)] | None = None
-    rate: Annotated[float, Field(ge=20, le=1e5, allow_inf_nan=False)] | None = None
+    duration: Annotated[float, _within("duration")] | None = None
+    rate: Annotated[float, _within("rate")] | None = None
     runs: tuple[Runs, Runs] | None = None
 
 
@@ -68,9 +75,7 @@ def request(file: Path | None, flags: Mapping[str, str | float | None]) -> Reque
             continue
         content[name] = _parsed(name, value) if isinstance(value, str) else value
         if content[name] is None:
-            raise SettingError(
-                f"--{name.replace('_', '-')}: expected {_LIKE[name]}, found {value!r}"
-            )
+            raise SettingError(f"{flag(name)}: expected {_LIKE[name]}, found {value!r}")
     return Request(content, "the flags" if file is None else str(file))
 
 
@@ -85,7 +90,8 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
     for name in ("range", "speed", "torque"):
         if name not in asked.content:
             raise SettingError(
-                f"--{name}: it must be given, or `{name} = …` in the file of --limits; inf is no "
+                f"{flag(name)}: it must be given, or `{name} = …` in the file of "
+                f"{flag('limits')}; inf is no "
                 "limit at all"
             )
     for name in ("range", "speed", "acceleration", "torque"):
@@ -93,18 +99,24 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
     low, high = _range(asked.content["range"])
     height = float(asked.get("tip_height", -np.inf))
     if np.isfinite(height) and not np.all(np.isfinite(lengths)):
-        raise SettingError("--tip-height: the link lengths are not known; give --l1 and --l2")
+        raise SettingError(
+            f"{flag('tip_height')}: the link lengths are not known; give {flag('l1')} and "
+            f"{flag('l2')}"
+        )
     reach = float(np.sum(lengths))
     if height >= reach:
         raise SettingError(
-            f"--tip-height: expected less than the arm's reach, {reach:.4g} m, found {height:g} m"
+            f"{flag('tip_height')}: expected less than the arm's reach, {reach:.4g} m, found "
+            f"{height:g} m"
         )
     others = {name: _both(asked.get(name, np.inf)) for name in ("speed", "acceleration", "torque")}
     if not others["torque"].any():
-        raise SettingError("--torque: expected a drive at one joint at least, found 0 for both")
+        raise SettingError(
+            f"{flag('torque')}: expected a drive at one joint at least, found 0 for both"
+        )
     if not np.any(np.isfinite([high - low, *others.values()])):
         raise SettingError(
-            "--range: without any limit no motion is the best, found inf for all; give one"
+            f"{flag('range')}: without any limit no motion is the best, found inf for all; give one"
         )
     return Limits(low=low, high=high, height=height, lengths=lengths, **others)
 
@@ -115,7 +127,7 @@ def _check(name: str, value: Any) -> None:
     wrong = ~(np.isinf(numbers) | (numbers == 0) | ((numbers >= SMALLEST) & (numbers <= LARGEST)))
     if np.any(wrong):
         raise SettingError(
-            f"--{name}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found "
+            f"{flag(name)}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found "
             f"{numbers[wrong][0]:g}"
         )
 
@@ -131,12 +143,13 @@ def _range(value: Any) -> tuple[FloatArray, FloatArray]:
     for joint in range(2):
         if not low[joint] < high[joint]:
             raise SettingError(
-                f"--range: expected LOW:HIGH with LOW below HIGH for joint {joint + 1}, found "
+                f"{flag('range')}: expected LOW:HIGH with LOW below HIGH for joint {joint + 1}, "
+                "found "
                 f"{low[joint]:g}:{high[joint]:g}"
             )
         if np.isfinite(low[joint]) != np.isfinite(high[joint]):
             raise SettingError(
-                f"--range: expected both ends of joint {joint + 1} or neither, found "
+                f"{flag('range')}: expected both ends of joint {joint + 1} or neither, found "
                 f"{low[joint]:g}:{high[joint]:g}; "
                 "give a wide one in place of inf"
             )

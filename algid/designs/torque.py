@@ -25,6 +25,7 @@ from algid.designs.position import Fourier
 from algid.designs.swing import FAST, Swings, step_for, swing
 from algid.errors import SettingError
 from algid.model import Motion, regressor
+from algid.options import flag
 from algid.progress import Progress
 
 POPULATION = 24
@@ -78,11 +79,12 @@ class TorqueProblem:
     ) -> None:
         if not np.all(np.isfinite(limits.torque)):
             raise SettingError(
-                "--torque: an open loop needs a limit at each joint, found inf; give one"
+                f"{flag('torque')}: an open loop needs a limit at each joint, found inf; give one"
             )
         if np.any(start <= limits.low) or np.any(start >= limits.high):
             raise SettingError(
-                "--range: an open loop starts hanging at rest, which the range leaves out; widen it"
+                f"{flag('range')}: an open loop starts hanging at rest, which the range leaves "
+                "out; widen it"
             )
         self._experiment, self._belief, self._limits, self._asked = (
             experiment,

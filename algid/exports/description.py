@@ -33,6 +33,7 @@ from algid.identification.known import (
 )
 from algid.model import SINES, TERMS, UNITS, Model, length_by_coupling, phasor
 from algid.notices import Notice
+from algid.options import flag
 from algid.results import Estimate, Result
 from algid.text import joined
 
@@ -72,7 +73,7 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
     if wrong is not None:
         raise ResultError(
             f"{file}: {wrong}, so that masses would come out negative; "
-            + ("check --l1" if conditioned else "identify it from more informative logs")
+            + (f"check {flag('l1')}" if conditioned else "identify it from more informative logs")
         )
     return Coefficients(model, value, {name: spread[name] for name in known}, conditioned)
 
@@ -205,7 +206,8 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
     gravity = coefficients.model.gravity
     if gravity == 0:
         raise SettingError(
-            f"--l1: {file}: an arm in a horizontal plane does not tell its length; give --l1"
+            f"{flag('l1')}: {file}: an arm in a horizontal plane does not tell its length; give "
+            f"{flag('l1')}"
         )
     value = coefficients.value
     k1, k2 = value["k1"], value["k2"]
@@ -213,7 +215,7 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
     if l1 is None or l1 <= 0:
         raise ResultError(
             f"{file}: k1 {k1:.4g} and k2 {k2:.4g} make l1 = g k1 / k2 no positive length; "
-            "give --l1, or identify it from more informative logs"
+            f"give {flag('l1')}, or identify it from more informative logs"
         )
     return l1
 

@@ -15,6 +15,7 @@ from algid.exports.programs import c99, python_module
 from algid.exports.robots import mjcf, sdf, urdf
 from algid.identification.known import contradictions, covariance_of
 from algid.notices import Notice
+from algid.options import flag
 from algid.results import Result
 
 
@@ -62,9 +63,9 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     takes = frozenset({"l2"}) if to == PAYLOAD else FORMATS[to].takes
     for name, value in knowns.given.items():
         if not 0 < value < float("inf") and not (name == "rotor1" and value == 0):
-            raise SettingError(f"--{name}: expected a positive number, found {value:g}")
+            raise SettingError(f"{flag(name)}: expected a positive number, found {value:g}")
         if name not in takes:
-            raise SettingError(f"--{name}: {to} holds no such number; leave it out")
+            raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
     if to == PAYLOAD:
         return payload_yaml(result, file, knowns), contradictions(result, knowns.given)
     arm = describe(result, file, knowns, links=FORMATS[to].links)
@@ -81,7 +82,7 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
     """
     mass = result.payload.get("m_p")
     if mass is None or mass.estimate is None or not mass.usable:
-        raise ResultError(f"{file}: the result has no payload; identify with --loaded LOG")
+        raise ResultError(f"{file}: the result has no payload; identify with {flag('loaded')} LOG")
     if mass.estimate <= 0:
         raise ResultError(
             f"{file}: no load explains a payload of {mass.estimate:.4g} kg; check which log is "
@@ -91,7 +92,9 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
     found = result.payload.get("l2")
     length = given or (None if found is None else found.estimate)
     if length is None:
-        raise ResultError(f"{file}: the result does not tell where the payload hangs; give --l2")
+        raise ResultError(
+            f"{file}: the result does not tell where the payload hangs; give {flag('l2')}"
+        )
     spread = 0.0 if given or found is None else found.std
     y, y_std = _told(result, "y_p")
     J, J_std = _told(result, "J_p")

@@ -39,6 +39,7 @@ from scipy.special import expit
 
 from algid.errors import SettingError
 from algid.model import phasor_of
+from algid.options import flag
 
 ALONG = 0.05  # of a link's inertia across: that about its own line, as of a stout bar
 _ENDS = 25.0  # how near the ends of the masses' range the search goes, in logits
@@ -142,10 +143,10 @@ def _within(
 
 
 def _refusal(file: str, knowns: Knowns, why: str, name: str) -> str:
-    others = " or ".join(f"--{other}" for other in knowns.given if other != name)
-    flag = "--" + name
+    others = " or ".join(flag(other) for other in knowns.given if other != name)
+    typed = flag(name)
     return (
-        f"{flag}: {file}: {why}; check {flag}{' or ' + others if others else ''}, or leave it out"
+        f"{typed}: {file}: {why}; check {typed}{' or ' + others if others else ''}, or leave it out"
     )
 
 

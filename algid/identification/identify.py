@@ -27,6 +27,7 @@ from algid.identification.source import (
 from algid.identification.summary import result_of
 from algid.identification.survey import Survey
 from algid.methods import estimator_of, settles
+from algid.options import flag
 from algid.physics.effort import absent
 from algid.progress import Progress
 from algid.results import Result, read_result, write_result
@@ -139,7 +140,8 @@ def identify(
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
         raise SettingError(
-            f"--cross-validate: expected two {kind} logs or more, found one; give more, or leave "
+            f"{flag('cross_validate')}: expected two {kind} logs or more, found one; give more, "
+            "or leave "
             "it out"
         )
     if out is None:
@@ -219,7 +221,7 @@ def _by_the_paper(
         if len(logs) > 1:
             raise LogError(
                 f"{logs[1].name}: the paper's method takes one log of each kind; "
-                "give one, or use --estimator refined or weak"
+                f"give one, or use {flag('estimator')} refined or weak"
             )
     known = None
     if earlier is not None:

@@ -14,6 +14,7 @@ from algid.estimators.whitening import NoiseLevels
 from algid.identification.source import Role
 from algid.model import Model, length_by_coupling, phasor_of, without_delay
 from algid.notices import Notice
+from algid.options import flag
 from algid.physics.effort import absent
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.results import Result
@@ -56,8 +57,9 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
     file = file or result.log.path
     if result.fit is None:
         raise ResultError(
-            f"{file}: the result of --estimator {result.estimator} has no error bars; "
-            "identify with --estimator refined or weak, or use --estimator paper here too"
+            f"{file}: the result of {flag('estimator')} {result.estimator} has no error bars; "
+            f"identify with {flag('estimator')} refined or weak, or use {flag('estimator')} "
+            "paper here too"
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
     gone = absent(Settings.of(result.settings).effort, model.names)

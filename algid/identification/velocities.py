@@ -11,6 +11,7 @@ from algid.arm import FloatArray
 from algid.errors import LogError
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
+from algid.options import flag
 from algid.settings import Settings
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.observers import PAPER_POLES, LuenbergerObserver
@@ -33,7 +34,8 @@ def with_velocities(
         if settings.velocity == "measured":
             if segment.omega is None:
                 raise LogError(
-                    f"{log.name}: expected velocities omega1, omega2 for --velocity measured, "
+                    f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')} "
+                    "measured, "
                     "found none; "
                     "leave the flag out to observe them"
                 )

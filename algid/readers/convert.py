@@ -17,6 +17,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import ChannelReading, IntArray
 from algid.notices import Remedy
+from algid.options import flag
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
 
@@ -297,7 +298,7 @@ def _factor(
                 f"{motor}; "
                 f"{torque}; {unknown} gives all constants up to a gain, and a known payload that "
                 "gain "
-                "(--payload-mass)"
+                f"({flag('payload_mass')})"
             )
         return CURRENT[unit] * float(constant) * channel.gear_ratio
     if unit == "counts":

@@ -12,6 +12,7 @@ from pathlib import Path
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.notices import Remedy
+from algid.options import flag
 from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
 from algid.words import counted
@@ -234,7 +235,7 @@ def _named(path: Path, cells: list[str], names: Sequence[str] | None) -> tuple[s
     if len(names) != len(cells):
         raise LogError(
             f"{path}: {counted(len(cells), 'column')}, and {counted(len(names), 'name')} for them: "
-            f"{', '.join(names)[:200]}; name each: --columns"
+            f"{', '.join(names)[:200]}; name each: {flag('columns')}"
         )
     return tuple(names)
 

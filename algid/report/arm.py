@@ -13,6 +13,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.model import length_by_coupling, phasor_of
+from algid.options import flag
 from algid.report.series import TorqueLog
 from algid.report.text import escaped, script_json
 from algid.results import Result
@@ -79,7 +80,7 @@ def arm_of(result: Result, torque: TorqueLog | None) -> ArmDrawing | None:
     unknown = (
         ""
         if l2 is not None
-        else " Link 2's length is not known: it is drawn as long as link 1 (give --l2)."
+        else f" Link 2's length is not known: it is drawn as long as link 1 (give {flag('l2')})."
     )
     turn, loads = _phases(result)
     bent = "" if loads is None else " Dashed: where each joint's load lies, by gravity and inertia."

@@ -16,6 +16,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import SettingError
 from algid.files import whole_file
+from algid.options import flag
 from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ POINTS = 0.75  # of a page's pixel
 DPI = 200
 UPRIGHT = 6  # names of logs: more stand upright
 MISSING = (
-    "--save-plots: expected matplotlib, found none; install it with: pip install 'algid[plots]'"
+    f"{flag('save_plots')}: expected matplotlib, found none; "
+    "install it with: pip install 'algid[plots]'"
 )
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8, "pdf.fonttype": 42}
 DASHES: dict[str, Any] = {"dash": "--", "dot": ":", "solid": "-"}

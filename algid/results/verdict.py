@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid.model import CHOICES, EVERY_TERM
 from algid.notices import Notice, Remedy
+from algid.options import flag
 from algid.significance import SURE
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
@@ -73,17 +74,17 @@ def again(result: Result, flags: Sequence[str]) -> str:
     """The command that identifies again with `flags`, over the result that is there."""
     logs = [log.path for log in result.logs if log.role == "unloaded"]
     loaded = [
-        word for log in result.logs if log.role == "loaded" for word in ("--loaded", log.path)
+        word for log in result.logs if log.role == "loaded" for word in (flag("loaded"), log.path)
     ]
     made = result.settings.get("command")
     words = shlex.split(made) if isinstance(made, str) else _call(result, [*logs, *loaded])
-    force = [] if "--force" in words else ["--force"]
+    force = [] if flag("force") in words else [flag("force")]
     return visible(shlex.join([*words, *flags, *force]), LONGEST_COMMAND)
 
 
 def _call(result: Result, logs: Sequence[str]) -> list[str]:
     """The command that does what Python was asked for."""
-    from algid.settings import Settings, flag
+    from algid.settings import Settings
 
     asked = Settings.of(result.settings)
     words = ["algid", "identify", *logs]

@@ -42,6 +42,7 @@ from algid.identification.known import (
     shift_of,
 )
 from algid.model import SINES, TERMS, Model
+from algid.options import flag
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
@@ -241,8 +242,9 @@ def arm_of(
     """
     if result.fit is None:
         raise ResultError(
-            f"{result.log.path}: the result of --estimator {result.estimator} has no error bars; "
-            "identify with --estimator refined or weak"
+            f"{result.log.path}: the result of {flag('estimator')} {result.estimator} has no "
+            "error bars; "
+            f"identify with {flag('estimator')} refined or weak"
         )
     model = model_of(result)
     prior = prior_of(result, model)
