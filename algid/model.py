@@ -29,13 +29,32 @@ from algid.physics.parameters import BODY, PAYLOAD, Parameter
 from algid.physics.signals import ACCELERATIONS, rate
 from algid.physics.terms import ALWAYS, OPTIONAL, Term
 from algid.physics.terms.base import TorqueColumn
+from algid.physics.terms.coulomb import F1, F2
+from algid.physics.terms.rigid import K1, K2, K3, K4, K5
+from algid.physics.terms.rotor import J2
+from algid.physics.terms.viscous import K6, K7
 
-__all__ = ["Model", "Motion", "Term", "sine_cosine"]
+__all__ = [
+    "F1",
+    "F2",
+    "J2",
+    "K1",
+    "K2",
+    "K3",
+    "K4",
+    "K5",
+    "K6",
+    "K7",
+    "Model",
+    "Motion",
+    "Term",
+    "sine_cosine",
+]
 
 EVERY_TERM = {term.name: term for term in (*ALWAYS, *OPTIONAL)}
-TERMS = {term.name: term for term in OPTIONAL if term.timing != "delay"}
+TERMS = {term.name: term for term in OPTIONAL if not term.delays}
 """Terms that a model may have; a delay acts before a model does, on the log's times."""
-DELAYS = tuple(name for term in OPTIONAL if term.timing == "delay" for name in term.names)
+DELAYS = tuple(name for term in OPTIONAL if term.delays for name in term.names)
 CHOICES = tuple(term.name for term in OPTIONAL)
 """Names that ``--model`` takes."""
 PARAMETERS: dict[str, Parameter] = {
@@ -47,6 +66,8 @@ UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 RIGID = tuple(name for term in ALWAYS if term.inertial for name in term.names)
 SINES = {own: of for term in TERMS.values() for own, of in term.sines}
 """Parameters that are the sine part of another."""
+MOMENTS = (K1, K2, K4)
+"""The constants k1, k2 and k4, which are phasors with their sine parts: K = k + i ks."""
 LARGEST_PHASE = np.pi / 4
 """rad: beyond, a phase is another convention."""
 _SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
@@ -120,12 +141,7 @@ class Model:
         None where there is no such term.
         """
         return next(
-            (
-                name
-                for term in self.terms
-                if TERMS[term].timing == "lag"
-                for name in TERMS[term].names
-            ),
+            (name for term in self.terms if TERMS[term].lags for name in TERMS[term].names),
             None,
         )
 
@@ -359,7 +375,14 @@ def phasor(model: Model, c: FloatArray, name: str) -> complex:
 
 def phasor_of(values: Mapping[str, float], name: str) -> complex:
     """The moment `name` of coefficients by name as a phasor; what they lack is 0."""
-    return complex(values.get(name, 0.0), values.get(f"{name}s", 0.0))
+    sine = next((own for own, of in SINES.items() if of == name), "")
+    return complex(values.get(name, 0.0), values.get(sine, 0.0))
+
+
+def moments_of(values: Mapping[str, float]) -> tuple[complex, complex, complex]:
+    """The moments k1, k2 and k4 of coefficients by name as phasors; what they lack is 0."""
+    first, second, fourth = (phasor_of(values, name) for name in MOMENTS)
+    return first, second, fourth
 
 
 def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | None:
@@ -367,9 +390,9 @@ def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | N
 
     It has the sign of k1 k2: an arm's is positive. None without gravity, k1 or k2.
     """
-    K1, K2 = phasor_of(values, "k1"), phasor_of(values, "k2")
-    sign = np.sign(K1.real * K2.real)
-    return gravity * abs(K1) / abs(K2) * float(sign) if gravity and sign else None
+    first, second, _ = moments_of(values)
+    sign = np.sign(first.real * second.real)
+    return gravity * abs(first) / abs(second) * float(sign) if gravity and sign else None
 
 
 def attributes(model: Model, kind: str) -> list[tuple[str, int]]:

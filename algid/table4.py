@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
+from algid.estimators.paper import STAGE1_NAMES
 from algid.limits import LIMITS
 from algid.log import Truth
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Table4Row
 
-UNLOADED_ROWS = ("k5+k3", "k1", "k3", "k6", "k4", "k2")
+UNLOADED_ROWS = STAGE1_NAMES
 LOADED_ROWS = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
 UNITS = {
     row: PARAMETER_UNITS[row.partition("+")[0]] for row in (*UNLOADED_ROWS, *LOADED_ROWS, "m_p")

@@ -50,7 +50,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "errors files limits log model notices options settings significance text verdict "
         "words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
-    "table4": room("arm limits log model results synth"),
+    "table4": room("arm estimators limits log model results synth"),
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(

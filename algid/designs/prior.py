@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray
+from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.designs.belief import Belief
 from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
@@ -22,7 +22,7 @@ from algid.identification.known import (
     noise_of,
     wrong_inertia,
 )
-from algid.model import DELAYS, TERMS, Model
+from algid.model import DELAYS, SINES, TERMS, Model
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result, read_result
@@ -160,8 +160,8 @@ def _shared(
 def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray:
     """Parameters (Q,) of an arm and its payload, an object of the shape that the case's has."""
     x, y = case.place
-    value = {f"k{place}": float(k) for place, k in enumerate(arm.constants(), start=1)}
-    value |= dict(zip(("k1s", "k2s", "k4s"), arm.sines().tolist(), strict=True))
+    value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
+    value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
     value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2 if x is None else x, "y_p": y}
     value |= {"J_p": case.inertia * (mass / case.payload if case.payload else 1.0)}
     return np.array([value[name] for name in shared.names])

@@ -34,7 +34,7 @@ from algid.estimators.convention_sums import (
     together,
 )
 from algid.estimators.conventions import AS_READ, Convention
-from algid.model import LARGEST_PHASE
+from algid.model import F1, F2, J2, K1, K2, K3, K4, K5, K6, K7, LARGEST_PHASE, MOMENTS, PARAMETERS
 from algid.significance import SURE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
@@ -300,13 +300,13 @@ class _Trials:
         self._fine = _Windowed.of(logs, *_FINE)
         self._coarse = _Windowed.of(logs, *_COARSE)
         self.seconds = self._fine.seconds
-        kept = [not name.startswith(("k2", "k4")) or gravity for name in COLUMNS]
+        kept = [gravity or not PARAMETERS[name].weighs for name in COLUMNS]
         self._passive = logs[0].passive
         self._free = np.eye(len(COLUMNS))[:, kept]
         self._zeros = [
             (turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])
         ]
-        self._names = tuple(name for name in ZEROED if name not in ("k2", "k4") or gravity)
+        self._names = tuple(name for name in ZEROED if gravity or not PARAMETERS[name].weighs)
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two conventions differ that are told apart."""
         self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
@@ -378,7 +378,7 @@ class _Trials:
         """
         free = self._solved(self._sums(AS_READ, self._fine), [AS_READ], self._free[None])
         c = self._free @ free[0][0]
-        moments = [c[COLUMNS.index(name) :][:2] for name in ("k1", "k2", "k4")]
+        moments = [c[COLUMNS.index(name) :][:2] for name in MOMENTS]
         turned = [np.arctan2(abs(sine), cosine) for cosine, sine in moments if cosine or sine]
         return float(_sizes(free[1])[0]) if max(turned, default=0.0) <= LARGEST_PHASE else None
 
@@ -430,7 +430,7 @@ class _Trials:
     def _place(self, zero: tuple[float, float]) -> FloatArray:
         """T (15, q) of the zeros δ1 and δ2."""
         T = np.zeros((len(COLUMNS), len(self._names)))
-        turned = {"k1": zero[1], "k2": zero[0] + zero[1], "k4": zero[0]}
+        turned = {K1: zero[1], K2: zero[0] + zero[1], K4: zero[0]}
         for column, name in enumerate(self._names):
             row = COLUMNS.index(name)
             T[row, column] = 1.0
@@ -502,23 +502,23 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
             slope[place[name]] = share
         return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
 
-    k1, m22, k5 = k["k1"], k["k3"] + k["j2"], k["k5"]
+    k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]
     found = {
-        "M22 > 0": distance(m22, {"k3": 1, "j2": 1}),
-        "k5 > 0": distance(k5, {"k5": 1}),
+        "M22 > 0": distance(m22, {K3: 1, J2: 1}),
+        "k5 > 0": distance(k5, {K5: 1}),
         "det M > 0": distance(
-            k5 * m22 + k["k3"] * k["j2"] - k1**2,
-            {"k1": -2 * k1, "k3": k5 + k["j2"], "k5": m22, "j2": k5 + k["k3"]},
+            k5 * m22 + k[K3] * k[J2] - k1**2,
+            {K1: -2 * k1, K3: k5 + k[J2], K5: m22, J2: k5 + k[K3]},
         ),
         "that the friction of joint 1 brakes": distance(
-            k["k6"] * speed[0] + k["f1"], {"k6": float(speed[0]), "f1": 1}
+            k[K6] * speed[0] + k[F1], {K6: float(speed[0]), F1: 1}
         ),
         "that the friction of joint 2 brakes": distance(
-            k["k7"] * speed[1] + k["f2"], {"k7": float(speed[1]), "f2": 1}
+            k[K7] * speed[1] + k[F2], {K7: float(speed[1]), F2: 1}
         ),
     }
-    if "k2" not in k:
-        return found | {"k1 > 0": distance(k1, {"k1": 1})}
-    first, second, fourth = (distance(k[name], {name: 1}) for name in ("k1", "k2", "k4"))
+    if K2 not in k:
+        return found | {"k1 > 0": distance(k1, {K1: 1})}
+    first, second, fourth = (distance(k[name], {name: 1}) for name in MOMENTS)
     both = copysign(min(abs(first), abs(second)), first * second)
     return found | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": fourth}

@@ -25,30 +25,22 @@ from algid.arm import FloatArray
 from algid.criteria import AT_REST
 from algid.estimators.conventions import Convention
 from algid.estimators.modulating_functions import OVERLAP, Windows
-from algid.model import sine_cosine
+from algid.model import SINES, Model
+from algid.physics.motion import Motion
+from algid.physics.terms.coulomb import COULOMB
+from algid.physics.terms.offset import OFFSET
+from algid.physics.terms.phases import PHASES
+from algid.physics.terms.rotor import ROTOR
 from algid.signals.filters import correlate, differentiator, half_length
 
-COLUMNS = (
-    "k1",
-    "k1'",
-    "k2",
-    "k2'",
-    "k3",
-    "k4",
-    "k4'",
-    "k5",
-    "k6",
-    "k7",
-    "f1",
-    "f2",
-    "o1",
-    "o2",
-    "j2",
-)
-ZEROED = tuple(name for name in COLUMNS if not name.endswith("'"))
+MODEL = Model(tuple(term.name for term in (COULOMB, OFFSET, ROTOR, PHASES)), coulomb_speed=0.1)
+ZEROED = tuple(name for name in MODEL.names if name not in SINES)
+_SINE_OF = {of: sine for sine, of in SINES.items()}
+COLUMNS = tuple(one for name in ZEROED for one in (name, _SINE_OF.get(name)) if one is not None)
+"""The columns of `MODEL`, each sine part behind the one whose it is."""
+_PLACES = [MODEL.names.index(name) for name in COLUMNS]
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
-_COULOMB_SPEED = 0.1  # rad/s
 _REWEIGHTINGS = 4
 _LEAST_POWER = 1e-280  # (N m)²: the square of a torque of denormal numbers is zero
 _FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
@@ -139,46 +131,10 @@ def summed(
         angles.angles(log.theta[:, log.reach : -log.reach]),
         angles.angles(log.omega),
     )  # linear without zeros
-    tau, windows = log.tau[:, log.reach : -log.reach], log.windows
-    weight, slope, bend = log.kernels
-    (s1, s2), (c1, c2) = sine_cosine(theta)
-    friction = np.tanh(omega / _COULOMB_SPEED)
-    centripetal = omega[0] * (omega[0] + omega[1])
-    weighed = [
-        centripetal * s2,
-        centripetal * c2,
-        c1,
-        s1,
-        c1 * c2 - s1 * s2,
-        s1 * c2 + c1 * s2,
-        *friction,
-        *tau,
-    ]
-    turned2, turning2, c1_, s1_, c12_, s12_, f1, f2, *b = windows.moments(np.stack(weighed), weight)
-    slope1, slope2, momentum, momentum_ = windows.moments(
-        np.stack([*theta, c2 * omega[0], s2 * omega[0]]), slope
-    )
-    bend1, bend2, s2_bend, c2_bend = windows.moments(np.stack([*theta, s2, c2]), bend)
-    zeros, one = np.zeros_like(f1), np.ones_like(f1)
-    columns = {
-        "k1": (s2_bend - 2 * momentum, turned2 - momentum),
-        "k1'": (c2_bend + 2 * momentum_, turning2 + momentum_),
-        "k2": (c12_, c12_),
-        "k2'": (-s12_, -s12_),
-        "k3": (bend1 + bend2, bend1 + bend2),
-        "k4": (c1_, zeros),
-        "k4'": (-s1_, zeros),
-        "k5": (bend1, zeros),
-        "k6": (-slope1, zeros),
-        "k7": (zeros, -slope2),
-        "f1": (f1, zeros),
-        "f2": (zeros, f2),
-        "o1": (one, zeros),
-        "o2": (zeros, one),
-        "j2": (zeros, bend2),
-    }
-    X = np.array([columns[name] for name in COLUMNS]).swapaxes(0, 1)[:, :, kept]
-    torques = np.array(b)[:, kept]
+    motion = Motion(theta, omega, omega)
+    X = log.windows.columns(MODEL, motion)[:, _PLACES][:, :, kept]
+    tau = log.tau[:, log.reach : -log.reach]
+    torques = log.windows.moments(tau, log.kernels[0])[:, kept]
     speed = np.sqrt(np.mean(omega**2, axis=1))
     independent = X.shape[2] / OVERLAP
     drives = (X, np.stack([X[0] - X[1], X[1]]))

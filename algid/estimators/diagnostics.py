@@ -32,7 +32,19 @@ from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
-from algid.model import CHOICES, EVERY_TERM, PARAMETERS, SINES, Model, inertia, phasor
+from algid.model import (
+    CHOICES,
+    EVERY_TERM,
+    K1,
+    K2,
+    K3,
+    K5,
+    PARAMETERS,
+    SINES,
+    Model,
+    inertia,
+    phasor,
+)
 from algid.notices import Notice
 from algid.significance import sigmas
 
@@ -74,7 +86,7 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
     if shared.model.gravity > 0:
         # Table 1: k1 k2 = m2² g l1 lc2²; as phasors, θ1's zero lies between them
         found["k1 k2 >= 0"] = lambda beta: (
-            (phasor(shared.model, beta, "k1") * phasor(shared.model, beta, "k2").conjugate()).real
+            (phasor(shared.model, beta, K1) * phasor(shared.model, beta, K2).conjugate()).real
         )
     for place, name in enumerate(shared.names):
         if name in _NOT_NEGATIVE:
@@ -89,7 +101,7 @@ def _parameter(place: int, beta: FloatArray) -> float:
 def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
     """M22 and the determinant of M at θ2 = 0 and π."""
     c = beta[: len(shared.model.names)]
-    bent = -np.angle(phasor(shared.model, c, "k1")) if "k1" in shared.model.names else 0.0
+    bent = -np.angle(phasor(shared.model, c, K1)) if K1 in shared.model.names else 0.0
     bent = (
         bent if abs(bent) <= np.pi / 2 else bent + np.pi
     )  # k1 itself may be negative: a convention of θ2
@@ -110,9 +122,9 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     spreads = zip(fit.names, fit.std, strict=True)
     unknown = {name for name, std in spreads if np.isinf(std)} | {*shrunk, *fit.absent}
     open_ones = {f"{name} >= 0" for name in unknown}
-    if {"k1", "k2"} & set(fit.absent):
+    if {K1, K2} & set(fit.absent):
         open_ones.add("k1 k2 >= 0")
-    if {"k1", "k3", "k5"} & set(fit.absent):
+    if {K1, K3, K5} & set(fit.absent):
         open_ones |= {"M22 > 0", "det M > 0 at theta2 = 0", "det M > 0 at theta2 = pi"}
     broken = []
     for name, bound in bounds(fit.shared).items():
@@ -133,14 +145,14 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
     No gain of both torques changes it: where it is not the length that is known, gravity is
     compensated in part, or the zeros or the terms of the torque are wrong.
     """
-    if fit.shared.model.gravity == 0 or {"k1", "k2"} & set(fit.absent):
+    if fit.shared.model.gravity == 0 or {K1, K2} & set(fit.absent):
         return None
-    places = [fit.names.index(name) for name in ("k1", "k2")]
+    places = [fit.names.index(name) for name in (K1, K2)]
     if np.any(np.isinf(fit.std[places])) or not fit.values[places[1]]:
         return None
 
     def length(beta: FloatArray) -> float:
-        k1, k2 = (phasor(fit.shared.model, beta, name) for name in ("k1", "k2"))
+        k1, k2 = (phasor(fit.shared.model, beta, name) for name in (K1, K2))
         sign = 1.0 if (k1 * k2.conjugate()).real >= 0 else -1.0
         return sign * fit.shared.model.gravity * abs(k1) / abs(k2)
 
@@ -268,7 +280,7 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     shared = Shared(model)
     if not all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in range(2)):
         return None  # without a motor a joint's equation is solved by nothing
-    both = [place for place, name in enumerate(model.names) if name in ("k1", "k2", "k3")]
+    both = [place for place, name in enumerate(model.names) if name in (K1, K2, K3)]
     found = []
     for joint in range(2):
         grams = [normal.gram[:, joint] for normal in normals]

@@ -62,11 +62,8 @@ def untold(
     settings : WeakSettings
         Of the fit.
     """
-    value = dict(zip(fit.names, fit.values.tolist(), strict=True))
     model = fit.shared.model
-    settings = replace(
-        settings, model=model, estimate_delay=False, delay=value.get("delay", settings.delay)
-    )
+    settings = replace(_delayed(fit, settings), model=model)
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:
             continue
@@ -83,14 +80,19 @@ def untold(
     return fit
 
 
+def _delayed(fit: Fit, settings: WeakSettings) -> WeakSettings:
+    """The settings with the fit's delay, where it has one."""
+    delay = settings.delay if fit.delay is None else fit.delay
+    return replace(settings, estimate_delay=False, delay=delay)
+
+
 def _doubt(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Notice | None:
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if still:
         return Notice("JOINT_STILL", numbers={"joints": still})
-    value = dict(zip(fit.names, fit.values.tolist(), strict=True))
-    settings = replace(settings, estimate_delay=False, delay=value.get("delay", settings.delay))
+    settings = _delayed(fit, settings)
     for sources in (unloaded, loaded):
         every = [weak.normal_equations(source, settings) for source in sources]
         normals = [normal for normal in every if normal is not None]

@@ -28,6 +28,7 @@ from algid.estimators.identifiability import (
 from algid.estimators.innovations import ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
+from algid.model import DELAYS
 from algid.notices import Notice
 from algid.significance import NORMAL
 
@@ -99,6 +100,12 @@ class Fit:
     def names(self) -> tuple[str, ...]:
         """Names of the shared parameters."""
         return self.shared.names
+
+    @property
+    def delay(self) -> float | None:
+        """The torque's delay in s, where it is estimated."""
+        places = [self.names.index(name) for name in DELAYS if name in self.names]
+        return float(self.values[places[0]]) if places else None
 
     @property
     def absent(self) -> tuple[str, ...]:

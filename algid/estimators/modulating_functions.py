@@ -166,7 +166,13 @@ class Windows:
         tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
         theta = piece.theta[:, margin : len(piece) - margin]
         X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
-        self._fill(X, model, piece, theta, known)
+        speed = (self._own, "velocity")  # a change of friction's width asks for it again
+
+        def motion() -> Motion:
+            omega = known[speed] = known[speed] if speed in known else self._velocity(piece)
+            return Motion(theta, omega, omega)
+
+        self._fill(X, model, motion, theta.shape[1], known)
         if at is not None and attributes(model, "by_load"):
             place = model.compiled.place
             for name, joint, dissipated in self._dissipated(
@@ -185,6 +191,13 @@ class Windows:
             X[:, -2] = -tau_slope
         return X
 
+    def columns(self, model: Model, motion: Motion) -> FloatArray:
+        """Moments (2, q, R) of the model's columns along a motion with velocities, by windows."""
+        samples = motion.theta.shape[1]
+        X = np.zeros((2, len(model.names), samples // self.step - OVERLAP + 1))
+        self._fill(X, model, lambda: motion, samples, {})
+        return X
+
     def _of_torque(self, tau: FloatArray, order: int, known: Known) -> FloatArray:
         """Moments (2, R) of the torques (2, n) by φ or φ', as late as they act."""
         key = (self._own, self.shift, order)
@@ -193,7 +206,12 @@ class Windows:
         return known[key]
 
     def _fill(
-        self, X: FloatArray, model: Model, piece: Segment, theta: FloatArray, known: Known
+        self,
+        X: FloatArray,
+        model: Model,
+        motion: Callable[[], Motion],
+        samples: int,
+        known: Known,
     ) -> None:
         """Write moments of the columns of τ = d²s/dt² + dp/dt + f to X: ∫φ″ s - ∫φ′ p + ∫φ f."""
         compiled, shape, own = model.compiled, model.shape, self._own
@@ -211,11 +229,9 @@ class Windows:
             for order, products in wanted.items()
         }
         if any(missing.values()):
-            speed = (self._own, "velocity")  # a change of friction's width asks for it again
-            omega = known[speed] = known[speed] if speed in known else self._velocity(piece)
-            values = Values(Motion(theta, omega, omega), shape)
+            values = Values(motion(), shape)
             for order, products in missing.items():
-                self._learn(products, order, values, theta.shape[1], known, key)
+                self._learn(products, order, values, samples, known, key)
         for order, entries in parts:
             for joint, place, entry in entries:
                 for product, factor in entry.products.items():

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.model import K1, K2, K3, K4, K5, K6
 from algid.signals.differences import integral, nested_integral
 from algid.signals.segments import Segment, pieces
 
@@ -205,7 +206,7 @@ def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
 
 EPSILON = 0.2  # s: the estimates are arbitrary before (the paper's ε)
 
-STAGE1_NAMES = ("k5+k3", "k1", "k3", "k6", "k4", "k2")
+STAGE1_NAMES = (f"{K5}+{K3}", K1, K3, K6, K4, K2)
 STAGE2_NAMES = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
 
 

@@ -41,14 +41,10 @@ from algid.model import (
 )
 from algid.physics.motion import Widths
 
-CHOICE = tuple(
-    name for name, term in EVERY_TERM.items() if name in CHOICES and term.timing != "lag"
-)
+CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
 """Terms that the logs choose from; one column serves lag and delay, equal to first order."""
-_DELAY, _LAG = (
-    tuple(name for name, term in EVERY_TERM.items() if term.timing == timing)
-    for timing in ("delay", "lag")
-)
+_DELAY = tuple(name for name, term in EVERY_TERM.items() if term.delays)
+_LAG = tuple(name for name, term in EVERY_TERM.items() if term.lags)
 # Where a joint has no motor, its gain is nothing and makes its equation vanish.
 _OF_BOTH_TORQUES = tuple(name for name in CHOICE if EVERY_TERM[name].gains)
 FIRST_TERMS = tuple(name for name, term in TERMS.items() if term.usual)

@@ -26,7 +26,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -46,35 +45,6 @@ _SETTLED = 1e-3  # change of log τ
 _LEAST = 1e-4  # of s: a spread that counts as nothing
 _PRIOR_LOGS = 4.0  # logs that the white information counts as, beside the scores' own scatter
 _FEWEST = 3  # logs whose scatter tells an overdispersion
-
-
-@dataclass(frozen=True)
-class TermScale:
-    """Scale of a term's coefficients: `size` in joint torque (RMS), in k3, or in their own unit.
-
-    The sine part of a constant is measured by the constant itself. `usual` is what most arms have
-    of `size`.
-    """
-
-    size: float
-    of: Literal["torque", "k3", "cosine", "unit"] = "unit"
-    usual: float = 0.5
-
-
-SCALES = {
-    "coulomb": TermScale(0.3, "torque"),
-    "stribeck": TermScale(0.05, "torque"),
-    "asymmetry": TermScale(0.02, "torque"),
-    "offset": TermScale(0.02, "torque"),
-    "rotor": TermScale(1.0, "k3"),
-    "load": TermScale(0.03),
-    "gain": TermScale(0.03),  # what a torque constant may be off
-    "phases": TermScale(
-        0.5, "cosine", 0.02
-    ),  # rad: a bent gripper; most arms have an encoder's error at most
-    "delay": TermScale(2e-3),  # s: a loop's, about half a sample
-}
-"""The spread that physics allows each term of the torque."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,10 +21,10 @@ from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import OVERLAP, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
-from algid.estimators.shrinkage import SCALES, Expected, dispersion, divided, joined, shrink
+from algid.estimators.shrinkage import Expected, dispersion, divided, joined, shrink
 from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Normal, Source, WeakSettings
-from algid.model import DELAYS, SINES, TERMS
+from algid.model import DELAYS, EVERY_TERM, K3, SINES, TERMS
 
 _ROUNDS = 3
 _REWEIGHTINGS = 4
@@ -83,7 +83,8 @@ def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, .
     return tuple(
         term
         for term, content in TERMS.items()
-        if (term in SCALES and (driven or not content.gains)) or set(content.names) & set(held)
+        if (content.spread is not None and (driven or not content.gains))
+        or set(content.names) & set(held)
     )
 
 
@@ -192,21 +193,21 @@ def expectation(
     torque = np.where(
         torque > 0, torque, torque.max()
     )  # a joint without a motor bears a load like the other's
-    inertia = float(abs(beta[shared.names.index("k3")]))
+    inertia = float(abs(beta[shared.names.index(K3)]))
     late = (
         0.5 * normals[0].dt if settings.hold == "foh" else 0.0
     )  # a torque held by a digital controller
     rows = []
     for term in (*shared.model.terms, *(DELAYS if shared.delay else ())):
-        scale = SCALES.get(term)
+        spread = EVERY_TERM[term].spread
         for name in DELAYS if term in DELAYS else TERMS[term].names:
-            if scale is None or name in held or name not in shared.names:
+            if spread is None or name in held or name not in shared.names:
                 continue
             cosine = abs(float(beta[shared.names.index(SINES[name])])) if name in SINES else 0.0
             own = float(torque[1 if name.endswith("2") else 0])
-            unit = {"unit": 1.0, "k3": inertia, "torque": own, "cosine": cosine}[scale.of]
+            unit = {"unit": 1.0, "inertia": inertia, "torque": own, "cosine": cosine}[spread.of]
             rows.append(
-                (name, term, late if term in DELAYS else 0.0, scale.size * unit, scale.usual)
+                (name, term, late if term in DELAYS else 0.0, spread.size * unit, spread.usual)
             )
     names, terms, means, spreads, usual = zip(*rows, strict=True)
     return Expected(names, terms, np.array(means), np.array(spreads), np.array(usual))

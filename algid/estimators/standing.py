@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.model import Model
+from algid.model import F1, F2, Model
 
-FRICTIONS = ("f1", "f2")
+FRICTIONS = (F1, F2)
 
 
 def _nothing() -> FloatArray:

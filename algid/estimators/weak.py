@@ -38,7 +38,7 @@ from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_su
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.too_short import TooShortError
-from algid.model import Model
+from algid.model import K2, K4, Model
 from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
 
@@ -496,7 +496,7 @@ def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> Fl
     for mass in _FIRST_MASSES:
         guess = {"m_p": mass} | {
             length: _length_of(shared, loaded.c0 - arm, mass, name)
-            for length, name in (("l1", "k4"), ("l2", "k2"))
+            for length, name in (("l1", K4), ("l2", K2))
         }
         start = np.concatenate([arm, [guess[name] for name in shared.names[arm.size :]]])
         beta, _, value = combine(shared, [loaded], start, hold)

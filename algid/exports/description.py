@@ -31,7 +31,7 @@ from algid.identification.known import (
     torque_constants,
     wrong_inertia,
 )
-from algid.model import SINES, TERMS, UNITS, Model, length_by_coupling, phasor
+from algid.model import K1, K2, SINES, TERMS, UNITS, Model, length_by_coupling, phasor
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Estimate, Result
@@ -84,7 +84,7 @@ def _conditioned(
     """Coefficients and covariance under g |K1| = l1 |K2|, which is linear without sine parts."""
     for _ in range(_STEPS):
         wrong, a = _mismatch(model, c, l1)
-        if abs(wrong) <= _ROUNDING * l1 * abs(phasor(model, c, "k2")):
+        if abs(wrong) <= _ROUNDING * l1 * abs(phasor(model, c, K2)):
             break
         # without error bars, the moments are taken as equally wrong for their size
         toward = C @ a if a @ C @ a > 0 else c**2 * a
@@ -103,7 +103,7 @@ def _mismatch(model: Model, c: FloatArray, l1: float) -> tuple[float, FloatArray
     a = np.zeros(c.size)
     wrong = 0.0
     sines = {of: own for own, of in SINES.items() if own in model.names}
-    for name, factor in (("k1", model.gravity), ("k2", -l1)):
+    for name, factor in ((K1, model.gravity), (K2, -l1)):
         K = phasor(model, c, name)
         if name not in sines:
             wrong += factor * K.real
@@ -180,7 +180,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         l1 = _first_length(coefficients, file) if length is None else length
         chosen = links_of(coefficients.value, coefficients.model.gravity, l1, full, file)
         numbers += _chosen(chosen, coefficients, known, result)
-    delay = result.parameters.get("delay")
+    delay = result.delay
     return Description(
         name=re.sub(
             r"\W|^(?=\d)",
@@ -210,7 +210,7 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
             f"{flag('l1')}"
         )
     value = coefficients.value
-    k1, k2 = value["k1"], value["k2"]
+    k1, k2 = value[K1], value[K2]
     l1 = length_by_coupling(value, gravity)
     if l1 is None or l1 <= 0:
         raise ResultError(

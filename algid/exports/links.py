@@ -38,7 +38,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import expit
 
 from algid.errors import SettingError
-from algid.model import phasor_of
+from algid.model import K3, K5, moments_of
 from algid.options import flag
 
 ALONG = 0.05  # of a link's inertia across: that about its own line, as of a stout bar
@@ -88,10 +88,10 @@ def turn_of(k: Mapping[str, float], gravity: float) -> float:
 
     0 without gravity, or where the moments have no sine parts.
     """
-    K1, K2 = phasor_of(k, "k1"), phasor_of(k, "k2")
-    if gravity == 0 or not (K1.imag or K2.imag):
+    first, second, _ = moments_of(k)
+    if gravity == 0 or not (first.imag or second.imag):
         return 0.0
-    return cmath.phase(K2 / K1)
+    return cmath.phase(second / first)
 
 
 def links_of(
@@ -104,11 +104,11 @@ def links_of(
     SettingError
         If what is known leaves no positive mass or inertia.
     """
-    K1, K2, K4 = (phasor_of(k, name) for name in ("k1", "k2", "k4"))
+    first, second, fourth = moments_of(k)
     level = cmath.exp(-1j * turn_of(k, gravity))
-    s2, h2 = K2 * level / gravity if gravity else K1 / l1, k["k3"]
-    h = k["k5"] - (knowns.rotor1 or 0.0)
-    arm = _Free(s2, h2, h, K4 * level / gravity if gravity else None, l1, knowns)
+    s2, h2 = second * level / gravity if gravity else first / l1, k[K3]
+    h = k[K5] - (knowns.rotor1 or 0.0)
+    arm = _Free(s2, h2, h, fourth * level / gravity if gravity else None, l1, knowns)
     low, high = abs(s2) ** 2 / h2, h / l1**2
     if not low < high:
         why = f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²"

@@ -27,7 +27,7 @@ from algid.estimators.selection import (
     needs_shape,
     select,
 )
-from algid.estimators.shrinkage import SCALES, joined
+from algid.estimators.shrinkage import joined
 from algid.estimators.too_short import TooShortError
 from algid.estimators.window_scatter import scattered
 from algid.identification.known import model_of
@@ -279,7 +279,7 @@ def _shrunk(
     told = chosen.hold_by == "logs"  # by a likelihood that does not hold: a term tells the delay
     hold: Hold = "foh" if told else chosen.hold
     shaped = replace(ours, model=chosen.shapes or chosen.model, hold=hold)
-    every = replace(shaped.model, terms=tuple(term for term in TERMS if term in SCALES))
+    every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
     nothing = absent(settings.effort, every.names)
     known = without(prior, nothing)
     least = shrunk.fit(unloaded, loaded, shaped, settings.lengths, known)
@@ -310,9 +310,8 @@ def residual_of(
     if fit.residual:
         return pooled(fit.residual)
     weak_settings = _weak_settings(settings, chosen)
-    if fit.shared.delay:
-        found = float(fit.values[fit.names.index("delay")])
-        weak_settings = replace(weak_settings, delay=found, estimate_delay=False)
+    if fit.delay is not None:
+        weak_settings = replace(weak_settings, delay=fit.delay, estimate_delay=False)
     unloaded, loaded = _passes(survey, settings)
     sums = [
         weak.residuals(moving, weak_settings, torque_coefficients(fit, role))

@@ -17,7 +17,7 @@ import numpy as np
 
 from algid.estimators.diagnostics import by_themselves
 from algid.estimators.fit import Fit
-from algid.model import EVERY_TERM, SINES
+from algid.model import EVERY_TERM, K3, K4, K5, K6, K7, MOMENTS, SINES
 from algid.notices import Notice, Remedy
 from algid.physics.effort import FRICTION
 from algid.settings import Settings
@@ -70,7 +70,7 @@ def of_effort(fit: Fit, found: Settings, asked: Settings) -> list[Notice]:
 def _arm_weightless(fit: Fit) -> bool:
     """Whether unloaded logs alone, or else the fit, show an arm with coupling but no weight."""
     known = _own(fit, False) or _of_fit(fit)
-    (k1, of_k1), *weights = (_size(known, name) for name in ("k1", "k2", "k4"))
+    (k1, of_k1), *weights = (_size(known, name) for name in MOMENTS)
     least = fit.shared.model.gravity * k1 / fit.shared.lengths.get("l1", BOTH_LONG)
     return k1 > SURE * of_k1 and all(value + SURE * std < least for value, std in weights)
 
@@ -82,7 +82,7 @@ def _payload_weightless(fit: Fit) -> bool:
         return False
     (z1, of_z1), (z4, of_z4) = (
         (loaded[name][0] - unloaded[name][0], np.hypot(loaded[name][1], unloaded[name][1]))
-        for name in ("k5", "k4")
+        for name in (K5, K4)
     )
     least = fit.shared.model.gravity * z1 / fit.shared.lengths.get("l1", LONGEST)
     return bool(z1 > SURE * of_z1 and abs(z4) + SURE * of_z4 < least)
@@ -93,10 +93,10 @@ def _external(fit: Fit) -> bool:
     unloaded, loaded = _own(fit, False), _own(fit, True)
     if not (unloaded and loaded):
         return False
-    inertia, spread = loaded["k5"]
+    inertia, spread = loaded[K5]
     nothing = (
         abs(unloaded[name][0]) + SURE * unloaded[name][1] < NO_ARM * loaded[name][0]
-        for name in ("k3", "k5")
+        for name in (K3, K5)
     )
     return inertia > SURE * spread and all(nothing)
 
@@ -107,9 +107,9 @@ def _without_friction(fit: Fit) -> bool:
     if fit.absent or (fit.shrinkage is None and terms & set(fit.names)):
         return False
     found = _of_fit(fit)
-    k3, k4, k5 = (_size(found, name)[0] for name in ("k3", "k4", "k5"))
+    k3, k4, k5 = (_size(found, name)[0] for name in (K3, K4, K5))
     most = NO_DAMPING * float(np.sqrt((k3 + k5) * k4))
-    damping = [_size(found, name) for name in ("k6", "k7")]
+    damping = [_size(found, name) for name in (K6, K7)]
     return all(value < SURE * std and value + SURE * std < most for value, std in damping)
 
 

@@ -12,7 +12,18 @@ from algid.estimators.combine import Prior
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.source import Role
-from algid.model import Model, length_by_coupling, phasor_of, without_delay
+from algid.model import (
+    K1,
+    K2,
+    K3,
+    K5,
+    SINES,
+    Model,
+    length_by_coupling,
+    moments_of,
+    phasor_of,
+    without_delay,
+)
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
@@ -39,7 +50,7 @@ def model_of(result: Result) -> Model:
 
 def shift_of(result: Result) -> TorqueShift:
     """After how long a logged torque acts: hold, and delay."""
-    delay = result.parameters.get("delay")
+    delay = result.delay
     found = None if delay is None else delay.estimate
     return Settings.of(result.settings).torque_shift(found)
 
@@ -123,7 +134,7 @@ def given_lengths(result: Result) -> dict[str, float]:
 
 def wrong_inertia(values: Mapping[str, float]) -> str | None:
     """That no arm has the inertia matrix of these constants, in words; None where one has."""
-    k1, k3, k5 = abs(phasor_of(values, "k1")), values["k3"], values["k5"]
+    k1, k3, k5 = abs(phasor_of(values, K1)), values[K3], values[K5]
     if min(k3, k5) > 0 and k3 * k5 > k1**2:
         return None
     return (
@@ -156,20 +167,21 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     k1 / k2, so that a wrong one shows.
     """
     gravity = Settings.of(result.settings).gravity
-    names = [name for name in ("k1", "k2", "k1s", "k2s") if has_error_bar(result, name)]
-    if not gravity or not {"k1", "k2"} <= set(names):
+    both = (K1, K2)
+    sines = [own for own, of in SINES.items() if of in both]
+    names = [name for name in (*both, *sines) if has_error_bar(result, name)]
+    if not gravity or not set(both) <= set(names):
         return None
     value = {name: result.parameters[name].estimate or 0.0 for name in names}
     l1 = length_by_coupling(value, gravity)
     if l1 is None:
         return None
-    K1, K2 = phasor_of(value, "k1"), phasor_of(value, "k2")
-    slopes = {
-        "k1": l1 * K1.real / abs(K1) ** 2,
-        "k1s": l1 * K1.imag / abs(K1) ** 2,
-        "k2": -l1 * K2.real / abs(K2) ** 2,
-        "k2s": -l1 * K2.imag / abs(K2) ** 2,
-    }
+    first, second, _ = moments_of(value)
+    slopes = {}
+    for name, moment, power in ((K1, first, 1), (K2, second, -1)):
+        slopes[name] = power * l1 * moment.real / abs(moment) ** 2
+        for sine in (own for own in sines if SINES[own] == name):
+            slopes[sine] = power * l1 * moment.imag / abs(moment) ** 2
     return l1, {name: slopes[name] for name in names}
 
 

@@ -25,7 +25,7 @@ from algid.identification.predicted import prediction
 from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
-from algid.model import DELAYS, UNITS
+from algid.model import DELAYS, K3, K5, UNITS
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
@@ -34,7 +34,7 @@ from algid.significance import LEVEL, chance
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
 
-NEVER_ZERO = ("k3", "k5", "l1", "l2")
+NEVER_ZERO = (K3, K5, "l1", "l2")
 """Inertias and lengths: any other parameter of an arm may be zero."""
 
 

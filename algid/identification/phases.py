@@ -20,7 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.diagnostics import bent
 from algid.estimators.fit import Fit
-from algid.model import SINES, phasor
+from algid.model import K1, K2, K4, SINES, phasor
 from algid.notices import Notice
 
 
@@ -32,11 +32,11 @@ def phase_note(fit: Fit) -> Notice | None:
     """
     if not set(SINES) & set(fit.names) or (fit.shrinkage is not None and not bent(fit)):
         return None
-    second, of_second = _argument(fit, "k1")
+    second, of_second = _argument(fit, K1)
     numbers = {"second": _told(fit, second, of_second)}
-    if {"k2", "k4"} <= set(fit.names) - set(fit.absent):
-        whole, of_whole = _argument(fit, "k2")
-        load, of_load = _argument(fit, "k4")
+    if {K2, K4} <= set(fit.names) - set(fit.absent):
+        whole, of_whole = _argument(fit, K2)
+        load, of_load = _argument(fit, K4)
         first, of_first = whole - second, of_whole - of_second
         numbers["first"] = _told(fit, first, of_first)
         numbers["load"] = _told(fit, load - first, of_load - of_first)

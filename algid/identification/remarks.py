@@ -11,6 +11,7 @@ from algid.estimators.diagnostics import broken_bounds, length_by_constants, pay
 from algid.estimators.fit import Fit
 from algid.identification.phases import phase_note
 from algid.methods import estimator_of
+from algid.model import K4
 from algid.notices import Notice, Remedy
 from algid.significance import CERTAIN, LEVEL, ONE_SIDED, chance, sigmas
 
@@ -74,12 +75,12 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
 def _of_mass(fit: Fit) -> Iterator[Notice]:
     """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1)."""
     by_constants = length_by_constants(fit)
-    if "k4" not in fit.names or "k4" in fit.absent or by_constants is None:
+    if K4 not in fit.names or K4 in fit.absent or by_constants is None:
         return
     length, std = by_constants
     if not LEAST_SURE * std < length:
         return
-    mass = abs(float(fit.values[fit.names.index("k4")])) / (fit.shared.model.gravity * length)
+    mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
     if mass > STEEL * length**3:
         small = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")
         numbers = {"mass": mass, "length": length}

@@ -289,5 +289,4 @@ def torque_coefficients(fit: Fit, role: str) -> FloatArray:
 
 def torque_shift(settings: Settings, fit: Fit) -> TorqueShift:
     """After how long a logged torque acts, with the delay of the fit, if any."""
-    found = float(fit.values[fit.names.index("delay")]) if "delay" in fit.names else None
-    return settings.torque_shift(found)
+    return settings.torque_shift(fit.delay)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.model import length_by_coupling, phasor_of
+from algid.model import SINES, length_by_coupling, moments_of
 from algid.options import flag
 from algid.report.series import TorqueLog
 from algid.report.text import escaped, script_json
@@ -105,12 +105,12 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
     Without gravity only that of joint 2 is known.
     """
     value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
-    if not {"k1", "k1s"} <= set(value):
+    if not set(value) & set(SINES):
         return 0.0, None
-    K1, K2, K4 = (phasor_of(value, name) for name in ("k1", "k2", "k4"))
-    second = cmath.phase(K1)
-    turn = cmath.phase(K2 / K1) if K1 and K2 else 0.0
-    return turn, (cmath.phase(K4 * cmath.exp(-1j * turn)) if K4 else 0.0, second)
+    first, second, fourth = moments_of(value)
+    turn = cmath.phase(second / first) if first and second else 0.0
+    load = cmath.phase(fourth * cmath.exp(-1j * turn)) if fourth else 0.0
+    return turn, (load, cmath.phase(first))
 
 
 def _length(result: Result, name: str) -> float | None:

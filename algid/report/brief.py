@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.model import PARAMETERS, SINES
+from algid.model import DELAYS, PARAMETERS, SINES
 from algid.notices import Notice
 from algid.report.phasors import Moment, moments
 from algid.results import Estimate, Result, Status
@@ -19,8 +19,6 @@ from algid.words import counted
 WIDTH, HEIGHT = 80, 25
 MOST_COMMAND = 6
 """Lines of what to run first."""
-TIMED = ("delay",)
-"""Terms whose coefficient is their name, and that are in no regressor."""
 
 
 def brief(result: Result, place: str = "") -> list[str]:
@@ -145,7 +143,7 @@ def _terms(result: Result) -> list[str]:
         f"{name} {resolved(found.estimate, found.std)} ± {_half(found)}"
         for name, found in others.items()
     ]
-    kept = [*terms, *(name for name in TIMED if name in others and name not in terms)]
+    kept = [*terms, *(name for name in DELAYS if name in others and name not in terms)]
     beside = f" ({', '.join(numbers)})" if numbers else ""
     return _at_most(2, f"Terms kept: {', '.join(kept)}{beside}")
 

@@ -16,6 +16,7 @@ from algid.arm import FloatArray
 from algid.criteria import CUT
 from algid.errors import ResultError
 from algid.methods import settles
+from algid.model import K7
 from algid.progress import Progress
 from algid.report.reduce import (
     Block,
@@ -117,7 +118,7 @@ class _SeriesGathering:
         late = np.mod(since + 1e-9, self._window) >= EPSILON
         for name in self.names:
             self._lines[name].feed(t, block[name])
-            conditions = ["condition", *(["k7_condition"] if name == "k7" else [])]
+            conditions = ["condition", *(["k7_condition"] if name == K7 else [])]
             known = [
                 ~(block[condition] <= LARGEST_CONDITION)
                 for condition in conditions

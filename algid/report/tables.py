@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from algid.methods import settles
-from algid.model import PARAMETERS
+from algid.model import DELAYS, PARAMETERS
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.phasors import moments
 from algid.report.series import TorqueLog
@@ -210,9 +210,9 @@ def _found(result: Result) -> dict[str, str]:
     if settles(result.estimator):
         found["model"] = "plain"
     model = None if result.fit is None else result.fit.model
-    delay = result.parameters.get("delay")
+    delay = result.delay
     if model is not None:
-        terms = [*model.terms, *(["delay"] if delay is not None else [])]
+        terms = [*model.terms, *(DELAYS if delay is not None else ())]
         shape = f" (Coulomb friction over {significant(model.coulomb_speed, 2)} rad/s)"
         found["model"] = (", ".join(terms) or "plain") + (shape if "coulomb" in terms else "")
     if delay is not None and delay.estimate is not None:

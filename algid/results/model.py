@@ -21,6 +21,7 @@ from algid.errors import ResultError, SettingError
 from algid.files import first_misfit, read_text, whole_file
 from algid.limits import LIMITS
 from algid.log import Reading
+from algid.model import DELAYS
 from algid.notices import Notice, from_flags
 from algid.text import visible
 from algid.verdict import Verdict
@@ -351,6 +352,11 @@ class Result(_Model):
     def logs(self) -> list[LogSummary]:
         """Every log that was used, the first one first."""
         return [self.log, *self.more_logs]
+
+    @property
+    def delay(self) -> Estimate | None:
+        """The estimate of the torque's delay, where there is one."""
+        return next((self.parameters[name] for name in DELAYS if name in self.parameters), None)
 
     @property
     def estimates(self) -> dict[str, Estimate]:

@@ -41,7 +41,7 @@ from algid.identification.known import (
     prior_of,
     shift_of,
 )
-from algid.model import SINES, TERMS, Model
+from algid.model import K3, K6, K7, SINES, TERMS, Model
 from algid.options import flag
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
@@ -52,7 +52,7 @@ CELL = 0.02  # s
 _PIECE_SAMPLES = 16384
 SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 COULOMB = TERMS["coulomb"]
-FRICTION = ("k6", "k7", *COULOMB.names)
+FRICTION = (K6, K7, *COULOMB.names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class IdentifiedArm:
     @property
     def tip_equivalent(self) -> float:
         """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
-        return abs(float(self.k[self.model.names.index("k3")])) / self.l2**2
+        return abs(float(self.k[self.model.names.index(K3)])) / self.l2**2
 
     @property
     def by_shape(self) -> FloatArray:

@@ -13,9 +13,9 @@ from algid.criteria import AT_REST
 from algid.estimators import shrunk, weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.parametrisation import Shared
-from algid.estimators.shrinkage import SCALES, Expected, dispersion, divided, joined, shrink, spread
+from algid.estimators.shrinkage import Expected, dispersion, divided, joined, shrink, spread
 from algid.estimators.weak import WeakSettings
-from algid.model import DELAYS, TERMS, Model
+from algid.model import DELAYS, EVERY_TERM, TERMS, Model
 from algid.signals.segments import Segment
 
 from .conftest import Bench
@@ -173,7 +173,8 @@ def test_a_joint_that_stands_says_nothing(bench: Bench) -> None:
 
 
 def test_every_term_has_a_scale_save_the_lag_which_is_a_delay() -> None:
-    assert set(SCALES) == {*TERMS, *DELAYS} - {"lag"}
+    shrunken = {name for name, term in EVERY_TERM.items() if term.spread is not None}
+    assert shrunken == {*TERMS, *DELAYS} - {"lag"}
 
 
 def test_dividing_leaves_the_maximum() -> None:

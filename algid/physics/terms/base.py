@@ -32,6 +32,26 @@ class TorqueColumn:
 
 
 @dataclass(frozen=True)
+class Spread:
+    """How large physics lets a term's coefficients be, before any log.
+
+    Parameters
+    ----------
+    size : float
+        The largest spread, in what `of` names.
+    of : str
+        "torque" (RMS of the joint's), "inertia" (k3), "cosine" (the constant whose sine part a
+        coefficient is), or "unit", the coefficient's own.
+    usual : float
+        What most arms have of `size`.
+    """
+
+    size: float
+    of: Literal["torque", "inertia", "cosine", "unit"] = "unit"
+    usual: float = 0.5
+
+
+@dataclass(frozen=True)
 class Term:
     """A term of the torque. Where it needs nothing special, it leaves the rest out.
 
@@ -58,6 +78,8 @@ class Term:
         low-pass.
     damping, friction, rotor : pairs of a parameter and the joint
         Whose viscous and dry friction and rotor inertia it is, as robots' descriptions have them.
+    spread : Spread or None
+        What its coefficients are shrunk by; None leaves them free.
     """
 
     name: str
@@ -76,6 +98,7 @@ class Term:
     damping: tuple[tuple[str, int], ...] = ()
     friction: tuple[tuple[str, int], ...] = ()
     rotor: tuple[tuple[str, int], ...] = ()
+    spread: Spread | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,6 +109,16 @@ class Term:
     def unit(self) -> str:
         """Unit of its parameters, which are alike."""
         return self.parameters[0].unit
+
+    @property
+    def delays(self) -> bool:
+        """Whether it is a time by which the torque is late as a whole."""
+        return self.timing == "delay"
+
+    @property
+    def lags(self) -> bool:
+        """Whether it is the time constant of a low-pass of the torque."""
+        return self.timing == "lag"
 
     @property
     def linear(self) -> bool:

@@ -17,3 +17,4 @@ VISCOUS = Term(
     damping=(("k6", 0), ("k7", 1)),
     columns=(TorqueColumn("k6", p=(Q1, NOTHING)), TorqueColumn("k7", p=(NOTHING, Q2))),
 )
+K6, K7 = VISCOUS.names

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
+from algid.model import K1, K3, K5
 from algid.report.figures.base import (
     Figure,
     Legend,
@@ -21,7 +22,7 @@ from algid.results import Result
 from algid.significance import NORMAL
 
 TITLE = "Mass matrix M(θ)"
-NAMES = ("k1", "k3", "k5")
+NAMES = (K1, K3, K5)
 PARTS = (("M11", "@blue"), ("M12 = M21", "@orange"), ("M22", "@green"))
 LEGEND = (
     *(Legend(name, name, colour) for name, colour in PARTS),
