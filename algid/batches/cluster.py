@@ -155,6 +155,7 @@ def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | No
 
     `mark` is a file in OUT that is there meanwhile.
     """
+    place = flag("out")
 
     def misfit() -> str | None:
         import os  # by value there is no module around it
@@ -173,8 +174,7 @@ def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | No
         if mark is not None and not os.path.exists(mark):  # noqa: PTH110
             return (
                 f"{socket.gethostname()}: it does not see {out}; choose a place with "
-                f"{flag('out')} that "
-                "all machines see"
+                f"{place} that all machines see"
             )
         return None
 

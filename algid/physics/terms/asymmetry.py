@@ -3,7 +3,7 @@
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import MOMENT, Parameter
 from algid.physics.signals import T1, T2
-from algid.physics.terms.base import Spread, Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 ASYMMETRY = Term(
     name="asymmetry",
@@ -20,5 +20,5 @@ ASYMMETRY = Term(
     columns=(TorqueColumn("a1", f=(T1 * T1, NOTHING)), TorqueColumn("a2", f=(NOTHING, T2 * T2))),
     needs="coulomb",
     shapes=("coulomb_speed",),
-    spread=Spread(0.02, "torque"),
+    spread=PriorSpread(0.02, "torque"),
 )

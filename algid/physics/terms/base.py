@@ -32,7 +32,7 @@ class TorqueColumn:
 
 
 @dataclass(frozen=True)
-class Spread:
+class PriorSpread:
     """How large physics lets a term's coefficients be, before any log.
 
     Parameters
@@ -78,7 +78,7 @@ class Term:
         low-pass.
     damping, friction, rotor : pairs of a parameter and the joint
         Whose viscous and dry friction and rotor inertia it is, as robots' descriptions have them.
-    spread : Spread or None
+    spread : PriorSpread or None
         What its coefficients are shrunk by; None leaves them free.
     """
 
@@ -98,7 +98,7 @@ class Term:
     damping: tuple[tuple[str, int], ...] = ()
     friction: tuple[tuple[str, int], ...] = ()
     rotor: tuple[tuple[str, int], ...] = ()
-    spread: Spread | None = None
+    spread: PriorSpread | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from math import inf
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import MOMENT, Parameter
 from algid.physics.signals import T1, T2
-from algid.physics.terms.base import Spread, Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 COULOMB = Term(
     name="coulomb",
@@ -22,6 +22,6 @@ COULOMB = Term(
     usual=True,
     friction=(("f1", 0), ("f2", 1)),
     shapes=("coulomb_speed",),
-    spread=Spread(0.3, "torque"),
+    spread=PriorSpread(0.3, "torque"),
 )
 F1, F2 = COULOMB.names

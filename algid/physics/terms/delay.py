@@ -1,7 +1,7 @@
 """The time after which a logged torque acts."""
 
 from algid.physics.parameters import TIME, Parameter
-from algid.physics.terms.base import Spread, Term
+from algid.physics.terms.base import PriorSpread, Term
 
 DELAY = Term(
     name="delay",
@@ -19,5 +19,5 @@ DELAY = Term(
         ),
     ),
     timing="delay",
-    spread=Spread(2e-3),  # s: a loop's, about half a sample
+    spread=PriorSpread(2e-3),  # s: a loop's, about half a sample
 )

@@ -5,7 +5,7 @@ A gain of both is in every other parameter.
 
 from algid.physics.parameters import GAIN as SCALE
 from algid.physics.parameters import Parameter
-from algid.physics.terms.base import Spread, Term
+from algid.physics.terms.base import PriorSpread, Term
 
 GAIN = Term(
     name="gain",
@@ -23,5 +23,5 @@ GAIN = Term(
         ),
     ),
     gains=(("gain2", 1),),
-    spread=Spread(0.03),  # what a torque constant may be off
+    spread=PriorSpread(0.03),  # what a torque constant may be off
 )

@@ -1,7 +1,7 @@
 """Friction in proportion to the joint's load, as of gears: bilinear in parameters and motion."""
 
 from algid.physics.parameters import LOAD_SHARE, Parameter
-from algid.physics.terms.base import Spread, Term
+from algid.physics.terms.base import PriorSpread, Term
 
 LOAD = Term(
     name="load",
@@ -29,5 +29,5 @@ LOAD = Term(
     ),
     shapes=("coulomb_speed",),
     by_load=(("e1", 0), ("e2", 1)),
-    spread=Spread(0.03),
+    spread=PriorSpread(0.03),
 )

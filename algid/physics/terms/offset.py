@@ -2,7 +2,7 @@
 
 from algid.physics.expressions import NOTHING, ONE
 from algid.physics.parameters import MOMENT, Parameter
-from algid.physics.terms.base import Spread, Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 OFFSET = Term(
     name="offset",
@@ -14,5 +14,5 @@ OFFSET = Term(
     ),
     columns=(TorqueColumn("o1", f=(ONE, NOTHING)), TorqueColumn("o2", f=(NOTHING, ONE))),
     usual=True,
-    spread=Spread(0.02, "torque"),
+    spread=PriorSpread(0.02, "torque"),
 )

@@ -8,7 +8,7 @@ zeros off by ε, arg K1 = δ2 + ε2 and arg K2 = δ2 + ε1 + ε2.
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import INERTIA, MOMENT, Parameter
 from algid.physics.signals import C2, S1, S2, S12, W1, W2
-from algid.physics.terms.base import Spread, Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 PHASES = Term(
     name="phases",
@@ -51,5 +51,7 @@ PHASES = Term(
     ),
     inertial=True,
     sines=(("k1s", "k1"), ("k2s", "k2"), ("k4s", "k4")),
-    spread=Spread(0.5, "cosine", 0.02),  # rad: a bent gripper; most arms have an encoder's error
+    spread=PriorSpread(
+        0.5, "cosine", 0.02
+    ),  # rad: a bent gripper; most arms have an encoder's error
 )

@@ -8,7 +8,7 @@ from math import inf
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import INERTIA, Parameter
 from algid.physics.signals import Q2
-from algid.physics.terms.base import Spread, Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 ROTOR = Term(
     name="rotor",
@@ -22,6 +22,6 @@ ROTOR = Term(
     columns=(TorqueColumn("j2", s=(NOTHING, Q2)),),
     usual=True,
     rotor=(("j2", 1),),
-    spread=Spread(1.0, "inertia"),
+    spread=PriorSpread(1.0, "inertia"),
 )
 (J2,) = ROTOR.names

@@ -3,7 +3,7 @@
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import MOMENT, Parameter
 from algid.physics.signals import H1, H2, T1, T2
-from algid.physics.terms.base import Spread, Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 STRIBECK = Term(
     name="stribeck",
@@ -16,5 +16,5 @@ STRIBECK = Term(
     columns=(TorqueColumn("s1", f=(T1 * H1, NOTHING)), TorqueColumn("s2", f=(NOTHING, T2 * H2))),
     needs="coulomb",
     shapes=("coulomb_speed", "stribeck_speed"),
-    spread=Spread(0.05, "torque"),
+    spread=PriorSpread(0.05, "torque"),
 )
