@@ -386,7 +386,7 @@ class _Trials:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
         sums = self._sums(family, self._fine)
         c = self._free @ self._solved(sums, [family], self._free[None])[0][0]
-        of_one, of_two = COLUMNS.index("k4"), COLUMNS.index("k1")  # each with its sine part next
+        of_one, of_two = COLUMNS.index(K4), COLUMNS.index(K1)  # each with its sine part next
         start = np.array(
             [np.arctan2(c[of_one + 1], c[of_one]), np.arctan2(c[of_two + 1], c[of_two])]
         )
