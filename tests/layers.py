@@ -12,17 +12,20 @@ from functools import cache
 
 PURE = frozenset(
     {
-        *(
-            "__future__",
-            "abc",
-            "bisect",
-            "collections",
-            "contextlib",
-            "dataclasses",
-            "enum",
-            "functools",
-        ),
-        *("itertools", "math", "operator", "string", "typing", "warnings"),
+        "__future__",
+        "abc",
+        "bisect",
+        "collections",
+        "contextlib",
+        "dataclasses",
+        "enum",
+        "functools",
+        "itertools",
+        "math",
+        "operator",
+        "string",
+        "typing",
+        "warnings",
     }
 )
 """Standard library for the mathematics: nothing that reads, writes, prints or waits."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from algid.batches.jobs import TABLE, utc_of
-from algid.batches.records import JobRecord
+from algid.batches.jobs import TABLE, Label, utc_of
+from algid.batches.records import Input, JobRecord
 from algid.stores import Store
 
 if TYPE_CHECKING:
@@ -36,45 +36,57 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     """
     import polars as pl
 
-    columns: dict[str, pl.Series] = {
-        "job": pl.Series([r.job.name for r in records], dtype=pl.String),
-        "robot": pl.Series([r.job.robot for r in records], dtype=pl.String),
-        "time": pl.Series([time_of(r) for r in records], dtype=pl.Datetime("us", "UTC")),
-        "status": pl.Series([r.status.value for r in records], dtype=pl.String),
-        "reason": pl.Series([r.reason for r in records], dtype=pl.String),
-        "seconds": pl.Series([r.seconds for r in records], dtype=pl.Float64),
-        "log_seconds": pl.Series([r.log_seconds for r in records], dtype=pl.Float64),
-        "verdict": pl.Series([r.verdict for r in records], dtype=pl.String),
-        "headline": pl.Series([r.headline for r in records], dtype=pl.String),
-        "reasons": pl.Series([list(r.reasons) for r in records], dtype=pl.List(pl.String)),
-        "command": pl.Series([r.command for r in records], dtype=pl.String),
-        "estimator": pl.Series([r.estimator for r in records], dtype=pl.String),
-        "version": pl.Series([r.version for r in records], dtype=pl.String),
-        "settings": pl.Series(
-            [json.dumps(r.settings, sort_keys=True) for r in records], dtype=pl.String
+    def column(
+        kind: pl.DataType | type[pl.DataType], value: Callable[[JobRecord], Any]
+    ) -> pl.Series:
+        return pl.Series([value(record) for record in records], dtype=kind)
+
+    def of_logs(kind: type[pl.DataType], value: Callable[[Input], Any]) -> pl.Series:
+        return column(pl.List(kind), lambda record: [value(log) for log in record.inputs])
+
+    columns = {
+        "job": column(pl.String, lambda record: record.job.name),
+        "robot": column(pl.String, lambda record: record.job.robot),
+        "time": column(pl.Datetime("us", "UTC"), time_of),
+        "status": column(pl.String, lambda record: record.status.value),
+        "reason": column(pl.String, lambda record: record.reason),
+        "seconds": column(pl.Float64, lambda record: record.seconds),
+        "log_seconds": column(pl.Float64, lambda record: record.log_seconds),
+        "verdict": column(pl.String, lambda record: record.verdict),
+        "headline": column(pl.String, lambda record: record.headline),
+        "reasons": column(pl.List(pl.String), lambda record: list(record.reasons)),
+        "command": column(pl.String, lambda record: record.command),
+        "estimator": column(pl.String, lambda record: record.estimator),
+        "version": column(pl.String, lambda record: record.version),
+        "settings": column(pl.String, lambda record: json.dumps(record.settings, sort_keys=True)),
+        "logs": of_logs(pl.String, lambda log: log.path),
+        "sha256": of_logs(pl.String, lambda log: log.sha256),
+        "size": of_logs(pl.Int64, lambda log: log.size),
+        "changed": of_logs(pl.Int64, lambda log: _in_int64(log.mtime_ns)).cast(
+            pl.List(pl.Datetime("ns", "UTC"))
         ),
-        "logs": pl.Series([[i.path for i in r.inputs] for r in records], dtype=pl.List(pl.String)),
-        "sha256": pl.Series(
-            [[i.sha256 for i in r.inputs] for r in records], dtype=pl.List(pl.String)
-        ),
-        "size": pl.Series([[i.size for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)),
-        "changed": pl.Series(
-            [[_in_int64(i.mtime_ns) for i in r.inputs] for r in records], dtype=pl.List(pl.Int64)
-        ).cast(pl.List(pl.Datetime("ns", "UTC"))),
     }
-    for name in _names([r.job.labels for r in records]):
-        labels = [r.job.labels.get(name) for r in records]
-        numbers = all(label is None or type(label) in (int, float) for label in labels)
-        kind, dtype = (float, pl.Float64) if numbers else (str, pl.String)
-        columns[f"label_{name}"] = pl.Series(
-            [None if x is None else kind(x) for x in labels], dtype=dtype
+    for name in _names([record.job.labels for record in records]):
+        columns[f"label_{name}"] = _label_column(
+            [record.job.labels.get(name) for record in records]
         )
-    for name in _names([r.estimates for r in records]):
-        found = [r.estimates.get(name, (None, None, None)) for r in records]
-        columns[name] = pl.Series([one[0] for one in found], dtype=pl.Float64)
-        columns[f"{name}_std"] = pl.Series([one[1] for one in found], dtype=pl.Float64)
-        columns[f"{name}_status"] = pl.Series([one[2] for one in found], dtype=pl.String)
+    for name in _names([record.estimates for record in records]):
+        estimates = [record.estimates.get(name, (None, None, None)) for record in records]
+        values, stds, statuses = zip(*estimates, strict=True)
+        columns[name] = pl.Series(values, dtype=pl.Float64)
+        columns[f"{name}_std"] = pl.Series(stds, dtype=pl.Float64)
+        columns[f"{name}_status"] = pl.Series(statuses, dtype=pl.String)
     return pl.DataFrame(columns)
+
+
+def _label_column(labels: Sequence[Label | None]) -> pl.Series:
+    """Numbers where every label is one, else text."""
+    import polars as pl
+
+    numeric = all(label is None or type(label) in (int, float) for label in labels)
+    kind, dtype = (float, pl.Float64) if numeric else (str, pl.String)
+    cells = [None if label is None else kind(label) for label in labels]
+    return pl.Series(cells, dtype=dtype)
 
 
 def _in_int64(number: int) -> int | None:

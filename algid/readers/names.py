@@ -17,168 +17,65 @@ from algid.readers.joints import along_the_arm
 from algid.units import is_foreign, unit_of
 from algid.words import counted
 
+
+def _words(text: str) -> tuple[str, ...]:
+    """The words of a text, in their order."""
+    return tuple(text.split())
+
+
 STEMS: dict[str, tuple[str, ...]] = {
-    "theta": (
-        *(
-            "theta",
-            "theta_meas",
-            "pos_meas",
-            "q_meas",
-            "position_measured",
-            "measured_position",
-            "actual_q",
-        ),
-        *(
-            "position",
-            "pos",
-            "q",
-            "angle",
-            "joint_position",
-            "joint_pos",
-            "joint_angle",
-            "jointposition",
-        ),
-        *(
-            "positions",
-            "angles",
-            "ang",
-            "phi",
-            "pos_filt",
-            "q_filt",
-            "position_filtered",
-            "theta_filt",
-        ),
-        *("observation_position", "observation_state"),
+    "theta": _words(
+        """
+        theta theta_meas pos_meas q_meas position_measured measured_position actual_q
+        position pos q angle joint_position joint_pos joint_angle jointposition
+        positions angles ang phi pos_filt q_filt position_filtered theta_filt
+        observation_position observation_state
+        """
     ),
-    "omega": (
-        *("omega", "vel_meas", "dq_meas", "velocity_measured", "measured_velocity", "actual_qd"),
-        *("velocity", "vel", "dq", "qd", "qdot", "q_dot", "dtheta", "thetadot", "theta_dot"),
-        *(
-            "joint_velocity",
-            "joint_vel",
-            "velocities",
-            "speed",
-            "vel_filt",
-            "dq_filt",
-            "velocity_filtered",
-        ),
-        "observation_velocity",
+    "omega": _words(
+        """
+        omega vel_meas dq_meas velocity_measured measured_velocity actual_qd
+        velocity vel dq qd qdot q_dot dtheta thetadot theta_dot
+        joint_velocity joint_vel velocities speed vel_filt dq_filt velocity_filtered
+        observation_velocity
+        """
     ),
-    "tau": (
-        *(
-            "tau",
-            "tau_meas",
-            "tau_j",
-            "tau_est",
-            "torque_measured",
-            "measured_torque",
-            "actual_tau",
-            "actual_torque",
-        ),
-        *(
-            "torque",
-            "trq",
-            "effort",
-            "joint_torque",
-            "joint_effort",
-            "torques",
-            "efforts",
-            "tau_filt",
-        ),
-        *(
-            "torque_filtered",
-            "tau_con",
-            "tau_cmd",
-            "tau_des",
-            "tau_d",
-            "tau_j_d",
-            "torque_cmd",
-            "target_torque",
-        ),
-        *("motor_torque", "observation_effort", "observation_torque"),
-        *("actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"),
+    "tau": _words(
+        """
+        tau tau_meas tau_j tau_est torque_measured measured_torque actual_tau actual_torque
+        torque trq effort joint_torque joint_effort torques efforts tau_filt
+        torque_filtered tau_con tau_cmd tau_des tau_d tau_j_d torque_cmd target_torque
+        motor_torque observation_effort observation_torque
+        actual_current current currents motor_current joint_current i_q iq
+        """
     ),
-    "q_des": (
-        *("q_des", "q_desired", "q_d", "q_ref", "q_reference", "q_cmd", "q_target", "target_q"),
-        *("theta_des", "theta_desired", "theta_d", "theta_ref", "theta_cmd", "theta_target"),
-        *("pos_des", "pos_desired", "pos_ref", "pos_cmd", "pos_target", "target_pos"),
-        *("position_desired", "desired_position", "position_reference", "reference_position"),
-        *("position_command", "commanded_position", "target_position", "position_target"),
+    "q_des": _words(
+        """
+        q_des q_desired q_d q_ref q_reference q_cmd q_target target_q
+        theta_des theta_desired theta_d theta_ref theta_cmd theta_target
+        pos_des pos_desired pos_ref pos_cmd pos_target target_pos
+        position_desired desired_position position_reference reference_position
+        position_command commanded_position target_position position_target
+        """
     ),
 }
-COMMANDED = frozenset(
-    {"tau_con", "tau_cmd", "tau_des", "tau_d", "tau_j_d", "torque_cmd", "target_torque"}
-)
-CURRENTS = frozenset(
-    {"actual_current", "current", "currents", "motor_current", "joint_current", "i_q", "iq"}
-)
-TIMES = (
-    *(
-        "stamp_ns",
-        "t",
-        "time",
-        "timestamp",
-        "stamp",
-        "__time",
-        "_time",
-        "time_s",
-        "time_ms",
-        "time_us",
-        "time_ns",
-    ),
-    *(
-        "timestamp_s",
-        "timestamp_ms",
-        "timestamp_us",
-        "timestamp_ns",
-        "t_s",
-        "t_ms",
-        "t_us",
-        "t_ns",
-        "time_sec",
-    ),
-    *(
-        "seconds",
-        "secs",
-        "sec",
-        "elapsed",
-        "elapsed_time",
-        "log_time",
-        "header.stamp",
-        "header/stamp",
-    ),
-    *("milliseconds", "millis", "microseconds", "micros", "nanoseconds", "nanos"),
+COMMANDED = frozenset(_words("tau_con tau_cmd tau_des tau_d tau_j_d torque_cmd target_torque"))
+CURRENTS = frozenset(_words("actual_current current currents motor_current joint_current i_q iq"))
+TIMES = _words(
+    """
+    stamp_ns t time timestamp stamp __time _time time_s time_ms time_us time_ns
+    timestamp_s timestamp_ms timestamp_us timestamp_ns t_s t_ms t_us t_ns time_sec
+    seconds secs sec elapsed elapsed_time log_time header.stamp header/stamp
+    milliseconds millis microseconds micros nanoseconds nanos
+    """
 )
 _NO_JOINTS = frozenset(
-    {
-        "cmd",
-        "command",
-        "commanded",
-        "ref",
-        "reference",
-        "des",
-        "desired",
-        "target",
-        "goal",
-        "set",
-        "setpoint",
-        "error",
-    }
-    | {
-        "err",
-        "raw",
-        "max",
-        "min",
-        "limit",
-        "old",
-        "new",
-        "filt",
-        "filtered",
-        "meas",
-        "measured",
-        "actual",
-        "est",
-    }
+    _words(
+        """
+        cmd command commanded ref reference des desired target goal set setpoint error err raw
+        max min limit old new filt filtered meas measured actual est
+        """
+    )
 )
 """Words before or behind a stem that name no joint."""
 _STEMS = sorted(

@@ -84,40 +84,40 @@ def _reasons(judged: Verdict, room: int) -> Iterator[str]:
 def _estimates(result: Result) -> Iterator[str]:
     """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning."""
     errors, phasors = _errors(result), moments(result)
-    for name, found in {
-        **{k: v for k, v in result.parameters.items() if k in ARM},
-        **result.payload,
-    }.items():
+    constants = {name: one for name, one in result.parameters.items() if name in ARM}
+    for name, estimate in (constants | result.payload).items():
         if name in phasors:
-            yield from _moment(name, phasors[name], found)
+            yield from _moment(name, phasors[name], estimate)
             continue
-        number = (
-            f"{resolved(found.estimate, found.std)} ± {_half(found)}"
-            if found.estimate is not None
-            else ABSENT
-        )
+        number = ABSENT if estimate.estimate is None else _with_half(estimate)
         error = f"{errors[name]:>8}" if errors else ""
+        line = f"{visible(name):<4}{number:>19} {unit_text(estimate.unit):<10}{error} "
         words = PARAMETERS[name].meaning.partition(", ")[0] if name in PARAMETERS else ""
-        status = "" if found.status is Status.OK else found.status.value
-        line = f"{visible(name):<4}{number:>19} {unit_text(found.unit):<10}{error} "
-        fits = (
-            len(line) + len(words) <= WIDTH or not errors
-        )  # beside errors there is no room for a second line
-        yield from _wrapped(f"{line}{status or (words if fits else '')}", rest=" " * len(line))
+        if errors and len(line) + len(words) > WIDTH:  # there is no room for a second line
+            words = ""
+        if estimate.status is not Status.OK:
+            words = estimate.status.value
+        yield from _wrapped(f"{line}{words}", rest=" " * len(line))
 
 
-def _moment(name: str, one: Moment, found: Estimate) -> list[str]:
+def _moment(name: str, moment: Moment, estimate: Estimate) -> list[str]:
     """A moment's size with its angle in place of its meaning."""
-    half = ABSENT if one.std is None else significant(one.quantile * one.std, 2)
-    number = f"{resolved(one.size, one.std)} ± {half}"
-    status = "" if found.status is Status.OK else f" {found.status.value}"
-    line = f"{f'|{name.upper()}|':<4}{number:>19} {unit_text(one.unit):<10} "
-    return _wrapped(f"{line}at {one.angle_text}{status}", rest=" " * len(line))
+    half = ABSENT
+    if moment.std is not None:
+        half = significant(moment.quantile * moment.std, 2)
+    symbol, number = f"|{name.upper()}|", f"{resolved(moment.size, moment.std)} ± {half}"
+    line = f"{symbol:<4}{number:>19} {unit_text(moment.unit):<10} "
+    status = "" if estimate.status is Status.OK else f" {estimate.status.value}"
+    return _wrapped(f"{line}at {moment.angle_text}{status}", rest=" " * len(line))
 
 
-def _half(found: Estimate) -> str:
-    low, high = found.ci95 or (None, None)
-    return ABSENT if low is None or high is None else significant((high - low) / 2, 2)
+def _with_half(estimate: Estimate) -> str:
+    """An estimate with half its 95 % interval."""
+    low, high = estimate.ci95 or (None, None)
+    half = ABSENT
+    if low is not None and high is not None:
+        half = significant((high - low) / 2, 2)
+    return f"{resolved(estimate.estimate, estimate.std)} ± {half}"
 
 
 def _errors(result: Result) -> dict[str, str]:
@@ -134,18 +134,17 @@ def _errors(result: Result) -> dict[str, str]:
 
 def _terms(result: Result) -> list[str]:
     """The terms of the torque beside eq. (1), and their coefficients."""
-    terms = [] if result.fit is None or result.fit.model is None else result.fit.model.terms
-    told = {sine for sine, name in SINES.items() if name in moments(result)}  # beside k1, k2, k4
-    others = {name: found for name, found in result.parameters.items() if name not in {*ARM, *told}}
+    model = None if result.fit is None else result.fit.model
+    terms = [] if model is None else list(model.terms)
+    phasors = moments(result)
+    shown = {*ARM, *(sine for sine, name in SINES.items() if name in phasors)}
+    others = {name: one for name, one in result.parameters.items() if name not in shown}
     if not terms and not others:
-        return ["Terms kept: none"] if result.fit is not None else []
-    numbers = [
-        f"{name} {resolved(found.estimate, found.std)} ± {_half(found)}"
-        for name, found in others.items()
-    ]
-    kept = [*terms, *(name for name in DELAYS if name in others and name not in terms)]
+        return [] if result.fit is None else ["Terms kept: none"]
+    terms += [name for name in DELAYS if name in others and name not in terms]
+    numbers = [f"{name} {_with_half(estimate)}" for name, estimate in others.items()]
     beside = f" ({', '.join(numbers)})" if numbers else ""
-    return _at_most(2, f"Terms kept: {', '.join(kept)}{beside}")
+    return _at_most(2, f"Terms kept: {', '.join(terms)}{beside}")
 
 
 def _at_most(lines: int, text: str) -> list[str]:
@@ -154,23 +153,18 @@ def _at_most(lines: int, text: str) -> list[str]:
 
 
 def _prediction(result: Result) -> list[str]:
+    """How well the torque is predicted, of other logs where that was tried."""
     fit = result.fit
-    found = None if fit is None else fit.cross_validation or fit.residual
-    if found is None:
+    prediction = None if fit is None else fit.cross_validation or fit.residual
+    if prediction is None:
         return []
-    band = "" if found.bandwidth is None else f" below {found.bandwidth:g} Hz"
-    return [
-        (
-            f"R² of the torque{band}: joint 1 {share_text(found.r2[0])}, joint 2 "
-            f"{share_text(found.r2[1])}"
-        )
-    ]
+    band = "" if prediction.bandwidth is None else f" below {prediction.bandwidth:g} Hz"
+    first, second = (share_text(r2) for r2 in prediction.r2)
+    return [f"R² of the torque{band}: joint 1 {first}, joint 2 {second}"]
 
 
 def _notes(notes: Iterable[Notice]) -> list[str]:
     codes = [one.code for one in notes]
-    return (
-        _at_most(1, f"Data notes ({len(codes)}): {', '.join(dict.fromkeys(codes))}")
-        if codes
-        else []
-    )
+    if not codes:
+        return []
+    return _at_most(1, f"Data notes ({len(codes)}): {', '.join(dict.fromkeys(codes))}")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 from algid.report.document import Column, Table
 from algid.report.tables import flat_settings
-from algid.results import Estimate, Result
+from algid.results import Estimate, Result, Status
 from algid.text import ABSENT, file_name, resolved, significant, unit_text, visible
 from algid.words import counted
 
@@ -62,19 +63,12 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
         raise ValueError(f"a comparison needs at least two results, got {len(results)}")
     if labels is not None and len(labels) != len(results):
         raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
-    shown = (
-        [visible(label) for label in labels] if labels else [file_name(r.log.path) for r in results]
-    )
-    if len(set(shown)) < len(shown):
-        shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
-    first, others = results[0].estimates, [result.estimates for result in results[1:]]
-    names = dict.fromkeys(
-        name for result in results for name in result.estimates
-    )  # in the order met
-    sigma = {
-        name: tuple(distance_sigma(first.get(name), other.get(name)) for other in others)
-        for name in names
-    }
+    shown = _distinct(labels or [file_name(result.log.path) for result in results])
+    first, *others = (result.estimates for result in results)
+    sigma: dict[str, tuple[float | None, ...]] = {}
+    for name in _names([result.estimates for result in results]):
+        distances = [distance_sigma(first.get(name), other.get(name)) for other in others]
+        sigma[name] = tuple(distances)
     return Comparison(
         tuple(shown),
         sigma,
@@ -84,25 +78,39 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     )
 
 
-def comparison_json(found: Comparison, results: Sequence[Result]) -> str:
+def _distinct(labels: Sequence[str]) -> list[str]:
+    """The labels as they are printed; with their numbers where two would look alike."""
+    shown = [visible(label) for label in labels]
+    if len(set(shown)) == len(shown):
+        return shown
+    return [f"{number} {label}" for number, label in enumerate(shown, start=1)]
+
+
+def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The names in several mappings, each once and in the order in which they are met."""
+    names: dict[str, None] = {}
+    for one in several:
+        names |= dict.fromkeys(one)
+    return list(names)
+
+
+def comparison_json(compared: Comparison, results: Sequence[Result]) -> str:
     """The comparison as JSON: estimates, standard deviations and distances in σ by parameter."""
-    parameters = {
-        name: {
-            "estimate": [_number(result, name, "estimate") for result in results],
-            "std": [_number(result, name, "std") for result in results],
+    parameters = {}
+    for name, distances in compared.sigma.items():
+        estimates = [result.estimates.get(name, _NONE) for result in results]
+        parameters[name] = {
+            "estimate": [one.estimate for one in estimates],
+            "std": [one.std for one in estimates],
             "sigma": [None, *distances],
         }
-        for name, distances in found.sigma.items()
-    }
-    settings = {name: list(values) for name, *values in found.settings.rows}
-    content = {"labels": list(found.labels), "parameters": parameters, "settings": settings}
+    settings = {name: list(values) for name, *values in compared.settings.rows}
+    content = {"labels": list(compared.labels), "parameters": parameters, "settings": settings}
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _number(result: Result, name: str, which: str) -> float | None:
-    found = result.estimates.get(name)
-    number: float | None = None if found is None else getattr(found, which)
-    return number
+_NONE = Estimate(estimate=None, std=None, ci95=None, unit="", status=Status.NOT_IDENTIFIABLE)
+"""In place of what a result does not estimate."""
 
 
 def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | None:
@@ -119,31 +127,34 @@ def _estimates(
     results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]
 ) -> Table:
     columns = [Column("Parameter", "name"), Column("Unit", "text"), Column(labels[0], "number")]
+    change, distance = Column("Δ %", "number", rank=1), Column("Δ/σ", "number")
     for label in labels[1:]:
-        columns += [
-            Column(label, "number"),
-            Column("Δ %", "number", rank=1),
-            Column("Δ/σ", "number"),
-        ]
+        columns += [Column(label, "number"), change, distance]
     rows = []
     for name, distances in sigma.items():
         first, *others = (result.estimates.get(name) for result in results)
         unit = next(unit_text(one.unit) for one in (first, *others) if one is not None)
         cells = [visible(name), unit, with_std(first)]
-        for other, distance in zip(others, distances, strict=True):
-            change = ABSENT
-            if (
-                first is not None
-                and other is not None
-                and first.estimate
-                and other.estimate is not None
-            ):
-                change = f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
-            cells += [with_std(other), change, ABSENT if distance is None else f"{distance:+.1f}"]
+        for other, far in zip(others, distances, strict=True):
+            cells += [with_std(other), _change(first, other), _far(far) or ABSENT]
         rows.append(tuple(cells))
     note = f"Differences are against {labels[0]}; σ combines both standard deviations."
     table = Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
     return replace(table, upright=_upright(results, labels, sigma, note))
+
+
+def _change(first: Estimate | None, other: Estimate | None) -> str:
+    """By how many percent `other` differs from `first`."""
+    before = None if first is None else first.estimate
+    after = None if other is None else other.estimate
+    if not before or after is None:
+        return ABSENT
+    return f"{100 * (after - before) / abs(before):+.3g}"
+
+
+def _far(distance: float | None) -> str:
+    """A distance in σ; empty where there is none."""
+    return "" if distance is None else f"{distance:+.1f}"
 
 
 def _upright(
@@ -163,48 +174,53 @@ def _upright(
     rows = []
     for name, distances in sigma.items():
         for place, (label, result) in enumerate(zip(labels, results, strict=True)):
-            found = result.estimates.get(name)
-            unit = "" if found is None else unit_text(found.unit)
-            distance = distances[place - 1] if place else None
-            far = "" if distance is None else f"{distance:+.1f}"
-            rows.append((visible(name) if place == 0 else "", label, with_std(found), unit, far))
+            estimate = result.estimates.get(name)
+            unit = "" if estimate is None else unit_text(estimate.unit)
+            if place == 0:
+                rows.append((visible(name), label, with_std(estimate), unit, ""))
+            else:
+                rows.append(("", label, with_std(estimate), unit, _far(distances[place - 1])))
     return Table("Estimates side by side", columns, tuple(rows), note)
 
 
-def with_std(found: Estimate | None) -> str:
+def with_std(estimate: Estimate | None) -> str:
     """``estimate ± std``, and the status where it is not OK."""
-    if found is None:
+    if estimate is None:
         return ABSENT
-    spread = "" if found.std is None else f" ± {significant(found.std, 2)}"
-    status = "" if found.status == "OK" else f" ({found.status.value})"
-    return f"{resolved(found.estimate, found.std)}{spread}{status}"
+    text = resolved(estimate.estimate, estimate.std)
+    if estimate.std is not None:
+        text += f" ± {significant(estimate.std, 2)}"
+    if estimate.status != Status.OK:
+        text += f" ({estimate.status.value})"
+    return text
 
 
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     """What was set otherwise, and how the first log of each kind was read otherwise."""
-    every: list[dict[str, str]] = []
-    for result in results:
-        settings = {
-            **flat_settings(result.settings),
-            "estimator": result.estimator,
-            "algid": result.version,
-        }
-        for role, log in {log.role: log for log in reversed(result.logs)}.items():
-            reading = {} if log.reading is None else flat_settings(asdict(log.reading))
-            settings |= {f"{role} log: {name}": value for name, value in reading.items()}
-        every.append(settings)
-    names = dict.fromkeys(name for settings in every for name in settings)
-    differing = [name for name in names if len({settings.get(name) for settings in every}) > 1]
-    rows = tuple(
-        (visible(n), *(visible(settings.get(n, ABSENT)) for settings in every)) for n in differing
-    )
+    every = [_made_with(result) for result in results]
+    rows: list[tuple[str, ...]] = []
+    for name in _names(every):
+        if len({settings.get(name) for settings in every}) > 1:
+            values = [visible(settings.get(name, ABSENT)) for settings in every]
+            rows.append((visible(name), *values))
     columns = (Column("Setting", "name"), *(Column(label, "text") for label in labels))
     note = "" if rows else "Every setting is the same, and every log was read the same way."
-    table = Table("Settings that differ", columns, rows, note)
-    upright = tuple(
-        (row[0] if place == 0 else "", label, row[place + 1])
-        for row in rows
-        for place, label in enumerate(labels)
-    )
+    table = Table("Settings that differ", columns, tuple(rows), note)
+    upright: list[tuple[str, ...]] = []
+    for name, first, *others in rows:
+        upright.append((name, labels[0], first))
+        upright += [("", label, value) for label, value in zip(labels[1:], others, strict=True)]
     headings = (Column("Setting", "name"), Column("Result", "text"), Column("Value", "text"))
-    return replace(table, upright=replace(table, columns=headings, rows=upright))
+    return replace(table, upright=replace(table, columns=headings, rows=tuple(upright)))
+
+
+def _made_with(result: Result) -> dict[str, str]:
+    """The settings of a result, and how the first log of each kind was read."""
+    settings = flat_settings(result.settings)
+    settings |= {"estimator": result.estimator, "algid": result.version}
+    firsts = {log.role: log for log in reversed(result.logs)}
+    for role, log in firsts.items():
+        if log.reading is not None:
+            reading = flat_settings(asdict(log.reading))
+            settings |= {f"{role} log: {name}": value for name, value in reading.items()}
+    return settings

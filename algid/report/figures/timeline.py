@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import takewhile
 
 import numpy as np
 
@@ -33,23 +32,26 @@ def chained(
     series: Mapping[int, tuple[FloatArray, FloatArray]], moved: Mapping[int, float]
 ) -> tuple[FloatArray, FloatArray]:
     """The logs' series as one line that breaks between logs."""
-    x, y = [], []
+    x: list[FloatArray] = [np.empty(0)]
+    y: list[FloatArray] = [np.empty(0)]
     for log, (own_x, own_y) in sorted(series.items()):
-        x += [own_x + moved[log], own_x[-1:] + moved[log]]
-        y += [own_y, np.full(own_x[-1:].size, np.nan)]
-    return (np.concatenate(x), np.concatenate(y)) if x else (np.empty(0), np.empty(0))
+        last = own_x[-1:]  # empty where the log is
+        x += [own_x + moved[log], last + moved[log]]
+        y += [own_y, np.full(last.size, np.nan)]
+    return np.concatenate(x), np.concatenate(y)
 
 
 def views(
     ranges: Mapping[int, LogRange], logs: list[LogSummary]
 ) -> tuple[tuple[str, float, float], ...]:
     """Name, start and end of each log on the common axis; nothing for a single one."""
+    if len(ranges) < 2:
+        return ()
     moved = offsets(ranges)
-    spans = [
-        (log_name(log, logs), moved[log] + span.first, moved[log] + span.last)
-        for log, span in sorted(ranges.items())
-    ]
-    return tuple(spans) if len(spans) > 1 else ()
+    spans = []
+    for log, span in sorted(ranges.items()):
+        spans.append((log_name(log, logs), moved[log] + span.first, moved[log] + span.last))
+    return tuple(spans)
 
 
 def separators(
@@ -58,24 +60,30 @@ def separators(
     """Shapes and annotations that tell the logs apart; none for a single one."""
     if len(ranges) < 2:
         return {}
-    starts = {log: moved[log] + span.first for log, span in sorted(ranges.items())}
-    shapes = [upright(start, "@muted/0.6") for start in list(starts.values())[1:]]
-    words = [log_name(log, logs) for log in starts]
-    if len(words) > MOST_NAMES:
-        words = short(words)
-    name: Layout = {
+    in_order = sorted(ranges)
+    starts = [moved[log] + ranges[log].first for log in in_order]
+    names = [log_name(log, logs) for log in in_order]
+    if len(names) > MOST_NAMES:
+        names = short(names)
+    return {
+        "shapes": [upright(start, "@muted/0.6") for start in starts[1:]],
+        "annotations": [_name_at(x, name) for x, name in zip(starts, names, strict=True)],
+        "margin": {"t": ROOM},
+    }
+
+
+def _name_at(x: float, text: str) -> Layout:
+    """A log's name over the left end of its part of the panel."""
+    return {
+        "x": x,
         "y": 1,
         "yref": "paper",
         "xanchor": "left",
         "yanchor": "bottom",
         "showarrow": False,
+        "font": {"size": 11, "color": "@muted"},
+        "text": text,
     }
-    name["font"] = {"size": 11, "color": "@muted"}
-    names = [
-        {**name, "x": start, "text": text}
-        for start, text in zip(starts.values(), words, strict=True)
-    ]
-    return {"shapes": shapes, "annotations": names, "margin": {"t": ROOM}}
 
 
 def short(names: Sequence[str]) -> list[str]:
@@ -88,9 +96,13 @@ def short(names: Sequence[str]) -> list[str]:
 
 def _in_common(names: Sequence[str]) -> int:
     """How many characters all names begin with, up to the end of a word."""
-    alike = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-    first = [letters[0] for letters in alike]
-    return max((at + 1 for at, letter in enumerate(first) if not letter.isalnum()), default=0)
+    in_common = 0
+    for place, letters in enumerate(zip(*names, strict=False), start=1):
+        if len(set(letters)) > 1:
+            break
+        if not letters[0].isalnum():
+            in_common = place
+    return in_common
 
 
 def log_name(log: int, logs: list[LogSummary]) -> str:
