@@ -168,10 +168,11 @@ def outcome(call: Call, outer: Path) -> tuple[str, str, float]:
     seconds = time.process_time() - start
     kind, why = judged(call, code, out, err)
     new = {path.name for path in Path().iterdir()} - own - {"out"}
-    if kind not in FAILURES and (
-        _listing(outer) != before or any(name.startswith(".") for name in new)
-    ):
-        kind, why = "left", f"{sorted(new)} {sorted(_listing(outer) - before)}"
+    outside = _listing(outer) ^ before
+    if ".." in call.arguments:  # where the call itself asks to write
+        outside = {path for path in outside if Path(path).name.startswith(".")}
+    if kind not in FAILURES and (outside or any(name.startswith(".") for name in new)):
+        kind, why = "left", f"{sorted(new)} {sorted(outside)}"
     for name in new:
         shutil.rmtree(name, ignore_errors=True) if Path(name).is_dir() else Path(name).unlink()
     told = f"{' '.join(call.arguments)[:500]!r} | {call.note!r} | {why}" if kind in FAILURES else ""

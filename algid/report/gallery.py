@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -55,6 +55,7 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
         folder / f"{name}.parquet"
         for name in ("estimates", "loaded", "torque", "innovations", "running", "information")
     )
+    scored = folder / "scored.parquet"
     found = _try(
         "torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, progress)
     )
@@ -63,7 +64,14 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
     if isinstance(found, Missing):
         figures.append(found)
     else:
-        figures.append(torque(found, result.logs, _scored(folder / "scored.parquet", result)))
+        figures.append(
+            _try(
+                "torque",
+                f"{TORQUE}, residual",
+                torques,
+                lambda: torque(found, result.logs, _scored(scored, result, found.ranges.keys())),
+            )
+        )
         if found.reduced:
             figures.append(
                 _try("closeup", CLOSEUP, torques, lambda: closeup(torques, found, result.logs))
@@ -85,15 +93,25 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
     return Gallery(read, figures, paper)
 
 
-def _scored(path: Path, result: Result) -> Scored | None:
+def _scored(path: Path, result: Result, logs: Collection[int]) -> Scored | None:
     """The torque that is scored.
 
     None of a result that scores none, or one of an earlier version.
+
+    Raises
+    ------
+    ResultError
+        If `path` cannot be read, or holds others than these logs.
     """
     score = None if result.fit is None else result.fit.residual
     if score is None or not path.is_file():
         return None
-    return Scored(read_scored(path), score)
+    series = read_scored(path)
+    if others := sorted(series.keys() - logs):
+        raise ResultError(
+            f"{path}: expected the logs of torque.parquet, found log {others[0]}; identify again"
+        )
+    return Scored(series, score)
 
 
 def drawable(result: Result) -> Result:

@@ -11,11 +11,11 @@ import polars as pl
 import pytest
 from scipy.stats import binom
 
-from algid.report.figures.base import Figure
+from algid.report.figures.base import Figure, Missing
 from algid.report.figures.innovations import CORRELATION, WHITENED, innovations, read_curves
 from algid.report.figures.running import running
 from algid.report.gallery import gallery
-from algid.results import Result, WhitenessTest
+from algid.results import Result, TorquePrediction, WhitenessTest
 
 
 @pytest.fixture
@@ -69,6 +69,24 @@ def test_colour_is_told_and_seen(folder: Path, result: Result) -> None:
     figure = _figure(innovations(path, poor))
     assert "Inside the band: 0 of 40 and 0 of 40 correlations" in figure.note
     assert "coloured; the intervals do not allow for that" in figure.note
+
+
+@pytest.mark.parametrize("least", [1e-308, 0.0])
+def test_a_band_that_none_computes_is_drawn(least: float, folder: Path, result: Result) -> None:
+    path = folder / "innovations.parquet"
+    pl.read_parquet(path).with_columns(low=pl.lit(least)).write_parquet(path)
+    _figure(innovations(path, result))
+
+
+def test_scored_torque_of_a_log_that_is_not_there_is_refused(folder: Path, result: Result) -> None:
+    assert result.fit is not None
+    score = TorquePrediction(rmse=(0.1, 0.2), nrmse=(0.1, 0.2), r2=(0.9, 0.9), filter="")
+    fit = result.fit.model_copy(update={"residual": score})
+    torque = pl.read_parquet(folder / "torque.parquet").with_columns(log=pl.lit(-1, pl.Int32))
+    torque.write_parquet(folder / "scored.parquet")
+    first = gallery(folder, result.model_copy(update={"fit": fit})).figures[0]
+    assert isinstance(first, Missing)
+    assert first.why.endswith("expected the logs of torque.parquet, found log -1; identify again")
 
 
 def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(

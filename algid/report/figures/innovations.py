@@ -34,6 +34,7 @@ COLUMNS = ("quantity", "joint", "x", "value", "low", "high")
 FAINT = 0.02  # a correlation below which the estimator's test takes colour not to matter
 HEIGHT = 260
 _FEW_DECADES = 4
+_LARGEST_RANGE = 1e12
 MILLI = 0.5  # s: lags that end before are shown in milliseconds
 WHITE_READING = (
     "Read: white noise leaves 19 of 20 points and bars inside the blue band; a hump in the "
@@ -159,8 +160,8 @@ def _layout(x: FloatArray, y: dict[str, object]) -> dict[str, object]:
 def _round_ticks(white: Curve) -> dict[str, Any]:
     """Ticks and a range that holds the band and the values, in shares of white noise."""
     positive = white.value[white.value > 0]
-    low = min(0.25, float(white.low.min()), *positive.tolist())
     high = max(4.0, float(white.high.max()), float(white.value.max()))
+    low = max(min(0.25, float(white.low.min()), *positive.tolist()), high / _LARGEST_RANGE)
     decades = np.log10(high / low)
     if decades > _FEW_DECADES:  # ticks of their own would stand on one another
         step = int(np.ceil(decades / _FEW_DECADES))
