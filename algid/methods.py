@@ -63,8 +63,7 @@ def _refined(
 ) -> Fit:
     from algid.estimators import refined
 
-    settings = refined.RefinedSettings(windows, lengths=lengths, prior=prior)
-    return refined.fit(unloaded, loaded, settings, progress)
+    return refined.fit(unloaded, loaded, windows, lengths, prior, progress)
 
 
 def _weak(

@@ -207,9 +207,7 @@ def _delayed(here: scenes.Scene, seed: int) -> tuple[FloatArray, float]:
     late = replace(
         log, theta=log.theta[:, :-5], tau=log.tau[:, 5:]
     )  # the logged torque acts 5 ms after its stamp
-    estimated = refined.fit(
-        [lambda: [late]], settings=refined.RefinedSettings(weak.WeakSettings(estimate_delay=True))
-    )
+    estimated = refined.fit([lambda: [late]], settings=weak.WeakSettings(estimate_delay=True))
     ignored = refined.fit([lambda: [late]]).values[5:7] / here.arm.constants()[5:7] - 1
     return estimated.values, float(100 * np.abs(ignored).max())
 
@@ -221,9 +219,7 @@ def _held(here: scenes.Scene) -> dict[str, float]:
     log = Segment(0.0, 1 / scenes.RATE, motion.theta, here.bare.tau)
     bias = {}
     for hold in ("zoh", "foh"):
-        fit = refined.fit(
-            [lambda: [log]], settings=refined.RefinedSettings(weak.WeakSettings(hold=hold))
-        )
+        fit = refined.fit([lambda: [log]], settings=weak.WeakSettings(hold=hold))
         bias[hold] = float(100 * np.abs(fit.values[5:7] / k[5:7] - 1).max())
     return bias
 

@@ -53,7 +53,7 @@ def evaluate(folder: Path) -> list[dict[str, Any]]:
         settings = weak.WeakSettings(
             model=chosen.model, bandwidth=60.0, estimate_delay=chosen.delay
         )
-        fit = refined.fit(sources, settings=refined.RefinedSettings(settings))
+        fit = refined.fit(sources, settings=settings)
         score = cross_validate(fit, sources)
         assert score is not None
         terms = " + ".join([*chosen.model.terms, *(["delay"] if chosen.delay else [])]) or "viscous"

@@ -53,8 +53,7 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     flags = Selection(Model(("coulomb", "offset", "rotor")), delay=True)
     chosen = select(*logs, weak) if mode == MODES[0] else flags
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    settings = refined.RefinedSettings(weak)
-    fit = refined.fit(*logs, settings)
+    fit = refined.fit(*logs, weak)
     if fit.refuted and mode == MODES[0]:
         fit = shrunk.fit(
             *logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False)

@@ -109,7 +109,7 @@ def _refined(
     sources: Sequence[Source], chosen: Selection, weak: WeakSettings
 ) -> tuple[Fit, Selection]:
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    return refined.fit(sources, settings=refined.RefinedSettings(weak)), chosen
+    return refined.fit(sources, settings=weak), chosen
 
 
 def evaluate(draws: int, kinds: Iterable[str] = KINDS) -> list[Row]:

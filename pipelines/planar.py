@@ -274,8 +274,7 @@ def _burdened(q: FloatArray, g: float) -> FloatArray:
 
 def _fitted(logs: list[Segment], model: Model) -> Fit:
     unloaded, loaded = logs
-    settings = refined.RefinedSettings(WeakSettings(model))
-    return refined.fit([lambda: [unloaded]], [lambda: [loaded]], settings)
+    return refined.fit([lambda: [unloaded]], [lambda: [loaded]], WeakSettings(model))
 
 
 def _segment(motion: SimulatedMotion, rng: np.random.Generator) -> Segment:

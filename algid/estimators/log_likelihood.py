@@ -144,6 +144,11 @@ class LogEvidence:
         # A joint without a motor bears a load of the size of the other's.
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
 
+    @property
+    def noise_known(self) -> bool:
+        """Whether its noise levels are given, and not estimated."""
+        return self._known is not None
+
     def _pieces(self) -> Iterator[Segment]:
         return (piece for piece in pieces(self._source(), PIECE_SAMPLES) if len(piece) >= SHORTEST)
 

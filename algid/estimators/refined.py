@@ -10,7 +10,7 @@ already within its own error bars.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import reduce
 from operator import add
 from typing import Literal
@@ -49,36 +49,17 @@ _WIDTH_FAR = 0.5  # the same where the likelihood was refuted: no less would men
 _ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without information is held
 
 
-@dataclass(frozen=True, eq=False)
-class RefinedSettings:
-    """Settings of the refined estimator.
-
-    Parameters
-    ----------
-    weak : WeakSettings
-        Model, hold and delay; window and bandwidth are of the weak estimate that it starts from.
-    noise : NoiseLevels or None
-        Known noise levels; None estimates them log by log.
-    lengths : dict
-        Known link lengths "l1", "l2" in m.
-    prior : Prior or None
-        What an earlier result knows of the arm; unloaded logs are not needed then.
-    """
-
-    weak: WeakSettings = field(default_factory=WeakSettings)
-    noise: NoiseLevels | None = None
-    lengths: dict[str, float] = field(default_factory=dict)
-    prior: Prior | None = None
-
-
 End = Literal["settled", "refuted", "unsettled"]
 
 
 def fit(
     unloaded: Sequence[Source],
     loaded: Sequence[Source] = (),
-    settings: RefinedSettings | None = None,
+    settings: WeakSettings | None = None,
+    lengths: dict[str, float] | None = None,
+    prior: Prior | None = None,
     progress: Progress | None = None,
+    noise: NoiseLevels | None = None,
 ) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
@@ -87,9 +68,16 @@ def fit(
     unloaded, loaded : sequences of callables
         Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called
         several times.
-    settings : RefinedSettings
+    settings : WeakSettings
+        Model, hold and delay; window and bandwidth are of the weak estimate that it starts from.
+    lengths : dict
+        Known link lengths "l1", "l2" in m.
+    prior : Prior
+        What an earlier result knows of the arm; unloaded logs are not needed then.
     progress : callable
         Called with each step of the training and how many samples of how many it has gone over.
+    noise : NoiseLevels
+        Known noise levels; None estimates them log by log.
 
     Returns
     -------
@@ -103,16 +91,17 @@ def fit(
     ValueError
         If a known noise level is not positive.
     """
-    settings = settings or RefinedSettings()
-    noise = settings.noise
+    settings = settings or WeakSettings()
     if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
         raise ValueError(
             f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m"
         )
-    start = weak_fit(unloaded, loaded, settings.weak, settings.lengths, settings.prior)
-    shared = start.shared
-    settings, prior = replace(settings, prior=_anchored(start)), settings.prior
-    logs = [*_opened(unloaded, False, shared, settings), *_opened(loaded, True, shared, settings)]
+    start = weak_fit(unloaded, loaded, settings, lengths, prior)
+    shared, anchored = start.shared, _anchored(start)
+    logs = [
+        *_opened(unloaded, False, shared, settings, noise),
+        *_opened(loaded, True, shared, settings, noise),
+    ]
     for loaded_ones, given in ((False, unloaded), (True, loaded)):
         if given and not any(log.loaded is loaded_ones for log in logs):
             which = "loaded" if loaded_ones else "unloaded"
@@ -123,20 +112,20 @@ def fit(
     refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
     try:
         if len(logs) >= _MANY and (
-            steps := _refuted_alone(shared, logs[0], start.values, settings)
+            steps := _refuted_alone(shared, logs[0], start.values, anchored)
         ):
             return replace(refuted, iterations=steps)
-        beta, outcomes, iterations, end = _train(shared, logs, start.values, settings, progress)
+        beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
         width = None
         if end != "unsettled" and has_width(shared.model):
             shared, beta, outcomes, end, width = _settled_width(
-                shared, logs, (beta, outcomes, end), settings, progress
+                shared, logs, (beta, outcomes, end), anchored, progress
             )
         if end == "refuted":
             return replace(refuted, iterations=iterations)
         settled = end == "settled" and bool(np.all(np.isfinite(beta)))
         if settled and not all(log.whole for log in logs):
-            beta, outcomes = _finish(shared, logs, beta, settings)
+            beta, outcomes = _finish(shared, logs, beta, anchored)
     except np.linalg.LinAlgError:
         settled, iterations = False, 0
     if not settled:
@@ -195,16 +184,20 @@ def _anchored(start: Fit) -> Prior | None:
 
 
 def _opened(
-    sources: Sequence[Source], loaded: bool, shared: Shared, settings: RefinedSettings
+    sources: Sequence[Source],
+    loaded: bool,
+    shared: Shared,
+    settings: WeakSettings,
+    noise: NoiseLevels | None,
 ) -> Iterator[LogEvidence]:
     def stencil(dt: float, c: FloatArray) -> Stencil:
-        held = settings.weak.hold == "zoh"
-        delay = float(c[-1]) if shared.delay else settings.weak.delay
+        held = settings.hold == "zoh"
+        delay = float(c[-1]) if shared.delay else settings.delay
         shift = TorqueShift(held, delay).at(dt) - shared.model.lag(c)
         return Stencil(dt, shift, held=held)
 
     for source in sources:
-        log = LogEvidence(source, loaded, shared, stencil, settings.noise)
+        log = LogEvidence(source, loaded, shared, stencil, noise)
         if log.kept:
             yield log
 
@@ -213,11 +206,12 @@ def _train(
     shared: Shared,
     logs: Sequence[LogEvidence],
     beta: FloatArray,
-    settings: RefinedSettings,
+    prior: Prior | None,
     progress: Progress | None,
 ) -> tuple[FloatArray, list[Outcome], int, End]:
     """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
     total = sum(log.trained for log in logs)
+    known = any(log.noise_known for log in logs)
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
@@ -226,23 +220,19 @@ def _train(
             done += log.trained
             if progress is not None:
                 progress(f"fitting, step {iteration}", done, total)
-        better, S, _ = combine(
-            shared, [outcome.information for outcome in outcomes], beta, settings.prior
-        )
-        free = settings.noise is None and iteration <= _NOISE_STEPS
+        better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
+        free = not known and iteration <= _NOISE_STEPS
         improved = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
         moved = _distance(better - beta, S)
         beta = better
-        if settings.noise is None and any(log.refuted for log in logs):
+        if not known and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
         if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     return beta, outcomes, _STEPS, "unsettled"
 
 
-def _refuted_alone(
-    shared: Shared, log: LogEvidence, beta: FloatArray, settings: RefinedSettings
-) -> int:
+def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Prior | None) -> int:
     """Steps after which a log by itself refutes the likelihood; 0 where it does not.
 
     With parameters of its own it is explained better than with those of all logs: what it refutes
@@ -252,7 +242,7 @@ def _refuted_alone(
     try:
         for step in range(1, _NOISE_STEPS + 1):
             outcome, before = log.train(shared.coefficients(beta, log.loaded)), log.noise.tau
-            beta, _, _ = combine(shared, [outcome.information], beta, settings.prior)
+            beta, _, _ = combine(shared, [outcome.information], beta, prior)
             log.improve_noise(outcome)
             if log.refuted:
                 return step
@@ -269,7 +259,7 @@ def _settled_width(
     shared: Shared,
     logs: Sequence[LogEvidence],
     trained: tuple[FloatArray, list[Outcome], End],
-    settings: RefinedSettings,
+    prior: Prior | None,
     progress: Progress | None,
 ) -> tuple[Shared, FloatArray, list[Outcome], End, Width | None]:
     """What was `trained`, at the likeliest width of friction's step, and that width.
@@ -283,7 +273,7 @@ def _settled_width(
         other = replace(shared, model=replace(shared.model, coulomb_speed=width))
         seen = [log.shaped(other, other.coefficients(beta, log.loaded)) for log in logs]
         informations = [outcome.information for outcome in seen]
-        better, _, value = combine(other, informations, beta, settings.prior)
+        better, _, value = combine(other, informations, beta, prior)
         return sum(outcome.deviance for outcome in seen) - 2 * value, better
 
     width = None
@@ -296,21 +286,19 @@ def _settled_width(
         shared = replace(shared, model=replace(shared.model, coulomb_speed=width.value))
         for log in logs:
             log.reshape(shared)
-        beta, outcomes, _, end = _train(shared, logs, beta, settings, progress)
+        beta, outcomes, _, end = _train(shared, logs, beta, prior, progress)
         if end != "settled":
             break
     return shared, beta, outcomes, end, width
 
 
 def _finish(
-    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, settings: RefinedSettings
+    shared: Shared, logs: Sequence[LogEvidence], beta: FloatArray, prior: Prior | None
 ) -> tuple[FloatArray, list[Outcome]]:
     """Passes over whole logs until the step is one that a single Gauss-Newton step can make."""
     for _ in range(_PASSES):
         outcomes = [log.run(shared.coefficients(beta, log.loaded)) for log in logs]
-        better, S, _ = combine(
-            shared, [outcome.information for outcome in outcomes], beta, settings.prior
-        )
+        better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
         share = sum(log.trained for log in logs)
         far = _distance(better - beta, S) * np.sqrt(share / max(share, _count(outcomes)))
         beta = better

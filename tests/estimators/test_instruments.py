@@ -14,7 +14,6 @@ import pytest
 from algid.estimators import instruments, refined, selection, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
-from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, Motion, acceleration, torque
 from algid.signals.segments import Segment
@@ -58,7 +57,7 @@ def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: B
     loaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=2)])]
     for fit in (
         weak.fit(unloaded, loaded, lengths=lengths),
-        refined.fit(unloaded, loaded, RefinedSettings(lengths=lengths)),
+        refined.fit(unloaded, loaded, lengths=lengths),
     ):
         place = fit.names.index("m_p")
         assert fit.status[place] == "OK"

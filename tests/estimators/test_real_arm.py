@@ -12,7 +12,6 @@ from algid.estimators import refined, weak
 from algid.estimators.diagnostics import term_worths
 from algid.estimators.doubt import doubted
 from algid.estimators.prediction import cross_validate
-from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
 from algid.signals.segments import Segment
@@ -45,7 +44,7 @@ def _run(path: Path) -> Segment:
 
 
 def test_prediction_beats_the_published_parameters(sources: list[Source]) -> None:
-    fit = refined.fit(sources, settings=RefinedSettings(WeakSettings(Model(("coulomb", "rotor")))))
+    fit = refined.fit(sources, settings=WeakSettings(Model(("coulomb", "rotor"))))
     assert fit.refuted  # an arm's torque error is no white noise
     assert fit.unidentifiable == ()
     found = cross_validate(fit, sources)

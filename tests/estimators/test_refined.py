@@ -9,7 +9,6 @@ from algid.arm import inverse_dynamics
 from algid.estimators import log_likelihood as evidence
 from algid.estimators import refined, weak
 from algid.estimators.combine import LogInformation, Prior
-from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import WeakSettings
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
@@ -65,7 +64,7 @@ def test_intervals_of_arm_and_payload_hold(bench: Bench) -> None:
 
 def test_known_noise_levels_are_kept(bench: Bench) -> None:
     known = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    fit = refined.fit([lambda: [bench.log(sigma=1e-3)]], settings=RefinedSettings(noise=known))
+    fit = refined.fit([lambda: [bench.log(sigma=1e-3)]], noise=known)
     assert fit.noise == (known,)
 
 
@@ -73,14 +72,14 @@ def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
     with pytest.raises(ValueError, match="positive"):
         refined.fit(
             [lambda: [bench.log()]],
-            settings=RefinedSettings(noise=NoiseLevels(np.zeros(2), np.ones(2))),
+            noise=NoiseLevels(np.zeros(2), np.ones(2)),
         )
 
 
 def test_known_lengths_sharpen_the_payload(bench: Bench) -> None:
     sources = [lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]]
     free = refined.fit(*sources)
-    known = refined.fit(*sources, RefinedSettings(lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
+    known = refined.fit(*sources, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})
     assert known.names[-1] == "m_p"
     assert known.std[7] < 0.6 * free.std[7]
     assert abs(known.values[7] - bench.payload) < 4 * known.std[7]
@@ -90,7 +89,7 @@ def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
     before = refined.fit([lambda: [bench.log(sigma=1e-3)]])
     prior = Prior.of(before.names, before.values, before.covariance)
     together = refined.fit([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]])
-    after = refined.fit([], [lambda: [bench.log(True, 1e-3)]], RefinedSettings(prior=prior))
+    after = refined.fit([], [lambda: [bench.log(True, 1e-3)]], prior=prior)
     assert np.allclose(
         after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std
     )
@@ -100,7 +99,7 @@ def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
 def test_a_delay_is_recovered_with_its_error_bar(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     late = replace(log, theta=log.theta[:, :-5], tau=log.tau[:, 5:], omega=None)
-    fit = refined.fit([lambda: [late]], settings=RefinedSettings(WeakSettings(estimate_delay=True)))
+    fit = refined.fit([lambda: [late]], settings=WeakSettings(estimate_delay=True))
     assert fit.names[-1] == "delay"
     assert (fit.estimator, fit.converged) == ("refined", True)
     assert abs(fit.values[-1] - 5e-3) < 1e-4
@@ -112,7 +111,7 @@ def test_a_held_torque_does_not_bias_friction(bench: Bench) -> None:
     t, k = np.arange(1501) * DT, bench.arm.constants()
     torque = SampledTorque(t, bench.bare.tau[:, :1501], "zoh")
     log = Segment(0.0, DT, simulate(k, torque, t).theta, torque.tau)
-    held = refined.fit([lambda: [log]], settings=RefinedSettings(WeakSettings(hold="zoh"))).values
+    held = refined.fit([lambda: [log]], settings=WeakSettings(hold="zoh")).values
     assert np.allclose(held[5:7], k[5:7], rtol=5e-4)
     smooth = refined.fit([lambda: [log]]).values
     assert np.abs(smooth[5:7] / k[5:7] - 1).max() > 2e-3  # what half a sample does
@@ -192,7 +191,7 @@ def test_a_horizontal_arm_has_five_constants(bench: Bench) -> None:
     motion = simulate(k, lambda now: np.stack([np.sin(9 * now), 0.6 * np.cos(14 * now)]), t)
     fit = refined.fit(
         [lambda: [Segment(0.0, DT, motion.theta, motion.tau)]],
-        settings=RefinedSettings(WeakSettings(Model(gravity=0))),
+        settings=WeakSettings(Model(gravity=0)),
     )
     assert fit.names == ("k1", "k3", "k5", "k6", "k7")
     assert np.allclose(fit.values, k[[0, 2, 4, 5, 6]], rtol=1e-4)

@@ -7,7 +7,6 @@ import pytest
 
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit, Status
-from algid.estimators.refined import RefinedSettings
 from algid.estimators.running import has_running, running
 from algid.estimators.whitening import NoiseLevels
 from algid.signals.segments import Segment
@@ -69,8 +68,8 @@ def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
     19 times of 20.
     """
     log = bench.log(sigma=1e-4, seed=2)
-    known = RefinedSettings(noise=NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-3)))
-    whole, half = (refined.fit([_source(log.part(0, end))], settings=known) for end in (4001, 2001))
+    known = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-3))
+    whole, half = (refined.fit([_source(log.part(0, end))], noise=known) for end in (4001, 2001))
     found = running(whole, [4.0], 8)
     place = int(np.argmin(np.abs(found.share - 0.5)))
     assert found.share[place] == pytest.approx(0.5, abs=0.01)

@@ -76,7 +76,7 @@ def _fit(estimator: str, model: Model, log: Segment, loaded: Segment | None = No
     logs = [lambda: [log]], [] if loaded is None else [lambda: [loaded]]
     if estimator == "weak":
         return weak.fit(*logs, settings=weak.WeakSettings(model=model))
-    return refined.fit(*logs, settings=refined.RefinedSettings(weak.WeakSettings(model=model)))
+    return refined.fit(*logs, settings=weak.WeakSettings(model=model))
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])

@@ -17,7 +17,6 @@ from algid.arm import mass_matrix, passive_torque, with_payload
 from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import cross_validate, score
-from algid.estimators.refined import RefinedSettings
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import TERMS as MODEL_TERMS
 from algid.model import Model
@@ -108,7 +107,7 @@ def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source
     settings = WeakSettings(model, hold=hold, estimate_delay=delay)
     if estimator != "refined":
         return (weak if estimator == "weak" else instruments).fit(unloaded, loaded, settings)
-    return refined.fit(unloaded, loaded, RefinedSettings(settings))
+    return refined.fit(unloaded, loaded, settings)
 
 
 def _truth(fit: Fit) -> np.ndarray:
