@@ -18,8 +18,10 @@ from algid.results.verdict import CAUSES
 from algid.settings import Settings
 from algid.units import TORQUE
 
-TRIED = ("HEAVY_ARM", "EXTERNAL_EFFORT")
-"""Notices whose remedies are assertions, and not the result's own settings."""
+TRIED = {"HEAVY_ARM": ("HEAVY_ARM", "LOGS_APART"), "EXTERNAL_EFFORT": ("EXTERNAL_EFFORT",)}
+"""Notices whose remedies are assertions and not the result's own settings; with what each is told
+wrong by, beside the causes of error.
+"""
 AIR = 1.2  # kg/m³
 
 Again = Callable[[Survey, Settings], Identified | None]
@@ -57,11 +59,11 @@ def _standing(notice: Notice, survey: Survey, settings: Settings, again: Again) 
                 continue
             logs = [_in_unit(log, ratio) for log in logs]
         found = again(Survey(logs), replace(settings, **said))
-        if found is not None and _stands(found):
+        if found is not None and _stands(found, TRIED[notice.code]):
             yield remedy
 
 
-def _stands(found: Identified) -> bool:
+def _stands(found: Identified, contradictions: tuple[str, ...]) -> bool:
     """Whether a result is physical, explains the torque, and names no cause of error."""
     codes = {notice.code for notice in found.notices if not notice.note}
     summary = found.fit
@@ -69,7 +71,7 @@ def _stands(found: Identified) -> bool:
         summary is not None
         and summary.converged
         and not is_implausible(summary)
-        and not codes & {*CAUSES, *TRIED, "LOGS_APART"}
+        and not codes & {*CAUSES, *contradictions}
     )
 
 
