@@ -490,7 +490,23 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "late in the mean, and "
         "inertia and friction take up what that makes"
     ),
-    "SATURATED_EFFORT": "{channel} stands at its limit in {percent:.3g} % of the samples",
+    "SATURATED_EFFORT": {
+        "open": "{channel} stands at its limit in {percent:.3g} % of the samples",
+        "true": (
+            "{channel} stands at its limit in {percent:.3g} % of the samples, and the motion "
+            "agrees: it is what the joint got"
+        ),
+    },
+    "CLIPPED_TORQUE": {
+        "sensor": (
+            "{channel} is cut off at {level:.4g} N m, where the motion tells of more: the sensor "
+            "reaches the end of its range; {count:# sample|samples} ({percent:.2g} %) left out"
+        ),
+        "drive": (
+            "{channel} exceeds {level:.4g} N m, where the motion tells of no more: the drive "
+            "gives less than is logged; {count:# sample|samples} ({percent:.2g} %) left out"
+        ),
+    },
     "DEAD_EFFORT": (
         "{channel} stands still for {seconds:.3g} s from t = {start:.6g} s; leave that out"
     ),

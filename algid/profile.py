@@ -46,8 +46,9 @@ Check = Literal[
     "LOST_SAMPLES",
     "WRONG_CONVENTION",
     "NOT_FINITE",
+    "CLIPPED_TORQUE",
 ]
-"""Checks of a log that refuse it, or its result, unless they are accepted."""
+"""Checks of a log that refuse it, its result or some samples, unless they are accepted."""
 
 
 ALL_CHANNELS = (

@@ -1,4 +1,4 @@
-.PHONY: accuracy accuracy-quick run-to-run
+.PHONY: accuracy accuracy-quick run-to-run saturation
 
 ACCURACY_DRAWS ?= 100
 ACCURACY_MODEL_DRAWS ?= 4
@@ -13,3 +13,6 @@ accuracy-quick: setup
 
 run-to-run: setup ## halves of two real arms' runs: whether intervals hold, and repeatability beside output error
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.run_to_run ../shared/data/dfki
+
+saturation: setup ## torques cut off by a sensor or a drive: whether they are found and left out, and coverage
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.saturation

@@ -38,7 +38,7 @@ from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces
 
 PIECE_SAMPLES = 16384
-_TRAINED = 4  # pieces of a log in the training set, up to twice as many
+_TRAINED = 4  # whole pieces of a log in the training set, up to twice as many
 SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
@@ -125,7 +125,7 @@ class LogEvidence:
         self._stencil = stencil
         self._known = known
         usable = (replace(piece, omega=None) for piece in self._pieces())
-        self.kept, self.whole = spread_pieces(usable, _TRAINED)
+        self.kept, self.whole = spread_pieces(usable, _TRAINED, PIECE_SAMPLES)
         if not self.kept:
             return
         self._trajectories = [_first_trajectory(piece) for piece in self.kept]

@@ -163,7 +163,7 @@ class Windows:
             return np.zeros((2, size, 0))
         here = np.zeros(len(model.names)) if at is None else at
         known = {} if known is None else known
-        tau = piece.tau[:, margin - self.whole : len(piece) - margin - self.whole]
+        tau = self._acting(piece.tau)
         theta = piece.theta[:, margin : len(piece) - margin]
         X = np.zeros((2, size, (len(piece) - 2 * margin) // self.step - OVERLAP + 1))
         speed = (self._own, "velocity")  # a change of friction's width asks for it again
@@ -197,6 +197,15 @@ class Windows:
         X = np.zeros((2, len(model.names), samples // self.step - OVERLAP + 1))
         self._fill(X, model, lambda: motion, samples, {})
         return X
+
+    def _acting(self, torques: FloatArray) -> FloatArray:
+        """Torques (m, n) that act where a piece's windows are, of all (m, N) of the piece."""
+        first = self.margin - self.whole
+        return torques[:, first : torques.shape[1] - self.margin - self.whole]
+
+    def torque_moments(self, torques: FloatArray) -> FloatArray:
+        """Integrals (m, R) of φ times torques (m, N) of a piece that holds a window."""
+        return self.moments(self._acting(torques), self._shifted[0])
 
     def _of_torque(self, tau: FloatArray, order: int, known: Known) -> FloatArray:
         """Moments (2, R) of the torques (2, n) by φ or φ', as late as they act."""

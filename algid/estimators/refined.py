@@ -39,6 +39,7 @@ from algid.signals.shift import TorqueShift
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
+_CLOSE = 0.1  # standard deviations of the last step: friction's step at noisy speeds may keep it up
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
 _MANY = 4  # logs of which one is tried alone before all of them are
@@ -229,7 +230,7 @@ def _train(
             return beta, outcomes, iteration, "refuted"
         if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
-    return beta, outcomes, _STEPS, "unsettled"
+    return beta, outcomes, _STEPS, "settled" if moved < _CLOSE else "unsettled"
 
 
 def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Prior | None) -> int:
@@ -283,10 +284,16 @@ def _settled_width(
         moved = abs(np.log(width.value / now))
         if moved < (_WIDTH_SETTLED if end == "settled" else _WIDTH_FAR):
             break
+        before, states = (shared, beta, outcomes, end), [log.state for log in logs]
         shared = replace(shared, model=replace(shared.model, coulomb_speed=width.value))
         for log in logs:
             log.reshape(shared)
         beta, outcomes, _, end = _train(shared, logs, beta, prior, progress)
+        if end == "unsettled" and before[-1] == "settled":  # the step is too narrow for the motion
+            for log, state in zip(logs, states, strict=True):
+                log.reshape(before[0])
+                log.restore(state)
+            return *before, width
         if end != "settled":
             break
     return shared, beta, outcomes, end, width

@@ -62,7 +62,8 @@ class Training:
     @classmethod
     def of(cls, source: Source, loaded: bool) -> Training:
         """The pieces of one pass over a log."""
-        return cls(tuple(spread_pieces(pieces(source(), _PIECE_SAMPLES), _PIECES)[0]), loaded)
+        every = pieces(source(), _PIECE_SAMPLES)
+        return cls(tuple(spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0]), loaded)
 
     @property
     def driven(self) -> bool:

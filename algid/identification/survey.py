@@ -17,6 +17,7 @@ from algid.signals.segments import Segment, segments
 
 if TYPE_CHECKING:
     from algid.estimators.convention_search import Recorded
+    from algid.estimators.saturation import Limit
 
 EXAMINED = 1 << 16
 """Samples at the start of a long log that the named checks look at."""
@@ -55,6 +56,7 @@ class Survey:
         self._seen: dict[LogSource, Seen] = {}
         self._findings: dict[LogSource, tuple[Notice, ...]] = {}
         self._recorded: dict[LogSource, Recorded] = {}
+        self._limits: dict[LogSource, tuple[Limit, ...]] = {}
         self._conventions: dict[LogSource, Notice] | None = None
         self._digests: dict[LogSource, Beside[str]] = {}
         self._kept: dict[LogSource, tuple[Segment, ...]] = {}
@@ -80,6 +82,8 @@ class Survey:
     def segments(self, log: LogSource) -> Iterator[Segment]:
         """A fresh pass over a log: its uniform segments, from its start.
 
+        Without samples whose torque a limit cuts off.
+
         Raises `LogError` where it is refused.
         """
         rows = 0
@@ -91,7 +95,7 @@ class Survey:
                 self._tell(log, rows)
             return
         held: list[Segment] = []
-        for piece in segments(self._counted(log)):
+        for piece in self._sound(log):
             rows += len(piece)
             if rows <= self._room:
                 held.append(piece)
@@ -101,6 +105,15 @@ class Survey:
         if rows <= self._room and log not in self._kept:
             self._kept[log] = tuple(held)
             self._room -= rows
+
+    def _sound(self, log: LogSource) -> Iterator[Segment]:
+        """The segments of a pass, without what a limit cuts off: the first block tells it."""
+        from algid.estimators.saturation import sound
+
+        passing = segments(self._counted(log))
+        first = next(passing, None)
+        if first is not None:
+            yield from sound(chain([first], passing), self._limits.get(log, ()))
 
     def seen(self, log: LogSource) -> Seen:
         """What the log holds; goes over it where no estimator has done so to its end."""
@@ -142,12 +155,18 @@ class Survey:
         """What the named checks find at the `begin` of a log."""
         from algid.estimators.convention_search import MOST_LOGS, seconds_of_each
         from algid.inspection.checks import noticed
+        from algid.inspection.clipping import saturation
         from algid.inspection.conventions import recorded
 
         alike = [one for one in self.logs if one.role == log.role]
-        if len(alike) == 1:
-            return noticed(begin, gravity=_weight(log), effort=log.effort, whole=whole)
-        found = noticed(begin, gravity=_weight(log), effort=log.effort, whole=whole, alone=False)
+        gravity, alone = _weight(log), len(alike) == 1
+        known = saturation(begin, gravity=gravity, effort=log.effort)
+        self._limits[log] = known.limits
+        found = noticed(
+            begin, gravity=gravity, effort=log.effort, whole=whole, alone=alone, known=known
+        )
+        if alone:
+            return found
         kept = None
         if log.effort != "external" and log in alike[:: -(-len(alike) // MOST_LOGS)]:
             kept = recorded(begin, seconds_of_each(len(alike)))
@@ -177,10 +196,13 @@ class Survey:
 
         The first is examined, and refuses a log only where that is all of it.
         """
+        from algid.inspection.clipping import Counted
+
         if log.digest is not None and log not in self._digests:
             self._digests[log] = Beside(log.digest)
         rows, first_ns, last_ns = 0, 0, 0
         notices: list[Notice] = list(log.notices)
+        counted: Counted | None = None
         self._tell(log, 0)
         for block, alone in _with_end(log.blocks(), log.promised):
             if len(block) and not rows:
@@ -189,12 +211,17 @@ class Survey:
                     begin = block if alone else block.part(0, EXAMINED)
                     self._findings[log] = self._checked(log, begin, whole=alone)
                 notices += self._findings[log]
+                counted = Counted(self._limits.get(log, ()))
+            if counted is not None:
+                counted.add(block)
             if len(block):
                 last_ns = int(block.stamp_ns[-1])
             rows += len(block)
             notices += block.notices
             yield block
             self._tell(log, rows)
+        if counted is not None:
+            notices += counted.notices(log.origin)
         self._seen.setdefault(log, Seen(rows, first_ns, last_ns, tuple(notices)))
 
     def _tell(self, log: LogSource, rows: int) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.estimators.saturation import UNSEEN, Saturation
 from algid.inspection.candidates import torques_beside
 from algid.inspection.figures import differences, robust_deviation, saturated_share, thinned
 from algid.log import Log
@@ -30,11 +31,13 @@ _OFF_STEP, _IN_STEP = 0.15, 0.9
 _TURN = 2 * math.pi
 
 
-def efforts(log: Log) -> Iterator[Notice]:
-    """Torques that are zero, constant or clipped.
+def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
+    """Torques that are zero, constant or at a limit.
 
-    That of a joint without a motor may be anything.
+    That of a joint without a motor may be anything. A limit that motion tells to be true is no
+    reason to doubt; one that cuts the torque off is told by `algid.inspection.clipping`.
     """
+    cut_off = {limit.joint + 1 for limit in known.limits}
     for joint, tau in enumerate(log.tau, start=1):
         if joint == log.origin.reading.passive:
             continue
@@ -55,8 +58,10 @@ def efforts(log: Log) -> Iterator[Notice]:
         elif tau.min() == tau.max():
             seen = {"channel": what, "value": float(tau[0])}
             yield Notice("EFFORT_CONSTANT", numbers=seen, refuse=True, remedies=(other,))
-        elif (share := saturated_share(tau)) > 0.01:
-            yield Notice("SATURATED_EFFORT", numbers={"channel": what, "percent": 100 * share})
+        elif (share := saturated_share(tau)) > 0.01 and joint not in cut_off:
+            sound = joint - 1 in known.sound
+            seen = {"channel": what, "percent": 100 * share, "case": "true" if sound else "open"}
+            yield Notice("SATURATED_EFFORT", numbers=seen, note=sound)
 
 
 def dead_efforts(log: Log) -> Iterator[Notice]:

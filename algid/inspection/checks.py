@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 from algid.errors import LogError
+from algid.estimators.saturation import Saturation
 from algid.inspection.channels import (
     angles,
     dead_efforts,
@@ -14,6 +15,7 @@ from algid.inspection.channels import (
     held_efforts,
     spikes,
 )
+from algid.inspection.clipping import saturation
 from algid.inspection.conventions import advised, is_right, judged, mend
 from algid.inspection.dynamics import dynamic_figures, gravity_findings
 from algid.inspection.findings import yielding
@@ -29,6 +31,7 @@ def examine(
     effort: str | None = None,
     whole: bool = True,
     alone: bool = True,
+    known: Saturation | None = None,
 ) -> tuple[Notice, ...]:
     """Everything that the checks find in a log.
 
@@ -45,6 +48,8 @@ def examine(
         False where `log` is the beginning of a longer one.
     alone : bool
         False where the conventions of several logs are judged together: see `mends`.
+    known : Saturation
+        What motion tells of the limits of torques, where that is known already.
 
     Returns
     -------
@@ -55,8 +60,9 @@ def examine(
         return ()
     tried = cache(partial(judged, log, gravity=gravity > 0))
     external = effort == "external"
+    known = saturation(log, gravity=gravity, effort=effort) if known is None else known
     every = (
-        *(() if external else efforts(log)),
+        *(() if external else efforts(log, known)),
         *(() if external else dead_efforts(log)),
         *held_efforts(log),
         *angles(log),
@@ -84,6 +90,7 @@ def noticed(
     effort: str | None = None,
     whole: bool = True,
     alone: bool = True,
+    known: Saturation | None = None,
 ) -> tuple[Notice, ...]:
     """What `examine` finds, as notices.
 
@@ -92,7 +99,7 @@ def noticed(
     LogError
         If a check forbids the use of a log that is all there.
     """
-    findings = examine(log, gravity=gravity, effort=effort, whole=whole, alone=alone)
+    findings = examine(log, gravity=gravity, effort=effort, whole=whole, alone=alone, known=known)
     refused = next((finding for finding in findings if finding.refuse), None)
     if refused is not None and whole:
         raise LogError(f"{log.origin.path}: {refused.code}: {refused.clause}")

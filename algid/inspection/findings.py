@@ -11,7 +11,8 @@ DEGREES               yes      angles or velocities are 57.3 times what the othe
 ANGLE_CONSTANT        no       an angle that never changes
 STUCK_SENSOR          no       an angle freezes in motion and jumps when it comes back
 SPIKES                no       single samples far off their neighbours
-SATURATED_EFFORT      no       a torque clipped at its limit
+SATURATED_EFFORT      no       a torque that stands at its limit
+CLIPPED_TORQUE        no       a torque that a sensor or a drive cuts off, by the motion
 HELD_EFFORT           no       a torque that holds its value for samples while the angle moves
 DEAD_EFFORT           no       a torque that keeps one value where others change all the time
 LOST_SAMPLES          no       steps twice as long as usual, though the stamps are even

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from algid.errors import LogError
 from algid.faults import during
 from algid.inspection.checks import examine
+from algid.inspection.clipping import clipped, saturation
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
 from algid.log import Log
@@ -128,7 +129,12 @@ def inspect_log(given: Any, profile: Profile | None = None) -> Inspection:
         return Inspection(path, seen.format, seen.entries, refused=seen.refused)
     log = seen.found
     gravity = profile.gravity if profile is not None else 9.81
-    findings = examine(log, gravity=gravity, effort=None if profile is None else profile.effort)
+    effort = None if profile is None else profile.effort
+    known = saturation(log, gravity=gravity, effort=effort)
+    findings = (
+        *examine(log, gravity=gravity, effort=effort, known=known),
+        *clipped(log, known.limits),
+    )
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     return Inspection(
         path=log.origin.path if isinstance(given, Log) else path,

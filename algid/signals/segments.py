@@ -200,7 +200,7 @@ def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
     yield from cutter.finish()
 
 
-def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment], bool]:
+def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[list[Segment], bool]:
     """Copies of evenly spread pieces of a log, from one pass over it.
 
     Parameters
@@ -209,6 +209,9 @@ def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment],
     count : int
         How many are kept of a long log, up to twice as many. What was cut from a block does not
         hold it.
+    rows : int
+        Samples of a whole piece. Of shorter ones, as a log with many gaps has, so many are kept
+        that they hold as many samples.
 
     Returns
     -------
@@ -233,7 +236,7 @@ def spread_pieces(usable: Iterable[Segment], count: int) -> tuple[list[Segment],
                 continues=continues,
             )
         )
-        if len(kept) > 2 * count:
+        if len(kept) > 2 * count and sum(map(len, kept)) > 2 * count * rows:
             kept, stride = [replace(other, continues=False) for other in kept[::2]], 2 * stride
     return kept, stride == 1
 

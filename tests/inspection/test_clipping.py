@@ -1,0 +1,114 @@
+"""Torques that are cut off: counted, told and left out, and kept where that is accepted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from algid.identification.source import open_sources
+from algid.identification.survey import Survey
+from algid.inspection.clipping import clipped, saturation
+from algid.inspection.report import inspect_log
+from algid.log import Log
+from tests.inspection.test_checks import moving_log
+
+LIMIT = 18.0
+
+
+def cut_off() -> Log:
+    """A log of 6,000 samples, whose sensors reach the end of their range at 18 N m."""
+    log = moving_log()
+    return replace(log, tau=np.clip(log.tau, -LIMIT, LIMIT))
+
+
+def surveyed(log: Log) -> Survey:
+    return Survey(open_sources(log, "unloaded", None, 9.81))
+
+
+def told(survey: Survey) -> list[str]:
+    return [one.text for one in survey.notices(survey.logs[0]) if one.code == "CLIPPED_TORQUE"]
+
+
+def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
+    log = cut_off()
+    (limit,) = saturation(log).limits
+    beyond = limit.beyond(log.tau)
+    survey = surveyed(log)
+    pieces = list(survey.segments(survey.logs[0]))
+    assert sum(map(len, pieces)) < np.count_nonzero(~beyond)
+    assert not any(limit.beyond(piece.tau).any() for piece in pieces)
+    (text,) = told(survey)
+    assert text.startswith(f"tau{limit.joint + 1} is cut off at 17.9")
+    assert f"{np.count_nonzero(beyond):,} samples" in text
+    assert survey.seen(survey.logs[0]).rows == len(log)
+
+
+def test_a_second_pass_leaves_the_same_out() -> None:
+    survey = surveyed(cut_off())
+    first, second = (
+        [(piece.start, len(piece)) for piece in survey.segments(survey.logs[0])] for _ in range(2)
+    )
+    assert first == second
+
+
+def test_they_are_lost_data_and_used_where_that_is_accepted() -> None:
+    log = cut_off()
+    known = saturation(log)
+    (notice,) = clipped(log, known.limits)
+    assert notice.lossy
+    assert "--accept CLIPPED_TORQUE" in notice.advice
+    reading = replace(log.origin.reading, accepted=("CLIPPED_TORQUE",))
+    accepted = surveyed(replace(log, origin=replace(log.origin, reading=reading)))
+    assert sum(map(len, accepted.segments(accepted.logs[0]))) == len(log)
+    assert told(accepted) == []
+
+
+def test_a_sound_log_loses_nothing() -> None:
+    survey = surveyed(moving_log())
+    assert sum(map(len, survey.segments(survey.logs[0]))) == 6000
+    assert told(survey) == []
+
+
+def test_inspection_tells_them_in_place_of_a_limit_that_may_be_true() -> None:
+    codes = [one.code for one in inspect_log(cut_off()).findings]
+    assert codes.count("CLIPPED_TORQUE") == 1
+    assert "SATURATED_EFFORT" not in codes
+
+
+def test_an_external_torque_is_not_judged() -> None:
+    assert saturation(cut_off(), effort="external").limits == ()
+
+
+def test_a_limit_that_the_motion_confirms_is_a_note() -> None:
+    """The highest torque is one value for 3 % of the samples, by its noise alone."""
+    log = moving_log()
+    top = np.quantile(log.tau[0], 0.97)
+    peak = log.tau[0] >= top
+    # the peak as the converter of a coarse sensor has it: what the arm gets is within its step
+    tau = np.vstack([np.where(peak, log.tau[0][peak].mean(), log.tau[0]), log.tau[1]])
+    (found,) = [
+        one for one in inspect_log(replace(log, tau=tau)).findings if one.code == "SATURATED_EFFORT"
+    ]
+    assert found.note
+    assert "the motion agrees" in found.text
+
+
+@pytest.mark.parametrize("limit", [4.0, 8.0, 14.0])
+def test_a_limit_that_leaves_little_of_the_motion_is_confirmed_by_nothing(limit: float) -> None:
+    log = moving_log()
+    found = inspect_log(replace(log, tau=np.clip(log.tau, -limit, limit))).findings
+    doubts = [one for one in found if one.code == "SATURATED_EFFORT"]
+    assert doubts
+    assert not any(one.note for one in doubts)
+
+
+@pytest.mark.parametrize("channel", ["tau1", "tau2"])
+def test_the_channel_is_named_as_the_file_names_it(channel: str) -> None:
+    log = cut_off()
+    named = replace(log, origin=replace(log.origin, mapping={channel: "effort[0]"}))
+    texts = [one.text for one in clipped(named, saturation(log).limits)]
+    assert any("effort[0]" in text for text in texts) == (
+        int(channel[-1]) - 1 in {one.joint for one in saturation(log).limits}
+    )
