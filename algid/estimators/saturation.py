@@ -11,8 +11,8 @@ the equations of `algid.estimators.modulating_functions` are
   parabola over each time that it stands there, as a smooth peak that is cut off has.
 - Of a drive with the limit ±L, h = β (clip(τ, ±L) − τ) with β = 1, and L is looked for.
 
-Each is believed where it is certain, and makes up so much of what the equations leave that neither
-friction nor a gain explains the same: real arms without limits stay below a third of it.
+Each is believed where it is certain, makes up so much of what the equations leave that neither
+friction nor a gain explains the same, and the arm that it leaves has inertia.
 
 ======  ============================================================  =====================
 symbol  name                                                          shape
@@ -54,12 +54,13 @@ _FINE = np.linspace(-0.04, 0.04, 17)  # of the largest torque, around the best o
 _MOST = 0.5  # of the samples beyond the limit: more leave nothing to tell it by
 _TRUE = 0.01  # of a torque at its limit: what the arm may get beyond a limit that is true
 _PROMISING = 0.05  # of the squares of both joints: less is not looked at
-_SHARE = {"sensor": 0.25, "drive": 0.5}
+_SHARE = {"sensor": 0.25, "drive": 0.85}
 """Of what a joint's equation leaves (squares): least that a limit makes up.
 
 Plateaus tell where to look for a sensor's; a drive's is looked for at every level.
 """
 _CERTAIN = 4.0  # standard deviations
+_INERTIAS = ("k3", "k5")
 _EXPLAINED = 0.9  # of the joint's torque, with the limit
 _NEAR_ONE = 0.25  # of β
 _MARGIN = 3.0  # standard deviations of the torque's noise: what is nearer to the limit is left out
@@ -156,7 +157,8 @@ def _stands(rows: _Rows, found: Mapping[int, Limit], one: Limit) -> bool:
     candidates = _candidates_of(one)
     with_limit = others.with_candidates(one.joint, candidates)
     after = _solved(with_limit.gram, 1 if one.cause == "drive" else 2)
-    if not _certain(_solved(others.gram, 0), after, one):
+    inertias = -after.rest[list(rows.inertias)]
+    if np.any(inertias <= 0) or not _certain(_solved(others.gram, 0), after, one):
         return False
     if one.cause == "drive":
         return bool(abs(after.h[0] - 1) <= _NEAR_ONE)
@@ -242,10 +244,12 @@ def _cut(held: Segment, found: Sequence[Limit], first: int, last: int) -> Iterat
 class _Rows:
     """The equations of a log on windows, and candidates that are taken for true.
 
-    `parts` holds of each piece its windows, itself and the equations' columns, the torque last.
+    `parts` holds of each piece its windows, itself and the equations' columns, the torque last;
+    `inertias` are the places of the columns that any arm has with a positive coefficient.
     """
 
     parts: tuple[tuple[Windows, Segment, FloatArray], ...]
+    inertias: tuple[int, ...]
 
     @classmethod
     def of(cls, pieces: Sequence[Segment], settings: WeakSettings) -> _Rows | None:
@@ -255,7 +259,8 @@ class _Rows:
             for piece, windows, _ in overlapping(pieces, settings)
             if (X := windows.equations(settings.model, piece, True)).shape[2]
         )
-        return cls(parts) if parts else None
+        places = tuple(settings.model.names.index(name) for name in _INERTIAS)
+        return cls(parts, places) if parts else None
 
     def torque(self, joint: int) -> FloatArray:
         """The joint's torque (N,), the samples that windows share twice."""
@@ -273,7 +278,7 @@ class _Rows:
             H = np.zeros((2, len(moments), X.shape[2]))
             H[joint] = moments
             parts.append((windows, piece, np.concatenate([X[:, :-1], H, X[:, -1:]], axis=1)))
-        return _Rows(tuple(parts))
+        return replace(self, parts=tuple(parts))
 
     @property
     def gram(self) -> FloatArray:

@@ -157,6 +157,7 @@ class Survey:
         from algid.inspection.checks import noticed
         from algid.inspection.clipping import saturation
         from algid.inspection.conventions import recorded
+        from algid.inspection.findings import CONTRADICTIONS
 
         alike = [one for one in self.logs if one.role == log.role]
         gravity, alone = _weight(log), len(alike) == 1
@@ -166,6 +167,8 @@ class Survey:
             begin, gravity=gravity, effort=log.effort, whole=whole, alone=alone, known=known
         )
         if alone:
+            if any(one.code in CONTRADICTIONS for one in found):
+                self._limits[log] = ()  # of an arm that is not this one
             return found
         kept = None
         if log.effort != "external" and log in alike[:: -(-len(alike) // MOST_LOGS)]:

@@ -40,6 +40,9 @@ from algid.notices import Notice, Remedy
 REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
 """The checks that refuse a log unless they are accepted."""
 
+CONTRADICTIONS = ("WRONG_CONVENTION", "FLIPPED_SIGN", "WRONG_ZERO")
+"""Findings that say that a log was read by a wrong convention."""
+
 
 def yielding(notice: Notice, accepted: Collection[str]) -> Notice:
     """A refusal with what overrides it, or as a warning where its code is in `accepted`.

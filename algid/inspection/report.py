@@ -19,6 +19,7 @@ from algid.inspection.checks import examine
 from algid.inspection.clipping import clipped, saturation
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
+from algid.inspection.findings import CONTRADICTIONS
 from algid.log import Log
 from algid.notices import Notice
 from algid.readers import read_log
@@ -72,10 +73,6 @@ def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-
-
-CONTRADICTIONS = ("WRONG_CONVENTION", "FLIPPED_SIGN", "WRONG_ZERO")
-"""Findings that say that a log was read by a wrong convention."""
 
 
 @dataclass(frozen=True)
