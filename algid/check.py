@@ -31,9 +31,9 @@ class Judged:
     @property
     def text(self) -> str:
         """One line for the terminal."""
-        found = "no estimate" if self.error is None else f"{self.error:.4g} %"
+        size = "no estimate" if self.error is None else f"{self.error:.4g} %"
         return (
-            f"{'ok  ' if self.passed else 'OVER'}  {self.parameter:12}  {found:>12}  limit "
+            f"{'ok  ' if self.passed else 'OVER'}  {self.parameter:12}  {size:>12}  limit "
             f"{self.limit:.4g} %"
         )
 

@@ -46,9 +46,9 @@ def _extension(package: str, name: str) -> Any:
 
 
 def _lapack() -> Any:
-    found = _extension("linalg", "_flapack")
-    if all(hasattr(found, name) for name in ("dpbtrf", "dtbtrs")):
-        return found
+    module = _extension("linalg", "_flapack")
+    if all(hasattr(module, name) for name in ("dpbtrf", "dtbtrs")):
+        return module
     from scipy.linalg import lapack as packaged
 
     return packaged
@@ -61,9 +61,9 @@ lapack = _lapack()
 @cache
 def _gamma() -> tuple[Any, Any]:
     """The regularised upper incomplete gamma function Q(a, x), and its inverse in x."""
-    found = _extension("special", "_special_ufuncs")
-    if all(hasattr(found, name) for name in ("gammaincc", "gammainccinv")):
-        return found.gammaincc, found.gammainccinv
+    module = _extension("special", "_special_ufuncs")
+    if all(hasattr(module, name) for name in ("gammaincc", "gammainccinv")):
+        return module.gammaincc, module.gammainccinv
     from scipy.special import gammaincc, gammainccinv
 
     return gammaincc, gammainccinv

@@ -157,14 +157,14 @@ def folders_below(root: Path) -> Iterator[tuple[str, list[str]]]:
         folder = pending.pop()
         try:
             with os.scandir(folder) as entries:
-                found = [
+                inner = [
                     (e.name, e.is_dir(follow_symlinks=False) and not _LEFT.fullmatch(e.name))
                     for e in entries
                 ]
         except OSError:
             continue
-        yield folder, [name for name, is_folder in found if not is_folder]
-        pending += [f"{folder}/{name}" for name, is_folder in found if is_folder]
+        yield folder, [name for name, is_folder in inner if not is_folder]
+        pending += [f"{folder}/{name}" for name, is_folder in inner if is_folder]
 
 
 def remove_left(folder: Path, name: str | None = None) -> None:
@@ -172,10 +172,10 @@ def remove_left(folder: Path, name: str | None = None) -> None:
 
     A result that was to make room and has no successor goes back to its place.
     """
-    for found in _left_in(folder, name):
+    for left in _left_in(folder, name):
         with suppress(OSError):
-            if os.lstat(found.path).st_uid == os.getuid():
-                _take_away(found)
+            if os.lstat(left.path).st_uid == os.getuid():
+                _take_away(left)
 
 
 class _Left:
@@ -194,8 +194,8 @@ def _left_in(folder: Path, name: str | None) -> list[_Left]:
     except OSError:
         return []
     matches = ((entry, _LEFT.fullmatch(entry)) for entry in names)
-    found = [_Left(folder, entry, match) for entry, match in matches if match]
-    return [one for one in found if name is None or one.target.name == name]
+    left = [_Left(folder, entry, match) for entry, match in matches if match]
+    return [one for one in left if name is None or one.target.name == name]
 
 
 def _take_away(found: _Left) -> None:

@@ -173,10 +173,10 @@ def read_start(path: Path, most: int) -> bytes:
         path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
     )  # else opening a pipe waits already
     with os.fdopen(handle, "rb") as stream:
-        found = os.fstat(handle)
-        if not stat.S_ISREG(found.st_mode):
+        status = os.fstat(handle)
+        if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
-        return stream.read(most) if found.st_size else b""
+        return stream.read(most) if status.st_size else b""
 
 
 def read_text(path: Path, encoding: str = "utf-8") -> str:
@@ -304,8 +304,8 @@ def refuse_misleading(name: str | None) -> None:
             "own"
         )
     if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
-        found = f"found {name!r:.60}; {flag('out')} names the folder around it"
-        raise SettingError(f"{flag('name')}: expected a name without slashes, {found}")
+        problem = f"found {name!r:.60}; {flag('out')} names the folder around it"
+        raise SettingError(f"{flag('name')}: expected a name without slashes, {problem}")
 
 
 def refuse_existing(folder: Path, force: bool) -> None:

@@ -149,10 +149,10 @@ def estimator_of(name: str) -> Estimator:
     ValueError
         If there is none.
     """
-    found = next((one for one in ESTIMATORS if one.name == name), None)
-    if found is None:
+    estimator = next((one for one in ESTIMATORS if one.name == name), None)
+    if estimator is None:
         raise ValueError(f"estimator must be one of {', '.join(NAMES)}, got {name!r}")
-    return found
+    return estimator
 
 
 def settles(name: object) -> bool:

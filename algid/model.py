@@ -249,11 +249,11 @@ class Compiled:
         return self._weighted(lambda column, row: _slope(column, row, signal), joint)
 
     def _weighted(self, of: Callable[[TorqueColumn, int], Expression], joint: int) -> Weighted:
-        found: dict[Product, list[tuple[int, float]]] = {}
+        weighted: dict[Product, list[tuple[int, float]]] = {}
         for column in self.columns:
             for product, factor in of(column, joint).products.items():
-                found.setdefault(product, []).append((self.place[column.parameter], factor))
-        return {product: tuple(pairs) for product, pairs in found.items()}
+                weighted.setdefault(product, []).append((self.place[column.parameter], factor))
+        return {product: tuple(pairs) for product, pairs in weighted.items()}
 
     def only(self, weighted: Weighted, places: Iterable[int]) -> Weighted:
         """What the columns at `places` give of it."""
@@ -512,8 +512,8 @@ def damping(model: Model, c: FloatArray) -> FloatArray:
     """
     rest = Motion(np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1)))
     values = Values(rest, model.shape)
-    found = [summed(model.compiled.partials[1, joint, joint], c, values) for joint in range(2)]
-    return np.array([float(np.squeeze(one)) for one in found])
+    sums = [summed(model.compiled.partials[1, joint, joint], c, values) for joint in range(2)]
+    return np.array([float(np.squeeze(one)) for one in sums])
 
 
 def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
@@ -585,12 +585,12 @@ def acceleration(
             (D[1] * M[2] + R[2], D[1] * M[3] + R[3]),
         )
         alpha = _solved(*first, *second, left - D * n)
-        found = np.sign(
+        after = np.sign(
             np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n
         )
-        if np.array_equal(found, signs):
+        if np.array_equal(after, signs):
             break
-        signs = found
+        signs = after
     return alpha
 
 

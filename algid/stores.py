@@ -128,17 +128,17 @@ class Store:
             return _names_below(self.folder, under)
         path = f"{self.root}/{under}".rstrip("/")
         with _translated(self.place, OutputError, "its objects cannot be listed"):
-            found = self.filesystem.get_file_info(
+            entries = self.filesystem.get_file_info(
                 FileSelector(path, recursive=True, allow_not_found=True)
             )
             bucket = self.root.partition("/")[0]
-            if not found and not _is_there(self.filesystem.get_file_info(bucket)):
+            if not entries and not _is_there(self.filesystem.get_file_info(bucket)):
                 raise OutputError(
                     f"{self.place}: there is no bucket {bucket}; check its name, or make it"
                 )
         files = (
             info
-            for info in found
+            for info in entries
             if info.type == FileType.File and not info.base_name.startswith(".")
         )
         return sorted(info.path.removeprefix(f"{self.root}/") for info in files)
@@ -196,8 +196,8 @@ def connect(url: str) -> tuple[FileSystem, str]:
     scheme = "abfs" if scheme == "az" else scheme
     with _translated(url, OutputError, "the object store cannot be reached", "check the URL"):
         path = quote(re.sub("%(?![0-9A-Fa-f]{2})", "%25", path), safe=_SAFE)
-        filesystem, found = FileSystem.from_uri(f"{scheme}://{path}{mark}{query}")
-    return filesystem, found.rstrip("/")
+        filesystem, place = FileSystem.from_uri(f"{scheme}://{path}{mark}{query}")
+    return filesystem, place.rstrip("/")
 
 
 def list_urls(url: str) -> list[tuple[str, str]]:

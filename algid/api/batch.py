@@ -225,8 +225,8 @@ def _workers(
     if scheduler is not None:
         from algid.batches.cluster import cluster
 
-        with cluster(scheduler, out, timeout) as found:
-            yield found
+        with cluster(scheduler, out, timeout) as pool_and_size:
+            yield pool_and_size
         return
     count = workers or cores()
     may_open(OPEN_FILES + OPEN_FILES_A_WORKER * count)

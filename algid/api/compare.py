@@ -70,12 +70,12 @@ def compare(
     paths = [Path(one) for one in results if not isinstance(one, Result)]
     if labels is None and len(paths) == len(read):
         labels = labels_of(paths)
-    found = compared(read, labels)
+    comparison = compared(read, labels)
     if out is not None:
         from algid.report.comparison_page import write_comparison
 
-        write_comparison(found, read, Path(out), force)
-    return found
+        write_comparison(comparison, read, Path(out), force)
+    return comparison
 
 
 def page_of(out: Path) -> Path:

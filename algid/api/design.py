@@ -277,8 +277,8 @@ def noise_of(
         from algid.log import Log
         from algid.readers import read_log
 
-        found = log if isinstance(log, Log) else read_log(log)
-        measured = first_guess(found.theta, found.tau)
+        read = log if isinstance(log, Log) else read_log(log)
+        measured = first_guess(read.theta, read.tau)
     levels = {}
     for option, given, name in (
         ("position_noise", position, "theta"),

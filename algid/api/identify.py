@@ -101,7 +101,7 @@ def identify(
             f"{flag('export')}: the log is made from the time series; leave "
             f"{flag('report', off=True)} out"
         )
-    found = run(
+    result = run(
         unloaded,
         loaded,
         asked,
@@ -115,7 +115,7 @@ def identify(
         command=command,
         progress=progress,
     )
-    return Result.of(found)
+    return Result.of(result)
 
 
 def folder_of(result: PlainResult, out: Path, name: str | None) -> Path:

@@ -304,13 +304,13 @@ def _among(flag: str, value: object, known: Sequence[str]) -> None:
 
 def _start_ns(start: datetime) -> int:
     """A date in ns since 1970, in UTC where it names no zone."""
-    found = start if start.tzinfo is not None else start.replace(tzinfo=UTC)
-    if not FIRST_YEAR <= found.year <= LAST_YEAR:
+    aware = start if start.tzinfo is not None else start.replace(tzinfo=UTC)
+    if not FIRST_YEAR <= aware.year <= LAST_YEAR:
         span = f"from {FIRST_YEAR} to {LAST_YEAR}"
         raise SettingError(
             f"{flag('start_time')}: expected a date {span}, found {start.isoformat()}"
         )
-    return int(found.timestamp()) * 10**9
+    return int(aware.timestamp()) * 10**9
 
 
 def _schedule(given: Schedule | str) -> list[tuple[float, float]]:

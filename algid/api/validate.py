@@ -90,9 +90,9 @@ def validate(
     sources = open_sources(logs, "unloaded", said, gravity)
     survey = Survey([*sources, *open_sources(loaded, "loaded", said, gravity)], progress)
     survey.begin("prediction")
-    found = judge(model, survey)
+    validation = judge(model, survey)
     rolled = roll(model, survey) if simulate else None
     if known is not None:
         summaries = [survey.summary(log) for log in survey.logs]
         warnings += tuple(one.sentence for one in read_otherwise(summaries, known, file))
-    return Validated(found.logs, found.total, rolled, warnings, max_nrmse)
+    return Validated(validation.logs, validation.total, rolled, warnings, max_nrmse)

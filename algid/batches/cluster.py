@@ -129,8 +129,8 @@ def _reach(address: str) -> None:
     SettingError
         If the address is none, or no scheduler answers there in time.
     """
-    found = _ADDRESS.fullmatch(address)
-    if found is None or not 0 < int(found["port"]) < 1 << 16:
+    match = _ADDRESS.fullmatch(address)
+    if match is None or not 0 < int(match["port"]) < 1 << 16:
         raise SettingError(
             f"{flag('scheduler')}: expected an address like tcp://HOST:8786, found {address!r:.60}"
         )
@@ -182,8 +182,8 @@ def misfit_of(version: str, mark: str | None, out: str) -> Callable[[], str | No
 
 
 def _refuse_misfits(client: Any, misfit: Callable[[], str | None], address: str) -> None:
-    found = client.run(misfit, on_error="return")
-    wrong = sorted({str(answer) for answer in found.values() if answer is not None})
+    answers = client.run(misfit, on_error="return")
+    wrong = sorted({str(answer) for answer in answers.values() if answer is not None})
     if wrong:
         raise SettingError(f"{flag('scheduler')} {address}: worker on {'; worker on '.join(wrong)}")
 

@@ -50,12 +50,14 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
     for source in sources:
         try:
             manifest = not is_url(source) and is_manifest(Path(source))
-            found = read_manifest(Path(source)) if manifest else _paired(_logs(source, out), alone)
+            all_jobs = (
+                read_manifest(Path(source)) if manifest else _paired(_logs(source, out), alone)
+            )
         except (OSError, ValueError) as error:  # ValueError: a NUL in a path
             raise SettingError(
                 f"{source}: cannot look there ({error}); check its name and rights"
             ) from error
-        for job in found:
+        for job in all_jobs:
             before = jobs.get(job.name, job)
             jobs[job.name] = job if before == job else _of_one_name(before, job)
     return [jobs[name] for name in sorted(jobs)]
@@ -69,8 +71,8 @@ def _logs(source: str, out: str) -> list[Found]:
     """The logs of a source."""
     if is_url(source):
         own = _written_by_batch(source, out)
-        found = [(url, name) for url, name in list_urls(source) if _is_log(name) and not own(name)]
-        return [(url, _stem(name), None) for url, name in found]
+        logs = [(url, name) for url, name in list_urls(source) if _is_log(name) and not own(name)]
+        return [(url, _stem(name), None) for url, name in logs]
     path = Path(source)
     if path.is_dir() and not _is_bag(path):
         return [
@@ -165,8 +167,8 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
 
 
 def _mark(folder: str) -> tuple[int, int]:
-    found = Path(folder).stat()
-    return found.st_dev, found.st_ino
+    status = Path(folder).stat()
+    return status.st_dev, status.st_ino
 
 
 def _entries(folder: str) -> tuple[list[str], list[str], list[str]]:
@@ -196,11 +198,11 @@ def _matches(pattern: str, out: str) -> Iterator[_File]:
     parts = Path(pattern).parts
     first = parts.index("**") if "**" in parts else len(parts)
     # a pattern may be absolute
-    found = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207
+    paths = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207
     if first == len(parts):
-        yield from (_File(match, _is_bag(Path(match))) for match in found)
+        yield from (_File(match, _is_bag(Path(match))) for match in paths)
         return
-    for folder in (Path(match) for match in found if Path(match).is_dir()):
+    for folder in (Path(match) for match in paths if Path(match).is_dir()):
         files = (one for one in _walk(folder, out) if not one.trouble)
         yield from (
             one for one in files if _fits(Path(one.path).relative_to(folder).parts, parts[first:])

@@ -126,13 +126,13 @@ class Partial(File):
 
 def merged(ranges: Iterable[Range], gap: int = 0) -> list[Range]:
     """Ranges in order, those made one that lie at most `gap` bytes apart."""
-    found: list[Range] = []
+    joint: list[Range] = []
     for start, end in sorted(ranges):
-        if found and start <= found[-1][1] + gap:
-            found[-1] = (found[-1][0], max(found[-1][1], end))
+        if joint and start <= joint[-1][1] + gap:
+            joint[-1] = (joint[-1][0], max(joint[-1][1], end))
         else:
-            found.append((start, end))
-    return found
+            joint.append((start, end))
+    return joint
 
 
 def without(ranges: Iterable[Range], held: Sequence[Range]) -> Iterator[Range]:
@@ -181,14 +181,14 @@ def _one_version(filesystem: FileSystem, path: str, url: str) -> Iterator[Native
         If another object stands in its place then.
     """
     with filesystem.open_input_file(path) as source:
-        found = source.metadata()
+        metadata = source.metadata()
         failure: Exception | None = None
         try:
             yield source
         except (OSError, AlgidError) as error:
             failure = error
         with filesystem.open_input_file(path) as again:
-            if again.metadata() != found:
+            if again.metadata() != metadata:
                 raise LogError(f"{url}: it was replaced while it was read; run again") from failure
         if failure is not None:
             raise failure
@@ -268,14 +268,14 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
             *((first, last) for first, last in between(chunks, start) if last - first <= SMALL),
         ]
     )
-    found = catalogue(part)  # a scan of the whole is unforeseen
+    index = catalogue(part)  # a scan of the whole is unforeseen
     part.on_demand = True
-    source = McapSource(part, found)
+    source = McapSource(part, index)
     topics = plan(source, profile).topics
     channels = frozenset[int]().union(
         *(channels_of(source, topic.name, topic.type) for topic in topics)
     )
-    spans = [*spans_of(found, channels), *spans_beside(found, channels)]
+    spans = [*spans_of(index, channels), *spans_beside(index, channels)]
     return [(span.start, span.start + span.length + span.index_length) for span in spans]
 
 

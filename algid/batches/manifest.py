@@ -72,8 +72,8 @@ def _tables(path: Path) -> list[dict[str, object]]:
         or not isinstance(rows, list)
         or not all(isinstance(row, dict) for row in rows)
     ):
-        found = ", ".join(content) or "nothing"
-        raise SettingError(f"{path}: expected tables [[job]] alone, found {visible(found, 200)}")
+        keys = ", ".join(content) or "nothing"
+        raise SettingError(f"{path}: expected tables [[job]] alone, found {visible(keys, 200)}")
     return rows
 
 
@@ -94,8 +94,8 @@ def _rows(path: Path) -> list[dict[str, object]]:
 def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
     logs, loaded = _paths(row, "logs", place, folder), _paths(row, "loaded", place, folder)
     if "name" not in row or not (logs or loaded):
-        found = ", ".join(row) or "nothing"
-        raise SettingError(f"{place}: expected a name and logs, found {visible(found, 200)}")
+        columns = ", ".join(row) or "nothing"
+        raise SettingError(f"{place}: expected a name and logs, found {visible(columns, 200)}")
     profile = _paths(row, "profile", place, folder)
     labels = {
         name: _label(row, name, place) for name in row if name not in ("logs", "loaded", "profile")
@@ -163,12 +163,12 @@ def _number_in(text: str) -> str | float:
 
 
 def _paths(row: Mapping[str, object], name: str, place: str, folder: Path) -> tuple[str, ...]:
-    found = row.get(name)
-    if found is None:
+    cell = row.get(name)
+    if cell is None:
         return ()
-    parts = found.split(";") if isinstance(found, str) else found
+    parts = cell.split(";") if isinstance(cell, str) else cell
     if not isinstance(parts, list) or not all(
         isinstance(part, str) and part.strip() and "\0" not in part for part in parts
     ):
-        raise SettingError(f"{place}: {name}: expected paths, found {reprlib.repr(found):.60}")
+        raise SettingError(f"{place}: {name}: expected paths, found {reprlib.repr(cell):.60}")
     return tuple(part.strip() if "://" in part else str(folder / part.strip()) for part in parts)

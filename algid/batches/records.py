@@ -97,7 +97,7 @@ def stat_of(path: str) -> Input:
         return Input(kept_path(path), *object_stat(path))
     try:
         files = filter(Path.is_file, Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]
-        found = [file.stat() for file in files]
+        stats = [file.stat() for file in files]
     except (FileNotFoundError, NotADirectoryError):
         return Input(kept_path(path), 0, 0)
     except OSError as error:
@@ -105,9 +105,9 @@ def stat_of(path: str) -> Input:
             f"{path}: it cannot be looked at ({error.strerror}); check name and rights"
         ) from error
     mtime, ctime = (
-        max((getattr(s, name) for s in found), default=0) for name in ("st_mtime_ns", "st_ctime_ns")
+        max((getattr(s, name) for s in stats), default=0) for name in ("st_mtime_ns", "st_ctime_ns")
     )
-    return Input(kept_path(path), sum(s.st_size for s in found), mtime, ctime)
+    return Input(kept_path(path), sum(s.st_size for s in stats), mtime, ctime)
 
 
 def hash_of(path: str) -> str | None:

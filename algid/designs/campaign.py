@@ -174,13 +174,13 @@ def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Des
     loads = [belief.load(loaded) for loaded in experiment.kinds]
     rest = resting(kept, experiment.shared.model, loads)
     problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
-    found = optimise(problem, experiment.rate, campaign.seed, progress)
-    motion = problem.family.motion(found.x, problem.family.basis(t))
+    optimum = optimise(problem, experiment.rate, campaign.seed, progress)
+    motion = problem.family.motion(optimum.x, problem.family.basis(t))
     slopes = Slopes(experiment.shared.model, motion, experiment.rate)
     kinds = (False, True) if experiment.shared.payload else (False,)
     torque = {loaded: np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c) for loaded in kinds}
     used = usage(campaign.limits, slopes, loads, derivatives=False)
-    return _judged(campaign, t, dict.fromkeys(kinds, motion), torque, used, found.interrupted)
+    return _judged(campaign, t, dict.fromkeys(kinds, motion), torque, used, optimum.interrupted)
 
 
 def _swung(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:

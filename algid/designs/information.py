@@ -206,12 +206,14 @@ def informations(
     experiment: Experiment, motions: dict[bool, Motion], beta: FloatArray, every: int, rate: float
 ) -> list[Information]:
     """The information of each kind's runs, from every `every`-th of `rate` samples a second."""
-    found = []
+    gathered = []
     for loaded, motion in motions.items():
         runs = (0, experiment.runs[1]) if loaded else (experiment.runs[0], 0)
         own = Experiment(experiment.shared, runs, experiment.noise, experiment.rate)
         thinned = Motion(
             *(signal[:, ::every] for signal in (motion.theta, motion.omega, motion.alpha))
         )
-        found.append(Information(own, beta, Slopes(experiment.shared.model, thinned, rate / every)))
-    return found
+        gathered.append(
+            Information(own, beta, Slopes(experiment.shared.model, thinned, rate / every))
+        )
+    return gathered

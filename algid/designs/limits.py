@@ -130,12 +130,12 @@ def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bo
     derivatives : bool
         Whether the derivatives by the motion are asked for too.
     """
-    found = list(_kinematic(limits, slopes.motion))
+    uses = list(_kinematic(limits, slopes.motion))
     for load in loads:
-        found += _torque(limits.torque, slopes, load, derivatives)
-    rows = tuple(row for row, _, _ in found)
-    u = np.array([values for _, values, _ in found])
-    return Usage(rows, u, np.array([slope for _, _, slope in found]) if derivatives else None)
+        uses += _torque(limits.torque, slopes, load, derivatives)
+    rows = tuple(row for row, _, _ in uses)
+    u = np.array([values for _, values, _ in uses])
+    return Usage(rows, u, np.array([slope for _, _, slope in uses]) if derivatives else None)
 
 
 def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Found]:

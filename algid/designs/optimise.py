@@ -197,12 +197,16 @@ class _Search:
         a step so long that nothing can be said of the motion is one to be shortened.
         """
         try:
-            found = self._problem.evaluate(x, stage)
+            evaluation = self._problem.evaluate(x, stage)
         except np.linalg.LinAlgError:
-            found = None
-        if found is not None and np.isfinite(found.figure) and np.all(np.isfinite(found.room)):
-            self._rows = found.room.size
-            return found
+            evaluation = None
+        if (
+            evaluation is not None
+            and np.isfinite(evaluation.figure)
+            and np.all(np.isfinite(evaluation.room))
+        ):
+            self._rows = evaluation.room.size
+            return evaluation
         room = np.full(self._rows, -_HOPELESS)
         return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((self._rows, x.size)))
 

@@ -163,15 +163,15 @@ class TorqueProblem:
         kinds = list(self._experiment.kinds)
         swings = self._swings(patterns, self._arms)
         width = len(self._arms) * len(kinds)
-        found = []
+        rows = []
         for place, x in enumerate(patterns):
             columns = range(place * width, (place + 1) * width)
             motions = [swings.motion(column) for column in columns]
             most = max(float(row.u.max()) for row in self._used(x, swings.t, motions))
             beyond = max(0.0, most - 1.0)
             bound = self._bound(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 1.0
-            found.append(np.log(bound) + _PENALTY * min(beyond, 1e3))
-        return np.array(found)
+            rows.append(np.log(bound) + _PENALTY * min(beyond, 1e3))
+        return np.array(rows)
 
     def _bound(self, motions: dict[bool, Motion]) -> float:
         """The believed arm's largest relative bound.
@@ -189,18 +189,18 @@ class TorqueProblem:
     def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
         """Constraint use of motions: kinematics, torque, the believed arm's rest at the end."""
         model = self._experiment.shared.model
-        found = [
+        uses = [
             usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False)
             for motion in motions
         ]
         share = np.abs(self.torques(x, t)[self._driven]) / self._limits.torque[self._driven, None]
-        found.append(Usage(tuple(Row("torque", joint) for joint in self._driven.tolist()), share))
+        uses.append(Usage(tuple(Row("torque", joint) for joint in self._driven.tolist()), share))
         believed = np.abs([motion.omega for motion in motions[: len(self._experiment.kinds)]])
         left = believed[:, :, -1] / (END * np.maximum(believed.max(axis=2), 1e-9))
-        found.append(
+        uses.append(
             Usage(tuple(Row("rest", joint) for joint in range(2)), left.max(axis=0)[:, None])
         )
-        return found
+        return uses
 
     def checked(self, x: FloatArray) -> Swung:
         """The pattern's motion, its amplitude reduced until all checked arms keep the limits."""

@@ -41,8 +41,8 @@ def with_body(fit: Fit) -> Fit:
         return fit
     names, worth = _candidates(fit)
     for count in range(len(names), 0, -1):
-        found = [with_body_of(fit, chosen) for chosen in combinations(names, count)]
-        worthy = [one for one in found if _least_worth(one) > worth]
+        fits = [with_body_of(fit, chosen) for chosen in combinations(names, count)]
+        worthy = [one for one in fits if _least_worth(one) > worth]
         if worthy:
             return max(worthy, key=_likelihood)
     return with_body_of(fit, ()) if fit.shared.body else fit
@@ -71,12 +71,12 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     for count in range(1, len(others) + 1):
         for more in combinations(others, count):
             body = [one.name for one in BODY if one.name in (*fit.shared.body, *more)]
-            found = with_body_of(fit, body)
-            weight = _weight(found, more)
+            other = with_body_of(fit, body)
+            weight = _weight(other, more)
             if weight > 0:
-                places = [found.names.index(name) for name in fit.names]
-                values.append(found.values[places])
-                covariances.append(found.covariance[np.ix_(places, places)])
+                places = [other.names.index(name) for name in fit.names]
+                values.append(other.values[places])
+                covariances.append(other.covariance[np.ix_(places, places)])
                 weights.append(weight)
     w = np.array(weights) / sum(weights)
     beta = w @ np.array(values)
@@ -120,11 +120,13 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     start = np.array([known.get(name, 0.0) for name in shared.names])
     if fit.shrinkage is not None and fit.prior is not None:
-        found = concluded(shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved, fit.repeats)
-        found = replace(found, estimator=fit.estimator)
+        changed = concluded(
+            shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved, fit.repeats
+        )
+        changed = replace(changed, estimator=fit.estimator)
     else:
         coloured = fit.intervals != "likelihood"
-        found = conclude(
+        changed = conclude(
             fit.estimator,
             shared,
             fit.logs,
@@ -135,12 +137,12 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
             samples=fit.freedom,
         )
     before = dict(zip(fit.names, fit.status, strict=True))
-    statuses = zip(found.names, found.status, strict=True)
+    statuses = zip(changed.names, changed.status, strict=True)
     status = tuple(
         own if before.get(name, "OK") == "OK" else before[name] for name, own in statuses
     )
     return replace(
-        found,
+        changed,
         status=status,
         noise=fit.noise,
         whiteness=fit.whiteness,

@@ -161,11 +161,11 @@ def combine(
 
 def _by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
     """Unloaded and loaded logs in one sum each, and what that adds to their likelihood."""
-    found, offset = [], 0.0
+    sums, offset = [], 0.0
     for loaded in (False, True):
         own = [log for log in logs if log.loaded is loaded]
         if len(own) < 2:
-            found += own
+            sums += own
             continue
         c0, size = own[0].c0, own[0].c0.size
         S, g = np.zeros((size, size)), np.zeros(size)
@@ -175,8 +175,8 @@ def _by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], 
             S += log_S
             g += log_g - log_S @ change
             offset += float(log_g @ change - 0.5 * change @ log_S @ change)
-        found.append(LogInformation(loaded, c0, S[None], g[None]))
-    return found, offset
+        sums.append(LogInformation(loaded, c0, S[None], g[None]))
+    return sums, offset
 
 
 def likelihood(
@@ -244,15 +244,15 @@ def left_out(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> FloatArray:
     """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass."""
-    found = np.empty((len(logs), len(shared.names)))
+    estimates = np.empty((len(logs), len(shared.names)))
     sums = {kind: _sum_of_rest(logs, kind) for kind in {log.loaded for log in logs}}
     for kind, (_, without_each) in sums.items():
         others = [whole for other, (whole, _) in sums.items() if other is not kind]
         places = [place for place, log in enumerate(logs) if log.loaded is kind]
         for place, rest in zip(places, without_each, strict=True):
             left = [*others, rest] if len(places) > 1 else others
-            found[place] = combine(shared, left, beta, prior)[0]
-    return found
+            estimates[place] = combine(shared, left, beta, prior)[0]
+    return estimates
 
 
 def _sum_of_rest(

@@ -178,15 +178,15 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
     log = _trials(logs, gravity)
     if log is None:
         return None
-    found = list(log.discrete())
-    judged = _judged(found, log.apart)
+    candidates = list(log.discrete())
+    judged = _judged(candidates, log.apart)
     if judged.alone and judged.best.left.max() < _CLEAN:
         return _of_a_bent_arm(judged, log)
-    found += log.shifted(found)
-    judged = _judged(found, log.apart)
+    candidates += log.shifted(candidates)
+    judged = _judged(candidates, log.apart)
     if not judged.alone:
-        found += log.scaled()
-        judged = _judged(found, log.apart)
+        candidates += log.scaled()
+        judged = _judged(candidates, log.apart)
     return _of_a_bent_arm(judged, log)
 
 
@@ -215,8 +215,8 @@ def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
     motors = [joint for joint in (0, 1) if joint + 1 != usable[0].passive]
     if not all(any(np.any(log.tau[joint]) for log in usable) for joint in motors):
         return None
-    found = _Trials(usable, gravity)
-    return found if found.seconds >= _SHORTEST else None
+    trials = _Trials(usable, gravity)
+    return trials if trials.seconds >= _SHORTEST else None
 
 
 def _of_a_bent_arm(judged: Judgement, log: _Trials) -> Judgement:
@@ -259,8 +259,8 @@ class _Windowed:
     @classmethod
     def of(cls, logs: Sequence[Recorded], rate: float, longest: float) -> _Windowed:
         longest = seconds_of_each(len(logs), longest)
-        found = tuple(thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs)
-        return cls(found, tuple(moving(found)))
+        thin = tuple(thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs)
+        return cls(thin, tuple(moving(thin)))
 
     @property
     def seconds(self) -> float:
@@ -314,8 +314,8 @@ class _Trials:
     def under(self, convention: Convention) -> Candidate:
         """The candidate of one convention."""
         family = replace(convention, zero=AS_READ.zero)
-        (found,) = self._with_zeros([family], [convention.zero])
-        return found
+        (candidate,) = self._with_zeros([family], [convention.zero])
+        return candidate
 
     def zeroed(self, family: Convention) -> Candidate:
         """The candidate of a family with the zeros that fit best."""
@@ -342,9 +342,9 @@ class _Trials:
             family = self._scaled(joints)
             if family is None:
                 continue
-            found = list(self._with_zeros([family], self._zeros))
-            yield from found
-            yield from self._with_free_zero(family, found)
+            candidates = list(self._with_zeros([family], self._zeros))
+            yield from candidates
+            yield from self._with_free_zero(family, candidates)
 
     def _with_zeros(
         self, families: Sequence[Convention], zeros: Sequence[tuple[float, float]]
@@ -503,7 +503,7 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
         return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
 
     k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]
-    found = {
+    distances = {
         "M22 > 0": distance(m22, {K3: 1, J2: 1}),
         "k5 > 0": distance(k5, {K5: 1}),
         "det M > 0": distance(
@@ -518,7 +518,7 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
         ),
     }
     if K2 not in k:
-        return found | {"k1 > 0": distance(k1, {K1: 1})}
+        return distances | {"k1 > 0": distance(k1, {K1: 1})}
     first, second, fourth = (distance(k[name], {name: 1}) for name in MOMENTS)
     both = copysign(min(abs(first), abs(second)), first * second)
-    return found | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": fourth}
+    return distances | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": fourth}

@@ -78,20 +78,20 @@ def bounds(shared: Shared) -> dict[str, Callable[[FloatArray], float]]:
     Each takes (Q,) and gives a float in the bound's own unit: kg m², its square, the parameter's,
     or k1 k2's.
     """
-    found: dict[str, Callable[[FloatArray], float]] = {
+    by_text: dict[str, Callable[[FloatArray], float]] = {
         "M22 > 0": lambda beta: _mass(shared, beta)[0],
         "det M > 0 at theta2 = 0": lambda beta: _mass(shared, beta)[1],
         "det M > 0 at theta2 = pi": lambda beta: _mass(shared, beta)[2],
     }
     if shared.model.gravity > 0:
         # Table 1: k1 k2 = m2² g l1 lc2²; as phasors, θ1's zero lies between them
-        found["k1 k2 >= 0"] = lambda beta: (
+        by_text["k1 k2 >= 0"] = lambda beta: (
             (phasor(shared.model, beta, K1) * phasor(shared.model, beta, K2).conjugate()).real
         )
     for place, name in enumerate(shared.names):
         if name in _NOT_NEGATIVE:
-            found[f"{name} >= 0"] = partial(_parameter, place)
-    return found
+            by_text[f"{name} >= 0"] = partial(_parameter, place)
+    return by_text
 
 
 def _parameter(place: int, beta: FloatArray) -> float:
@@ -281,7 +281,7 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     if not all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in range(2)):
         return None  # without a motor a joint's equation is solved by nothing
     both = [place for place, name in enumerate(model.names) if name in (K1, K2, K3)]
-    found = []
+    both_joints = []
     for joint in range(2):
         grams = [normal.gram[:, joint] for normal in normals]
         nothing = np.zeros(len(model.names))
@@ -289,8 +289,8 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
             shared,
             [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]) for gram in grams],
         )
-        found.append((c[both], np.diag(covariance)[both]))
-    (first, of_first), (second, of_second) = found
+        both_joints.append((c[both], np.diag(covariance)[both]))
+    (first, of_first), (second, of_second) = both_joints
     distance = np.abs(first - second) / np.sqrt(of_first + of_second + 1e-300)
     unlike = np.abs(first - second) > _UNLIKE * np.maximum(np.abs(first), np.abs(second))
     worst = int(np.argmax(np.where(unlike, distance, 0.0)))

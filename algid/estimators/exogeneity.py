@@ -98,13 +98,13 @@ def settled(
     """
     settings = resting(unloaded, loaded, settings)
     following = followed([*unloaded, *loaded], settings)
-    found = instrumented(fit, fit.values, unloaded, loaded, settings, following)
-    if found is None:
+    corrected = instrumented(fit, fit.values, unloaded, loaded, settings, following)
+    if corrected is None:
         return fit
-    if _moved(found, fit) > _NEAR:
-        better = instrumented(fit, found.values, unloaded, loaded, settings, following)
-        found = better or found
-    tests = examined(found, fit, unloaded, loaded, settings)
+    if _moved(corrected, fit) > _NEAR:
+        better = instrumented(fit, corrected.values, unloaded, loaded, settings, following)
+        corrected = better or corrected
+    tests = examined(corrected, fit, unloaded, loaded, settings)
     fit = replace(fit, endogeneity=tests.distance)
     if not tests.endogenous:
         return fit
@@ -112,7 +112,7 @@ def settled(
         return fit.noted(feedback(tests.silent))
     code = "INSTRUMENTS_STAND" if following is None else "REFERENCE_STANDS"
     note = Notice(code, numbers={"distance": tests.moved}, note=True)
-    return replace(found, endogeneity=tests.distance, notes=fit.notes).noted(note)
+    return replace(corrected, endogeneity=tests.distance, notes=fit.notes).noted(note)
 
 
 def watched(
@@ -163,8 +163,8 @@ def instrumented(
         return None
     logs = shared_out(logs, fit.repeats)
     scaled = divided(logs, dispersion(shared, merged(logs, fit.repeats), at))
-    found = concluded(shared, scaled, at, fit.prior, fit.shrinkage, fit.moved, fit.repeats)
-    return replace(found, estimator="instruments")
+    by_instruments = concluded(shared, scaled, at, fit.prior, fit.shrinkage, fit.moved, fit.repeats)
+    return replace(by_instruments, estimator="instruments")
 
 
 def examined(
@@ -209,12 +209,12 @@ def _influences(fit: Fit) -> list[FloatArray]:
     """What the stretches (B, Q) of each log move the estimate by."""
     _, H, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
     inverse = scaled_pinv(H)
-    found: list[FloatArray] = []
+    influences: list[FloatArray] = []
     for log in fit.logs:
         change = fit.shared.coefficients(fit.values, log.loaded) - log.c0
         scores = (log.g - log.S @ change) @ fit.shared.jacobian(fit.values, log.loaded)
-        found.append(scores @ inverse)
-    return found
+        influences.append(scores @ inverse)
+    return influences
 
 
 def _variance(one: FloatArray, other: FloatArray) -> FloatArray:

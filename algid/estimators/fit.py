@@ -183,7 +183,7 @@ class OwnEstimate:
 
 def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
     """Each log's own estimate of `Shared.log_names` from its blocks alone, unloaded logs first."""
-    found = []
+    estimates = []
     shared = Shared(fit.shared.model, fit.shared.delay)
     for log in fit.logs:
         alone = [replace(log, loaded=False)]
@@ -196,8 +196,8 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
             else known.covariance
         )
         std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
-        found.append(OwnEstimate(log.loaded, values, std))
-    return tuple(found)
+        estimates.append(OwnEstimate(log.loaded, values, std))
+    return tuple(estimates)
 
 
 def conclude(
@@ -284,12 +284,12 @@ def examined(
     if not absent:
         return examine(names, beta, S, moved)
     free = [place for place, name in enumerate(names) if name not in absent]
-    found = examine([names[place] for place in free], beta[free], S[np.ix_(free, free)], moved)
+    of_free = examine([names[place] for place in free], beta[free], S[np.ix_(free, free)], moved)
     covariance = np.zeros_like(S)
-    covariance[np.ix_(free, free)] = found.covariance
-    determined = dict(zip(free, found.determined, strict=True))
+    covariance[np.ix_(free, free)] = of_free.covariance
+    determined = dict(zip(free, of_free.determined, strict=True))
     every = tuple(determined.get(place, True) for place in range(len(names)))
-    return Identifiability(found.left_open, every, covariance)
+    return Identifiability(of_free.left_open, every, covariance)
 
 
 def _satterthwaite(

@@ -166,10 +166,8 @@ def autocorrelation(sums: ResidualSums) -> Autocorrelation:
 
 def whiteness_of(sums: ResidualSums) -> Spectra:
     """Spectra of the residual alone in shares of white noise of the same variance: 1 is white."""
-    found = spectra(sums)
+    raw = spectra(sums)
     variance = (sums.products[:, 0] / np.maximum(sums.pairs[0], 1.0))[:, None]
     level = 2 * sums.dt * variance
-    share = np.divide(
-        found.density[:2], level, out=np.zeros_like(found.density[:2]), where=level > 0
-    )
-    return Spectra(found.frequency, share, found.low, found.high)
+    share = np.divide(raw.density[:2], level, out=np.zeros_like(raw.density[:2]), where=level > 0)
+    return Spectra(raw.frequency, share, raw.low, raw.high)

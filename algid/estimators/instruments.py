@@ -126,10 +126,10 @@ def fit(
             shared.delay
         ):  # the windows are shifted by what is known of it: its column tells a change
             c[-1] = 0.0
-        found = _solved(sources, settings, c, kind, following)
-        if found is None:
+        informations = _solved(sources, settings, c, kind, following)
+        if informations is None:
             return replace(start.marked("NOT_CONVERGED"), converged=False)
-        logs += found
+        logs += informations
     if shared.delay:
         logs = [replace(log, c0=np.append(log.c0[:-1], log.c0[-1] + base)) for log in logs]
     return conclude("instruments", shared, logs, start.values, start.moved, prior, coloured=True)
@@ -148,10 +148,10 @@ def _solved(
     """
     logs: list[LogInformation] = []
     for _ in range(_ROUNDS):
-        found = moments(sources, settings, c, following=following)
-        if any(one is None or gone_astray(one) for one in found):
+        gathered = moments(sources, settings, c, following=following)
+        if any(one is None or gone_astray(one) for one in gathered):
             return None
-        sums = [one for one in found if one is not None and one.rows]
+        sums = [one for one in gathered if one is not None and one.rows]
         if not sums:
             return None
         better, logs = solve(sums, c, loaded)
@@ -218,16 +218,16 @@ def moments(
     At most `most` pieces of a log are looked at. The windows of many pieces are simulated side by
     side: a step costs the same for few as for many.
     """
-    found: list[_Sums | None] = [_Sums() for _ in sources]
+    gathered: list[_Sums | None] = [_Sums() for _ in sources]
     for batch in _batches(sources, settings, most):
         by = _side_by_side if following is None else partial(_explained, following)
         for (number, _, _), (both, good, moves) in zip(batch, by(batch, settings, c), strict=True):
-            sums = found[number]
+            sums = gathered[number]
             if not moves:
-                found[number] = None
+                gathered[number] = None
             elif sums is not None:
                 sums.add(both, good)
-    return [None if sums is None else sums.total() for sums in found]
+    return [None if sums is None else sums.total() for sums in gathered]
 
 
 @dataclass(eq=False)
@@ -470,10 +470,10 @@ def endogeneity(
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
         looked_at = sources[:: -(-len(sources) // _MOST_EXAMINED)]
         following = followed(looked_at, settings)
-        found = moments(looked_at, settings, c, _EXAMINED, following)
+        gathered = moments(looked_at, settings, c, _EXAMINED, following)
         sums = [
             one
-            for one in found
+            for one in gathered
             if one is not None and one.rows and one.astray <= _FEWEST * one.rows
         ]
         if sums:

@@ -310,15 +310,15 @@ def _kernels(length: int, dt: float, offset: float) -> FloatArray:
     s = np.clip((np.arange(length) + offset) / length, 0, 1)
     span = length * dt
     window = _WINDOW / _WINDOW_INTEGRAL
-    found = np.stack(
+    kernels = np.stack(
         [
             window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span
             for order in range(3)
         ]
     )
-    found *= dt
-    found.setflags(write=False)
-    return found
+    kernels *= dt
+    kernels.setflags(write=False)
+    return kernels
 
 
 MOTORLESS = 0.1

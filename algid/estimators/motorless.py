@@ -52,14 +52,14 @@ def by_instruments(
     """
     start = weak.fit(unloaded, (), settings, lengths, prior)
     start = replace(start, values=_equally_weighted(unloaded, settings))
-    found = instruments.fit(unloaded, (), settings, lengths, prior, start)
-    if not found.converged:
+    better = instruments.fit(unloaded, (), settings, lengths, prior, start)
+    if not better.converged:
         return None
-    broken = [one.distance for one in broken_bounds(found)]
-    if any(distance is None or distance > found.quantile for distance in broken):
+    broken = [one.distance for one in broken_bounds(better)]
+    if any(distance is None or distance > better.quantile for distance in broken):
         return None
-    checked = untold(found, unloaded, (), settings)
-    return found.noted(Notice("MOTORLESS_INSTRUMENTS", note=True)) if checked is found else None
+    checked = untold(better, unloaded, (), settings)
+    return better.noted(Notice("MOTORLESS_INSTRUMENTS", note=True)) if checked is better else None
 
 
 def _equally_weighted(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:

@@ -356,9 +356,9 @@ def stage1_series(source: Iterable[Segment], window: float) -> Iterator[PaperSer
     """
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
-        found = stage1(theta, omega, tau, dt)
-        total = found.k[4] + found.k[2]
-        return np.concatenate([found.k, [total, found.condition, found.k7_condition]])
+        solved = stage1(theta, omega, tau, dt)
+        total = solved.k[4] + solved.k[2]
+        return np.concatenate([solved.k, [total, solved.condition, solved.k7_condition]])
 
     return _windows(source, window, stage)
 
@@ -376,8 +376,8 @@ def stage2_series(
     """
 
     def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
-        found = stage2(theta, omega, tau, dt, k, gravity)
-        return np.concatenate([found.x, [found.l1, found.m_p, found.condition]])
+        solved = stage2(theta, omega, tau, dt, k, gravity)
+        return np.concatenate([solved.x, [solved.l1, solved.m_p, solved.condition]])
 
     return _windows(source, window, stage)
 

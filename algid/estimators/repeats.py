@@ -37,15 +37,15 @@ def grouped(unloaded: Sequence[Source], loaded: Sequence[Source]) -> Groups:
 
 
 def _groups(motions: Sequence[FloatArray], start: int) -> Groups:
-    found: list[list[int]] = []
+    groups: list[list[int]] = []
     for place, motion in enumerate(motions):
-        same = (group for group in found if alike(motions[group[0]], motion))
+        same = (group for group in groups if alike(motions[group[0]], motion))
         group = next(same, None)
         if group is None:
-            found.append([place])
+            groups.append([place])
         else:
             group.append(place)
-    return tuple(tuple(start + place for place in group) for group in found)
+    return tuple(tuple(start + place for place in group) for group in groups)
 
 
 def alike(one: FloatArray, other: FloatArray) -> bool:

@@ -95,10 +95,10 @@ def rollouts(
     if not sum(x.shape[1] for x, _, _ in starts):
         return total
     x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*starts, strict=True))
-    found = np.stack(_angles_at_horizons(model, c, x, u, step))
+    angles = np.stack(_angles_at_horizons(model, c, x, u, step))
     judged = np.isfinite(y[:, 0])
     with np.errstate(over="ignore", invalid="ignore"):
-        error = np.where(judged[:, None], found - y, 0.0)
+        error = np.where(judged[:, None], angles - y, 0.0)
         moved = np.where(judged[:, None], y - x[:2], 0.0)
         squares = np.where(np.isnan(error), np.inf, error) ** 2
     return RolloutScore(
@@ -158,7 +158,7 @@ def _angles_at_horizons(
     def rate(x: FloatArray, tau: FloatArray) -> FloatArray:
         return np.concatenate([x[2:], acceleration(model, c, x[:2], x[2:], tau)])
 
-    found: list[FloatArray] = []
+    angles: list[FloatArray] = []
     ends = [round(horizon / step) for horizon in HORIZONS]
     with np.errstate(
         all="ignore"
@@ -170,5 +170,5 @@ def _angles_at_horizons(
             d = rate(x + 0.5 * step * b, middle)
             x = x + step / 6 * (a + 2 * (b + d) + rate(x + step * d, end))
             if number + 1 in ends:
-                found.append(x[:2])
-    return found
+                angles.append(x[:2])
+    return angles

@@ -316,19 +316,14 @@ class _Search:
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are plausible."""
         value = self.grams.coefficients([*among, *terms])[False]
-        names = [
-            name
-            for term in terms
-            for name in term_names(term)
-            if name in value and name not in self.absent
-        ]
-        ranges = ((value[name], PARAMETERS[name].plausible) for name in names)
-        turned = (
-            np.arctan2(abs(value[name]), value[SINES[name]]) for name in names if name in SINES
-        )
-        return all(low <= found <= high for found, (low, high) in ranges) and all(
-            t <= LARGEST_PHASE for t in turned
-        )
+        names = {name for term in terms for name in term_names(term)} - set(self.absent)
+        for name in names & value.keys():
+            low, high = PARAMETERS[name].plausible
+            if not low <= value[name] <= high:
+                return False
+            if name in SINES and np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
+                return False
+        return True
 
     def run(self) -> list[str]:
         """The terms that stay."""
@@ -344,16 +339,16 @@ class _Search:
             term for term in self.candidates if term not in kept and _need(term) in (None, *kept)
         ]
         for count in range(1, _TOGETHER + 1):
-            found = [
+            better = [
                 (self.evidence(terms, kept), list(terms)) for terms in combinations(left, count)
             ]
-            found = [
+            better = [
                 (evidence, terms)
-                for evidence, terms in found
+                for evidence, terms in better
                 if evidence > 0 and self.agreed(terms, kept)
             ]
-            if found:
-                return max(found)[1]
+            if better:
+                return max(better)[1]
         return []
 
     def _removal(self, kept: list[str]) -> str | None:

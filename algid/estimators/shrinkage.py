@@ -92,10 +92,10 @@ def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray)
         if len(scores) >= _FEWEST:
             among += len(scores) / (len(scores) - 1) * np.transpose(scores) @ np.array(scores)
             informed += own
-    found = [float(np.sum(scaled_pinv(S) * within)) / _rank(S)]
+    ratios = [float(np.sum(scaled_pinv(S) * within)) / _rank(S)]
     if informed.any():
-        found.append(float(np.sum(scaled_pinv(informed) * among)) / _rank(informed))
-    return max(1.0, *found)
+        ratios.append(float(np.sum(scaled_pinv(informed) * among)) / _rank(informed))
+    return max(1.0, *ratios)
 
 
 def _scores(shared: Shared, log: LogInformation, beta: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -197,11 +197,11 @@ class Grams:
         A kind of which there is no log has those of the other.
         """
         p = _solved(self._total, self._columns(terms))
-        found = {
+        by_kind = {
             kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True))
             for kind in self.kinds
         }
-        return {kind: found.get(kind, next(iter(found.values()))) for kind in (False, True)}
+        return {kind: by_kind.get(kind, next(iter(by_kind.values()))) for kind in (False, True)}
 
     def held_out_squares(self, terms: Iterable[str]) -> float:
         """Sum of squared prediction errors of moments of logs or blocks, each from the others."""
@@ -237,10 +237,10 @@ class Grams:
         value, covariances, stretches = self._spreads[key]
         names = {name for term in terms for name in term_names(term)}
         own = np.flatnonzero(np.isin(columns, self._named(names)))
-        found = [
+        solutions = [
             float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances
         ]
-        return min(found), own.size, float(stretches)
+        return min(solutions), own.size, float(stretches)
 
     def lateness(self, terms: Iterable[str]) -> Lateness:
         """How late the torque acts in the sub-model with `terms`.

@@ -164,17 +164,17 @@ def _left_out(
     """
     arms, burdened = _solved_without_each(unloaded, False), _solved_without_each(loaded, True)
     every, every_loaded = _solved_together(unloaded, False), _solved_together(loaded, True)
-    found = []
+    estimates = []
     for place in range(len(unloaded) + len(loaded)):
         of_loaded = place - len(unloaded)
         rest = arms[place] if of_loaded < 0 else every
         rest_loaded = burdened[of_loaded] if of_loaded >= 0 else every_loaded
         if (unloaded and rest is None) or (loaded and rest_loaded is None):
-            found.append(beta)
+            estimates.append(beta)
             continue
         start, others = _from(shared, *_started(shared, rest, rest_loaded, prior), base)
-        found.append(combine(shared, others, start, prior)[0])
-    return np.array(found)
+        estimates.append(combine(shared, others, start, prior)[0])
+    return np.array(estimates)
 
 
 def _solved_together(normals: Sequence[Normal], loaded: bool) -> Solved | None:
@@ -199,7 +199,7 @@ def _solved_without_each(normals: Sequence[Normal], loaded: bool) -> list[Solved
     rows = np.stack([normal.rows for normal in normals])
     least = 1e-24 * grams[:, :, -1, -1].max(axis=1)[:, None] + 1e-300
     size, flat = grams.shape[-1], grams.reshape(2 * len(normals), -1)
-    found: list[Solved | None] = []
+    solutions: list[Solved | None] = []
     for first in range(0, len(normals), _TOGETHER):
         left = np.arange(first, min(first + _TOGETHER, len(normals)))
         others = np.ones((left.size, len(normals), 1))
@@ -216,8 +216,8 @@ def _solved_without_each(normals: Sequence[Normal], loaded: bool) -> list[Solved
         for own, gram in zip(c, total, strict=True):
             S = gram[:-1, :-1]
             g = gram[:-1, -1] - S @ own
-            found.append((own, [LogInformation(loaded, own, S[None], g[None])]))
-    return found
+            solutions.append((own, [LogInformation(loaded, own, S[None], g[None])]))
+    return solutions
 
 
 def _linearisation(
@@ -225,18 +225,18 @@ def _linearisation(
 ) -> list[FloatArray | None]:
     """Model coefficients at which the next pass linearises unloaded and loaded logs."""
     count = len(shared.model.names)
-    found = [
+    coefficients = [
         next((log.c0[:count] for log in logs if log.loaded is loaded), None)
         for loaded in (False, True)
     ]
-    return [beta[:count] if found[0] is None else found[0], found[1]]
+    return [beta[:count] if coefficients[0] is None else coefficients[0], coefficients[1]]
 
 
 def _normals(
     sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None
 ) -> list[Normal]:
-    found = [normal_equations(source, settings, at) for source in sources]
-    return [normal for normal in found if normal is not None]
+    normals = [normal_equations(source, settings, at) for source in sources]
+    return [normal for normal in normals if normal is not None]
 
 
 def first_estimate(
@@ -351,9 +351,9 @@ def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
     squares, count = np.zeros(2), 0
     for source in sources:
         for piece, windows, _ in overlapping(source(), settings):
-            found = windows.square_speeds(piece)
-            squares += found.sum(axis=1)
-            count += found.shape[1]
+            squares_of_piece = windows.square_speeds(piece)
+            squares += squares_of_piece.sum(axis=1)
+            count += squares_of_piece.shape[1]
     return np.sqrt(squares / max(count, 1))
 
 
@@ -364,14 +364,14 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
     """
 
     def gather(window: float) -> tuple[list[ResidualSums], float]:
-        found: list[ResidualSums] = []
+        gathered: list[ResidualSums] = []
         rows: list[FloatArray] = []
         longest = spacing = 0.0
 
         def add_up() -> None:
             together = np.concatenate(rows, axis=1) if rows else np.empty((4, 0))
             if together.shape[1] >= 2 * OVERLAP:
-                found.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
+                gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
             rows.clear()
 
         for piece, windows, _ in overlapping(source(), settings, window):
@@ -382,15 +382,15 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
             X = windows.equations(settings.model, piece, False, c)
             rows.append(np.concatenate([X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1]), X[:, -1]]))
         add_up()
-        return found, longest
+        return gathered, longest
 
     return pooled(_with_window(gather, settings.window))
 
 
 def _with_window(gather: Callable[[float], tuple[Gathered, float]], window: float) -> Gathered:
     """Gather by windows of `window` s, or shorter if the longest piece holds fewer than four."""
-    found, longest = gather(window)
-    return gather(longest / 4)[0] if 0 < longest < 4 * window else found
+    gathered, longest = gather(window)
+    return gather(longest / 4)[0] if 0 < longest < 4 * window else gathered
 
 
 def _seconds(piece: Segment) -> float:

@@ -51,11 +51,11 @@ def scattered(
     for factor in FACTORS:
         other = replace(settings, window=factor * settings.window)
         try:
-            found = shrunk.fit(unloaded, loaded, other, lengths, known)
+            other_fit = shrunk.fit(unloaded, loaded, other, lengths, known)
         except TooShortError:  # of the longer windows
             continue
-        if found.names == least.names:
-            moved.append(np.where(told, found.values - least.values, 0.0))
+        if other_fit.names == least.names:
+            moved.append(np.where(told, other_fit.values - least.values, 0.0))
     if not moved:
         return fit
     scatter = np.transpose(moved) @ np.array(moved) / len(moved)

@@ -231,11 +231,13 @@ def _of_first_length(result: Result) -> str:
 
 def _identified(coefficients: Coefficients) -> tuple[Number, ...]:
     after = ", conditioned on l1" if coefficients.conditioned else ""
-    found = []
+    numbers = []
     for name in coefficients.model.names:
         std = "" if name not in coefficients.std else f", ± {coefficients.std[name]:.2g}"
-        found.append(Number(name, coefficients.value[name], UNITS[name], f"identified{std}{after}"))
-    return (*found, Number("g", coefficients.model.gravity, "m/s^2", "given"))
+        numbers.append(
+            Number(name, coefficients.value[name], UNITS[name], f"identified{std}{after}")
+        )
+    return (*numbers, Number("g", coefficients.model.gravity, "m/s^2", "given"))
 
 
 def _chosen(
@@ -298,16 +300,16 @@ def _aside(links: tuple[Link, Link], coefficients: Coefficients) -> Iterator[Num
 
 def lacking(arm: Description, held: frozenset[str]) -> list[str]:
     """Sentences about the torque's terms that a format, which holds those of `held`, lacks."""
-    value, found = arm.coefficients.value, []
+    value, sentences = arm.coefficients.value, []
     for term in arm.coefficients.model.terms:
         if term not in held:
             numbers = joined(
                 [f"{name} {value[name]:.6g} {TERMS[term].unit}" for name in TERMS[term].names]
             )
-            found.append(f"lacks {TERMS[term].title}, {TERMS[term].equation}: {numbers}")
+            sentences.append(f"lacks {TERMS[term].title}, {TERMS[term].equation}: {numbers}")
     if arm.delay is not None:
-        found.append(f"lacks the delay from torque to angle: {arm.delay:.6g} s")
-    return found
+        sentences.append(f"lacks the delay from torque to angle: {arm.delay:.6g} s")
+    return sentences
 
 
 def header(arm: Description, remarks: list[str]) -> list[str]:

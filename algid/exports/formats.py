@@ -89,13 +89,13 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
             "the loaded one"
         )
     given = knowns.l2 or result.settings.get("l2")
-    found = result.payload.get("l2")
-    length = given or (None if found is None else found.estimate)
+    identified = result.payload.get("l2")
+    length = given or (None if identified is None else identified.estimate)
     if length is None:
         raise ResultError(
             f"{file}: the result does not tell where the payload hangs; give {flag('l2')}"
         )
-    spread = 0.0 if given or found is None else found.std
+    spread = 0.0 if given or identified is None else identified.std
     y, y_std = _told(result, "y_p")
     J, J_std = _told(result, "J_p")
     shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
@@ -128,8 +128,12 @@ def _covariance(result: Result, shared: Sequence[str]) -> list[list[float]]:
 
 def _told(result: Result, name: str) -> tuple[float, float | None]:
     """Estimate and standard deviation of a part of the payload's body: zero if it has no body."""
-    found = result.payload.get(name)
-    return (0.0, 0.0) if found is None or found.estimate is None else (found.estimate, found.std)
+    estimate = result.payload.get(name)
+    return (
+        (0.0, 0.0)
+        if estimate is None or estimate.estimate is None
+        else (estimate.estimate, estimate.std)
+    )
 
 
 def _or_null(value: float | None) -> str:

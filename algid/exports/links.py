@@ -185,10 +185,10 @@ class _Free:
             m2 = low + (high - low) * float(expit(logit))
             return _distance(self.first(m2)) + _distance(self.second(m2))
 
-        found = minimize_scalar(
+        minimum = minimize_scalar(
             distance, bounds=(-_ENDS, _ENDS), method="bounded", options={"xatol": 1e-10}
         )
-        return low + (high - low) * float(expit(found.x))
+        return low + (high - low) * float(expit(minimum.x))
 
 
 def _link(length: float, mass: float, s: complex, h: float) -> Link:

@@ -48,9 +48,9 @@ def python_module(arm: Description) -> str:
 def _constants(arm: Description) -> dict[str, float]:
     """Constants of the module by their names."""
     model, value = arm.coefficients.model, arm.coefficients.value
-    found = {name.upper(): value[name] for name in model.names if name != model.lag_name}
+    constants = {name.upper(): value[name] for name in model.names if name != model.lag_name}
     shapes = {shape for term in model.terms for shape in TERMS[term].shapes}
-    return found | {
+    return constants | {
         s.name.upper(): getattr(model, s.name) for s in fields(Widths) if s.name in shapes
     }
 

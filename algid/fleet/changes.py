@@ -94,8 +94,8 @@ def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataF
     kinds: dict[str, Any] = dict.fromkeys(("robot", "job", "parameter"), pl.String())
     kinds |= dict.fromkeys(("before", "after"), jobs.schema["time"])
     kinds |= dict.fromkeys(("step", "step_std", "share", "p"), pl.Float64())
-    found = pl.DataFrame(rows, schema=kinds)
-    return ordered.with_columns(stint=pl.Series(stint)), found
+    frame = pl.DataFrame(rows, schema=kinds)
+    return ordered.with_columns(stint=pl.Series(stint)), frame
 
 
 def _numbers(column: pl.Series) -> FloatArray:
@@ -131,13 +131,13 @@ def _told(
 
 def _changes(t: FloatArray, y: FloatArray, w: FloatArray) -> list[Change]:
     """The changes of one robot, in time order; each part is looked at again by itself."""
-    found = change_of(t, y, w)
-    if found is None:
+    change = change_of(t, y, w)
+    if change is None:
         return []
-    at = found.place
+    at = change.place
     late = _changes(t[at:], y[:, at:], w[:, at:])
     later = [Change(one.place + at, one.p, one.step, one.std) for one in late]
-    return [*_changes(t[:at], y[:, :at], w[:, :at]), found, *later]
+    return [*_changes(t[:at], y[:, :at], w[:, :at]), change, *later]
 
 
 def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:

@@ -125,8 +125,8 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
         )
         for robot, name in pairs
     )
-    found = history.drifts.height + history.findings.height + _changed(history)
-    title = "What was found, log by log" if found else "The clearest trends, which are no drift"
+    count = history.drifts.height + history.findings.height + _changed(history)
+    title = "What was found, log by log" if count else "The clearest trends, which are no drift"
     return Figure("logs", title, panels, READING, LEGEND, columns=2) if panels else None
 
 
@@ -161,11 +161,11 @@ def _worth_a_look(history: History) -> list[Marked]:
     outlying = history.findings.filter(pl.col("kind") == "outlier")
     outlying = outlying.sort(pl.col("sigmas").abs(), descending=True)
     frames = [history.drifts, *([] if history.changes is None else [history.changes]), outlying]
-    found = [pair for frame in frames for pair in frame.select("robot", "parameter").rows()]
-    if not found:
+    pairs = [pair for frame in frames for pair in frame.select("robot", "parameter").rows()]
+    if not pairs:
         tested = history.windows.filter(pl.col("p").is_not_nan()).sort("p", "robot", "parameter")
-        found = tested.select("robot", "parameter").unique(maintain_order=True).head(4).rows()
-    return list(dict.fromkeys(found))[:MOST_PANELS]
+        pairs = tested.select("robot", "parameter").unique(maintain_order=True).head(4).rows()
+    return list(dict.fromkeys(pairs))[:MOST_PANELS]
 
 
 def _panel(

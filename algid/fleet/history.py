@@ -44,8 +44,8 @@ def read_jobs(path: Path) -> pl.DataFrame:
     import polars as pl
 
     if not path.is_file():
-        found = "it is no regular file" if path.exists() else "there is no such file"
-        raise ResultError(f"{path}: {found}; expected jobs.parquet of algid batch")
+        problem = "it is no regular file" if path.exists() else "there is no such file"
+        raise ResultError(f"{path}: {problem}; expected jobs.parquet of algid batch")
     try:
         names = list(pl.read_parquet_schema(path))
         wanted = [
@@ -182,8 +182,8 @@ class History:
         """The latest drifting window of each robot and parameter, the clearest first."""
         import polars as pl
 
-        found = self.windows.filter("drift").sort("month").group_by("robot", "parameter").last()
-        return found.sort(pl.col("p"), "robot", "parameter")
+        last = self.windows.filter("drift").sort("month").group_by("robot", "parameter").last()
+        return last.sort(pl.col("p"), "robot", "parameter")
 
     @property
     def untested(self) -> list[Notice]:

@@ -66,8 +66,8 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
     robots = robot_table(history).at(
         Depth.TERMINAL if history.robots <= MOST_ROBOTS else Depth.PAGE
     )
-    found = filled(change_table(history), drift_table(history), finding_table(history))
-    sections: tuple[Section, ...] = (Section((robots, *found)),)
+    tables = filled(change_table(history), drift_table(history), finding_table(history))
+    sections: tuple[Section, ...] = (Section((robots, *tables)),)
     if reports is not None:
         sections = _page_sections(history, reports)
     return Document(
@@ -94,7 +94,7 @@ def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Sectio
         links=places,
     )
     jobs = {visible(job): place for job, place in reports.items()}
-    found = [
+    tables = [
         replace(table, links=links)
         for table, links in (
             (change_table(history), places),
@@ -106,7 +106,7 @@ def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Sectio
     shown = _only(history, list(keys))
     each = [_robot_section(shown, robot, key, reports) for robot, key in keys.items()]
     return (
-        Section((robots, *([ReadingAid(READING)] if drawn else []), *filled(*found))),
+        Section((robots, *([ReadingAid(READING)] if drawn else []), *filled(*tables))),
         Section(() if first is None else (first,)),
         Section((ReadingAid(_which(history, len(each))),) if each else (), "each", "Each robot"),
         *each,
@@ -200,7 +200,7 @@ def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
     """Where each job's report is, as seen from `out`; jobs without one are left out."""
     if history.jobs is None:
         return {}
-    found, listed = {}, dict[str, frozenset[str]]()
+    reports, listed = {}, dict[str, frozenset[str]]()
     for job in history.jobs["job"].to_list():
         above = job.rpartition("/")[0]
         if above not in listed:  # a folder is looked into once, not once a job
@@ -210,8 +210,8 @@ def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
         page = batch / f"{job}.algid" / "report.html"
         if page.is_file():
             there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
-            found[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
-    return found
+            reports[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
+    return reports
 
 
 def _names_in(folder: Path) -> frozenset[str]:
@@ -240,14 +240,14 @@ def verdict(history: History) -> Verdict:
         statement += f" (p = {p})" + (
             "" if row["drift"] else f", which does not pass p < {ALPHA:g}"
         )
-    found = [_drifting(history)] if drifts else []
+    reasons = [_drifting(history)] if drifts else []
     if history.changes is not None and history.changes.height:
-        found.append(_changed(history.changes))
+        reasons.append(_changed(history.changes))
     if findings:
-        found.append(_standing_out(history))
+        reasons.append(_standing_out(history))
     if history.scattered is not None:
-        found.append(history.scattered)
-    return graded(statement, [*found, *history.untested])
+        reasons.append(history.scattered)
+    return graded(statement, [*reasons, *history.untested])
 
 
 def _drifting(history: History) -> Notice:

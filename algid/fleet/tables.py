@@ -83,7 +83,7 @@ def change_table(history: History) -> Table:
         Column("Step", "number", rank=1),
         Column("Unit", "text", rank=2),
     )
-    found = None if history.changes is None else history.changes.head(MOST_ROWS)
+    changes = None if history.changes is None else history.changes.head(MOST_ROWS)
     rows = tuple(
         (
             visible(row["robot"]),
@@ -95,7 +95,7 @@ def change_table(history: History) -> Table:
             ),
             unit_text(UNITS[row["parameter"]]),
         )
-        for row in (() if found is None else found.iter_rows(named=True))
+        for row in (() if changes is None else changes.iter_rows(named=True))
     )
     note = (
         "An arm, a drive or a convention was replaced: what came before and what comes after are "

@@ -259,8 +259,8 @@ def _of_motorless(
     plainer = replace(chosen, model=model, delay=False, trials=trials, hold=hold, late=None)
     ours = _weak_settings(settings, plainer)
     known = without(prior, absent(settings.effort, model.names))
-    found = motorless.by_instruments(unloaded, ours, settings.lengths, known)
-    return None if found is None else (found, plainer)
+    better = motorless.by_instruments(unloaded, ours, settings.lengths, known)
+    return None if better is None else (better, plainer)
 
 
 _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
@@ -353,8 +353,8 @@ def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
     for log in survey.logs:
         c, shift = torque_coefficients(fit, log.role), torque_shift(settings, fit)
         total += score(fit.shared.model, c, survey.segments(log), shift)
-    found = prediction(total)
-    return found is not None and bool(found.unexplained(MOST))
+    predicted = prediction(total)
+    return predicted is not None and bool(predicted.unexplained(MOST))
 
 
 def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:

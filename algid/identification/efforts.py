@@ -106,10 +106,10 @@ def _without_friction(fit: Fit) -> bool:
     terms = {name for term in dry for name in term.names}
     if fit.absent or (fit.shrinkage is None and terms & set(fit.names)):
         return False
-    found = _of_fit(fit)
-    k3, k4, k5 = (_size(found, name)[0] for name in (K3, K4, K5))
+    known = _of_fit(fit)
+    k3, k4, k5 = (_size(known, name)[0] for name in (K3, K4, K5))
     most = NO_DAMPING * float(np.sqrt((k3 + k5) * k4))
-    damping = [_size(found, name) for name in (K6, K7)]
+    damping = [_size(known, name) for name in (K6, K7)]
     return all(value < SURE * std and value + SURE * std < most for value, std in damping)
 
 

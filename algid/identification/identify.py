@@ -226,7 +226,7 @@ def _by_the_paper(
     known = None
     if earlier is not None:
         constants = [earlier.result.parameters.get(name) for name in CONSTANT_NAMES]
-        values = [None if found is None else found.estimate for found in constants]
+        values = [None if one is None else one.estimate for one in constants]
         if None in values:
             raise ResultError(
                 f"{earlier.file}: the result lacks a constant; identify the arm from a better log "

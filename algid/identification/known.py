@@ -42,17 +42,17 @@ def model_of(result: Result) -> Model:
     a result that names none was made with what its settings ask for.
     """
     settings = Settings.of(result.settings)
-    found = None if result.fit is None else result.fit.model
-    if found is None:
+    model = None if result.fit is None else result.fit.model
+    if model is None:
         return Model(without_delay(settings.terms), settings.gravity)
-    return Model(tuple(found.terms), settings.gravity, found.coulomb_speed, found.stribeck_speed)
+    return Model(tuple(model.terms), settings.gravity, model.coulomb_speed, model.stribeck_speed)
 
 
 def shift_of(result: Result) -> TorqueShift:
     """After how long a logged torque acts: hold, and delay."""
     delay = result.delay
-    found = None if delay is None else delay.estimate
-    return Settings.of(result.settings).torque_shift(found)
+    seconds = None if delay is None else delay.estimate
+    return Settings.of(result.settings).torque_shift(seconds)
 
 
 def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
@@ -108,7 +108,8 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
         If one of them has no estimate.
     """
     values = {
-        name: found.estimate for name, found in {**result.parameters, **result.payload}.items()
+        name: estimate.estimate
+        for name, estimate in {**result.parameters, **result.payload}.items()
     }
     for name in absent(Settings.of(result.settings).effort, model.names):
         values[name] = 0.0
@@ -144,8 +145,8 @@ def wrong_inertia(values: Mapping[str, float]) -> str | None:
 
 def has_error_bar(result: Result, name: str) -> bool:
     """Whether an estimate is sound and the result's covariance holds it."""
-    found = result.estimates.get(name)
-    ok = found is not None and found.usable and found.std is not None
+    estimate = result.estimates.get(name)
+    ok = estimate is not None and estimate.usable and estimate.std is not None
     return ok and result.fit is not None and name in result.fit.covariance_names
 
 
@@ -187,10 +188,10 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
 
 def first_length(result: Result) -> tuple[float, float] | None:
     """l1 = g |K1| / |K2| and its standard deviation, in m; None where the result tells neither."""
-    found = by_constants(result)
-    if found is None or result.fit is None:
+    length_and_slopes = by_constants(result)
+    if length_and_slopes is None or result.fit is None:
         return None
-    l1, slopes = found
+    l1, slopes = length_and_slopes
     covariance = result.fit.covariance_of(list(slopes))
     slope = np.array(list(slopes.values()))
     return l1, float(np.sqrt(slope @ covariance @ slope))
@@ -198,26 +199,26 @@ def first_length(result: Result) -> tuple[float, float] | None:
 
 def payload_length(result: Result) -> tuple[float, float] | None:
     """The payload's l1 and its standard deviation in m, if more precise than `first_length`."""
-    found = result.payload.get("l1")
-    if found is None or found.estimate is None or not found.std or not found.usable:
+    l1 = result.payload.get("l1")
+    if l1 is None or l1.estimate is None or not l1.std or not l1.usable:
         return None
     by_constants = first_length(result)
-    if by_constants is not None and by_constants[0] > 0 and by_constants[1] <= found.std:
+    if by_constants is not None and by_constants[0] > 0 and by_constants[1] <= l1.std:
         return None
-    return found.estimate, found.std
+    return l1.estimate, l1.std
 
 
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
     """Notices of given lengths that contradict the result's own, or its l1 = g k1 / k2."""
     identified = {
-        name: (found.estimate, found.std)
-        for name, found in result.payload.items()
+        name: (one.estimate, one.std)
+        for name, one in result.payload.items()
         if name in ("l1", "l2")
     }
     by_constants = first_length(result)
     if by_constants is not None:
         identified["l1"] = by_constants
-    found = []
+    one = []
     for name, given in lengths.items():
         estimate, std = identified.get(name, (None, None))
         if estimate is None or not std:
@@ -231,5 +232,5 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
                 "estimate": estimate,
                 "std": std,
             }
-            found.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
-    return tuple(found)
+            one.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
+    return tuple(one)

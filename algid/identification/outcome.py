@@ -59,12 +59,12 @@ def outcome_of(
 ) -> Identified:
     """The fit as a result holds it."""
     # a constant that the model has no column for is not identifiable
-    found = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
-    found |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
-    found = with_significance(found)
+    estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
+    estimates |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
+    estimates = with_significance(estimates)
     gone = {*fit.absent, *absent(settings.effort, CONSTANT_NAMES)}
-    found = {name: one for name, one in found.items() if name not in gone}
-    payload = {name: found.pop(name) for name in PAYLOAD_PARAMETERS if name in found}
+    estimates = {name: one for name, one in estimates.items() if name not in gone}
+    payload = {name: estimates.pop(name) for name in PAYLOAD_PARAMETERS if name in estimates}
     rows, stds = table_rows(fit)
     held = [name for name in LOADED_ROWS if not gone & set(_LOADED[name])]
     combined = {name: unknown(TABLE_UNITS[name]) for name in held if survey.loaded}
@@ -75,12 +75,14 @@ def outcome_of(
         )
     summary = fit_summary(fit, predictions, survey, settings, chosen)
     if is_implausible(summary):
-        found, combined, payload = (distrusted(group) for group in (found, combined, payload))
+        estimates, combined, payload = (
+            distrusted(group) for group in (estimates, combined, payload)
+        )
     notices = [*fit_warnings(fit)]
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("NO_CROSS_VALIDATION"))
     return Identified(
-        parameters=found,
+        parameters=estimates,
         loaded=combined,
         payload=payload,
         rows=rows,
@@ -111,8 +113,8 @@ def is_implausible(summary: results.FitSummary) -> bool:
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """The estimates with no status OK left."""
     return {
-        name: found.model_copy(update={"status": Status.IMPLAUSIBLE}) if found.usable else found
-        for name, found in group.items()
+        name: one.model_copy(update={"status": Status.IMPLAUSIBLE}) if one.usable else one
+        for name, one in group.items()
     }
 
 
@@ -153,10 +155,10 @@ def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
     An inertia or a length is never zero.
     """
     return {
-        name: found.model_copy(update={"status": Status.NOT_SIGNIFICANT})
-        if found.status is Status.OK and name not in NEVER_ZERO and _holds_zero(found)
-        else found
-        for name, found in group.items()
+        name: one.model_copy(update={"status": Status.NOT_SIGNIFICANT})
+        if one.status is Status.OK and name not in NEVER_ZERO and _holds_zero(one)
+        else one
+        for name, one in group.items()
     }
 
 
@@ -356,5 +358,5 @@ def _torque_gain(fit: Fit, known: float | None) -> Estimate | None:
     half = fit.quantile * std
     if not np.isfinite(std) or mass <= half:
         return unknown("1")
-    found = estimate(known / mass, known / mass * std / mass, 0.0, "1", fit.status[place])
-    return found.model_copy(update={"ci95": (known / (mass + half), known / (mass - half))})
+    gain = estimate(known / mass, known / mass * std / mass, 0.0, "1", fit.status[place])
+    return gain.model_copy(update={"ci95": (known / (mass + half), known / (mass - half))})

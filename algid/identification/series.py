@@ -198,13 +198,13 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
 
 def running_columns(fit: Fit, durations: Sequence[float]) -> dict[str, FloatArray]:
     """Each shared parameter by time of each log, half its 95 % interval, from all logs so far."""
-    found = running(fit, durations)
-    lengths = np.array(durations)[found.log]
+    course = running(fit, durations)
+    lengths = np.array(durations)[course.log]
     return {
-        "log": found.log,
-        "t": found.share * lengths,
-        **{name: found.beta[:, place] for place, name in enumerate(fit.names)},
-        **{f"{name}_half": found.half[:, place] for place, name in enumerate(fit.names)},
+        "log": course.log,
+        "t": course.share * lengths,
+        **{name: course.beta[:, place] for place, name in enumerate(fit.names)},
+        **{f"{name}_half": course.half[:, place] for place, name in enumerate(fit.names)},
     }
 
 
@@ -225,14 +225,16 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
     """
     kinds: list[tuple[str, FloatArray, FloatArray, FloatArray, FloatArray]] = []
     if whitened:
-        found = whiteness_of(sums)
-        low, high = (np.broadcast_to(one, found.density.shape) for one in (found.low, found.high))
-        kinds.append((WHITE_SPECTRUM, found.frequency, found.density, low, high))
+        spectrum = whiteness_of(sums)
+        low, high = (
+            np.broadcast_to(one, spectrum.density.shape) for one in (spectrum.low, spectrum.high)
+        )
+        kinds.append((WHITE_SPECTRUM, spectrum.frequency, spectrum.density, low, high))
     else:
-        found = spectra(sums)
-        nowhere = np.full((2, found.frequency.size), np.nan)
+        spectrum = spectra(sums)
+        nowhere = np.full((2, spectrum.frequency.size), np.nan)
         kinds += [
-            (kind, found.frequency, found.density[rows], nowhere, nowhere)
+            (kind, spectrum.frequency, spectrum.density[rows], nowhere, nowhere)
             for kind, rows in ((SPECTRUM, slice(0, 2)), (TORQUE_SPECTRUM, slice(2, 4)))
         ]
     r = autocorrelation(sums)

@@ -137,10 +137,10 @@ def open_source(
             f"{source.name}: its metadata say that the payload changes; weigh it with algid track"
         )
     if (truth.payload > 0) != (role == "loaded"):
-        found = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
+        payload = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
         raise LogError(
-            f"{source.name}: expected a log of the {role} arm, its metadata say {found}; swap the "
-            "logs"
+            f"{source.name}: expected a log of the {role} arm, its metadata say {payload}; "
+            "swap the logs"
         )
     return source
 

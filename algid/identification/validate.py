@@ -61,24 +61,24 @@ def validate(known: Predictor, survey: Survey) -> Validation:
     ResultError
         If a parameter that the prediction needs has no estimate.
     """
-    found: dict[str, TorquePrediction | None] = {}
+    predictions: dict[str, TorquePrediction | None] = {}
     total = PredictionScore()
     for log in survey.logs:
         one = score(known.model, known.coefficients(log.role), survey.segments(log), known.shift)
-        found[log.name] = prediction(one)
+        predictions[log.name] = prediction(one)
         total += one
-    return Validation(found, prediction(total))
+    return Validation(predictions, prediction(total))
 
 
 def simulate(known: Predictor, survey: Survey) -> Simulation:
     """Simulate the arm forward from states of a survey's logs; raises as `validate`."""
-    found: dict[str, RolloutScore] = {}
+    scores: dict[str, RolloutScore] = {}
     total = RolloutScore()
     for log in survey.logs:
         duration = survey.summary(log).duration
         one = rollouts(
             known.model, known.coefficients(log.role), survey.segments(log), duration, known.shift
         )
-        found[log.name] = one
+        scores[log.name] = one
         total += one
-    return Simulation(found, total)
+    return Simulation(scores, total)

@@ -171,9 +171,9 @@ def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> lis
     They are judged together. Where that does not tell, each is judged by itself, and accused of
     another convention only: what a single run alleges of zeros may be friction.
     """
-    found = judged_together([recording for _, recording in logs], gravity=gravity)
-    if found is not None and found.alone:
-        return [mend(log, found) for log, _ in logs]
+    judgement = judged_together([recording for _, recording in logs], gravity=gravity)
+    if judgement is not None and judgement.alone:
+        return [mend(log, judgement) for log, _ in logs]
     own = [mend(log, judged_together([each], gravity=gravity)) for log, each in logs]
     return [None if one is None or not one.another else one for one in own]
 
@@ -190,10 +190,10 @@ def _tried(log: Log, suspicion: Suspicion, known: Recorded) -> Iterator[Remedy]:
     if suspicion.weightless and _is_real(tried_together([known], AS_READ, gravity=False)):
         yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
         yield Remedy({"gravity": 0}, "for a horizontal plane")
-    found = [tried_together([known], guess) for guess in suspicion.guesses]
-    if suspicion.free_zero and not any(map(_is_real, found)):
-        found += [zeroed_together([known], guess) for guess in suspicion.guesses]
-    for one in found:
+    candidates = [tried_together([known], guess) for guess in suspicion.guesses]
+    if suspicion.free_zero and not any(map(_is_real, candidates)):
+        candidates += [zeroed_together([known], guess) for guess in suspicion.guesses]
+    for one in candidates:
         if one is not None and one.convincing:
             yield Remedy(_flat(_settings(one.convention, log)))
 
@@ -237,19 +237,19 @@ def _is_unit(scale: float) -> bool:
 def _settings(convention: Convention, log: Read) -> dict[str, Any]:
     """The settings that read the log by `convention`, over those that it was read by."""
     reading = log.origin.reading
-    found: dict[str, Any] = dict(_sources(convention, log))
+    mending: dict[str, Any] = dict(_sources(convention, log))
     place = (1, 0) if convention.swapped else (0, 1)
     for joint in (0, 1):
         theta, tau = (
-            found.setdefault(f"theta{joint + 1}", {}),
-            found.setdefault(f"tau{joint + 1}", {}),
+            mending.setdefault(f"theta{joint + 1}", {}),
+            mending.setdefault(f"tau{joint + 1}", {}),
         )
         # A channel that is swapped keeps what the profile says of its joint: names and units go
         # with the joint.
         if convention.signs[joint] < 0 and convention.torque_signs[joint] < 0:
-            signs = list(found.get("signs", reading.signs))
+            signs = list(mending.get("signs", reading.signs))
             signs[joint] = -signs[joint]
-            found["signs"] = signs
+            mending["signs"] = signs
         elif convention.signs[joint] < 0:
             theta["sign"] = -_own_sign(reading, f"theta{joint + 1}")
         elif convention.torque_signs[joint] < 0:
@@ -260,11 +260,11 @@ def _settings(convention: Convention, log: Read) -> dict[str, Any]:
         elif scale != 1:
             theta["gear_ratio"] = float(f"{scale:.6g}")
     if convention.absolute:
-        found["second_angle"] = "absolute"
+        mending["second_angle"] = "absolute"
     if convention.base:
-        found["drive"] = "base"
-    found |= _zeros(convention, reading, place)
-    return {name: value for name, value in found.items() if value != {}}
+        mending["drive"] = "base"
+    mending |= _zeros(convention, reading, place)
+    return {name: value for name, value in mending.items() if value != {}}
 
 
 def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
@@ -319,5 +319,5 @@ def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> 
         remainder(both[joint], 2 * pi) - (own[joint] - reading.offsets[joint]) for joint in (0, 1)
     ]
     offsets = [0.0 if abs(angle) < _SAME else float(f"{angle:.6g}") for angle in added]
-    found: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
-    return found | ({"offsets": offsets} if offsets != list(reading.offsets) else {})
+    mending: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
+    return mending | ({"offsets": offsets} if offsets != list(reading.offsets) else {})

@@ -81,22 +81,22 @@ def dynamic_figures(log: Log) -> DynamicFigures | None:
     friction = _rows(np.stack([[coulomb[0], zeros, one, zeros], [zeros, coulomb[1], zeros, one]]))
     target = tau.ravel()
     wide = np.hstack([rows, turned, friction])
-    found = _fit(wide, target)
+    c = _fit(wide, target)
     total = float(np.sum((target - target.mean()) ** 2)) or 1.0
     without = np.hstack([np.delete(rows, [_K2, _K4], axis=1), friction])
-    left = _left(wide, found, target)
+    left = _left(wide, c, target)
     lost = _left(without, _fit(without, target), target) - left
-    turn = np.degrees(np.arctan2(found[7] + found[8], found[_K2] + found[_K4]))
+    turn = np.degrees(np.arctan2(c[7] + c[8], c[_K2] + c[_K4]))
     scale = np.linalg.norm(rows, axis=0)
     return DynamicFigures(
         condition=float(np.linalg.cond(rows / scale)) if np.all(scale > 0) else math.inf,
         explained=1 - left / total,
-        weight1=float(found[_K4]),
-        weight2=float(found[_K2]),
+        weight1=float(c[_K4]),
+        weight2=float(c[_K2]),
         turn=float(turn),
         gravity_share=lost / total,
         seen=_standing_out(np.hstack([rows[:, [_K2, _K4]], turned]), without),
-        inertia=float(found[_K3] + found[_K5]),
+        inertia=float(c[_K3] + c[_K5]),
     )
 
 
@@ -176,8 +176,8 @@ def _rows(columns: FloatArray) -> FloatArray:
 def _fit(matrix: FloatArray, target: FloatArray) -> FloatArray:
     scale = np.linalg.norm(matrix, axis=0)
     scale[scale == 0] = 1
-    found = np.linalg.lstsq(matrix / scale, target, rcond=1e-8)[0]
-    return np.asarray(found / scale)
+    c = np.linalg.lstsq(matrix / scale, target, rcond=1e-8)[0]
+    return np.asarray(c / scale)
 
 
 def _left(matrix: FloatArray, found: FloatArray, target: FloatArray) -> float:

@@ -149,13 +149,13 @@ def inspect_log(given: Any, profile: Profile | None = None) -> Inspection:
 
 
 def _signals(log: Log) -> dict[str, SignalFigures]:
-    found = {}
+    signals = {}
     pairs = [("theta", log.theta), ("tau", log.tau)]
     pairs += [("omega", log.omega)] if log.omega is not None else []
     for name, pair in pairs:
         for joint, values in enumerate(pair, start=1):
-            found[f"{name}{joint}"] = signal_figures(values)
-    return found
+            signals[f"{name}{joint}"] = signal_figures(values)
+    return signals
 
 
 def _finite(value: Any) -> Any:

@@ -222,22 +222,22 @@ def channel_readings(
     LogError
         If a torque is in amperes without a torque constant, or counts without counts a turn.
     """
-    found = {}
+    readings = {}
     for name in [name for name in CHANNELS if name in mapping]:
         joint = int(name[-1]) - 1
         like = f"theta{joint + 1}" if _is_desired(name, profile) else name
         channel = _channel(like, profile)
         unit, told = _unit(like, profile, stated)
         if name == f"tau{profile.passive}":
-            found[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
+            readings[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
             continue
         factor = (
             channel.sign * profile.signs[joint] * _factor(path, like, mapping[name], channel, unit)
         )
         angle = like.startswith(("theta", "q_des"))
         offset = channel.offset + (profile.offsets[joint] if angle else 0.0)
-        found[name] = ChannelReading(mapping[name], unit, told, factor, offset)
-    return found
+        readings[name] = ChannelReading(mapping[name], unit, told, factor, offset)
+    return readings
 
 
 def _channel(name: str, profile: Profile) -> Angle | Velocity | Torque:

@@ -157,19 +157,19 @@ def _frames(
                 return
     except pl.exceptions.PolarsError as error:
         reason = str(error).split("\n", maxsplit=1)[0]
-        found = re.search(
+        wrong = re.search(
             r"could not parse `(.*?)` as dtype `\w+` at column '(\d+)'", reason, re.DOTALL
         )
-        if found is None:
+        if wrong is None:
             raise LogError(
                 f"{path}: the table cannot be read past row {done}: {reason[:200]}"
             ) from error
-        if "\0" in found[1]:
+        if "\0" in wrong[1]:
             raise LogError(f"{path}: past row {done}: {NUL_AMONG_ROWS}") from error
         raise LogError(
-            f"{path}: column {dialect.columns[int(found[2])]!r}, past row {done}: expected a "
+            f"{path}: column {dialect.columns[int(wrong[2])]!r}, past row {done}: expected a "
             "number, found "
-            f"{found[1][:40]!r}; mend the file or name another column"
+            f"{wrong[1][:40]!r}; mend the file or name another column"
         ) from error
 
 

@@ -105,10 +105,10 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     if len(data) <= first_row:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
     number, row = data[first_row]
-    found = _checked(
+    dialect = _checked(
         path, columns, separator, number, comment, [line for _, line in data[first_row:]], row
     )
-    return replace(found, units={**in_text(above, columns), **units})
+    return replace(dialect, units={**in_text(above, columns), **units})
 
 
 def described(path: Path, head: bytes) -> Dialect:

@@ -37,24 +37,24 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
 
     file = opened(path)
     kinds = file.kinds()
-    found = cells(kinds, file.width)
+    cells_by_name = cells(kinds, file.width)
     other = [
         name for name in file.schema.names if name not in kinds
     ]  # of types that hold no numbers
-    roots = {name: cell.meta.root_names()[0] for name, (cell, _) in found.items()}
+    roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
     units = units_of_schema(file.schema, roots)
-    columns = assign(str(path), [*found, *other], profile, units)
+    columns = assign(str(path), [*cells_by_name, *other], profile, units)
     for name, source in columns.sources.items():
         if source in other:
             kind = file.schema.field(source).type
             raise LogError(
                 f"{path}: column {source!r} for {name} holds {str(kind)[:80]}; expected numbers"
             )
-    types: dict[str, pl.DataType] = {name: kind for name, (_, kind) in found.items()}
+    types: dict[str, pl.DataType] = {name: kind for name, (_, kind) in cells_by_name.items()}
     columns = of_numbers(str(path), columns, types | dict.fromkeys(other, pl.Null()))
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
-        numbers = [number(name, *found[source]) for name, source in columns.sources.items()]
+        numbers = [number(name, *cells_by_name[source]) for name, source in columns.sources.items()]
         left = most
         for frame in file.frames({roots[source] for source in columns.sources.values()}, rows):
             yield from (

@@ -359,9 +359,9 @@ def _head(path: Path) -> bytes:
                 "rosbag2 folder"
             )
         if not path.is_file():
-            found = "it is no regular file" if path.exists() else "there is no such file"
+            problem = "it is no regular file" if path.exists() else "there is no such file"
             raise LogError(
-                f"{path}: {found}; expected a log in MCAP, Parquet or CSV; check the name"
+                f"{path}: {problem}; expected a log in MCAP, Parquet or CSV; check the name"
             )
         return read_start(path, LIMITS.head_bytes)
     except (OSError, ValueError) as error:

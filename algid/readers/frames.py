@@ -105,20 +105,20 @@ def cells(
     """
     import polars as pl
 
-    found: dict[str, tuple[pl.Expr, pl.DataType]] = {}
+    by_name: dict[str, tuple[pl.Expr, pl.DataType]] = {}
     for column, kind in schema.items():
         cell = pl.col(column)
         if not isinstance(kind, (pl.List, pl.Array)):
-            found[column] = cell, kind
+            by_name[column] = cell, kind
             continue
         size = width(column) if isinstance(kind, pl.List) else kind.size
         lists = cell.list if isinstance(kind, pl.List) else cell.arr
         for place in range(min(size, LIMITS.list_cells)):
-            found[f"{column}[{place}]"] = (
+            by_name[f"{column}[{place}]"] = (
                 lists.get(place, null_on_oob=True),
                 cast("pl.DataType", kind.inner),
             )
-    return found
+    return by_name
 
 
 def of_numbers(path: str, columns: Columns, kinds: Mapping[str, pl.DataType]) -> Columns:

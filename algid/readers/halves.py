@@ -49,11 +49,11 @@ def open_halves(log: Any, profile: Profile, open_one: Opener) -> TableReader:
     path = angles.origin.path
 
     def tables(rows: int) -> Iterator[SampleTable]:
-        found = whole_topic(
+        torque_series = whole_topic(
             str(other), other.name, torques.origin.mapping, torques.tables(BLOCK_ROWS)
         )
         main = in_order(path, angles.tables(rows))
-        return aligned(_overlap(path, main, found), [found])
+        return aligned(_overlap(path, main, torque_series), [torque_series])
 
     return TableReader(
         _joined(angles.origin, torques.origin, other, profile),
@@ -88,11 +88,11 @@ def _torques(other: Path, profile: Profile, angles: Origin, open_one: Opener) ->
         if getattr(profile, key) not in names:
             of_angles[key] = None
     half = profile.half("tau").model_copy(update=of_angles)
-    found = open_one(other, half)
-    wanted, there = angles.reading.joints, found.origin.reading.joints
+    reader = open_one(other, half)
+    wanted, there = angles.reading.joints, reader.origin.reading.joints
     if wanted and there and wanted != there and set(wanted) == set(there):
         return open_one(other, half.model_copy(update={"joints": wanted}))
-    return found
+    return reader
 
 
 def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> Origin:

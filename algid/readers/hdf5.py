@@ -83,7 +83,7 @@ def _read(path: str, most_bytes: int, most_arrays: int) -> dict[str, NDArray[Any
     """Raises ValueError with a line for the user."""
     import h5py
 
-    found: dict[str, Any] = {}
+    by_path: dict[str, Any] = {}
 
     def keep(name: str, one: Any) -> None:
         if (
@@ -94,17 +94,17 @@ def _read(path: str, most_bytes: int, most_arrays: int) -> dict[str, NDArray[Any
             kinds = one.dtype.names or ()
             fields = {f"{name}/{field}": one.dtype[field] for field in kinds} or {name: one.dtype}
             if one.ndim <= 2 and all(kind.kind in "iuf" for kind in fields.values()):
-                found[name] = one
+                by_path[name] = one
 
     with h5py.File(path, "r") as file:
         file.visititems(keep)
-        claimed = sum(one.nbytes for one in found.values())
-        if claimed > most_bytes or len(found) > most_arrays:
+        claimed = sum(one.nbytes for one in by_path.values())
+        if claimed > most_bytes or len(by_path) > most_arrays:
             raise ValueError(
-                f"more than a log has (arrays: {len(found)} of {claimed} B); save it as Parquet"
+                f"more than a log has (arrays: {len(by_path)} of {claimed} B); save it as Parquet"
             )
         arrays: dict[str, NDArray[Any]] = {}
-        for name, one in found.items():
+        for name, one in by_path.items():
             _check_stored(name, one)
             values = one[()]
             plain = name.replace("/", ".")

@@ -66,8 +66,8 @@ def frame_of_lines(path: Path) -> pl.DataFrame:
                 raise LogError(
                     f"{path}: more than {LIMITS.columns} columns; expected a log of an arm"
                 )
-    found = frame.select(cells)
-    return found if end is None else pl.concat([found, found.clear(1)])
+    flat = frame.select(cells)
+    return flat if end is None else pl.concat([flat, flat.clear(1)])
 
 
 _OTHER_THAN_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))

@@ -148,20 +148,20 @@ def take_apart(column: str) -> Name:
 def _taken_apart(text: str) -> Name:
     unit = foreign = None
     for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
-        found = pattern.match(text)
-        if found and ((known := unit_of(found[2])) or is_foreign(found[2])):
-            text, unit, foreign = found[1].strip(), known, None if known else found[2]
+        match = pattern.match(text)
+        if match and ((known := unit_of(match[2])) or is_foreign(match[2])):
+            text, unit, foreign = match[1].strip(), known, None if known else match[2]
             break
     if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
         unit = known
-    if found := _JOINT_NAMED.match(text):
-        return Name(found[2], found[1], unit, foreign)
-    if found := _JOINT_PLACED.match(text):
-        return Name(found[1], found[2], unit, foreign)
+    if match := _JOINT_NAMED.match(text):
+        return Name(match[2], match[1], unit, foreign)
+    if match := _JOINT_PLACED.match(text):
+        return Name(match[1], match[2], unit, foreign)
     for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
-        if found := pattern.match(text):
-            plain = found[stem].replace(" ", "_").replace(".", "_")
-            return Name(plain, found[joint].lstrip("0") or "0", unit, foreign)
+        if match := pattern.match(text):
+            plain = match[stem].replace(" ", "_").replace(".", "_")
+            return Name(plain, match[joint].lstrip("0") or "0", unit, foreign)
     return Name(text, None, unit, foreign)
 
 
@@ -203,15 +203,15 @@ def choose(
     chosen = _pairs(parts, joints)
     if not set(needed) <= chosen.keys():
         states = {**parts, **_of_states(parts)}
-        found = _pairs(states, joints)
-        if set(needed) <= found.keys():
-            chosen, parts = found, states
+        pairs = _pairs(states, joints)
+        if set(needed) <= pairs.keys():
+            chosen, parts = pairs, states
     if not set(needed) <= chosen.keys():
         worded = _worded(parts)
-        found = _pairs({**parts, **worded}, joints)
-        own = _named_joints(found, {**parts, **worded})
+        pairs = _pairs({**parts, **worded}, joints)
+        own = _named_joints(pairs, {**parts, **worded})
         if joints or (own and along_the_arm(own)[1] == "names"):
-            chosen, parts = found, {**parts, **worded}
+            chosen, parts = pairs, {**parts, **worded}
         if joints and needed[0] not in {*chosen, *named}:
             names = [
                 name.own
@@ -284,13 +284,13 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
 def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
     """Columns of the two given joints, else of the only two, ordered by name from the base."""
     if joints:
-        found = [
+        keys_of = [
             [key for key in by_joint if _called(joint) & {key, key.rpartition("/")[2]}]
             for joint in joints
         ]
         return (
-            (by_joint[found[0][0]], by_joint[found[1][0]])
-            if all(len(keys) == 1 for keys in found)
+            (by_joint[keys_of[0][0]], by_joint[keys_of[1][0]])
+            if all(len(keys) == 1 for keys in keys_of)
             else None
         )
     if len(by_joint) != 2:
@@ -330,7 +330,7 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
 
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:
     """Parts of columns named by a joint and a stem: ``shoulder_pos``, ``torque elbow``."""
-    found = {}
+    by_words = {}
     for column, name in parts.items():
         if name.joint is not None or name.stem in _STEMS:
             continue
@@ -344,23 +344,23 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
             if joint != text:
                 words = [word for word in joint.split("_") if word not in ("joint", "axis")]
                 if words and _NO_JOINTS.isdisjoint(words):
-                    found[column] = replace(name, stem=stem, joint="_".join(words))
+                    by_words[column] = replace(name, stem=stem, joint="_".join(words))
                 break
-    return found
+    return by_words
 
 
 def _of_states(parts: dict[str, Name]) -> dict[str, Name]:
     """Parts of columns of state structures: ``state.q[0]`` (libfranka), ``motor_state[0].q``."""
-    found = {}
+    states = {}
     for column, name in parts.items():
         text = column.strip().lower()
         if len(text) > LIMITS.name_letters:
             continue
         if one := _STATE_OF_JOINT.match(text):
-            found[column] = replace(name, stem=one[2], joint=one[1])
+            states[column] = replace(name, stem=one[2], joint=one[1])
         elif one := _STATE_OF_ALL.match(text):
-            found[column] = replace(name, stem=one[1], joint=one[2])
-    return found
+            states[column] = replace(name, stem=one[1], joint=one[2])
+    return states
 
 
 def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, str] | None:
@@ -383,14 +383,14 @@ def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, 
 def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
     """The torque of the joint with the angle, or the only torque; the other joint has none."""
     for stem in STEMS["tau"]:
-        found = [column for column, name in parts.items() if name.stem == stem]
+        torques = [column for column, name in parts.items() if name.stem == stem]
         own = [
             column
-            for column in found
+            for column in torques
             if angle in parts and parts[column].joint == parts[angle].joint
         ]
-        if len(own or found) == 1:
-            return (own or found)[0]
+        if len(own or torques) == 1:
+            return (own or torques)[0]
     return None
 
 

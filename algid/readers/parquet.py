@@ -103,16 +103,18 @@ def _of_any_cells(path: Path, profile: Profile) -> TableReader:
     with _readable(path):
         metadata = pq.read_metadata(path)
         companion = _companion(path, metadata)
-        found = cells(schema, width)
+        cells_by_name = cells(schema, width)
         rows = counted_rows(path)
-    roots = {name: cell.meta.root_names()[0] for name, (cell, _) in found.items()}
+    roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
     try:
         units = units_of_schema(metadata.schema.to_arrow_schema(), roots)
     except (pa.ArrowException, OSError, ValueError):  # types that polars reads and pyarrow does not
         units = {}
-    columns = _assigned(path, list(found), profile, units, companion)
-    columns = of_numbers(str(path), columns, {name: kind for name, (_, kind) in found.items()})
-    groups = _Groups(path, found, roots, companion.sums)
+    columns = _assigned(path, list(cells_by_name), profile, units, companion)
+    columns = of_numbers(
+        str(path), columns, {name: kind for name, (_, kind) in cells_by_name.items()}
+    )
+    groups = _Groups(path, cells_by_name, roots, companion.sums)
     return flat_reader(str(path), "parquet", columns, groups.frames, profile, rows, companion)
 
 
@@ -204,7 +206,7 @@ def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, st
 
     `roots` are the fields that the names belong to.
     """
-    found = in_metadata(_decoded(schema.metadata), list(roots))
+    units = in_metadata(_decoded(schema.metadata), list(roots))
     times = Counter(schema.names)
     for name, root in roots.items():
         own = _decoded(schema.field(root).metadata) if times[root] == 1 else {}
@@ -212,8 +214,8 @@ def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, st
             (value for key, value in own.items() if key.lower() in ("unit", "units")), ""
         ).strip()
         if unit.lower() not in _NO_UNIT:
-            found[name] = unit[: LIMITS.unit_letters]
-    return found
+            units[name] = unit[: LIMITS.unit_letters]
+    return units
 
 
 def _decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
@@ -357,12 +359,12 @@ def _of_batch(columns: Columns, batch: pa.RecordBatch) -> WholeRows:
     if any(column.null_count for column in batch.columns):
         cut_off = not all(column[-1].is_valid for column in batch.columns)
         batch = batch.drop_null()
-    found = {}
+    arrays = {}
     for name, source in columns.sources.items():
         values = batch.column(source).to_numpy()
         whole = name == "t" and np.issubdtype(values.dtype, np.integer)
-        found[name] = values.astype(np.int64 if whole else np.float64, copy=False)
-    return WholeRows(found, read - batch.num_rows, cut_off)
+        arrays[name] = values.astype(np.int64 if whole else np.float64, copy=False)
+    return WholeRows(arrays, read - batch.num_rows, cut_off)
 
 
 def _check_pages(

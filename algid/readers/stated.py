@@ -48,7 +48,7 @@ def in_text(lines: Iterable[str], columns: Sequence[str]) -> dict[str, str]:
 
 
 def _in_text(lines: Iterable[str], columns: _Named) -> dict[str, str]:
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     statements = 0
     for line in islice(lines, LIMITS.stated_lines):
         text = " ".join(line[: LIMITS.stated_letters].split())
@@ -58,24 +58,24 @@ def _in_text(lines: Iterable[str], columns: _Named) -> dict[str, str]:
         ):
             statements += 1
             if statements > LIMITS.unit_statements:
-                return found
+                return units
             for column in stated:
-                found.setdefault(column, unit)
-    return found
+                units.setdefault(column, unit)
+    return units
 
 
 def in_metadata(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, str]:
     """Units by column in schema metadata: ``units`` (JSON, text), ``tau1.unit``, ``unit:tau1``."""
     named = _Named(columns)
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for key, value in islice(metadata.items(), LIMITS.metadata_keys):
         if key.lower() in ("unit", "units"):
-            found |= _of_units_key(value, named)
+            units |= _of_units_key(value, named)
             continue
         one = re.fullmatch(r"(?:units?[.:_ /](.+)|(.+)[.:_ /]units?)", key, re.IGNORECASE)
         if one and _is_unit(value):
-            found |= dict.fromkeys(named.of(one[1] or one[2]), value.strip())
-    return found
+            units |= dict.fromkeys(named.of(one[1] or one[2]), value.strip())
+    return units
 
 
 def _of_units_key(value: str, columns: _Named) -> dict[str, str]:
@@ -101,10 +101,10 @@ def _statements(line: str, columns: _Named) -> Stated:
 
     Of several names before one unit those that can have it: ``t, q1, tau1 in mNm``.
     """
-    for found in _STATEMENT.finditer(line):
-        unit = found["unit"].rstrip(".")
+    for match in _STATEMENT.finditer(line):
+        unit = match["unit"].rstrip(".")
         if _is_unit(unit):
-            *others, last = re.split(r" ?(?:,|&|\band\b) ?", found["names"])
+            *others, last = re.split(r" ?(?:,|&|\band\b) ?", match["names"])
             yield columns.of(last), unit
             for name in others:
                 yield (

@@ -228,12 +228,12 @@ def whole_topic(
     LogError
         As `in_order`, and if there is no sample.
     """
-    found = [table for table in in_order(path, tables) if len(table)]
-    if not found:
+    filled = [table for table in in_order(path, tables) if len(table)]
+    if not filled:
         channel = next(iter(channels))
         other = Remedy({f"{channel}.topic": None, f"{channel}.source": None}, "name another")
         raise LogError(f"{path}: topic {topic!r} holds no sample of {channel}; {other}")
-    return Series(topic, stack(found))
+    return Series(topic, stack(filled))
 
 
 def aligned(
@@ -266,8 +266,8 @@ def aligned(
             between[other.topic] |= not other.holds(kept.stamp_ns)
         for other in beside:
             known = other.covers(kept.stamp_ns)
-            found = other.at(kept.stamp_ns)
-            columns |= {name: np.where(known, values, np.nan) for name, values in found.items()}
+            at_stamps = other.at(kept.stamp_ns)
+            columns |= {name: np.where(known, values, np.nan) for name, values in at_stamps.items()}
         held = SampleTable(kept.stamp_ns, columns, kept.notices)
     said = [
         Notice(

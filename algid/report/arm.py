@@ -104,7 +104,7 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
 
     Without gravity only that of joint 2 is known.
     """
-    value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
+    value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
     if not set(value) & set(SINES):
         return 0.0, None
     first, second, fourth = moments_of(value)
@@ -115,8 +115,8 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
 
 def _length(result: Result, name: str) -> float | None:
     """A link's length in m: estimated with the payload, or given."""
-    found = result.payload.get(name)
-    value = found.estimate if found is not None else result.settings.get(name)
+    estimate = result.payload.get(name)
+    value = estimate.estimate if estimate is not None else result.settings.get(name)
     return float(value) if isinstance(value, int | float) and value > 0 else None
 
 
@@ -125,7 +125,7 @@ def _coupling_length(result: Result) -> float | None:
 
     None where gravity does not act or the constants are no arm's.
     """
-    value = {name: found.estimate or 0.0 for name, found in result.parameters.items()}
+    value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
     gravity = result.settings.get("gravity")
     l1 = length_by_coupling(value, gravity) if isinstance(gravity, int | float) else None
     return l1 if l1 is not None and l1 > 0 else None

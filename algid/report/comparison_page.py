@@ -127,14 +127,14 @@ def _in_sigmas(found: Estimate | None, first: Estimate, sigma: float) -> tuple[f
 
 def _sigmas(results: Sequence[Result], names: Sequence[str]) -> dict[str, float]:
     """Each row's largest standard deviation, of the parameters that the first result has."""
-    found = {}
+    by_parameter = {}
     for name in names:
         first = results[0].estimates.get(name)
         every = [result.estimates.get(name) for result in results]
         stds = [one.std for one in every if one is not None and one.std]
         if first is not None and first.estimate is not None and stds:
-            found[name] = max(stds)
-    return found
+            by_parameter[name] = max(stds)
+    return by_parameter
 
 
 def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:

@@ -61,7 +61,9 @@ def forest(
     truth : what a synthetic log was made with, by name: drawn as a ring
     logs : each log's own estimates by name: drawn as dots
     """
-    shares = {name: share for name, found in group.items() if (share := _share(found)) is not None}
+    shares = {
+        name: share for name, estimate in group.items() if (share := _share(estimate)) is not None
+    }
     limit = _limit(list(shares.values()))
     rows = {
         name: _row(

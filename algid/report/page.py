@@ -186,12 +186,12 @@ def _own(result: Result) -> dict[str, list[float]]:
 
     a loaded one's hold its payload's share.
     """
-    found = [] if result.fit is None else result.fit.by_log
-    if len(found) != len(
+    estimates = [] if result.fit is None else result.fit.by_log
+    if len(estimates) != len(
         result.logs
     ):  # a log too short to be fitted has none, and which it is nobody tells
         return {}
-    own = [one for one, log in zip(found, result.logs, strict=True) if log.role == "unloaded"]
+    own = [one for one, log in zip(estimates, result.logs, strict=True) if log.role == "unloaded"]
     values = {
         name: [value for one in own if name in one and (value := one[name].estimate) is not None]
         for name in result.parameters

@@ -60,15 +60,15 @@ def moments(result: Result) -> dict[str, Moment]:
     """
     model = None if result.fit is None else result.fit.model
     shrunk = () if model is None else model.shrunk
-    found = {}
+    by_name = {}
     for sine, name in SINES.items():
         both = [result.parameters.get(one) for one in (name, sine)]
         if None in both or sine in shrunk:
             continue
         moment = _moment(result, name, sine, *both)  # type: ignore[arg-type]
         if moment is not None:
-            found[name] = moment
-    return found
+            by_name[name] = moment
+    return by_name
 
 
 def _moment(

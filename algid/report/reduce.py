@@ -105,10 +105,10 @@ def table_of(
 
     _check_columns(path, names, numbers=numbers)
     with _reading(path):
-        found: dict[str, list[Any]] = pyarrow.parquet.read_table(
+        columns: dict[str, list[Any]] = pyarrow.parquet.read_table(
             path, columns=list(names)
         ).to_pydict()
-        return found
+        return columns
 
 
 def _check_columns(path: Path, names: Sequence[str], *, numbers: Collection[str]) -> None:
@@ -137,8 +137,8 @@ def metadata_of(path: Path, key: bytes) -> bytes | None:
     import pyarrow.parquet
 
     with _reading(path):
-        found: bytes | None = (pyarrow.parquet.read_schema(path).metadata or {}).get(key)
-        return found
+        value: bytes | None = (pyarrow.parquet.read_schema(path).metadata or {}).get(key)
+        return value
 
 
 def row_count(path: Path) -> int:

@@ -206,18 +206,18 @@ def used_settings(result: Result) -> Table:
 
 def _found(result: Result) -> dict[str, str]:
     """The settings that the logs decided: estimator, terms of the torque, delay."""
-    found = {"estimator": result.estimator}
+    values = {"estimator": result.estimator}
     if settles(result.estimator):
-        found["model"] = "plain"
+        values["model"] = "plain"
     model = None if result.fit is None else result.fit.model
     delay = result.delay
     if model is not None:
         terms = [*model.terms, *(DELAYS if delay is not None else ())]
         shape = f" (Coulomb friction over {significant(model.coulomb_speed, 2)} rad/s)"
-        found["model"] = (", ".join(terms) or "plain") + (shape if "coulomb" in terms else "")
+        values["model"] = (", ".join(terms) or "plain") + (shape if "coulomb" in terms else "")
     if delay is not None and delay.estimate is not None:
-        found["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
-    return found
+        values["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
+    return values
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -336,7 +336,7 @@ def estimate_tables(result: Result) -> tuple[Table, ...]:
         Table(
             title,
             ESTIMATE_COLUMNS,
-            tuple(_estimate_row(name, found, result) for name, found in group.items()),
+            tuple(_estimate_row(name, one, result) for name, one in group.items()),
         )
         for title, group in groups.items()
     ]
@@ -446,19 +446,21 @@ def _prediction(fit: FitSummary | None) -> Table:
         (
             where,
             str(joint + 1),
-            significant(found.rmse[joint], 3),
-            significant(100 * found.nrmse[joint], 3),
-            f"{found.r2[joint]:.5f}",
+            significant(prediction.rmse[joint], 3),
+            significant(100 * prediction.nrmse[joint], 3),
+            f"{prediction.r2[joint]:.5f}",
         )
-        for where, found in pairs
-        if found is not None
+        for where, prediction in pairs
+        if prediction is not None
         for joint in range(2)
     )
-    filters = dict.fromkeys(visible(found.filter) for _, found in pairs if found is not None)
+    filters = dict.fromkeys(
+        visible(prediction.filter) for _, prediction in pairs if prediction is not None
+    )
     states = [
         f"{where}: {text}"
-        for where, found in pairs
-        if found is not None and (text := by_state(found))
+        for where, prediction in pairs
+        if prediction is not None and (text := by_state(prediction))
     ]
     note = " ".join([f"Filter: {'; '.join(filters)}.", *(f"RMSE of {one}." for one in states)])
     return Table("Torque prediction", PREDICTION_COLUMNS, rows, note)

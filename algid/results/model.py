@@ -384,15 +384,15 @@ class Result(_Model):
         """The estimates as a polars frame: parameter, estimate, std, low, high, unit, status."""
         import polars as pl
 
-        ends = [found.ci95 or (None, None) for found in self.estimates.values()]
+        ends = [one.ci95 or (None, None) for one in self.estimates.values()]
         columns = {
             "parameter": list(self.estimates),
-            "estimate": [found.estimate for found in self.estimates.values()],
-            "std": [found.std for found in self.estimates.values()],
+            "estimate": [one.estimate for one in self.estimates.values()],
+            "std": [one.std for one in self.estimates.values()],
             "low": [low for low, _ in ends],
             "high": [high for _, high in ends],
-            "unit": [found.unit for found in self.estimates.values()],
-            "status": [found.status.value for found in self.estimates.values()],
+            "unit": [one.unit for one in self.estimates.values()],
+            "status": [one.status.value for one in self.estimates.values()],
         }
         numbers = dict.fromkeys(("estimate", "std", "low", "high"), pl.Float64)
         return pl.DataFrame(columns, schema_overrides=numbers)
@@ -440,14 +440,14 @@ class Result(_Model):
         return f" and {len(self.more_logs)} more" if self.more_logs else ""
 
     def _rows(self) -> Iterator[tuple[str, str, str, str, str]]:
-        for name, found in self.estimates.items():
-            value = "-" if found.estimate is None else f"{found.estimate:.6g}"
+        for name, one in self.estimates.items():
+            value = "-" if one.estimate is None else f"{one.estimate:.6g}"
             yield (
                 name,
                 value,
-                "-" if found.std is None else f"{found.std:.2g}",
-                found.unit,
-                found.status.value,
+                "-" if one.std is None else f"{one.std:.2g}",
+                one.unit,
+                one.status.value,
             )
 
 
@@ -503,12 +503,12 @@ def read_result(path: str | Path) -> Result:
         raise ResultError(
             f"{file}: not JSON ({error}); expected a result of algid identify"
         ) from error
-    found = content.get("schema_version") if isinstance(content, dict) else None
-    if found not in READABLE:
+    version = content.get("schema_version") if isinstance(content, dict) else None
+    if version not in READABLE:
         known = " or ".join(map(str, READABLE))
         raise ResultError(
-            f"{file}: schema_version: expected {known}, found {found!r}; identify again with this "
-            "version"
+            f"{file}: schema_version: expected {known}, found {version!r}; identify again with "
+            "this version"
         )
     wrong = misfit_of_numbers(content)
     if wrong is not None:

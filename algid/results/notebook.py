@@ -31,7 +31,7 @@ def html_of(result: Result, title: str) -> str:
     reasons = "".join(f"<li>{_text(one.text)}</li>" for one in judged.reasons[:MOST_REASONS])
     verdict = f"<p><strong>{judged.word}</strong>: {_text(judged.headline)}.</p><ul>{reasons}</ul>"
     head = "".join(f"<th>{cell}</th>" for cell in _HEADING)
-    body = "".join(_row(name, found) for name, found in result.estimates.items())
+    body = "".join(_row(name, estimate) for name, estimate in result.estimates.items())
     caption = f"<caption>{html.escape(title)}</caption>"
     return f"{verdict}<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 

@@ -90,13 +90,13 @@ class LuenbergerObserver:
         """
         if self._rest is None:
             self._rest = theta[:, 0].copy()
-        found = np.empty_like(theta)
+        omega = np.empty_like(theta)
         for joint, (numerator, denominator) in enumerate(self._filters):
             moved = theta[joint] - self._rest[joint]
-            found[joint], self._states[joint] = recursion(
+            omega[joint], self._states[joint] = recursion(
                 numerator, denominator, moved, self._states[joint]
             )
-        return found
+        return omega
 
 
 def _differentiator(

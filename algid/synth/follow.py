@@ -70,9 +70,9 @@ def read_plan(path: Path) -> Reference:
         ) from error
     missing = next((name for name in COLUMNS if name not in names), None)
     if missing is not None or values.ndim != 2 or values.shape[1] < 2:
-        found = f"no column {missing}" if missing is not None else "no motion"
+        problem = f"no column {missing}" if missing is not None else "no motion"
         raise SettingError(
-            f"{file}: expected {', '.join(COLUMNS)}, found {found}; give what algid design wrote"
+            f"{file}: expected {', '.join(COLUMNS)}, found {problem}; give what algid design wrote"
         )
     column = dict(zip(names, values, strict=True))
     pairs = {

@@ -182,7 +182,7 @@ def cells_of(
 
     They are linearised `settle` times more at the trajectory found.
     """
-    c, found = arm.k + mass * arm.unit, []
+    c, cells = arm.k + mass * arm.unit, []
     for piece in pieces(segments, _PIECE_SAMPLES):
         if len(piece) < 3 * POINTS:
             continue
@@ -193,8 +193,8 @@ def cells_of(
             multiplier = linear.solve_transposed(linear.columns[-1:])[0]
             theta = trajectory(piece, linear, multiplier, arm.noise)
             linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
-        found.append(_sums(linear, piece, stencil, arm, mass))
-    return found
+        cells.append(_sums(linear, piece, stencil, arm, mass))
+    return cells
 
 
 def _sums(
@@ -281,10 +281,10 @@ def _by_constants(result: Result, given: float | None) -> tuple[float, dict[str,
     """
     if given is not None or result.settings.get("l1") is not None:
         return None
-    found = by_constants(result)
-    if found is None or found[0] <= 0 or payload_length(result) is not None:
+    length = by_constants(result)
+    if length is None or length[0] <= 0 or payload_length(result) is not None:
         return None
-    return found
+    return length
 
 
 def _with_first_length(
@@ -347,9 +347,9 @@ def _length(result: Result, name: str, given: float | None) -> float:
         result.settings.get(name),
         result.payload[name].estimate if name in result.payload else None,
     ]
-    found = next((value for value in known if value is not None), None)
-    if found is None:
+    length = next((value for value in known if value is not None), None)
+    if length is None:
         raise ResultError(
             f"{result.log.path}: its result has no {name}; give the link's length with --{name}"
         )
-    return float(found)
+    return float(length)

@@ -147,7 +147,7 @@ def excess(
         nor are those of the few moments at which a joint turns back.
     """
     typical, spread = (_median, _SPREAD) if robust else (np.mean, _MEAN_SPREAD)
-    found = 1.0
+    factor = 1.0
     for span in spans:
         starts = np.concatenate([np.arange(a, b - span + 1, span) for a, b in parts])
         part = np.repeat(np.arange(len(parts)), [max(0, (b - a) // span) for a, b in parts])
@@ -165,8 +165,8 @@ def excess(
         squares = np.diff(score / information)[neighbours] ** 2 / white[neighbours]
         ratio = float(typical(squares))
         if ratio > 1 + _SURE * spread / np.sqrt(squares.size):
-            found = max(found, ratio)
-    return found
+            factor = max(factor, ratio)
+    return factor
 
 
 def _median(squares: FloatArray) -> float:
@@ -210,10 +210,10 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
         rows = np.argmin(value, axis=0)
         best[ends], last[ends] = value[rows, np.arange(ends.size)] + penalty, starts.place[rows]
         starts.prune(int(rows[-1]))
-    found = [int(last[-1])]
-    while found[-1] > 0:
-        found.append(int(last[found[-1]]))
-    return found[-2::-1]
+    places = [int(last[-1])]
+    while places[-1] > 0:
+        places.append(int(last[places[-1]]))
+    return places[-2::-1]
 
 
 class Starts:

@@ -146,10 +146,10 @@ def knots_of(cells: Cells) -> FloatArray:
 
 def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
     """Values (C, ...) at times `t` (C,) by linear interpolation of (H, ...) at the knots (H,)."""
-    found = np.zeros((t.size, *values.shape[1:]))
+    values_at = np.zeros((t.size, *values.shape[1:]))
     for knot, own, hat in hats(knots, t):
-        found[own] += hat.reshape(-1, *[1] * (values.ndim - 1)) * values[knot]
-    return found
+        values_at[own] += hat.reshape(-1, *[1] * (values.ndim - 1)) * values[knot]
+    return values_at
 
 
 def hats(knots: FloatArray, t: FloatArray) -> Iterator[tuple[int, NDArray[np.int64], FloatArray]]:

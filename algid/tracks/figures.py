@@ -41,14 +41,14 @@ def figures(result: TrackResult) -> list[Figure]:
 
 
 def _payload(result: TrackResult) -> Figure:
-    found = result.track
+    track = result.track
     hover = "m_p %{y:.5g} kg at %{x:.3f} s<extra></extra>"
     traces = [
-        *_band(found),
-        line(*_curve(found, found.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover),
+        *_band(track),
+        line(*_curve(track, track.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover),
     ]
-    ends = np.array([end for one in found.stretches for end in (one.start, one.end)])
-    masses = np.repeat([one.m_p for one in found.stretches], 2)
+    ends = np.array([end for one in track.stretches for end in (one.start, one.end)])
+    masses = np.repeat([one.m_p for one in track.stretches], 2)
     traces.append(_steps(ends, masses, "@green", "stretch", "solid", 2.6))
     legend = [
         Legend("curve", f"m_p(t) from ± {HALF_BAND:g} s around, within its stretch", "@blue"),
@@ -58,19 +58,19 @@ def _payload(result: TrackResult) -> Figure:
     if result.schedule is not None:
         traces.append(_steps(*_true_steps(result), "@ink", "truth", "dash", 1.3))
         legend.append(Legend("truth", "true schedule", "@ink", "dash"))
-    if 0 < len(found.changes) <= MOST_MARKS:
+    if 0 < len(track.changes) <= MOST_MARKS:
         legend.append(Legend("", "95 % interval of a change's time", "@orange/0.2", "area"))
     layout = {
-        "xaxis": axis("time, s", range=_span(found)),
+        "xaxis": axis("time, s", range=_span(track)),
         "yaxis": axis("payload, kg", range=_view(result)),
-        "shapes": _marks(found),
+        "shapes": _marks(track),
         "hovermode": "closest",
     }
     reading = (
         "Read: blue should run level, green within its band; orange is where it may step. "
         "A band that opens wide tells that the arm moved too little; double-click shows all of it."
     )
-    words = joined([mass_text(one) for one in found.stretches[:6]])
+    words = joined([mass_text(one) for one in track.stretches[:6]])
     panel = Panel(
         traces, layout, f"Payload over time; stretches of {words} kg", height=380, sync=SYNC
     )
@@ -78,13 +78,13 @@ def _payload(result: TrackResult) -> Figure:
 
 
 def _left(result: TrackResult) -> Figure:
-    found = result.track
+    track = result.track
     hover = "%{y:.3g} times the noise at %{x:.3f} s<extra></extra>"
-    trace = line(*_curve(found, found.left), "@orange", "residual", "left", width=1.0, hover=hover)
+    trace = line(*_curve(track, track.left), "@orange", "residual", "left", width=1.0, hover=hover)
     layout = {
-        "xaxis": axis("time, s", range=_span(found)),
+        "xaxis": axis("time, s", range=_span(track)),
         "yaxis": axis("residual / noise", rangemode="tozero"),
-        "shapes": [*_marks(found), level(1.0, "@ink", "dash", 1.2)],
+        "shapes": [*_marks(track), level(1.0, "@ink", "dash", 1.2)],
         "hovermode": "closest",
     }
     reading = (
@@ -92,7 +92,7 @@ def _left(result: TrackResult) -> Figure:
         "neither arm nor "
         "payload explains. Times at which the payload may be changing are left out."
     )
-    middle = float(np.median(found.left))
+    middle = float(np.median(track.left))
     panel = Panel(
         [trace],
         layout,
@@ -113,13 +113,13 @@ def _span(found: Track) -> list[float]:
 
 def _view(result: TrackResult) -> list[float]:
     """Masses, their intervals and the truth; m_p(t) where it is as certain as usual."""
-    found = result.track
-    certain = found.std <= 3 * np.median(found.std)
-    ends = [end for one in found.stretches for end in one.ci95]
-    band = NORMAL * found.std[certain]
+    track = result.track
+    certain = track.std <= 3 * np.median(track.std)
+    ends = [end for one in track.stretches for end in one.ci95]
+    band = NORMAL * track.std[certain]
     # percentiles: a jolt's spike may leave the frame
-    ends += np.percentile(found.m_p[certain] - band, [1]).tolist()
-    ends += np.percentile(found.m_p[certain] + band, [99]).tolist()
+    ends += np.percentile(track.m_p[certain] - band, [1]).tolist()
+    ends += np.percentile(track.m_p[certain] + band, [99]).tolist()
     ends += [mass for _, mass in result.schedule or ()]
     low, high = min(ends), max(ends)
     space = SPACE * (high - low) or 0.05

@@ -98,16 +98,16 @@ def _write_curve(result: TrackResult, path: Path) -> None:
     import polars as pl
     import pyarrow.parquet as pq
 
-    found = result.track
-    number = found.stretch.astype(np.int64)
-    masses = np.array([(s.m_p, *s.ci95) for s in found.stretches])[number].T
+    track = result.track
+    number = track.stretch.astype(np.int64)
+    masses = np.array([(s.m_p, *s.ci95) for s in track.stretches])[number].T
     curve = pl.DataFrame(
         {
-            "t": found.t,
-            "m_p": found.m_p,
-            "low": found.m_p - NORMAL * found.std,
-            "high": found.m_p + NORMAL * found.std,
-            "left": found.left,
+            "t": track.t,
+            "m_p": track.m_p,
+            "low": track.m_p - NORMAL * track.std,
+            "high": track.m_p + NORMAL * track.std,
+            "left": track.left,
             "stretch": number,
             **dict(zip(("stretch_m_p", "stretch_low", "stretch_high"), masses, strict=True)),
         }

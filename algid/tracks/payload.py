@@ -112,15 +112,15 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise TooShortError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
-    found = edges(cells)
+    segments = edges(cells)
     for _ in range(ROUNDS):
-        rough = [cells.part(*ends) for ends in pairwise(found.places)]
-        cells = joined(_settled(source, arm, rough, _masses(rough, found.drift)))
-        found = edges(cells)
-    changes = _changes(source, arm, cells, found)
+        rough = [cells.part(*ends) for ends in pairwise(segments.places)]
+        cells = joined(_settled(source, arm, rough, _masses(rough, segments.drift)))
+        segments = edges(cells)
+    changes = _changes(source, arm, cells, segments)
     inner = _inner_parts(cells, changes)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
-    settled = _settled(source, arm, inner, _masses(inner, found.drift))
+    settled = _settled(source, arm, inner, _masses(inner, segments.drift))
     return _weigh(cells, changes, settled, arm, covariance)
 
 
@@ -202,11 +202,11 @@ def _settled(
     source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], masses: Sequence[float]
 ) -> list[Cells]:
     """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
-    found = list(rough)
+    settled = list(rough)
     for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
         if cells := cells_of((segment for _, segment in own), arm, masses[place]):
-            found[place] = joined(cells)
-    return found
+            settled[place] = joined(cells)
+    return settled
 
 
 def _by_stretch(

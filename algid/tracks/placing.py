@@ -146,10 +146,10 @@ def _linearised(
     coefficients = [arm.k + mass * arm.unit for mass in masses]
 
     def each(function: Callable[[Model, FloatArray, Motion], FloatArray]) -> FloatArray:
-        found = function(arm.model, coefficients[0], motion)
+        columns = function(arm.model, coefficients[0], motion)
         for place, c in enumerate(coefficients[1:], start=1):
-            found[..., which == place] = function(arm.model, c, motion)[..., which == place]
-        return found
+            columns[..., which == place] = function(arm.model, c, motion)[..., which == place]
+        return columns
 
     J, modelled = each(sensitivity), each(torque)
     if arm.model.lag_name is not None:
@@ -327,7 +327,7 @@ def _merged(log: _Log, changes: Changes, penalty: float, variance: float) -> Cha
         for at, (one, other) in enumerate(pairwise(changes.places))
         if other.time - one.time < CLOSE
     ]
-    found: dict[tuple[int, int], Place] = {}
+    places: dict[tuple[int, int], Place] = {}
     for (first, last), rows in log.rows(changes, close):
         left, right = (changes.places[at].time for at in (first, last))
         low = max(left - MARGIN, float(rows.t[0]) + MARGIN)
@@ -336,9 +336,9 @@ def _merged(log: _Log, changes: Changes, penalty: float, variance: float) -> Cha
             one = place(rows, low, high, variance)
             both = explained(rows, np.array([left, right]))
             if both - explained(rows, np.array([one.time])) < penalty:
-                found[first, last] = one
+                places[first, last] = one
     following = len(changes.places)
-    for (first, last), one in sorted(found.items(), reverse=True):
+    for (first, last), one in sorted(places.items(), reverse=True):
         if last < following:  # of pairs that share a change, the later one
             changes, following = changes.one_for(first, last, one), first
     return changes

@@ -43,7 +43,7 @@ def read_track(folder: Path) -> TrackResult:
         wrong = misfit_of_numbers(content)
         if wrong is not None:
             raise ResultError(f"{path}: {wrong}; {again}")
-        found = _File.model_validate(content)
+        file = _File.model_validate(content)
     except OSError as error:
         raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
     except ValidationError as error:
@@ -57,10 +57,10 @@ def read_track(folder: Path) -> TrackResult:
     if not curve:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
     columns = {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS}
-    wrong = _misfit_of_curve(columns, len(found.stretches))
+    wrong = _misfit_of_curve(columns, len(file.stretches))
     if wrong is not None:
         raise ResultError(f"{folder / CURVE}: {wrong}; {again}")
-    return _result(found, columns)
+    return _result(file, columns)
 
 
 def _misfit_of_curve(curve: Block, stretches: int) -> str | None:

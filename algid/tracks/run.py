@@ -68,7 +68,7 @@ def track_log(
     arm, covariance = arm_of(result, first, l1, l2)
     try:
         with one_blas_thread():
-            found = track(partial(survey.segments, source), arm, covariance)
+            weighed = track(partial(survey.segments, source), arm, covariance)
     except TooShortError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
     otherwise = read_otherwise([survey.summary(source)], result, _called(parameters))
@@ -78,7 +78,7 @@ def track_log(
         "ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline}
     )
     return TrackResult(
-        track=found,
+        track=weighed,
         log=survey.summary(source),
         arm=_called(parameters),
         arm_sha256=hashlib.sha256(content).hexdigest(),

@@ -223,7 +223,7 @@ def _failure(result: TrackResult) -> str | None:
 def _reasons(result: TrackResult) -> Iterator[Notice]:
     for status, code in STATUS_CODES.items():
         numbers = [
-            str(place) for place, found in enumerate(result.statuses, start=1) if found is status
+            str(place) for place, given in enumerate(result.statuses, start=1) if given is status
         ]
         if numbers:
             yield Notice(code, numbers={"numbers": numbers})

@@ -20,13 +20,13 @@ def as_blocks(log: Log | Iterable[Log]) -> Iterator[Log]:
 
 def columns(block: Log) -> dict[str, NDArray[Any]]:
     """Columns (N,) by canonical name, ``t`` in s first and ``stamp_ns`` last."""
-    found: dict[str, NDArray[Any]] = {"t": seconds(block)}
+    by_name: dict[str, NDArray[Any]] = {"t": seconds(block)}
     pairs = [("theta", block.theta), ("tau", block.tau)]
     pairs += [("omega", block.omega)] if block.omega is not None else []
     pairs += [("q_des", block.reference)] if block.reference is not None else []
     for name, (first, second) in pairs:
-        found |= {f"{name}1": first, f"{name}2": second}
-    return found | {"stamp_ns": block.stamp_ns}
+        by_name |= {f"{name}1": first, f"{name}2": second}
+    return by_name | {"stamp_ns": block.stamp_ns}
 
 
 def seconds(block: Log) -> NDArray[Any]:

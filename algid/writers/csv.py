@@ -32,11 +32,11 @@ def write(
             for block in as_blocks(log):
                 first = stamped is None
                 stamped = not exact_in_seconds(block.stamp_ns) if stamped is None else stamped
-                found = columns(block)
+                by_name = columns(block)
                 if not stamped:
-                    del found["stamp_ns"]
-                summed(sums, found)
-                pl.DataFrame(found).write_csv(stream, include_header=first)
+                    del by_name["stamp_ns"]
+                summed(sums, by_name)
+                pl.DataFrame(by_name).write_csv(stream, include_header=first)
     _beside(path, Companion(truth, sums) if truth is not None else None)
 
 

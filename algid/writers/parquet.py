@@ -29,9 +29,9 @@ def write(
     with whole_file(path, force=force) as temporary:
         try:
             for block in as_blocks(log):
-                found = columns(block)
-                summed(sums, found)
-                table = pa.table(found)
+                by_name = columns(block)
+                summed(sums, by_name)
+                table = pa.table(by_name)
                 # floats of a measured signal hardly ever repeat: a dictionary would only cost time
                 writer = writer or pq.ParquetWriter(
                     temporary,

@@ -34,8 +34,8 @@ def bag_files(folder: Path) -> Bag:
     if metadata.is_file():
         names = _listed(metadata)
     else:  # the files themselves, by the numbers that end their names
-        found = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
-        numbers = [(re.search(r"_(\d+)$", path.stem), path.name) for path in found]
+        files = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
+        numbers = [(re.search(r"_(\d+)$", path.stem), path.name) for path in files]
         names = [
             name
             for _, name in sorted(

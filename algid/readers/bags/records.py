@@ -72,7 +72,7 @@ def fields_of(header: bytes) -> dict[str, bytes]:
     BagError
         If they do not fill it.
     """
-    found, place = {}, 0
+    fields, place = {}, 0
     while place < len(header):
         if place + 4 > len(header):
             raise BagError("a record's header breaks off")
@@ -80,9 +80,9 @@ def fields_of(header: bytes) -> dict[str, bytes]:
         name, equals, value = header[place + 4 : place + 4 + length].partition(b"=")
         if not equals or place + 4 + length > len(header):
             raise BagError("a record's header breaks off")
-        found[name.decode("utf-8", errors="replace")] = value
+        fields[name.decode("utf-8", errors="replace")] = value
         place += 4 + length
-    return found
+    return fields
 
 
 def connection(fields: dict[str, bytes], data: bytes) -> tuple[int, MessageChannel]:
@@ -285,16 +285,16 @@ def unpacked(packed: bytes, packing: str, size: int, *, torn: bool) -> bytes:
         raise BagError(f"a chunk is packed with {packing[:40]!r}; expected {', '.join(_UNPACKERS)}")
     try:
         if packing == "none":
-            found = packed[:size] if torn else packed
+            octets = packed[:size] if torn else packed
         elif packing == "bz2":
-            found = bz2.BZ2Decompressor().decompress(packed, max_length=size + 1)
+            octets = bz2.BZ2Decompressor().decompress(packed, max_length=size + 1)
         else:
-            found = bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1))
+            octets = bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1))
     except (OSError, EOFError, RuntimeError, ValueError) as error:
         raise BagError(f"a chunk cannot be unpacked ({error})") from error
-    if len(found) != size and not torn:
+    if len(octets) != size and not torn:
         raise BagError(
             f"a chunk of {counted(size, 'byte')} unpacks to "
-            f"{'more' if len(found) > size else len(found)}"
+            f"{'more' if len(octets) > size else len(octets)}"
         )
-    return found
+    return octets

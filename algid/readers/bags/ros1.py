@@ -261,36 +261,36 @@ class _Outline:
 
     def layout(self) -> BagLayout:
         """What was found, once the walk is at its end."""
-        found = self._found
+        summary = self._found
         wrong, lost = self._wrong()
-        if wrong and not found.notices:
+        if wrong and not summary.notices:
             if lost:
                 numbers = {"case": "index", "why": wrong}
-                found.notices.append(Notice("CUT_OFF", numbers=numbers, lossy=True))
+                summary.notices.append(Notice("CUT_OFF", numbers=numbers, lossy=True))
             else:
-                found.notices.append(Notice("DAMAGED_INDEX", numbers={"why": wrong}))
-        found.agreed = found.agreed and not wrong and not found.notices
-        found.span_ns = (min(self._times), max(self._times)) if self._times else None
-        return found
+                summary.notices.append(Notice("DAMAGED_INDEX", numbers={"why": wrong}))
+        summary.agreed = summary.agreed and not wrong and not summary.notices
+        summary.span_ns = (min(self._times), max(self._times)) if self._times else None
+        return summary
 
     def _wrong(self) -> tuple[str, bool]:
         """What the bag tells of itself otherwise than it is, and whether something is missing."""
-        head, found = self._head, self._found
+        head, summary = self._head, self._found
         if head is None or head.number("index_pos", 8) == 0:
             return "it was not closed, so what its recorder still held is lost", True
         own = {
             start: {number: count for number, (_, count) in part.indexes.items() if count}
-            for start, part in zip(self._starts, found.parts, strict=True)
+            for start, part in zip(self._starts, summary.parts, strict=True)
         }
         chunks, connections = head.number("chunk_count"), head.number("conn_count")
-        if chunks != len(found.parts):
+        if chunks != len(summary.parts):
             return (
-                f"it tells of {counted(chunks, 'chunk')} and has {len(found.parts)}",
-                chunks > len(found.parts),
+                f"it tells of {counted(chunks, 'chunk')} and has {len(summary.parts)}",
+                chunks > len(summary.parts),
             )
-        if connections != len(found.channels):
+        if connections != len(summary.channels):
             return (
-                f"it tells of {counted(connections, 'connection')} and has {len(found.channels)}",
+                f"it tells of {counted(connections, 'connection')} and has {len(summary.channels)}",
                 False,
             )
         if self._tail is not None and head.number("index_pos", 8) != self._tail:
@@ -355,7 +355,7 @@ class Ros1Source(Source):
             )
             place = f"(at byte {part.start})"
             try:
-                found, others = self._records(part)
+                records, others = self._records(part)
                 try:
                     self._define(others)
                 except BagError as error:
@@ -365,7 +365,7 @@ class Ros1Source(Source):
             except BagError as error:
                 yield MessageBatch(None, checked=True, reason=f"{error} {place}", lost=promised)
                 continue
-            messages = _of(found, channels)
+            messages = _of(records, channels)
             yield MessageBatch(messages, checked=True)
             if promised > len(messages):
                 reason = (

@@ -134,9 +134,9 @@ def _contents(path: Path, base: sqlite3.Connection) -> Contents:
 
 
 def _check_table(path: Path, base: sqlite3.Connection, table: str, needed: set[str]) -> None:
-    found = base.execute("SELECT type, sql FROM sqlite_master WHERE name = ?", (table,)).fetchone()
-    if found is None or found[0] != "table" or not str(found[1]).upper().startswith("CREATE TABLE"):
-        there = "no such table" if found is None else f"a {found[0]} in its place"
+    row = base.execute("SELECT type, sql FROM sqlite_master WHERE name = ?", (table,)).fetchone()
+    if row is None or row[0] != "table" or not str(row[1]).upper().startswith("CREATE TABLE"):
+        there = "no such table" if row is None else f"a {row[0]} in its place"
         raise LogError(
             f"{path}: expected the table {table!r} of a rosbag2 file, found {there}; record it anew"
         )

@@ -48,8 +48,8 @@ Known = dict[tuple[Path, int, int], Catalogue]
 @contextmanager
 def messages_in(path: Path, known: Known | None = None) -> Iterator[McapSource]:
     """The messages of an opened file: see `opened`."""
-    with opened(path, known) as (file, found):
-        yield McapSource(file, found)
+    with opened(path, known) as (file, index):
+        yield McapSource(file, index)
 
 
 @contextmanager
@@ -62,16 +62,16 @@ def opened(path: Path, known: Known | None = None) -> Iterator[tuple[File, Catal
         If not even the start of the file is MCAP.
     """
     with File(path) as file:
-        found = None if known is None else known.get((path, file.size, file.changed_ns))
-        if found is None:
+        index = None if known is None else known.get((path, file.size, file.changed_ns))
+        if index is None:
             try:
-                found = catalogue(file)
+                index = catalogue(file)
             except DamagedError as error:
                 raise LogError(f"{path}: the MCAP file cannot be read: {error}") from error
         if known is not None:
-            known[path, file.size, file.changed_ns] = found
-            found = found.copy()
-        yield file, found
+            known[path, file.size, file.changed_ns] = index
+            index = index.copy()
+        yield file, index
 
 
 class McapSource(Source):

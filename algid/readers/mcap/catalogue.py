@@ -165,13 +165,13 @@ def catalogue(file: File) -> Catalogue:
         raise DamagedError("the file does not begin as MCAP does")
     notice, damage = Notice("NO_INDEX"), []
     try:
-        found = _from_summary(file)
+        index = _from_summary(file)
     except DamagedError as error:
-        found = None
+        index = None
         damage = [f"its summary: {error}"]
         notice = Notice("DAMAGED_SUMMARY", numbers={"why": str(error)})
-    if found is not None:
-        return found
+    if index is not None:
+        return index
     walked = _walked(file)
     walked.notices.insert(0, notice)
     walked.damage[:0] = damage
@@ -183,34 +183,34 @@ def _from_summary(file: File) -> Catalogue | None:
     from mcap import records
 
     start, content = framing.summary(file)
-    found, statistics, metadata = Catalogue(), None, []
+    index, statistics, metadata = Catalogue(), None, []
     chunks: list[ChunkIndex] = []
     for record in framing.walk_bytes(content, 0, len(content)):
         body = content[record.start : record.end]
         if record.code in (framing.SCHEMA, framing.CHANNEL):
-            found.define(record.code, body)
+            index.define(record.code, body)
         elif record.code == framing.CHUNK_INDEX:
             chunks.append(framing.chunk_index(body))
         elif record.code == framing.STATISTICS:
             statistics = parse(records.Statistics, body)
         elif record.code == framing.METADATA_INDEX:
             metadata.append(parse(records.MetadataIndex, body))
-    if statistics is None or not chunks or not found.channels:
+    if statistics is None or not chunks or not index.channels:
         return None
     chunks.sort(key=lambda one: one.chunk_start_offset)
-    _check_listed(file, chunks, statistics, found.channels, start)
-    found.counts = dict(statistics.channel_message_counts)
-    found.span_ns = (statistics.message_start_time, statistics.message_end_time)
+    _check_listed(file, chunks, statistics, index.channels, start)
+    index.counts = dict(statistics.channel_message_counts)
+    index.span_ns = (statistics.message_start_time, statistics.message_end_time)
     for chunk in chunks:
         channels = frozenset(chunk.message_index_offsets) if chunk.message_index_length else None
         place, length = chunk.chunk_start_offset + 9, chunk.chunk_length - 9
-        found.spans.append(Span(place, length, chunk.message_index_length, channels))
+        index.spans.append(Span(place, length, chunk.message_index_length, channels))
     for one in metadata:
-        if one.name == KEY and KEY not in found.metadata:
+        if one.name == KEY and KEY not in index.metadata:
             _keep_metadata(
-                file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), found
+                file, framing.Record(framing.METADATA, one.offset + 9, one.length - 9), index
             )
-    return found
+    return index
 
 
 def _check_listed(
@@ -304,7 +304,7 @@ def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
 
 def _walked(file: File) -> Catalogue:
     """Everything there is up to the end, or to where the file breaks off."""
-    found, spans = Catalogue(), _Spans()
+    index, spans = Catalogue(), _Spans()
     gaps: list[Gap] = []
     ended = None
     try:
@@ -319,27 +319,27 @@ def _walked(file: File) -> Catalogue:
                 record.code in (framing.SCHEMA, framing.CHANNEL)
                 and record.length <= LIMITS.record_bytes
             ):
-                _define(found, record.code, file.read(record.start, record.length), record.start)
+                _define(index, record.code, file.read(record.start, record.length), record.start)
             elif record.code == framing.METADATA:
-                _keep_metadata(file, record, found)
+                _keep_metadata(file, record, index)
             elif spans.add(record):
                 ended = None  # data behind the end of the data: there was none
     except DamagedError as error:
         gaps.append(Gap(file.size, file.size))
-        found.damage.append(str(error))
-    found.notices += _missing(file, gaps, ended, found)
+        index.damage.append(str(error))
+    index.notices += _missing(file, gaps, ended, index)
     for span in spans.all():
         try:
             records = span.records(file, file.read(span.start, span.length + span.index_length))
         except DamagedError as error:  # reported when it is read
-            found.damage.append(f"{error} (at byte {span.start})")
-            found.spans.append(span)
+            index.damage.append(f"{error} (at byte {span.start})")
+            index.spans.append(span)
             continue
-        found.spans.append(replace(span, channels=records.channels_seen))
+        index.spans.append(replace(span, channels=records.channels_seen))
         for code, body in records.others:
             if code in (framing.SCHEMA, framing.CHANNEL):
-                _define(found, code, body, span.start)
-    return found
+                _define(index, code, body, span.start)
+    return index
 
 
 @dataclass

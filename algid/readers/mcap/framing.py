@@ -339,8 +339,10 @@ def _decompressed(name: bytes, packed: memoryview, size: int, torn: bool) -> byt
 
     try:
         if name == b"lz4":  # this one goes as far as it can anyway
-            found = bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1))
-            return found[:size] if torn else found
+            content = bytes(
+                lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+            )
+            return content[:size] if torn else content
         if torn:
             unpacked = bytearray()
             stream = zstandard.ZstdDecompressor().stream_reader(packed)

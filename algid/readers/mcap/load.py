@@ -37,15 +37,15 @@ def spans_beside(catalogue: Catalogue, channels: frozenset[int]) -> list[Span]:
     """
     own = spans_of(catalogue, channels)
     left = _LOOKED_BESIDE + sum(span.length for span in own) // _SHARE_BESIDE
-    found: list[Span] = []
+    spans: list[Span] = []
     for span in catalogue.spans if own else ():
         if span.channels is None or span.channels & channels:
             continue
         left -= span.length
         if left < 0:
             break
-        found.append(span)
-    return found
+        spans.append(span)
+    return spans
 
 
 def look_beside(file: File, catalogue: Catalogue, channels: frozenset[int]) -> None:
@@ -83,11 +83,11 @@ def batches(file: File, catalogue: Catalogue, channels: frozenset[int]) -> Itera
     waiting: deque[Future[_Loaded]] = deque()
 
     def first() -> Iterator[MessageBatch]:
-        found, left = waiting.popleft().result()
-        yield from found
+        loaded, left = waiting.popleft().result()
+        yield from loaded
         while left:
-            found, left = _load(file, catalogue, left, channels)
-            yield from found
+            loaded, left = _load(file, catalogue, left, channels)
+            yield from loaded
 
     with executor(2) as pool:
         try:
@@ -132,7 +132,7 @@ def _load(
     file: File, catalogue: Catalogue, spans: Sequence[Span], channels: frozenset[int]
 ) -> _Loaded:
     """Batches of spans: a damaged or torn one by itself, those between two of them as one."""
-    found: list[MessageBatch] = []
+    loaded: list[MessageBatch] = []
     sound: list[_Sound] = []
     size, left = 0, spans[len(spans) :]
     for place, span in enumerate(spans):
@@ -141,13 +141,13 @@ def _load(
             break
         one = _opened(file, catalogue, span, channels)
         if isinstance(one, MessageBatch) or one.torn is not None:
-            found += _joined(sound, channels)
-            found += [one] if isinstance(one, MessageBatch) else _joined([one], channels)
+            loaded += _joined(sound, channels)
+            loaded += [one] if isinstance(one, MessageBatch) else _joined([one], channels)
             sound = []
         else:
             sound.append(one)
             size += one.records.content.size
-    return [*found, *_joined(sound, channels)], left
+    return [*loaded, *_joined(sound, channels)], left
 
 
 def _joined(sound: Sequence[_Sound], channels: frozenset[int]) -> list[MessageBatch]:

@@ -105,10 +105,10 @@ def records_in(
     octets = np.frombuffer(content, np.uint8)
     if len(content) < _SMALL:  # sooner walked than compared with its index
         return _walked(octets, content, works)
-    found = _indexed(octets, content, index)
-    if found is None and (same := alike(octets)) is not None:
-        found = Records(octets, same)
-    return found or _walked(octets, content, works)
+    records = _indexed(octets, content, index)
+    if records is None and (same := alike(octets)) is not None:
+        records = Records(octets, same)
+    return records or _walked(octets, content, works)
 
 
 def _walked(octets: NDArray[np.uint8], content: bytes, works: Callable[[int], bool]) -> Records:
@@ -193,14 +193,14 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
 
 def entries(index: bytes) -> list[tuple[int, IntArray]]:
     """Channel and offsets of each message index record; nothing where they are damaged."""
-    found = []
+    parts = []
     try:
         for record in framing.walk_bytes(index, 0, len(index)):
             channel, size = struct.unpack_from("<HI", index, record.start)
             if record.code != framing.MESSAGE_INDEX or size != record.length - 6 or size % 16:
                 return []
             pairs = np.frombuffer(index, "<i8", size // 8, record.start + 6)
-            found.append((channel, pairs[1::2]))
+            parts.append((channel, pairs[1::2]))
     except (DamagedError, struct.error):
         return []
-    return found
+    return parts

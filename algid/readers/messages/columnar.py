@@ -99,15 +99,15 @@ class Shape:
                 return None
             place += f"[{names.index(name)}]" if names else part
         if place in self.numbers:
-            found = self.numbers[place]
-            return found if found.count == 1 else None
+            numbers = self.numbers[place]
+            return numbers if numbers.count == 1 else None
         array = re.fullmatch(r"(.*)\[(\d{1,9})\]", place)
         if array is None or array[1] not in self.numbers:
             return Numbers(0, "zero") if self.absent(place) else None
-        found, index = self.numbers[array[1]], int(array[2])
-        if index >= found.count or found.kind[0] not in "<>|":
+        numbers, index = self.numbers[array[1]], int(array[2])
+        if index >= numbers.count or numbers.kind[0] not in "<>|":
             return None
-        return Numbers(found.offset + index * int(found.kind[-1]), found.kind)
+        return Numbers(numbers.offset + index * int(numbers.kind[-1]), numbers.kind)
 
     def of_others(self, paths: Iterable[str]) -> bool:
         """Whether the message is of other joints than those of `paths` such as ``effort[elbow]``.
@@ -116,7 +116,7 @@ class Shape:
         lacks something.
         """
         joints = {
-            found[1] for path in paths if (found := _NAMED.match(path)) and not found[1].isdigit()
+            match[1] for path in paths if (match := _NAMED.match(path)) and not match[1].isdigit()
         }
         lists = [texts for texts in self.texts.values() if texts]
         if not joints or any(joints.intersection(texts) for texts in lists):
@@ -192,9 +192,9 @@ def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
     masks = mask.view(np.uint64)
     words = np.flatnonzero(masks)
     whole = np.frombuffer(bytes(lead) + payload, np.uint64)
-    found = {name: at for name, path in wanted.items() if (at := shape.find(path)) is not None}
-    if len(found) == len(wanted):
-        return Layout(lead, words, masks[words], whole[words] & masks[words], found)
+    places = {name: at for name, path in wanted.items() if (at := shape.find(path)) is not None}
+    if len(places) == len(wanted):
+        return Layout(lead, words, masks[words], whole[words] & masks[words], places)
     return Layout(
         lead, words, masks[words], whole[words] & masks[words], None, missing(shape, wanted)
     )

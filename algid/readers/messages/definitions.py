@@ -81,10 +81,10 @@ def parse_msg(root: str, text: str, known: Types | None = None) -> Types:
     types = {**(known or {}), root: _fields(root, sections[0])}
     for section in sections[1:]:
         head, _, body = section.strip().partition("\n")
-        found = re.match(r"^MSG:\s*(\S+)$", head.strip())
-        if found is None:
+        heading = re.match(r"^MSG:\s*(\S+)$", head.strip())
+        if heading is None:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
-        types[found[1]] = _fields(found[1], body)
+        types[heading[1]] = _fields(heading[1], body)
     resolved = {
         name: tuple(_resolved(field, name, types) for field in fields)
         for name, fields in types.items()
@@ -105,17 +105,17 @@ def _fields(name: str, text: str) -> tuple[Field, ...]:
     """The fields of a structure, a line each; comments and constants are passed over."""
     fields = []
     for line in text.splitlines():
-        found = _FIELD.match(line.split("#", 1)[0].strip())
-        if found is None and line.split("#", 1)[0].strip():
+        match = _FIELD.match(line.split("#", 1)[0].strip())
+        if match is None and line.split("#", 1)[0].strip():
             raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
-        if found is None or found["rest"].startswith("="):
+        if match is None or match["rest"].startswith("="):
             continue
-        size = found["size"]
+        size = match["size"]
         if size and len(size.removeprefix("<=")) > LIMITS.length_digits:
             wrong = f"a length of {counted(len(size), 'digit')} in the line {line.strip()[:60]!r}"
             raise DefinitionError(f"{name}: {wrong}")
-        count = None if found["array"] is None else int(size) if size.isdigit() else -1
-        fields.append(Field(found["name"], found["type"], count))
+        count = None if match["array"] is None else int(size) if size.isdigit() else -1
+        fields.append(Field(match["name"], match["type"], count))
     if len(fields) > LIMITS.definition_fields:
         raise DefinitionError(f"{name}: {counted(len(fields), 'field')}")
     # an empty structure takes one byte, since IDL has none
@@ -188,17 +188,16 @@ def parse_idl(root: str, text: str) -> Types:
         If the text cannot be read, a type is missing, or types contain each other.
     """
     _check_length(root, text)
-    found = _Definitions()
+    definitions = _Definitions()
     for section in _SECTION.split(text):
         tokens = [one["token"] for one in _TOKEN.finditer(section) if one["token"]]
-        _Parser(root, tokens, found).definitions(())
-    if root not in found.structures:
-        raise DefinitionError(
-            f"{root}: not defined; found {', '.join([*found.structures][:8]) or 'no structure'}"
-        )
+        _Parser(root, tokens, definitions).definitions(())
+    if root not in definitions.structures:
+        there = ", ".join(list(definitions.structures)[:8]) or "no structure"
+        raise DefinitionError(f"{root}: not defined; found {there}")
     types = {
-        owner: tuple(found.resolved(owner, name, spec) for name, spec in members)
-        for owner, members in found.structures.items()
+        owner: tuple(definitions.resolved(owner, name, spec) for name, spec in members)
+        for owner, members in definitions.structures.items()
     }
     _check_depth(root, types, {})
     return types
@@ -365,8 +364,10 @@ class _Parser:
 
     def _expect(self, *tokens: str) -> None:
         for token in tokens:
-            if (found := self._next()) != token:
-                raise DefinitionError(f"{self.root}: {found[:40]!r} where {token!r} was expected")
+            if (token_there := self._next()) != token:
+                raise DefinitionError(
+                    f"{self.root}: {token_there[:40]!r} where {token!r} was expected"
+                )
 
     def _next(self) -> str:
         if self.place == len(self.tokens):

@@ -45,12 +45,12 @@ def _object(payload: bytes) -> dict[str, Any]:
             "most"
         )
     try:
-        found = json.loads(payload)
+        content = json.loads(payload)
     except (ValueError, RecursionError) as error:
         raise MisfitError(f"a message that is no JSON ({type(error).__name__})") from error
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise MisfitError("a JSON message that is no object")
-    return found
+    return content
 
 
 def _walk(value: Any, path: str, shape: Shape) -> None:
@@ -86,16 +86,16 @@ class JsonDecoder(Decoder):
                 _TOO_MUCH,
             )
             try:
-                found = _object(payload)
+                content = _object(payload)
             except MisfitError as error:
                 self.misfitting(str(error))
                 continue
-            values = list(map(_Paths(found).value, paths))
+            values = list(map(_Paths(content).value, paths))
             held[row] = None not in values
             if held[row]:
                 rows.append(values)
             else:
-                self._without(found, values)
+                self._without(content, values)
         return {
             name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)
         }
@@ -140,11 +140,11 @@ class _Paths:
 
     def value(self, parts: Sequence[str]) -> int | float | None:
         """The number at a path, or None."""
-        found: Any = self._message
+        inner: Any = self._message
         parent: Any = None
         for part in parts:
             if not part.startswith("["):
-                parent, found = found, found.get(part) if isinstance(found, dict) else None
+                parent, inner = inner, inner.get(part) if isinstance(inner, dict) else None
                 continue
             name, index = part[1:-1], None
             if isinstance(parent, dict):
@@ -157,9 +157,9 @@ class _Paths:
                     index = names.index(name) if names.count(name) == 1 else len(names)
             if index is None and name.isdigit():
                 index = int(name)
-            found = (
-                found[index]
-                if isinstance(found, list) and index is not None and index < len(found)
+            inner = (
+                inner[index]
+                if isinstance(inner, list) and index is not None and index < len(inner)
                 else None
             )
-        return found if isinstance(found, (int, float)) and not isinstance(found, bool) else None
+        return inner if isinstance(inner, (int, float)) and not isinstance(inner, bool) else None

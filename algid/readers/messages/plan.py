@@ -136,7 +136,7 @@ def _channels(profile: Profile | None) -> tuple[tuple[str, ...], tuple[str, ...]
 
 def _reference(source: Source, joints: tuple[str, str]) -> dict[str, tuple[str, str]]:
     """By reference channel topic and path of what joints follow, if one topic alone tells it."""
-    found = {}
+    by_topic = {}
     for topic, kind in kinds(source):
         if kind not in TRAJECTORY_STATE and (topic != JOINT_REFERENCES or kind not in JOINT_STATE):
             continue
@@ -146,8 +146,8 @@ def _reference(source: Source, joints: tuple[str, str]) -> dict[str, tuple[str, 
             continue
         paths = {} if shape is None else reference_fields(shape, joints)
         if paths:
-            found[topic] = {name: (topic, path) for name, path in paths.items()}
-    return next(iter(found.values())) if len(found) == 1 else {}
+            by_topic[topic] = {name: (topic, path) for name, path in paths.items()}
+    return next(iter(by_topic.values())) if len(by_topic) == 1 else {}
 
 
 def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
@@ -294,18 +294,18 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
         choice = choose(paths, profile.joints if profile else None, needed=needed)
     except LookupError:
         return None
-    found = {name: path for name, path in choice.columns.items() if name != "t"}
+    path_of = {name: path for name, path in choice.columns.items() if name != "t"}
     for both in (VELOCITIES, REFERENCES):
-        if not all(name in found and shape.find(found[name]) for name in both):
-            found = {name: path for name, path in found.items() if name not in both}
-    if not set(needed) <= found.keys() or not all(shape.find(path) for path in found.values()):
+        if not all(name in path_of and shape.find(path_of[name]) for name in both):
+            path_of = {name: path for name, path in path_of.items() if name not in both}
+    if not set(needed) <= path_of.keys() or not all(shape.find(path) for path in path_of.values()):
         return None
-    currents = {name: "A" for name, path in found.items() if take_apart(path).stem in CURRENTS}
+    currents = {name: "A" for name, path in path_of.items() if take_apart(path).stem in CURRENTS}
     return _Usual(
         topic,
         choice.joints or ("1", "2"),
         choice.joints is not None,
-        found,
+        path_of,
         {**choice.units, **currents},
     )
 

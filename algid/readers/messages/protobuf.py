@@ -66,7 +66,7 @@ def parse(root: str, data: bytes) -> Types:
             f"{LIMITS.definition_letters} at most"
         )
     try:
-        found = {
+        known = {
             name: (message, _implicit(file))
             for file in FileDescriptorSet.FromString(data).file
             for name, message in _messages(file.package, file.message_type)
@@ -77,9 +77,9 @@ def parse(root: str, data: bytes) -> Types:
             name = waiting.pop()
             if name in types:
                 continue
-            if name not in found:
+            if name not in known:
                 raise DefinitionError(f"{root}: the type {name[:80]!r} is not defined")
-            message, implicit = found[name]
+            message, implicit = known[name]
             types[name] = {one.number: _field(one, implicit) for one in message.field}
             waiting += [one.message for one in types[name].values() if one.type == _MESSAGE]
     except (DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -157,7 +157,7 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     """
     walk = _Walk(payload, types, root)
     walk.message(0, len(payload), root, "", 0)
-    walk.shape.texts |= {path: tuple(found) for path, found in walk.texts.items()}
+    walk.shape.texts |= {path: tuple(spans) for path, spans in walk.texts.items()}
     return walk.shape
 
 
@@ -181,14 +181,19 @@ class _Walk:
         kind, done = self.root, ""
         *inner, last = path.split(".")
         for part in inner:
-            found = self._named(kind, part.partition("[")[0])
+            field_of = self._named(kind, part.partition("[")[0])
             done += part
-            if found is None or found.type != _MESSAGE or done not in self.there:
+            if field_of is None or field_of.type != _MESSAGE or done not in self.there:
                 return False
             done += "."
-            kind = found.message
-        found = self._named(kind, last)
-        return found is not None and found.implicit and not found.repeated and _is_number(found)
+            kind = field_of.message
+        field_of = self._named(kind, last)
+        return (
+            field_of is not None
+            and field_of.implicit
+            and not field_of.repeated
+            and _is_number(field_of)
+        )
 
     def _named(self, kind: str, name: str) -> ProtobufField | None:
         return next((one for one in self.types[kind].values() if one.name == name), None)

@@ -90,15 +90,15 @@ def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
 
     Without velocities where one lacks them.
     """
-    found = {
+    paths = {
         f"{quantity}{number}": path
         for quantity in _QUANTITIES
         for number, joint in enumerate(joints, start=1)
         if (path := _path(shape, joint, quantity))
     }
-    if not all(name in found for name in VELOCITIES):
-        found = {name: path for name, path in found.items() if name not in VELOCITIES}
-    return found
+    if not all(name in paths for name in VELOCITIES):
+        paths = {name: path for name, path in paths.items() if name not in VELOCITIES}
+    return paths
 
 
 def reference_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:

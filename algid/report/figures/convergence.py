@@ -66,15 +66,15 @@ def _target(name: str, result: Result, loaded: bool) -> Target:
     groups = (
         [result.loaded, result.paper_payload, result.payload] if loaded else [result.parameters]
     )
-    found = next((group[name] for group in groups if name in group), None)
+    estimate = next((group[name] for group in groups if name in group), None)
     row = next((row for row in result.table4 if row.parameter == name), None)
-    unit = found.unit if found is not None else row.unit if row is not None else ""
+    unit = estimate.unit if estimate is not None else row.unit if row is not None else ""
     truth = result.truth.get(name) if row is None else row.truth
-    return Target(found, truth, unit_text(unit))
+    return Target(estimate, truth, unit_text(unit))
 
 
 def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:
-    found, unit = target.found, target.unit
+    estimate, unit = target.found, target.unit
     layout = {
         "xaxis": axis("time, s", range=[read.start, read.end]),
         "yaxis": axis(label(unit), range=_view(read.samples[name], target)),
@@ -83,7 +83,9 @@ def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:
         "hovermode": "closest",
     }
     final = (
-        "" if found is None else f"; final estimate {resolved(found.estimate, found.std)} {unit}"
+        ""
+        if estimate is None
+        else f"; final estimate {resolved(estimate.estimate, estimate.std)} {unit}"
     )
     truth = "" if target.truth is None else f"; truth {significant(target.truth)} {unit}"
     return Panel(
@@ -148,8 +150,12 @@ def _view(samples: FloatArray, target: Target) -> list[float] | None:
     settled = finite[finite.size // 4 :]
     if not settled.size:
         return None
-    found = target.found
-    known = [target.truth] if found is None else [target.truth, found.estimate, *(found.ci95 or ())]
+    estimate = target.found
+    known = (
+        [target.truth]
+        if estimate is None
+        else [target.truth, estimate.estimate, *(estimate.ci95 or ())]
+    )
     ends = [
         *np.percentile(settled, [4, 96]).tolist(),
         *(value for value in known if value is not None),
@@ -162,12 +168,12 @@ def _view(samples: FloatArray, target: Target) -> list[float] | None:
 def _marks(target: Target) -> list[Layout]:
     """The interval, the estimate and the truth, as far as they are known."""
     marks: list[Layout] = []
-    found = target.found
-    low, high = (found.ci95 if found is not None else None) or (None, None)
+    estimate = target.found
+    low, high = (estimate.ci95 if estimate is not None else None) or (None, None)
     if low is not None and high is not None:
         marks.append(band(low, high, "@green/0.28"))
-    if found is not None and found.estimate is not None:
-        marks.append(level(found.estimate, "@green", "solid"))
+    if estimate is not None and estimate.estimate is not None:
+        marks.append(level(estimate.estimate, "@green", "solid"))
     if target.truth is not None:
         marks.append(level(target.truth, "@ink", "dash", 1.2))
     return marks
@@ -187,7 +193,7 @@ def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...
         ]
     results = [target.found for target in targets.values() if target.found is not None]
     if results:
-        spread = " and its 95 % interval" if any(found.ci95 for found in results) else ""
+        spread = " and its 95 % interval" if any(estimate.ci95 for estimate in results) else ""
         entries.append(Legend("", f"result{spread}", "@green"))
     if any(target.truth is not None for target in targets.values()):
         entries.append(Legend("", "truth", "@ink", "dash"))

@@ -25,10 +25,10 @@ SCALE: Scale = [[0, "@page"], [0.5, "@blue/0.55"], [1, "@blue"]]
 def information(path: Path, result: Result) -> Figure | Missing:
     """Each parameter's information, in shares of what all logs gave it."""
     names = [name for name in columns_of(path) if name not in ("log", "t")]
-    found = [(log, block) for log, block in by_log(blocks(path, ["log", "t", *names]))]
-    if not names or not found:
+    logs = [(log, block) for log, block in by_log(blocks(path, ["log", "t", *names]))]
+    if not names or not logs:
         return Missing("information", TITLE, f"{path.name} holds no second")
-    x, gained, ranges = _summed(names, found)
+    x, gained, ranges = _summed(names, logs)
     total = gained.sum(axis=1, keepdims=True)
     shares = 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
     reading = (

@@ -60,17 +60,17 @@ class RunningCourse:
 def running(path: Path, result: Result) -> Figure | Missing:
     """A panel a parameter that has an estimate at the end. Raises `ResultError`."""
     names = [name.removesuffix(HALF) for name in columns_of(path) if name.endswith(HALF)]
-    found = list(by_log(blocks(path, ["log", "t", *names, *(name + HALF for name in names)])))
-    if not names or not found:
+    logs = list(by_log(blocks(path, ["log", "t", *names, *(name + HALF for name in names)])))
+    if not names or not logs:
         return Missing("running", TITLE, f"{path.name} holds no series")
     ranges: dict[int, LogRange] = {}
-    for log, block in found:
+    for log, block in logs:
         ranges.setdefault(log, LogRange(0.0, 0.0)).last = float(block["t"][-1])
     moved = offsets(ranges)
-    t = np.concatenate([block["t"] + moved[log] for log, block in found])
+    t = np.concatenate([block["t"] + moved[log] for log, block in logs])
 
     def whole(name: str) -> FloatArray:
-        return np.concatenate([block[name] for _, block in found])
+        return np.concatenate([block[name] for _, block in logs])
 
     courses = [
         RunningCourse(name, whole(name), whole(name + HALF))
