@@ -283,8 +283,8 @@ def misfit(error: ValidationError) -> tuple[str, str]:
 
 
 EXISTS = (
-    f"{{}}: exists already; choose another folder with {flag('out')}, "
-    f"or replace it with {flag('force')}"
+    f"{{}}: exists already; choose another folder with {flag('out')}, or replace it with "
+    f"{flag('force')}"
 )
 TEMPORARY = "algid"
 """The name for which things are made in the system's temporary folder."""
@@ -300,8 +300,7 @@ def refuse_misleading(name: str | None) -> None:
     if name == "":
         raise SettingError(
             f"{flag('name')}: expected a name for the result folder, found ''; leave it out for "
-            "the log's "
-            "own"
+            "the log's own"
         )
     if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
         problem = f"found {name!r:.60}; {flag('out')} names the folder around it"

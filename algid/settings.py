@@ -27,8 +27,7 @@ else:
 
 EXTERNAL_GRAVITY = (
     f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
-    f"{flag('gravity')} out, or say "
-    f"{flag('effort')} gravity-compensated"
+    f"{flag('gravity')} out, or say {flag('effort')} gravity-compensated"
 )
 
 
@@ -236,21 +235,20 @@ class Settings:
         for term in self.terms:
             if term not in CHOICES:
                 raise SettingError(
-                    f"{flag('model')}: expected auto, plain or some of {', '.join(CHOICES)}; "
-                    f"found {term!r}"
+                    f"{flag('model')}: expected auto, plain or some of {', '.join(CHOICES)}; found "
+                    f"{term!r}"
                 )
             needed = EVERY_TERM[term].needs
             if needed is not None and needed not in self.terms:
                 raise SettingError(
-                    f"{flag('model')}: {term} has no meaning without {needed}; add {needed} to "
-                    "the list"
+                    f"{flag('model')}: {term} has no meaning without {needed}; add {needed} to the "
+                    "list"
                 )
         gone = set(self.terms) - set(without_terms(self.effort, self.terms))
         if gone:
             raise SettingError(
-                f"{flag('model')}: torque that is {self.effort} has no {min(gone)}; leave it "
-                "out, or "
-                f"{flag('effort')}"
+                f"{flag('model')}: torque that is {self.effort} has no {min(gone)}; leave it out, "
+                f"or {flag('effort')}"
             )
         if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
             raise SettingError(

@@ -166,8 +166,8 @@ def batch(
     bytes_each = None if memory_limit is None else bytes_of(memory_limit)
     if scheduler is not None and (workers is not None or memory_limit is not None):
         raise SettingError(
-            f"{flag('scheduler')}: workers and their memory are the cluster's; set them where "
-            "it is started"
+            f"{flag('scheduler')}: workers and their memory are the cluster's; set them where it "
+            "is started"
         )
     asked, said = with_options(settings, profile, options)
     known = (

@@ -290,9 +290,8 @@ def noise_of(
             levels[name] = getattr(measured, name)
         else:
             raise SettingError(
-                f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give "
-                "it, or "
-                f"{flag('noise_from')} LOG"
+                f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give it, "
+                f"or {flag('noise_from')} LOG"
             )
     return NoiseLevels(**levels)
 

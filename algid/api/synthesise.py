@@ -241,9 +241,7 @@ class _Asked:
         if round(self.rate * duration) < 1:
             raise SettingError(
                 f"{flag('duration')}: expected at least {1 / self.rate:g} s, two samples at "
-                f"{flag('rate')} "
-                f"{self.rate:g}, "
-                f"found {duration:g}"
+                f"{flag('rate')} {self.rate:g}, found {duration:g}"
             )
         return run.Recording(self.rate, duration, sensors=self.sensors)
 
@@ -258,8 +256,7 @@ def _refuse_beside_motion(initial: object, schedule: object, excitation: object)
         if value is not None:
             raise SettingError(
                 f"{flag(option)} {value}: a motion starts where it was planned and carries one "
-                "payload; "
-                "leave it out"
+                "payload; leave it out"
             )
 
 
@@ -349,8 +346,8 @@ def _state(given: State | str) -> tuple[float, float, float, float]:
     turned, fast = PHYSICAL.angle[1], PHYSICAL.speed[1]
     if max(abs(first), abs(second)) > turned or max(abs(third), abs(fourth)) > fast:
         raise SettingError(
-            f"{flag('initial')}: expected angles within {turned:g} rad and {fast:g} rad/s, "
-            f"found {given!r}"
+            f"{flag('initial')}: expected angles within {turned:g} rad and {fast:g} rad/s, found "
+            f"{given!r}"
         )
     return first, second, third, fourth
 
@@ -366,8 +363,8 @@ def _torque(case: Case, given: str | Path | Log, hold: str) -> Torque:
 
         if not str(given) or not Path(given).exists():
             raise SettingError(
-                f"{flag('torque')} {given}: expected {', '.join(run.EXCITATIONS)} or a log, "
-                "found neither"
+                f"{flag('torque')} {given}: expected {', '.join(run.EXCITATIONS)} or a log, found "
+                "neither"
             )
         given = read_log(given)
     return SampledTorque(given.t, given.tau, "foh" if hold == "foh" else "zoh")

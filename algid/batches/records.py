@@ -175,8 +175,8 @@ def prepare(store: Store) -> None:
         if os.path.lexists(path) and path.is_dir() != wanted:
             kind = "folder" if wanted else "file"
             raise OutputError(
-                f"{path}: expected a {kind} of algid's own; move it, or choose another folder "
-                f"with {flag('out')}"
+                f"{path}: expected a {kind} of algid's own; move it, or choose another folder with "
+                f"{flag('out')}"
             )
     with writing(store.folder / FOLDER):
         (store.folder / FOLDER).mkdir(parents=True, exist_ok=True)

@@ -69,8 +69,7 @@ class Recipe:
         if not job.logs and self.parameters is None:
             raise SettingError(
                 f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without payload, "
-                "named "
-                f"{job.name}-unloaded.*, or give the arm's result as {flag('parameters')}"
+                f"named {job.name}-unloaded.*, or give the arm's result as {flag('parameters')}"
             )
         return self._task(job, self.profile(job.profile))
 

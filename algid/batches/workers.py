@@ -36,8 +36,8 @@ THREADS = (
     "ARROW_NUM_THREADS",
 )
 TOO_LONG = (
-    f"it took longer than {{:g}} s; raise {flag('timeout')}, "
-    f"and run it again with {flag('retry_failed')}"
+    f"it took longer than {{:g}} s; raise {flag('timeout')}, and run it again with "
+    f"{flag('retry_failed')}"
 )
 
 

@@ -163,15 +163,14 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
         if name not in every:
             hint = " (there are no loaded runs)" if name in PAYLOAD_PARAMETERS else ""
             raise SettingError(
-                f"{flag('for')} {name}: expected some of {', '.join(every)}, found "
-                f"{name!r}{hint}; leave "
-                "it out"
+                f"{flag('for')} {name}: expected some of {', '.join(every)}, found {name!r}{hint}; "
+                "leave it out"
             )
         place = every.index(name)
         if not known[place]:
             raise SettingError(
                 f"{flag('for')} {name}: {source} cannot tell it from zero ({mean[place]:.3g} ± "
-                f"{belief.std[place]:.2g}), so "
-                "that no error is large or small beside it; leave it out"
+                f"{belief.std[place]:.2g}), so that no error is large or small beside it; leave it "
+                "out"
             )
     return Asked(size, known, np.array([name in names for name in every]))

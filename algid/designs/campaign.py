@@ -149,9 +149,8 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
         # Torque noise below the rounding of the noise of twice differentiated angles.
         raise SettingError(
             f"{flag('rate')}: at {campaign.experiment.rate:g} Hz the noise of the angles, "
-            "differentiated "
-            f"twice, leaves nothing of the torque ({error}); ask for a lower rate or less "
-            f"{flag('position_noise')}"
+            f"differentiated twice, leaves nothing of the torque ({error}); ask for a lower rate "
+            f"or less {flag('position_noise')}"
         ) from error
 
 
@@ -161,8 +160,7 @@ def _driven_joints(limits: Limits) -> None:
     if without.size:
         raise SettingError(
             f"{flag('torque')}: position control asks for a drive at either joint, found 0 for "
-            "joint "
-            f"{without[0] + 1}; {flag('drive')} torque plans for a joint without one"
+            f"joint {without[0] + 1}; {flag('drive')} torque plans for a joint without one"
         )
 
 

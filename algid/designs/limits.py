@@ -211,19 +211,15 @@ def _missed(row: Row, limits: Limits, most: float) -> str:
         reach = float(limits.lengths.sum())
         lowest = reach - most * (reach - limits.height)
         return (
-            f"{flag('tip_height')}: within the range the tip rises no higher than {lowest:.3g} "
-            "m, the "
-            "limit asks for "
-            f"{limits.height:.3g} m (margin included); lower it, or widen {flag('range')}"
+            f"{flag('tip_height')}: within the range the tip rises no higher than {lowest:.3g} m, "
+            f"the limit asks for {limits.height:.3g} m (margin included); lower it, or widen "
+            f"{flag('range')}"
         )
     assert row.joint is not None
     limit = limits.torque[row.joint]
     with_load = "loaded " if row.loaded else ""
     return (
         f"{flag('torque')}: the {with_load}arm asks for {most * limit:.3g} N m at joint "
-        f"{row.joint + 1} "
-        "even at rest, the "
-        f"limit is {limit:.3g} N m (margin included); raise it, or move {flag('range')} to "
-        "where gravity "
-        "pulls less"
+        f"{row.joint + 1} even at rest, the limit is {limit:.3g} N m (margin included); raise it, "
+        f"or move {flag('range')} to where gravity pulls less"
     )

@@ -180,7 +180,7 @@ def _of_result(
     missing = next((name for name in shared.names if name not in value), None)
     if missing is not None:
         remedy = (
-            f"give --{missing}"
+            f"give {flag(missing)}"
             if missing in ("l1", "l2")
             else "identify it from logs that determine it"
         )

@@ -90,9 +90,8 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
     for name in ("range", "speed", "torque"):
         if name not in asked.content:
             raise SettingError(
-                f"{flag(name)}: it must be given, or `{name} = …` in the file of "
-                f"{flag('limits')}; inf is no "
-                "limit at all"
+                f"{flag(name)}: it must be given, or `{name} = …` in the file of {flag('limits')}; "
+                "inf is no limit at all"
             )
     for name in ("range", "speed", "acceleration", "torque"):
         _check(name, asked.content.get(name))
@@ -144,14 +143,12 @@ def _range(value: Any) -> tuple[FloatArray, FloatArray]:
         if not low[joint] < high[joint]:
             raise SettingError(
                 f"{flag('range')}: expected LOW:HIGH with LOW below HIGH for joint {joint + 1}, "
-                "found "
-                f"{low[joint]:g}:{high[joint]:g}"
+                f"found {low[joint]:g}:{high[joint]:g}"
             )
         if np.isfinite(low[joint]) != np.isfinite(high[joint]):
             raise SettingError(
                 f"{flag('range')}: expected both ends of joint {joint + 1} or neither, found "
-                f"{low[joint]:g}:{high[joint]:g}; "
-                "give a wide one in place of inf"
+                f"{low[joint]:g}:{high[joint]:g}; give a wide one in place of inf"
             )
     return low, high
 

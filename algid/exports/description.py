@@ -214,8 +214,8 @@ def _first_length(coefficients: Coefficients, file: str) -> float:
     l1 = length_by_coupling(value, gravity)
     if l1 is None or l1 <= 0:
         raise ResultError(
-            f"{file}: k1 {k1:.4g} and k2 {k2:.4g} make l1 = g k1 / k2 no positive length; "
-            f"give {flag('l1')}, or identify it from more informative logs"
+            f"{file}: k1 {k1:.4g} and k2 {k2:.4g} make l1 = g k1 / k2 no positive length; give "
+            f"{flag('l1')}, or identify it from more informative logs"
         )
     return l1
 

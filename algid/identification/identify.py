@@ -140,9 +140,8 @@ def identify(
     if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
         kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
         raise SettingError(
-            f"{flag('cross_validate')}: expected two {kind} logs or more, found one; give more, "
-            "or leave "
-            "it out"
+            f"{flag('cross_validate')}: expected two {kind} logs or more, found one; give more, or "
+            "leave it out"
         )
     if out is None:
         return _identified(survey, settings, earlier, said)
@@ -220,8 +219,8 @@ def _by_the_paper(
     for logs in (survey.unloaded, survey.loaded):
         if len(logs) > 1:
             raise LogError(
-                f"{logs[1].name}: the paper's method takes one log of each kind; "
-                f"give one, or use {flag('estimator')} refined or weak"
+                f"{logs[1].name}: the paper's method takes one log of each kind; give one, or use "
+                f"{flag('estimator')} refined or weak"
             )
     known = None
     if earlier is not None:

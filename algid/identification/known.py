@@ -69,8 +69,8 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
     if result.fit is None:
         raise ResultError(
             f"{file}: the result of {flag('estimator')} {result.estimator} has no error bars; "
-            f"identify with {flag('estimator')} refined or weak, or use {flag('estimator')} "
-            "paper here too"
+            f"identify with {flag('estimator')} refined or weak, or use {flag('estimator')} paper "
+            "here too"
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
     gone = absent(Settings.of(result.settings).effort, model.names)

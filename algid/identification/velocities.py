@@ -35,9 +35,7 @@ def with_velocities(
             if segment.omega is None:
                 raise LogError(
                     f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')} "
-                    "measured, "
-                    "found none; "
-                    "leave the flag out to observe them"
+                    "measured, found none; leave the flag out to observe them"
                 )
             yield segment
         elif luenberger:

@@ -295,10 +295,8 @@ def _factor(
             unknown = Remedy({f"{name}.torque_constant": 1}, "where the constant is not known")
             raise LogError(
                 f"{path}: {name} is a current; its torque needs the motor's constant in N m/A: "
-                f"{motor}; "
-                f"{torque}; {unknown} gives all constants up to a gain, and a known payload that "
-                "gain "
-                f"({flag('payload_mass')})"
+                f"{motor}; {torque}; {unknown} gives all constants up to a gain, and a known "
+                f"payload that gain ({flag('payload_mass')})"
             )
         return CURRENT[unit] * float(constant) * channel.gear_ratio
     if unit == "counts":

@@ -29,8 +29,8 @@ POINTS = 0.75  # of a page's pixel
 DPI = 200
 UPRIGHT = 6  # names of logs: more stand upright
 MISSING = (
-    f"{flag('save_plots')}: expected matplotlib, found none; "
-    "install it with: pip install 'algid[plots]'"
+    f"{flag('save_plots')}: expected matplotlib, found none; install it with: pip install "
+    "'algid[plots]'"
 )
 STYLE: Any = {"font.size": 8, "axes.titlesize": 8, "pdf.fonttype": 42}
 DASHES: dict[str, Any] = {"dash": "--", "dot": ":", "solid": "-"}

@@ -242,9 +242,8 @@ def arm_of(
     """
     if result.fit is None:
         raise ResultError(
-            f"{result.log.path}: the result of {flag('estimator')} {result.estimator} has no "
-            "error bars; "
-            f"identify with {flag('estimator')} refined or weak"
+            f"{result.log.path}: the result of {flag('estimator')} {result.estimator} has no error "
+            f"bars; identify with {flag('estimator')} refined or weak"
         )
     model = model_of(result)
     prior = prior_of(result, model)
@@ -350,6 +349,6 @@ def _length(result: Result, name: str, given: float | None) -> float:
     length = next((value for value in known if value is not None), None)
     if length is None:
         raise ResultError(
-            f"{result.log.path}: its result has no {name}; give the link's length with --{name}"
+            f"{result.log.path}: its result has no {name}; give the link's length with {flag(name)}"
         )
     return float(length)
