@@ -242,7 +242,7 @@ def put_file_in_place(temporary: Path, target: Path, *, replace: bool) -> None:
 def put_in_place(temporary: Path, target: Path, *, replace: bool) -> None:
     """Give a folder its name at one stroke.
 
-    What stands there is exchanged for it and bears its temporary name then; it is always whole,
+    What stands there is exchanged for it and has its temporary name then; it is always whole,
     and never absent where the file system can exchange two names.
 
     Raises

@@ -1,7 +1,7 @@
 """What ends a command that nobody foresaw: one line for its user, and an exit code.
 
-An exception that a library raises about what it was given is told with the file and the stage. Any
-other is an error inside algid, and is called one.
+An exception that a library raises about what it was given is reported with the file and the stage.
+Any other is an error inside algid, and is called one.
 """
 
 from __future__ import annotations

@@ -267,7 +267,7 @@ def watched(
 ) -> Ended:
     """Look for logs until stopped.
 
-    Nothing but settled ones are taken, and a trouble is told once.
+    Nothing but settled ones are taken, and a trouble is reported once.
     """
     from algid.batches.discover import jobs_of
     from algid.batches.run import LOOK_EVERY, Settling

@@ -263,8 +263,10 @@ def _job(name: str, path: str, *, loaded: bool, trouble: str | None) -> Job:
     """The job of one log, under a name that can stand for its own where that is unfit."""
     fault = trouble or name_fault(name)
     if fault is not None:
-        told = trouble or f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
-        return Job(safe_name(name), logs=(path,), trouble=told)
+        problem = (
+            trouble or f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
+        )
+        return Job(safe_name(name), logs=(path,), trouble=problem)
     robot = name.rpartition("/")[0] or None
     return (
         Job(name, loaded=(path,), robot=robot) if loaded else Job(name, logs=(path,), robot=robot)

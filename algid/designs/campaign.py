@@ -27,7 +27,7 @@ MARGIN = (
     0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
 )
 ARMS = 20  # of the belief, of which the worst is reported
-SECOND = 1.0  # s: for how long each stretch of the motion is, of which it is said what it teaches
+SECOND = 1.0  # s: for how long each stretch of the motion is, whose information is shown
 
 
 @dataclass(frozen=True, eq=False)

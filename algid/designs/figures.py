@@ -1,4 +1,4 @@
-"""The figures of a design: its motion within the limits, and what each second teaches."""
+"""The figures of a design: its motion within the limits, and the information of each second."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _teaching(design: Design) -> Figure:
     x = (np.arange(shares.shape[1]) + 0.5) * SECOND
     panel = information_panel(design.names, x, shares, SCALE)
     reading = (
-        "Read: strongly coloured seconds teach most; cut the motion there, and that "
+        "Read: strongly coloured seconds inform most; cut the motion there, and that "
         "parameter's error bar grows."
     )
-    return Figure("teaching", "Which second teaches what", (panel,), reading)
+    return Figure("teaching", "Information by second", (panel,), reading)

@@ -59,7 +59,7 @@ def bound_table(design: Design) -> Table:
     )
     runs = design.campaign.experiment.runs
     note = (
-        f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as told. "
+        f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as stated. "
         "The worst arm is the "
         "worst of 20 drawn from what is believed."
     )

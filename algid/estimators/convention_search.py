@@ -308,7 +308,7 @@ class _Trials:
         ]
         self._names = tuple(name for name in ZEROED if gravity or not PARAMETERS[name].weighs)
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
-        """By how much the scores of two conventions differ that are told apart."""
+        """By how much the scores of two distinct conventions differ."""
         self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
 
     def under(self, convention: Convention) -> Candidate:

@@ -331,14 +331,14 @@ def term_worths(fit: Fit) -> list[TermWorth]:
 def bent(fit: Fit) -> bool:
     """Whether the moments' sine parts are together more than chance makes one time in twenty."""
     places = [fit.names.index(name) for name in SINES if name in fit.names]
-    told = [place for place in places if fit.covariance[place, place] > 0]
-    if not told:
+    known = [place for place in places if fit.covariance[place, place] > 0]
+    if not known:
         return False
-    s, C = fit.values[told], fit.covariance[np.ix_(told, told)]
+    s, C = fit.values[known], fit.covariance[np.ix_(known, known)]
     scale = np.sqrt(np.diag(C))
     correlation = C / np.outer(scale, scale)
     distance = (s / scale) @ np.linalg.pinv(correlation, hermitian=True) @ (s / scale)
-    return float(chi2_tail(len(told), float(distance))) < 0.05
+    return float(chi2_tail(len(known), float(distance))) < 0.05
 
 
 def payload_distance(fit: Fit) -> float | None:

@@ -41,11 +41,11 @@ def doubted(
     return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
-UNTOLD = 0.02
+LEAST_ACTING = 0.02
 """Share of the other joint's torque: less at a joint without a motor is bearing or cable."""
 
 
-def untold(
+def doubted_without_motor(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Fit:
     """The fit with status WEAK_EXCITATION for k1 … k5 if they do not explain an undriven joint.
@@ -74,7 +74,7 @@ def untold(
             gram = np.sum([one[joint] for one in grams], axis=0)
             acting = float(np.diag(gram)[:-1] @ c**2)
             power = float(np.sum([one[1 - joint, -1, -1] for one in grams]))
-            if gram[-1, -1] == 0 and acting < UNTOLD**2 * power:
+            if gram[-1, -1] == 0 and acting < LEAST_ACTING**2 * power:
                 said = Notice("MOTORLESS_UNTOLD", numbers={"joint": joint + 1})
                 return fit.marked("WEAK_EXCITATION", RIGID).noted(said)
     return fit

@@ -1,4 +1,4 @@
-"""Whether a logged torque is held from each sample to the next, told by how late it acts.
+"""Whether a logged torque is held from each sample to the next, by how late it acts.
 
 A digital controller holds its torque h = dt / 2 late in the mean; a torque that moves evenly from
 sample to sample is not late. Logs tell how late with a deviation s, beside all that is fitted, and
@@ -62,7 +62,7 @@ class Lateness:
         return self.half * self.effect
 
     @property
-    def told(self) -> bool:
+    def decided(self) -> bool:
         """Whether one of the two is likelier by far, or it makes no difference."""
         return self.share < NEGLIGIBLE or abs(self.odds) >= SURE
 
@@ -79,7 +79,7 @@ class Lateness:
 
     @property
     def prior(self) -> Prior:
-        """The delay's prior where the log does not tell."""
+        """The delay's prior where the log does not decide."""
         spread = 0.5 * self.half
         return Prior(DELAYS, np.array([spread]), np.array([[spread**-2]]))
 

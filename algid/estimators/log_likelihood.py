@@ -141,7 +141,7 @@ class LogEvidence:
         self._rough = np.maximum(guess.tau, np.sqrt(squares))
         self._floor = replace(floor, tau=np.maximum(floor.tau, _SURE * guess.tau))
         rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
-        # A joint without a motor bears a load of the size of the other's.
+        # A joint without a motor carries a load of the size of the other's.
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
 
     @property

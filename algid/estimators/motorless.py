@@ -19,7 +19,7 @@ from algid.arm import FloatArray
 from algid.estimators import instruments, weak
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.diagnostics import broken_bounds
-from algid.estimators.doubt import untold
+from algid.estimators.doubt import doubted_without_motor
 from algid.estimators.fit import Fit
 from algid.estimators.weak import Source, WeakSettings
 from algid.notices import Notice
@@ -58,7 +58,7 @@ def by_instruments(
     broken = [one.distance for one in broken_bounds(better)]
     if any(distance is None or distance > better.quantile for distance in broken):
         return None
-    checked = untold(better, unloaded, (), settings)
+    checked = doubted_without_motor(better, unloaded, (), settings)
     return better.noted(Notice("MOTORLESS_INSTRUMENTS", note=True)) if checked is better else None
 
 

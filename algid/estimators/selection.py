@@ -108,9 +108,9 @@ class Selection:
     late: Lateness | None = None
 
     @property
-    def untold(self) -> Lateness | None:
+    def undecided(self) -> Lateness | None:
         """The torque's lateness, if the logs were to choose its hold and do not determine it."""
-        return self.late if self.hold_by == "logs" and self.late and not self.late.told else None
+        return self.late if self.hold_by == "logs" and self.late and not self.late.decided else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -192,7 +192,7 @@ def expectation(
     torque = np.sqrt(squares / np.maximum(np.sum([normal.rows for normal in normals], axis=0), 1.0))
     torque = np.where(
         torque > 0, torque, torque.max()
-    )  # a joint without a motor bears a load like the other's
+    )  # a joint without a motor carries a load like the other's
     inertia = float(abs(beta[shared.names.index(K3)]))
     late = (
         0.5 * normals[0].dt if settings.hold == "foh" else 0.0

@@ -46,7 +46,7 @@ def scattered(
     """
     if fit.intervals == "jackknife":
         return fit
-    told = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
+    determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
     moved: list[FloatArray] = []
     for factor in FACTORS:
         other = replace(settings, window=factor * settings.window)
@@ -55,7 +55,7 @@ def scattered(
         except TooShortError:  # of the longer windows
             continue
         if other_fit.names == least.names:
-            moved.append(np.where(told, other_fit.values - least.values, 0.0))
+            moved.append(np.where(determined, other_fit.values - least.values, 0.0))
     if not moved:
         return fit
     scatter = np.transpose(moved) @ np.array(moved) / len(moved)

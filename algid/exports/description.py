@@ -169,8 +169,8 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     """
     lengths = {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
     given = given_lengths(result) | lengths
-    told = None if not links or "l1" in given else payload_length(result)
-    length = given.get("l1") if told is None else told[0]
+    by_payload = None if not links or "l1" in given else payload_length(result)
+    length = given.get("l1") if by_payload is None else by_payload[0]
     coefficients = coefficients_of(result, file, length)
     numbers = _identified(coefficients)
     chosen = None

@@ -96,16 +96,16 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
             f"{file}: the result does not tell where the payload hangs; give {flag('l2')}"
         )
     spread = 0.0 if given or identified is None else identified.std
-    y, y_std = _told(result, "y_p")
-    J, J_std = _told(result, "J_p")
+    y, y_std = _with_std(result, "y_p")
+    J, J_std = _with_std(result, "J_p")
     shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
     rows = "".join(f"    - [{', '.join(map(repr, row))}]\n" for row in _covariance(result, shared))
     where = "given" if given else "identified"
     return (
         f"# Payload by algid export, from {json.dumps(file)}, estimator {result.estimator}; SI "
         "units.\n"
-        "# Mass identified; what is 0 below was not told by the logs, or lies out of the arm's "
-        "plane.\n"
+        "# Mass identified; what is 0 below was not determined by the logs, or lies out of the "
+        "arm's plane.\n"
         f"# centre_of_gravity x {where}, in the frame of link 2: x along the link from joint 2.\n"
         "payload:\n"
         f"  mass: {mass.estimate!r}  # kg\n"
@@ -120,13 +120,13 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
 
 
 def _covariance(result: Result, shared: Sequence[str]) -> list[list[float]]:
-    """Covariance (4, 4) of mass, x, y and inertia: nothing of what is given or was not told."""
+    """Covariance (4, 4) of mass, x, y and inertia: nothing of what is given or not determined."""
     covariance = covariance_of(result, ("m_p", "l2", "y_p", "J_p"), shared)
     rows: list[list[float]] = np.nan_to_num(covariance).tolist()
     return rows
 
 
-def _told(result: Result, name: str) -> tuple[float, float | None]:
+def _with_std(result: Result, name: str) -> tuple[float, float | None]:
     """Estimate and standard deviation of a part of the payload's body: zero if it has no body."""
     estimate = result.payload.get(name)
     return (

@@ -90,7 +90,7 @@ def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataF
         for change in _changes(t[own], y[:, own], w[:, own]):
             at = own[change.place]
             stint[own[change.place :]] += 1
-            rows += _told(ordered, change, at, own[change.place - 1], parameters, y)
+            rows += _rows_of(ordered, change, at, own[change.place - 1], parameters, y)
     kinds: dict[str, Any] = dict.fromkeys(("robot", "job", "parameter"), pl.String())
     kinds |= dict.fromkeys(("before", "after"), jobs.schema["time"])
     kinds |= dict.fromkeys(("step", "step_std", "share", "p"), pl.Float64())
@@ -102,7 +102,7 @@ def _numbers(column: pl.Series) -> FloatArray:
     return np.asarray(column.fill_null(float("nan")).to_numpy(), dtype=np.float64)
 
 
-def _told(
+def _rows_of(
     jobs: pl.DataFrame,
     change: Change,
     at: int,
@@ -184,8 +184,8 @@ def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:
 def _calmed(y: FloatArray, w: FloatArray) -> FloatArray:
     """The estimates, no single one further from the median than `_WILD` of the usual distances."""
     known = np.where(w > 0, y, np.nan)
-    told = (w > 0).any(axis=1, keepdims=True)
-    known = np.where(told, known, 0.0)
+    estimated = (w > 0).any(axis=1, keepdims=True)
+    known = np.where(estimated, known, 0.0)
     middle = np.nanmedian(known, axis=1, keepdims=True)
     usual = _MAD * np.nanmedian(np.abs(known - middle), axis=1, keepdims=True)
     return np.where(w > 0, np.clip(y, middle - _WILD * usual, middle + _WILD * usual), 0.0)

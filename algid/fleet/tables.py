@@ -100,7 +100,7 @@ def change_table(history: History) -> Table:
     note = (
         "An arm, a drive or a convention was replaced: what came before and what comes after are "
         "tested apart. "
-        f"Told from chance at p < {significant(CHANGED, 1)} in a robot's life."
+        f"Significant at p < {significant(CHANGED, 1)} in a robot's life."
     )
     return Table("Changed at once", columns, rows, note)
 
@@ -197,7 +197,7 @@ def drift_table(history: History) -> Table:
             )
         )
     note = (
-        f"{history.drifts.height} found. A slope over {SPAN} months is told from none at p < "
+        f"{history.drifts.height} found. A slope over {SPAN} months is significant at p < "
         f"{ALPHA:g}."
     )
     return Table("Drift", columns, tuple(rows), note)

@@ -13,7 +13,7 @@ from algid.estimators import exogeneity, instruments, motorless, shrunk, weak
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
-from algid.estimators.doubt import doubted, untold
+from algid.estimators.doubt import doubted, doubted_without_motor
 from algid.estimators.fit import Fit
 from algid.estimators.hold import Hold
 from algid.estimators.innovations import ResidualSums, pooled
@@ -111,7 +111,7 @@ def _with_hold(survey: Survey, settings: Settings) -> Selection:
         late = lateness(*passes, _weak_settings(settings, chosen))
     if late.hold == "zoh":
         chosen = _modelled(survey, settings, "zoh")
-    elif not late.told and not chosen.delay:
+    elif not late.decided and not chosen.delay:
         why = "kept: the logs do not tell whether the torque is held, half a sample late"
         open_delay = [TermTrial(term, True, np.nan, np.nan, why) for term in DELAYS]
         trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
@@ -137,14 +137,14 @@ def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
     return replace(chosen, hold=hold)
 
 
-def retold(fit: Fit, chosen: Selection) -> Selection:
+def with_hold_of_fit(fit: Fit, chosen: Selection) -> Selection:
     """The selection with the hold that the fit determines, if the logs did not; else unchanged."""
-    late = chosen.untold
+    late = chosen.undecided
     if late is None or chosen.shrunk or not fit.converged or not set(DELAYS) <= set(fit.names):
         return chosen
     place = fit.names.index(DELAYS[0])
     late = late.after(float(fit.values[place]), float(fit.std[place]))
-    if not late.told:
+    if not late.decided:
         return replace(chosen, late=replace(late, effect=np.inf))
     if late.another:
         return replace(chosen, late=late)
@@ -205,8 +205,8 @@ def run_fit(
     nothing = absent(settings.effort, chosen.model.names)
     try:
         known = without(prior, nothing)
-        if chosen.untold is not None and chosen.delay:
-            known = joined(known, chosen.untold.prior)
+        if chosen.undecided is not None and chosen.delay:
+            known = joined(known, chosen.undecided.prior)
         fit = estimator.fit(unloaded, loaded, ours, settings.lengths, known, survey.progress)
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
@@ -214,9 +214,9 @@ def run_fit(
         elif fit.shared.model != chosen.model:  # the fit has found the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
             sums.clear()
-        told = _of_motorless(fit, survey, settings, chosen, prior)
-        if told is not None:
-            fit, chosen = told
+        better = _of_motorless(fit, survey, settings, chosen, prior)
+        if better is not None:
+            fit, chosen = better
             ours = _weak_settings(settings, chosen)
             sums.clear()
         if fit.estimator == "instruments" and not chosen.shrunk:
@@ -244,10 +244,10 @@ def _of_motorless(
     passive = any(log.origin.reading.passive for log in survey.logs)
     if settings.estimator != "refined" or loaded or not passive:
         return None
-    if untold(fit, unloaded, loaded, _weak_settings(settings, chosen)) is fit:
+    if doubted_without_motor(fit, unloaded, loaded, _weak_settings(settings, chosen)) is fit:
         return None
-    told = chosen.chosen_by == "logs"
-    terms = tuple(term for term in chosen.model.terms if not told or term in FIRST_TERMS)
+    by_logs = chosen.chosen_by == "logs"
+    terms = tuple(term for term in chosen.model.terms if not by_logs or term in FIRST_TERMS)
     trials = tuple(
         replace(trial, kept=False, reason=_BY_NOTHING)
         if trial.kept and trial.term not in terms
@@ -276,8 +276,8 @@ def _shrunk(
     prior: Prior | None,
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk in place of the `refuted` one's, and its model."""
-    told = chosen.hold_by == "logs"  # by a likelihood that does not hold: a term tells the delay
-    hold: Hold = "foh" if told else chosen.hold
+    by_logs = chosen.hold_by == "logs"  # by a likelihood that does not hold: a term tells the delay
+    hold: Hold = "foh" if by_logs else chosen.hold
     shaped = replace(ours, model=chosen.shapes or chosen.model, hold=hold)
     every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
     nothing = absent(settings.effort, every.names)
@@ -324,11 +324,14 @@ def residual_of(
 def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
     """The fit; where its likelihood is refuted, with what makes k1 … k5 doubtful: see `doubted`.
 
-    Of an arm with a joint that has no motor, whether its equation tells them: see `untold`. One
-    that physics contradicts stays as sure as it is, so that the contradiction is reported.
+    Of an arm with a joint that has no motor, whether its equation determines them: see
+    `doubted_without_motor`. One that physics contradicts stays as sure as it is, so that the
+    contradiction is reported.
     """
     if any(log.origin.reading.passive for log in survey.logs):
-        fit = untold(fit, *_passes(survey, settings), _weak_settings(settings, chosen))
+        fit = doubted_without_motor(
+            fit, *_passes(survey, settings), _weak_settings(settings, chosen)
+        )
     if not (fit.refuted and settings.chooses):
         return fit
     far = [
@@ -383,7 +386,7 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
         term
         for term in CHOICES
         if (term in chosen.model.terms or set(EVERY_TERM[term].names) & set(fit.names))
-        and not (chosen.untold is not None and term in DELAYS)
+        and not (chosen.undecided is not None and term in DELAYS)
         and term not in settings.terms
         and all(size.get(name, 0.0) < NOTHING for name in EVERY_TERM[term].names)
         and not (EVERY_TERM[term].sines and "y_p" in fit.shared.body)  # what tells the payload's

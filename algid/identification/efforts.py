@@ -32,7 +32,7 @@ Known = dict[str, tuple[float, float]]
 """Values and standard deviations by name."""
 
 
-def told(fit: Fit, settings: Settings) -> Settings:
+def with_effort(fit: Fit, settings: Settings) -> Settings:
     """The settings with the effort, or without gravity, that the logs tell.
 
     The same where they do not.

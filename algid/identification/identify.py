@@ -240,13 +240,13 @@ def _by_likelihood(
 ) -> tuple[Identified, Settings]:
     """What the logs tell, and the settings with the effort that they tell."""
     from algid.identification.by_likelihood import residual_of, with_doubt, with_endogeneity
-    from algid.identification.efforts import of_effort, told
+    from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
     from algid.identification.trials import advised
 
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
-    settings = told(fit, settings)
+    settings = with_effort(fit, settings)
     said = of_effort(fit, settings, asked)
     if settings != asked:
         fit, predictions, chosen = _fitted(survey, settings, earlier)
@@ -284,8 +284,8 @@ def _fitted(
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
     from algid.identification.by_likelihood import (
         choose_model,
-        retold,
         run_fit,
+        with_hold_of_fit,
         without_nothing,
     )
     from algid.identification.known import prior_of
@@ -296,7 +296,7 @@ def _fitted(
     survey.begin("fitting")
     settings = replace(settings, torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
-    better = without_nothing(retold(fit, chosen), fit, settings)
+    better = without_nothing(with_hold_of_fit(fit, chosen), fit, settings)
     if (better.model, better.delay, better.hold) != (chosen.model, chosen.delay, chosen.hold):
         settings = replace(settings, torque_hold=better.hold)
         fit, predictions, chosen = run_fit(survey, settings, better, prior)

@@ -304,7 +304,7 @@ def _expected(fit: Fit, chosen: Selection) -> list[str]:
     """Coefficients of terms that were not chosen: each is what the logs and a prior agree on."""
     if fit.shrinkage is not None:
         return list(fit.shrinkage.names)
-    return [name for name in DELAYS if name in fit.names and chosen.untold is not None]
+    return [name for name in DELAYS if name in fit.names and chosen.undecided is not None]
 
 
 def _torque_hold(chosen: Selection) -> results.TorqueHold:
@@ -316,7 +316,7 @@ def _torque_hold(chosen: Selection) -> results.TorqueHold:
     return results.TorqueHold(
         asked=asked,
         used=chosen.hold,
-        told=late.told,
+        told=late.decided,
         half=late.half,
         late=late.late,
         late_std=finite(late.std),

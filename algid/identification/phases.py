@@ -33,13 +33,13 @@ def phase_note(fit: Fit) -> Notice | None:
     if not set(SINES) & set(fit.names) or (fit.shrinkage is not None and not bent(fit)):
         return None
     second, of_second = _argument(fit, K1)
-    numbers = {"second": _told(fit, second, of_second)}
+    numbers = {"second": _in_degrees(fit, second, of_second)}
     if {K2, K4} <= set(fit.names) - set(fit.absent):
         whole, of_whole = _argument(fit, K2)
         load, of_load = _argument(fit, K4)
         first, of_first = whole - second, of_whole - of_second
-        numbers["first"] = _told(fit, first, of_first)
-        numbers["load"] = _told(fit, load - first, of_load - of_first)
+        numbers["first"] = _in_degrees(fit, first, of_first)
+        numbers["load"] = _in_degrees(fit, load - first, of_load - of_first)
     code = "PHASES" if "first" in numbers else "PHASE"
     return Notice(code, numbers=numbers, note=True)
 
@@ -55,7 +55,7 @@ def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
     return float(np.angle(K)), slope
 
 
-def _told(fit: Fit, angle: float, slope: FloatArray) -> str:
+def _in_degrees(fit: Fit, angle: float, slope: FloatArray) -> str:
     turned = float(np.degrees(np.remainder(angle + np.pi, 2 * np.pi) - np.pi))
     variance = max(float(slope @ fit.covariance @ slope), 0.0)
     half = float(np.degrees(fit.quantile * np.sqrt(variance)))

@@ -21,7 +21,7 @@ FAR_APART = sigmas(CERTAIN)  # past which two logs are not of one arm
 
 
 def exchanged(fit: Fit) -> bool:
-    """Whether the unloaded arm bears more than the loaded one, and by far."""
+    """Whether the unloaded arm carries more than the loaded one, and by far."""
     return any(
         b.bound == "m_p >= 0" and b.distance is not None and b.distance > FAR_APART
         for b in broken_bounds(fit)

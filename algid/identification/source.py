@@ -193,7 +193,7 @@ def open_sources(
 def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
     """All logs, unloaded ones first.
 
-    a loaded one that is also given as unloaded says so: its payload is nought.
+    a loaded one that is also given as unloaded says so: its payload is zero.
     """
     lengths = {source.promised for source in unloaded if source.digest}
     if not any(source.digest and source.promised in lengths for source in loaded):

@@ -69,7 +69,7 @@ def lost_steps(log: Log) -> int:
     0 where noise or a slow motion does not tell.
 
     A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that
-    is nought as often.
+    is zero as often.
     """
     count = len(log) - 3
     before, own, after = (
@@ -91,7 +91,7 @@ def lost_steps(log: Log) -> int:
 def rests(log: Log, whole: bool) -> Iterator[Notice]:
     """Rest before the motion and, where the log is `whole`, after it.
 
-    A joint that stiction holds bears a torque of which the motion tells nothing: gravity's
+    A joint that stiction holds has a torque that the motion does not determine: gravity's
     constants take it. A posture that a motor holds freely tells more of gravity than any motion.
     The log cannot tell which it is: the rest is named, with the flags that leave it out, and
     stays.

@@ -227,7 +227,7 @@ def channel_readings(
         joint = int(name[-1]) - 1
         like = f"theta{joint + 1}" if _is_desired(name, profile) else name
         channel = _channel(like, profile)
-        unit, told = _unit(like, profile, stated)
+        unit, source = _unit(like, profile, stated)
         if name == f"tau{profile.passive}":
             readings[name] = ChannelReading("none: no motor", "N m", "profile", 0.0)
             continue
@@ -236,7 +236,7 @@ def channel_readings(
         )
         angle = like.startswith(("theta", "q_des"))
         offset = channel.offset + (profile.offsets[joint] if angle else 0.0)
-        readings[name] = ChannelReading(mapping[name], unit, told, factor, offset)
+        readings[name] = ChannelReading(mapping[name], unit, source, factor, offset)
     return readings
 
 

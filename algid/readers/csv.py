@@ -128,10 +128,10 @@ def _frames(
     import polars as pl
 
     done = 0
-    told = (
+    counted_before = (
         most is not None
     )  # of rows without a value, and of quotes that are left open, the whole pass tells
-    if not told and len(dialect.columns) > len(columns.sources):
+    if not counted_before and len(dialect.columns) > len(columns.sources):
         _check_quotes(path, kind, dialect)
     try:
         for frame in _parsed(path, kind, dialect, columns, rows, most):
@@ -148,9 +148,9 @@ def _frames(
             if any(
                 frame.null_count().row(0)
             ):  # empty lines, which are no rows, or rows without a value
-                if not told and (lost := _without_values(path, kind, dialect, columns)):
+                if not counted_before and (lost := _without_values(path, kind, dialect, columns)):
                     yield frame.clear(lost)
-                told = True
+                counted_before = True
                 frame = frame.filter(~pl.all_horizontal(pl.all().is_null()))
             yield frame
             if most is not None and done >= most:

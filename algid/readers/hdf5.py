@@ -55,9 +55,9 @@ def arrays_of(path: Path, *, most_bytes: int, most_arrays: int) -> Mapping[str, 
             arrays = _received(running.stdout)
         except (ValueError, EOFError):  # it ended before
             arrays = {}
-        told = running.stderr.read().decode(errors="replace").strip()
+        message = running.stderr.read().decode(errors="replace").strip()
     if running.returncode == _REFUSED:
-        raise LogError(f"{path}: {told.rpartition(chr(10))[2]}")
+        raise LogError(f"{path}: {message.rpartition(chr(10))[2]}")
     if running.returncode != 0:
         raise LogError(
             f"{path}: the HDF5 file is damaged: the library that reads it broke on it "

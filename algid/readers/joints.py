@@ -72,11 +72,11 @@ def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names
 
 
 def order_notice(
-    names: Sequence[str], chosen: tuple[str, str], told: Literal["names", "order"]
+    names: Sequence[str], chosen: tuple[str, str], by: Literal["names", "order"]
 ) -> tuple[Notice, ...]:
     """What to say of the order: nothing where names and log agree."""
     first, second = chosen
-    if told == "order":
+    if by == "order":
         why = "as they stand in the log: their names do not tell"
     elif list(names) != list(chosen):
         why = "by their names; the log has them the other way round"
@@ -84,7 +84,7 @@ def order_notice(
         return ()
     numbers = {"first": first, "second": second, "why": why}
     swapped = Remedy({"joints": [second, first]}, "to swap them")
-    note = told == "names"
+    note = by == "names"
     return (Notice("JOINT_ORDER", numbers=numbers, remedies=(swapped,), note=note),)
 
 
@@ -92,8 +92,8 @@ def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[N
     """Joints 1 and 2 by the user or else by the two `names`, their source, and notices."""
     if profile.joints:
         return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
-    joints, told = along_the_arm(names)
-    return Reading(joints=joints, joints_told=told), order_notice(names, joints, told)
+    joints, by = along_the_arm(names)
+    return Reading(joints=joints, joints_told=by), order_notice(names, joints, by)
 
 
 def _ranks(first: str, second: str) -> tuple[int, int] | None:

@@ -218,9 +218,7 @@ def choose(
                 for name in {**parts, **worded}.values()
                 if name.joint and name.stem in _STEMS
             ]
-            there = (
-                ", ".join(list(dict.fromkeys(names))[:16]) or "none that can be told by their names"
-            )
+            there = ", ".join(list(dict.fromkeys(names))[:16]) or "none that their names show"
             raise LookupError(
                 f"no columns of the joints {', '.join(joints)}; joints there are: {there}"
             )

@@ -60,11 +60,11 @@ def one_after_another(
         runs = counted(clock.run, "run")
         raise LogError(f"{path}: there is no segment {only}: its time makes {runs}; {last}")
     if held is not None:
-        told = _told(clock.run, only) if clock.run > 1 else ()
-        yield held.noting(*left_out, *told)
+        notices = _restarts(clock.run, only) if clock.run > 1 else ()
+        yield held.noting(*left_out, *notices)
 
 
-def _told(runs: int, only: int | None) -> tuple[Notice]:
+def _restarts(runs: int, only: int | None) -> tuple[Notice]:
     """What to say of several runs."""
     said = "one is read behind another, and no window spans two"
     mends: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)

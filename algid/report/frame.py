@@ -94,7 +94,7 @@ def page(document: Document, shared_library: bool = False) -> str:
     if shared_library:
         nonce = hashlib.sha256(
             (body + data).encode()
-        ).hexdigest()  # nobody who writes the body can foretell it
+        ).hexdigest()  # nobody who writes the body can predict it
         source, tag = f"'nonce-{nonce}'", f'<script nonce="{nonce}" src="../{LIBRARY}"></script>'
     else:
         own = library()

@@ -73,8 +73,8 @@ def _bridged(settled: list[Log]) -> Iterator[Log]:
     if len(settled) < 2:
         yield from settled
         return
-    crumb, piece = settled
-    yield join([crumb, piece.part(0, BRIDGE)])
+    remnant, piece = settled
+    yield join([remnant, piece.part(0, BRIDGE)])
     if len(piece) > BRIDGE:
         yield piece.part(BRIDGE, len(piece))
 

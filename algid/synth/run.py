@@ -105,7 +105,7 @@ def with_schedule(
     """A log with changes of payload: pairs of time in s, increasing, and payload in kg from then.
 
     Before the first time the arm is unloaded. An object is grasped and let go at the tip's own
-    velocity, so that the motion has no step. The truth that the log bears names the schedule.
+    velocity, so that the motion has no step. The truth in the log names the schedule.
 
     Raises
     ------

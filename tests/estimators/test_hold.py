@@ -20,7 +20,7 @@ def test_a_wrong_hold_is_taken_in_less_than_one_of_a_hundred_logs(
     drawn = true + std * np.random.default_rng(5).standard_normal(20_000)
     found = [Lateness(float(one), std, HALF) for one in drawn]
     wrong = "foh" if true else "zoh"
-    assert np.mean([one.told and one.hold == wrong for one in found]) < 0.01
+    assert np.mean([one.decided and one.hold == wrong for one in found]) < 0.01
 
 
 @pytest.mark.parametrize("share", [0.05, 0.3, 1.0, 4.0])
@@ -49,12 +49,12 @@ def test_the_posterior_without_its_prior_is_the_likelihood() -> None:
 
 
 def test_a_posterior_wider_than_its_prior_tells_nothing() -> None:
-    assert not Lateness(0.0, HALF, HALF).after(HALF, 2 * HALF).told
+    assert not Lateness(0.0, HALF, HALF).after(HALF, 2 * HALF).decided
 
 
 def test_a_delay_of_five_milliseconds_is_no_hold() -> None:
     late = Lateness(5e-3, 1e-5, HALF)
-    assert late.told
+    assert late.decided
     assert late.another
     assert late.hold == "foh"
 
@@ -63,5 +63,5 @@ def test_half_a_sample_that_moves_nothing_is_left_alone() -> None:
     late = Lateness(0.0, 10 * HALF, HALF, effect=0.05 / HALF)
     assert late.share == pytest.approx(0.05)
     assert abs(late.odds) < SURE
-    assert late.told
+    assert late.decided
     assert late.hold == "foh"

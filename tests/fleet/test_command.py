@@ -107,8 +107,7 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
     (drift,) = drift_table(history).rows
     assert drift[:4] == ("r0", "k6", "2023-11-23", "10")
     assert (
-        drift_table(history).note
-        == "1 found. A slope over 3 months is told from none at p < 0.001."
+        drift_table(history).note == "1 found. A slope over 3 months is significant at p < 0.001."
     )
     (finding,) = finding_table(history).rows
     assert finding == (

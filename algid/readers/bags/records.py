@@ -94,9 +94,9 @@ def connection(fields: dict[str, bytes], data: bytes) -> tuple[int, MessageChann
         If the record cannot be read.
     """
     record = BagRecord(fields, 0, 0)
-    told = fields_of(data)
-    kind = told.get("type", b"").decode("utf-8", errors="replace")
-    definition = told.get("message_definition", b"")
+    stated = fields_of(data)
+    kind = stated.get("type", b"").decode("utf-8", errors="replace")
+    definition = stated.get("message_definition", b"")
     return record.number("conn"), MessageChannel(
         record.text("topic"), kind, "ros1", "ros1msg", definition
     )

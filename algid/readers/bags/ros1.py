@@ -156,7 +156,7 @@ class _Outline:
         self._head: BagRecord | None = None
         self._starts: list[int] = []
         """Where the record of each part starts."""
-        self._told: dict[int, dict[int, int]] = {}
+        self._indexed_counts: dict[int, dict[int, int]] = {}
         """What the end of the file tells: by a chunk's start the messages of each connection."""
         self._times: list[int] = []
         self._tail: int | None = None
@@ -247,7 +247,7 @@ class _Outline:
     def _info(self, record: BagRecord) -> None:
         data = self._file.read(record.start, record.end - record.start)
         pairs = struct.iter_unpack("<II", data) if len(data) % _INFO_ENTRY == 0 else ()
-        self._told[record.number("chunk_pos", 8)] = {
+        self._indexed_counts[record.number("chunk_pos", 8)] = {
             number: count for number, count in pairs if count
         }
         self._times += [nanoseconds(record.number(name, 8)) for name in ("start_time", "end_time")]
@@ -295,7 +295,9 @@ class _Outline:
             )
         if self._tail is not None and head.number("index_pos", 8) != self._tail:
             return f"it tells of an index at byte {head.number('index_pos', 8)}", False
-        return ("chunks hold other messages than it tells" if own != self._told else ""), False
+        return (
+            "chunks hold other messages than it tells" if own != self._indexed_counts else ""
+        ), False
 
 
 class Ros1Source(Source):
@@ -319,7 +321,7 @@ class Ros1Source(Source):
     def _define_inside(self) -> None:
         """Take in the connections that chunks define.
 
-        What contradicts them is told when it is read.
+        What contradicts them is reported when it is read.
         """
         for part in self._layout.parts:
             try:

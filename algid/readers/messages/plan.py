@@ -95,9 +95,9 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         if profile is not None and profile.joints is not None:
             reading = Reading(joints=profile.joints, joints_told=profile.told_by("joints"))
         else:
-            joints, told = along_the_arm(usual.joints)
-            reading = Reading(joints=joints, joints_told=told)
-            notices = order_notice(usual.joints, joints, told) if usual.named else ()
+            joints, by = along_the_arm(usual.joints)
+            reading = Reading(joints=joints, joints_told=by)
+            notices = order_notice(usual.joints, joints, by) if usual.named else ()
         notices += _choice_notice(usual)
     if usual is not None and not set(REFERENCES) & named.keys():
         sources |= _reference(source, reading.joints) if usual.named and reading.joints else {}

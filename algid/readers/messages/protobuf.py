@@ -2,7 +2,7 @@
 
 A varint's width is fixed by the highest bits of its bytes, so those are the bytes that fix a
 shape, beside keys and lengths. A plain number of proto3 that is zero is left out of its message:
-it is read as zero. A number that can be told to be unset is not: one of a oneof, an ``optional``
+it is read as zero. A number that is known to be unset is not: one of a oneof, an ``optional``
 one, one of proto2, one of a message that is not there.
 
 google.protobuf reads the descriptors. Messages are walked by hand, since it does not tell where in

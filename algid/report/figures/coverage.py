@@ -30,7 +30,7 @@ def coverage(found: TorqueLog) -> Figure:
         ),
     )
     reading = (
-        "Read: dots spread over both planes teach; a line or a spot leaves parameters tied "
+        "Read: dots spread over both planes inform; a line or a spot leaves parameters tied "
         "to each other."
     )
     note = f"θ1 {theta[0]}, θ2 {theta[1]}; speeds {omega[0]} and {omega[1]}."
