@@ -10,7 +10,7 @@ results failed, and what `track` says of a third log with that result: whether i
 the mass, and changes of payload, of which there are none. A cell that right
 intervals give once in a thousand is marked. Phases and inertias of 1 to 3 of their own standard
 deviations, where the logs choose one or the other, are its last rows. Draws go round all rows, and
-`planar.md` in the output folder is written after each round: a run that is cut off leaves a table.
+`planar.md` in the output folder is written after each row: a run that is cut off leaves a table.
 """
 
 from __future__ import annotations
@@ -181,15 +181,16 @@ def _tracked(name: str, row: Row, seed: int, result: Result, mass: float) -> dic
 
 
 def rounds(draws: int, rows: tuple[Row, ...], processes: int) -> Iterator[list[str]]:
-    """The table of coverage after each round of draws of every arm and row."""
+    """The table of coverage after every row of a round, with as many draws of each arm."""
     totals: dict[Row, Counter[str]] = {row: Counter() for row in rows}
     with ProcessPoolExecutor(processes) as pool:
         for first in range(0, draws, ROUND):
             seeds = range(first, min(first + ROUND, draws))
             jobs = [(name, row, seeds) for row in rows for name in ARMS]
-            for (_, row, _), found in zip(jobs, pool.map(judged, jobs), strict=True):
+            for (name, row, _), found in zip(jobs, pool.map(judged, jobs), strict=True):
                 totals[row].update(found)
-            yield table(totals)
+                if name == ARMS[-1]:
+                    yield table(totals)
 
 
 def table(totals: Mapping[Row, Counter[str]]) -> list[str]:
