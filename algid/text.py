@@ -6,6 +6,8 @@ Names out of logs are foreign text, which may not reach a terminal or a page as 
 from __future__ import annotations
 
 import math
+import re
+import textwrap
 import unicodedata
 
 LONGEST = 300
@@ -62,6 +64,18 @@ def joined(words: list[str]) -> str:
 def unit_text(unit: str) -> str:
     """A unit with its power as it is printed: kg m²."""
     return visible(unit).replace("^2", "²")
+
+
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|(?:kg|N|rad|ms|m|s|Hz)\b))|(?<=±) (?=\d)")
+
+
+def lines_of(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """A text in lines of `width` at most that begin as given; no number parts from its unit."""
+    glued = _UNIT.sub("\u00a0", text)
+    wrapped = textwrap.wrap(
+        glued, width, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False
+    )
+    return [line.replace("\u00a0", " ") for line in wrapped]
 
 
 ABSENT = "–"

@@ -109,8 +109,12 @@ def _root(
 
 
 def _help(command: Callable[..., Any]) -> str:
-    """Help text from a command's docstring, without exceptions: these become line and exit code."""
-    return inspect.cleandoc(command.__doc__ or "").partition("\n\nRaises\n")[0]
+    """Help text from a command's docstring, a line a paragraph: the terminal breaks them.
+
+    Exceptions are left out: these become line and exit code.
+    """
+    text = inspect.cleandoc(command.__doc__ or "").partition("\n\nRaises\n")[0]
+    return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
 def gathered(names: Iterable[str], *, listed: bool = False) -> typer.Typer:

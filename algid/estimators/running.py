@@ -23,6 +23,8 @@ from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation, combine
 from algid.estimators.fit import Fit, examined
 
+_NEAR = 0.5
+"""Standard deviations from the largest likelihood within which a running estimate is drawn."""
 MOMENTS = 96
 """About how many moments the logs are looked at together."""
 
@@ -101,7 +103,10 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, Flo
 
 
 def has_running(fit: Fit) -> bool:
-    """Whether the fit is where its likelihood is largest: a fit held within bounds is not."""
+    """Whether the fit is near where its likelihood is largest, within half a standard deviation.
+
+    One that is averaged over the payload's bodies is near; one held within bounds may not be.
+    """
     beta, S, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
     step = beta - fit.values
-    return bool(fit.converged and step @ S @ step < 1e-6)
+    return bool(fit.converged and step @ S @ step < _NEAR**2)

@@ -120,7 +120,7 @@ def clock_figures(log: Log) -> ClockFigures:
         rows=len(log),
         duration=log.duration,
         rate=1 / period,
-        jitter=float(np.std(steps[~gaps])),
+        jitter=round(float(np.std(steps[~gaps])), 12),  # stamps count nanoseconds
         gaps=int(np.count_nonzero(gaps)),
         longest_gap=float(steps.max()) if gaps.any() else 0.0,
     )

@@ -12,11 +12,13 @@ from algid.notices import Notice
 from algid.report.phasors import Moment, moments
 from algid.results import Estimate, Result, Status
 from algid.results.verdict import share_text
-from algid.text import ABSENT, resolved, significant, unit_text, visible
+from algid.text import ABSENT, lines_of, resolved, significant, unit_text, visible
 from algid.verdict import MOST_REASONS, Verdict
 from algid.words import counted
 
 WIDTH, HEIGHT = 80, 25
+LEAST_ERROR = 0.01
+"""Percent of the truth: a smaller error is said to be smaller."""
 MOST_COMMAND = 6
 """Lines of what to run first."""
 
@@ -36,9 +38,18 @@ def brief(result: Result, place: str = "") -> list[str]:
     tail = [*_notes(judged.notes), *([f"Report: {place}"] if place else [])]
     command = run_first(judged.command)
     if len(command) > MOST_COMMAND:
-        command = ["Run first: the command with -v, or in the report; it is long"]
+        command = _added(result)
     room = HEIGHT - len(head) - len(body) - len(tail) - len(command)
     return [*head, *_reasons(judged, room), *command, *body, *tail]
+
+
+def _added(result: Result) -> list[str]:
+    """What to add to a call that is too long to be printed again."""
+    made, wanted = result.settings.get("command"), result.verdict.command or ""
+    begun = f"{made} " if isinstance(made, str) else ""
+    if not begun or not wanted.startswith(begun):
+        return ["Run first: the command with -v, or in the report; it is long"]
+    return _wrapped(f"Run first: the same command with {wanted.removeprefix(begun)}")
 
 
 def run_first(command: str | None) -> list[str]:
@@ -58,9 +69,7 @@ def run_first(command: str | None) -> list[str]:
 
 
 def _wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
-    return textwrap.wrap(
-        text, WIDTH, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False
-    )
+    return lines_of(text, WIDTH, first, rest)
 
 
 def _reasons(judged: Verdict, room: int) -> Iterator[str]:
@@ -93,8 +102,6 @@ def _estimates(result: Result) -> Iterator[str]:
         error = f"{errors[name]:>8}" if errors else ""
         line = f"{visible(name):<4}{number:>19} {unit_text(estimate.unit):<10}{error} "
         words = PARAMETERS[name].meaning.partition(", ")[0] if name in PARAMETERS else ""
-        if errors and len(line) + len(words) > WIDTH:  # there is no room for a second line
-            words = ""
         if estimate.status is not Status.OK:
             words = estimate.status.value
         yield from _wrapped(f"{line}{words}", rest=" " * len(line))
@@ -128,7 +135,8 @@ def _errors(result: Result) -> dict[str, str]:
     for name, true in result.truth.items():
         estimate = result.estimates[name].estimate if name in errors else None
         if estimate is not None and true:
-            errors[name] = f"{100 * (estimate - true) / abs(true):+.2g} %"
+            share = 100 * (estimate - true) / abs(true)
+            errors[name] = f"{share:+.2g} %" if abs(share) >= LEAST_ERROR else "<0.01 %"
     return errors
 
 

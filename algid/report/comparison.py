@@ -138,7 +138,7 @@ def _estimates(
         for other, far in zip(others, distances, strict=True):
             cells += [with_std(other), _change(first, other), _far(far) or ABSENT]
         rows.append(tuple(cells))
-    note = f"Differences are against {labels[0]}; σ combines both standard deviations."
+    note = f"Differences are against {labels[0]}; ± is one standard deviation, σ combines both."
     table = Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
     return replace(table, upright=_upright(results, labels, sigma, note))
 

@@ -207,6 +207,9 @@ def _cell(table: Table, slot: Slot, row: tuple[str, ...]) -> str:
     bare = column.kind == "number" or text in ANSWERS  # says nothing on a card without its heading
     heading = escaped(column.heading.removesuffix(" std"))  # beside an estimate ± is enough
     label = f' data-label="{heading}"' if bare and not main else ""
+    if column.kind == "number" and shown.endswith(")"):  # a status behind it has its own line
+        number, mark, status = shown.rpartition(" (")
+        shown = f'{number} <span class="aside">({status}</span>' if mark else shown
     return f'<td class="{column.kind}{main}{long}"{label}>{shown}</td>'
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from algid.report.brief import run_first
 from algid.report.document import Column, Depth, Document, Table
 from algid.results import Status
-from algid.text import visible
+from algid.text import lines_of, visible
 from algid.verdict import Grade, Verdict
 from algid.words import counted
 
@@ -40,9 +40,10 @@ def print_verdict(judged: Verdict, console: Console, most: int | None = None) ->
     from rich.table import Table as RichTable
     from rich.text import Text
 
-    console.print(
-        Text.assemble((judged.word, GRADE_STYLES[judged.grade]), f": {visible(judged.headline)}.")
-    )
+    head = lines_of(f"{judged.word}: {visible(judged.headline)}.", console.width)
+    shown = Text("\n".join(head))
+    shown.stylize(GRADE_STYLES[judged.grade], 0, len(judged.word))
+    console.print(shown)
     points = RichTable.grid(padding=(0, 1))
     points.add_column()
     points.add_column(overflow="fold")

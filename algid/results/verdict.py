@@ -147,7 +147,7 @@ def _failure(result: Result) -> str | None:
     if is_implausible(result):
         return _contradiction(result.fit)
     usable, count = sum(found.usable for found in result.estimates.values()), len(result.estimates)
-    if not usable:
+    if not any(_is_identified(found) for found in result.estimates.values()):
         words = sorted(
             {STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()}
         )
@@ -157,11 +157,13 @@ def _failure(result: Result) -> str | None:
     return next((one.text for one in _worse_than_constant(result.fit)), None)
 
 
+def _is_identified(found: Estimate) -> bool:
+    return found.status == "OK" and found.estimate is not None
+
+
 def _identified(result: Result) -> str:
     """How many parameters are identified, and by which estimator if it was not the requested."""
-    identified = sum(
-        found.status == "OK" and found.estimate is not None for found in result.estimates.values()
-    )
+    identified = sum(map(_is_identified, result.estimates.values()))
     count = len(result.estimates)
     have = (
         f"{'all' if identified == count else f'{identified} of'} {counted(count, 'parameter')} "

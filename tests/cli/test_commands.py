@@ -113,6 +113,11 @@ def test_help_has_an_example_for_every_command() -> None:
     assert "--install-completion" in Outcome("--help").out
 
 
+def test_a_paragraph_of_help_is_broken_by_the_terminal_alone() -> None:
+    for command in app.registered_commands:
+        assert "\n" not in (command.help or "").replace("\n\n", ""), command.name
+
+
 @pytest.mark.parametrize("command", ["convert", "profile new"])
 def test_help_leaves_out_what_the_function_raises(command: str) -> None:
     name, *rest = command.split()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from algid.estimators import refined, weak
+from algid.estimators.combine import combine
 from algid.estimators.fit import Fit, Status
 from algid.estimators.running import has_running, running
 from algid.estimators.whitening import NoiseLevels
@@ -85,6 +86,17 @@ def test_a_fit_held_within_bounds_has_none(bench: Bench) -> None:
     fit = _fit(bench, "weak", 1, loaded=False)
     assert not has_running(replace(fit, values=fit.values * 1.01))
     assert not has_running(replace(fit, converged=False))
+
+
+def test_a_fit_that_averages_models_has_one(bench: Bench) -> None:
+    """Its values lie beside where one model's likelihood is largest, by less than its errors."""
+    from dataclasses import replace
+
+    fit = _fit(bench, "weak", 1, loaded=False)
+    beta, S, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
+    away = np.linalg.solve(np.linalg.cholesky(S).T, np.eye(beta.size)[1])  # one deviation
+    assert has_running(replace(fit, values=beta + 0.3 * away))
+    assert not has_running(replace(fit, values=beta + away))
 
 
 def test_what_the_fit_calls_open_has_no_running_estimate(bench: Bench) -> None:

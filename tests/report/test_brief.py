@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 from algid.profile import Profile
 from algid.report.brief import HEIGHT, WIDTH, brief
 from algid.results import Result
@@ -44,6 +44,20 @@ def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
     logs = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
     text = held(algid.identify(*logs, settings=Settings(estimator=estimator)))
     assert " % " in text
+    assert "gravity moment of link 1" in text  # the longest meaning breaks, and is not left out
+    errors = [line[34:42] for line in text.splitlines() if line.startswith(("k", "m_p", "l"))]
+    assert len(errors) >= 9
+    assert all(error.endswith(" %") for error in errors)
+
+
+def test_a_call_that_is_too_long_is_told_what_to_add(result: Result) -> None:
+    made = shlex.join(["algid", "identify", *(f"runs/of/the/arm/{n:03}.csv" for n in range(60))])
+    wrong = Notice("GRAVITY_COMPENSATED", remedies=(Remedy({"zero": "hanging"}, "hanging"),))
+    failing = result.model_copy(
+        update={"notices": [wrong], "settings": {**result.settings, "command": made}}
+    )
+    text = held(failing)
+    assert "Run first: the same command with --zero hanging --force" in text
 
 
 def test_a_failed_log_says_what_to_run_first() -> None:

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from algid.report.comparison import compare
 from algid.report.comparison_page import _distances, _intervals, comparison_document, verdict
 from algid.report.frame import page
-from algid.results import Result, write_result
+from algid.results import Result, Status, write_result
 from tests.cli.commands import app
 from tests.report.folders import HOSTILE
 
@@ -79,6 +79,13 @@ def test_the_command_writes_the_page(result: Result, tmp_path: Path) -> None:
     assert "Estimates side by side" in page
     assert page.count('class="reading">Read: ') == 2
     assert not re.findall(r'(?:src|href)="(?!#|data:)', page)
+
+
+def test_a_status_stands_under_its_number(result: Result) -> None:
+    poor = result.parameters["k2"].model_copy(update={"status": Status.NOT_SIGNIFICANT})
+    other = result.model_copy(update={"parameters": {**result.parameters, "k2": poor}})
+    text = page(comparison_document(compare([result, other], ["a", "b"]), [result, other]))
+    assert text.count('<span class="aside">(NOT_SIGNIFICANT)</span></td>') == 1
 
 
 def test_a_name_that_attacks_stays_text(result: Result) -> None:

@@ -6,7 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from algid.text import file_name, interval, joined, percent, resolved, significant, visible
+from algid.text import (
+    file_name,
+    interval,
+    joined,
+    lines_of,
+    percent,
+    resolved,
+    significant,
+    visible,
+)
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e290, max_value=1e290)
 
@@ -69,3 +78,14 @@ def test_what_cannot_be_seen_is_written_as_an_escape() -> None:
 
 def test_words_are_joined_as_in_a_sentence() -> None:
     assert [joined([]), joined(["a"]), joined(["a", "b", "c"])] == ["", "a", "a, b and c"]
+
+
+@pytest.mark.parametrize("width", range(20, 60))
+def test_no_number_parts_from_its_unit(width: int) -> None:
+    text = "the least certain, k2, to ± 0.58 % (95 %); weighing 0, 0.05 and 0 kg at 2 and 4 s"
+    lines = lines_of(text, width, " • ", "   ")
+    assert max(map(len, lines)) <= width
+    assert " ".join(line[3:] for line in lines) == text
+    for line in lines:
+        assert not line[3:].startswith(("%", "kg", "s"))
+        assert not line.endswith("±")

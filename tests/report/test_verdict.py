@@ -170,6 +170,16 @@ def test_nothing_identified_is_a_failure(result: Result) -> None:
     )
 
 
+def test_nothing_but_what_may_be_zero_is_a_failure(result: Result) -> None:
+    vague = Estimate(
+        estimate=0.1, std=1.0, ci95=(-1.9, 2.1), unit="kg m^2", status=Status.NOT_SIGNIFICANT
+    )
+    found = result.model_copy(update={"parameters": {"k1": vague}, "payload": {}, "table4": []})
+    assert found.verdict.sentence.startswith(
+        "Failed: no parameter could be identified (not significant)"
+    )
+
+
 def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     told = with_parameter(result, "k5", lost)
