@@ -145,15 +145,15 @@ def combine(
     value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
         step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
-        trial = likelihood(shared, logs, beta + step, prior)
-        if not np.isfinite(trial[0]) or trial[0] < value - 1e-9 * (1 + abs(value)):
+        trial = _value(shared, logs, beta + step, prior)
+        if not np.isfinite(trial) or trial < value - 1e-9 * (1 + abs(value)):
             damping = max(10 * damping, 1e-3)
             if damping > 1e12:
                 break
             continue
         gain = float(gradient @ step)
         beta, damping = beta + step, damping / 10 if damping > 1e-6 else 0.0
-        value, gradient, S = trial
+        value, gradient, S = likelihood(shared, logs, beta, prior)
         if gain < _DONE and damping == 0.0:
             break
     return beta, S, value + offset
@@ -190,22 +190,35 @@ def likelihood(
     (Q,), and its information Tᵀ S T of shape (Q, Q), T = dc/dβ; the prior's with them.
     """
     size = len(shared.names)
-    value, gradient, S = 0.0, np.zeros(size), np.zeros((size, size))
+    gradient, S = np.zeros(size), np.zeros((size, size))
     for log in logs:
         T = shared.jacobian(beta, log.loaded)
         change = shared.coefficients(beta, log.loaded) - log.c0
         log_S, log_g = log.total
-        value += float(log_g @ change - 0.5 * change @ log_S @ change)
         gradient += T.T @ (log_g - log_S @ change)
         S += T.T @ log_S @ T
     if prior is not None:
         places = [shared.names.index(name) for name in prior.names]
         weight = prior.precision
-        change = beta[places] - prior.mean
-        value -= 0.5 * float(change @ weight @ change)
-        gradient[places] -= weight @ change
+        gradient[places] -= weight @ (beta[places] - prior.mean)
         S[np.ix_(places, places)] += weight
-    return value, gradient, S
+    return _value(shared, logs, beta, prior), gradient, S
+
+
+def _value(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
+) -> float:
+    """The log-likelihood alone, as `likelihood` gives it: a step that is refused needs no more."""
+    value = 0.0
+    for log in logs:
+        change = shared.coefficients(beta, log.loaded) - log.c0
+        log_S, log_g = log.total
+        value += float(log_g @ change - 0.5 * change @ log_S @ change)
+    if prior is not None:
+        places = [shared.names.index(name) for name in prior.names]
+        change = beta[places] - prior.mean
+        value -= 0.5 * float(change @ prior.precision @ change)
+    return value
 
 
 def sandwich(

@@ -149,7 +149,8 @@ def write_columns(
                 writer = pyarrow.parquet.ParquetWriter(
                     path, schema, compression="zstd", use_dictionary=False
                 )
-            writer.write_table(table.cast(writer.schema))
+            alike = table.schema.equals(writer.schema)  # to cast imports all of pyarrow's functions
+            writer.write_table(table if alike else table.cast(writer.schema))
     finally:
         if writer is not None:
             writer.close()

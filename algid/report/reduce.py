@@ -104,10 +104,9 @@ def table_of(
     import pyarrow.parquet
 
     _check_columns(path, names, numbers=numbers)
-    with _reading(path):
-        columns: dict[str, list[Any]] = pyarrow.parquet.read_table(
-            path, columns=list(names)
-        ).to_pydict()
+    # `pyarrow.parquet.read_table` would import all that reads sets of files.
+    with _reading(path), pyarrow.parquet.ParquetFile(path) as file:
+        columns: dict[str, list[Any]] = file.read(columns=list(names)).to_pydict()
         return columns
 
 
@@ -130,6 +129,43 @@ def _check_columns(path: Path, names: Sequence[str], *, numbers: Collection[str]
                 f"{path}: column {name!r}: expected numbers, found {kinds[name]}; identify again "
                 "with this version"
             )
+
+
+def between(
+    path: Path, names: Sequence[str], log: int, low: float, high: float
+) -> tuple[FloatArray, ...]:
+    """The columns `names` of a log's rows with t in [low, high]; NaN where one has no number.
+
+    Only the row groups that may hold such rows are read. Raises `ResultError` where the file
+    cannot be read, or lacks a column.
+    """
+    import pyarrow.parquet
+
+    wanted = tuple(dict.fromkeys(("log", "t", *names)))
+    _check_columns(path, wanted, numbers=wanted)
+    with _reading(path), pyarrow.parquet.ParquetFile(path) as file:
+        footer = file.metadata
+        bounds = {"log": (log, log), "t": (low, high)}
+        groups = [
+            place
+            for place in range(footer.num_row_groups)
+            if all(_overlaps(footer.row_group(place), *bound) for bound in bounds.items())
+        ]
+        table = file.read_row_groups(groups, columns=list(wanted))
+        columns = {
+            name: np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in wanted
+        }
+    near = (columns["log"] == log) & (columns["t"] >= low) & (columns["t"] <= high)
+    return tuple(columns[name][near] for name in names)
+
+
+def _overlaps(group: Any, name: str, bound: tuple[float, float]) -> bool:
+    """Whether a row group may hold values of the column `name` within a bound, ends included."""
+    columns = (group.column(place) for place in range(group.num_columns))
+    sums = next(column.statistics for column in columns if column.path_in_schema == name)
+    if sums is None or not sums.has_min_max:
+        return True
+    return bool(sums.min <= bound[1] and sums.max >= bound[0])
 
 
 def metadata_of(path: Path, key: bytes) -> bytes | None:

@@ -7,9 +7,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.signal import cont2discrete, lfilter
 
-from algid.signals.observers import C_OBS, PAPER_POLES, A, C, LuenbergerObserver, observer_gain
+from algid.signals.observers import (
+    C_OBS,
+    PAPER_POLES,
+    A,
+    C,
+    LuenbergerObserver,
+    _exponential,
+    observer_gain,
+)
 
 DT = 1e-3
 
@@ -128,3 +137,13 @@ def test_poles_on_the_axis_too_many_or_not_conjugate_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=r"poles.*got \("):
         observer_gain(poles)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 0.3, 1.0, 30.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_exponential_is_that_of_another_library(scale: float, seed: int) -> None:
+    matrix = scale * np.random.default_rng(seed).normal(size=(5, 5))
+    expected = expm(matrix)
+    np.testing.assert_allclose(
+        _exponential(matrix), expected, rtol=0, atol=1e-12 * np.abs(expected).max()
+    )

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from algid.errors import ResultError
 from algid.report.figures.base import Figure, Legend, Missing, Panel, Trace, axis, line
 from algid.report.figures.timeline import chained, log_name, offsets, separators, views
+from algid.report.reduce import between
 from algid.report.series import Series, TorqueLog
 from algid.results import LogSummary, TorquePrediction
 from algid.results.verdict import share_text
@@ -170,20 +170,9 @@ def _closeup_panel(path: Path, found: TorqueLog, joint: int, logs: list[LogSumma
     ResultError
         Where the file cannot be read.
     """
-    import polars as pl
-
     log, moment = found.worst[joint]
-    near = pl.col("t").is_between(moment - HALF, moment + HALF) & (pl.col("log") == log)
-    names = ["t", f"tau{joint}", f"tau{joint}_predicted"]
-    try:
-        rows = pl.scan_parquet(path).filter(near).select(names).collect()
-    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-        raise ResultError(
-            f"{path}: cannot read it ({error}); identify again with this version"
-        ) from error
-    t, measured, predicted = (
-        rows[name].cast(pl.Float64).fill_null(float("nan")).to_numpy() for name in names
-    )
+    names = ("t", f"tau{joint}", f"tau{joint}_predicted")
+    t, measured, predicted = between(path, names, log, moment - HALF, moment + HALF)
     residual = measured - predicted
     traces = [
         line(t, measured, "@measured", "measured", "measured", width=3.6),

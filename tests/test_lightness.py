@@ -1,0 +1,32 @@
+"""What a short log does not need is not imported: it takes longer than all that is computed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import algid
+from algid.writers import write_log
+
+HEAVY = ("polars", "scipy.linalg", "scipy.special", "scipy.signal", "pyarrow.dataset")
+SCRIPT = """
+import json, sys, algid
+algid.identify(sys.argv[1], out=sys.argv[2], report=json.loads(sys.argv[3]))
+print(json.dumps(sorted(sys.modules)))
+"""
+
+
+@pytest.mark.parametrize("report", [False, True])
+def test_a_short_parquet_log_needs_no_heavy_package(tmp_path: Path, report: bool) -> None:
+    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    path = tmp_path / "log.parquet"
+    write_log(path, log)
+    command = [sys.executable, "-c", SCRIPT, str(path), str(tmp_path / "out"), json.dumps(report)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    loaded = json.loads(done.stdout.splitlines()[-1])
+    heavy = HEAVY if report else (*HEAVY, "pyarrow.compute")
+    assert [name for name in heavy if name in loaded] == []
