@@ -31,7 +31,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation
 
 from algid.arm import FloatArray
 from algid.estimators.combine import scaled_pinv
@@ -227,12 +226,21 @@ def _guard(dt: float) -> int:
     return max(2, round(_GUARD / dt))
 
 
+def _spread(found: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Samples (N,) that lie within `reach` of one that was found.
+
+    (`scipy.ndimage.binary_dilation` does the same; its import takes longer than a short log.)
+    """
+    count = np.concatenate([[0], np.cumsum(np.pad(found, reach))])
+    return np.asarray(count[2 * reach + 1 :] > count[: -2 * reach - 1])
+
+
 def _cut(held: Segment, found: Sequence[Limit], first: int, last: int) -> Iterator[Segment]:
     """The stretches from sample `first` to `last` - 1 that lie far enough from any limit."""
     beyond = np.zeros(len(held), dtype=bool)
     for one in found:
         beyond |= one.beyond(held.tau)
-    beyond = binary_dilation(beyond, iterations=_guard(held.dt)) if beyond.any() else beyond
+    beyond = _spread(beyond, _guard(held.dt)) if beyond.any() else beyond
     inside = np.concatenate([[True], beyond[first:last], [True]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int8))) + first
     for start, end in edges.reshape(-1, 2).tolist():

@@ -7,9 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation
 
 from algid.arm import Arm, FloatArray, forward_dynamics
-from algid.estimators.saturation import Limit, saturation_of, sound
+from algid.estimators.saturation import Limit, _spread, saturation_of, sound
 from algid.signals.segments import Segment, append
 
 K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
@@ -169,3 +170,10 @@ def test_stretches_do_not_depend_on_how_the_segments_were_cut(size: int) -> None
 def test_without_limits_nothing_changes() -> None:
     whole = ramp()
     assert list(sound([whole], ())) == [whole]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 1.0])
+@pytest.mark.parametrize("reach", [2, 7, 60])
+def test_samples_near_a_limit_are_those_of_another_library(share: float, reach: int) -> None:
+    found = np.random.default_rng(reach).random(50) < share
+    assert np.array_equal(_spread(found, reach), binary_dilation(found, iterations=reach))
