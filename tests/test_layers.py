@@ -35,7 +35,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "physics": room("arm", "numpy", PURE),
     "model": room("arm physics", "numpy", PURE),
     "log": room("arm notices", "numpy"),
-    "signals": room("arm compiled criteria log", "numpy scipy", PURE),
+    "signals": room("arm compiled criteria log", "numpy", PURE),
     "estimators": room(
         "arm compiled criteria model notices physics progress signals significance",
         "numpy scipy", PURE
@@ -63,7 +63,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "report": room(
         "arm criteria errors files inspection methods model notices options progress "
         "results ros2 significance text verdict words",
-        "matplotlib mcap numpy plotly polars pyarrow rich"
+        "matplotlib mcap numpy plotly pyarrow rich"
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
