@@ -49,8 +49,7 @@ def _noise(rows: list[dict[str, Any]]) -> list[str]:
         bias = max(abs(value) for value in row["bias_over_sigma"])
         lines.append(
             f"| {row['arm']} | {row['turns'][0]}, {row['turns'][1]} | {_sigma(row)} | {ratios} | "
-            f"{bias:.2f} "
-            f"| {100 * row['coverage']:.1f} | {row['fell_back']} |"
+            f"{bias:.2f} | {100 * row['coverage']:.1f} | {row['fell_back']} |"
         )
     return lines
 

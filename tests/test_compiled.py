@@ -78,10 +78,9 @@ theirs = float(scipy.special.chdtrc(4, 3.0))
 print(json.dumps([packages, tail, theirs, compiled.lapack is not None]))
 """
 REFUSAL = (
-    "lambda self, module, real=importlib.machinery.ExtensionFileLoader.exec_module: "
-    "refuse(self, module) if 'linalg._flapack' in module.__name__ and 'scipy.linalg' not in "
-    "sys.modules "
-    "else real(self, module)"
+    "lambda self, module, real=importlib.machinery.ExtensionFileLoader.exec_module: refuse(self, "
+    "module) if 'linalg._flapack' in module.__name__ and 'scipy.linalg' not in sys.modules else "
+    "real(self, module)"
 )
 
 

@@ -111,8 +111,7 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
         )
         reading = (
             "Read: a dot is a log with its 95 % interval, and leads to its report; a red ring is "
-            "an outlier, "
-            "an orange line a drift."
+            "an outlier, an orange line a drift."
         )
         return Figure("logs", "Every log of every robot", panels, reading, legend, columns=2)
     panels = tuple(

@@ -99,8 +99,7 @@ def change_table(history: History) -> Table:
     )
     note = (
         "An arm, a drive or a convention was replaced: what came before and what comes after are "
-        "tested apart. "
-        f"Significant at p < {significant(CHANGED, 1)} in a robot's life."
+        f"tested apart. Significant at p < {significant(CHANGED, 1)} in a robot's life."
     )
     return Table("Changed at once", columns, rows, note)
 

@@ -80,8 +80,7 @@ def assign(
     if gone:
         raise LogError(
             f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
-            "changed "
-            "or damaged; write it again, or remove its truth if it was changed on purpose"
+            "changed or damaged; write it again, or remove its truth if it was changed on purpose"
         )
     named = {name: column for name in profile.channels if (column := profile.channel(name).column)}
     if profile.time:
@@ -213,8 +212,7 @@ def _of_foreign_units(
             right = Remedy({f"{name}.unit": usual}, "say its unit if that is wrong")
             raise LogError(
                 f"{path}: the column {sources[name]!r} for {name} is in {foreign[name]!r}, which "
-                "is no "
-                f"unit of a joint; {right}"
+                f"is no unit of a joint; {right}"
             )
         column = {"column": sources[name], "name": name}
         yield Notice("FOREIGN_UNIT", numbers={**column, "unit": foreign[name], "given": given})

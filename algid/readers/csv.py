@@ -168,8 +168,7 @@ def _frames(
             raise LogError(f"{path}: past row {done}: {NUL_AMONG_ROWS}") from error
         raise LogError(
             f"{path}: column {dialect.columns[int(wrong[2])]!r}, past row {done}: expected a "
-            "number, found "
-            f"{wrong[1][:40]!r}; mend the file or name another column"
+            f"number, found {wrong[1][:40]!r}; mend the file or name another column"
         ) from error
 
 

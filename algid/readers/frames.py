@@ -282,8 +282,8 @@ def tables(
     if wrong:
         raise LogError(
             f"{path}: the values of {', '.join(wrong)} are not those that were written: the file "
-            "was changed "
-            "or damaged; write it again, or remove its truth if it was changed on purpose"
+            "was changed or damaged; write it again, or remove its truth if it was changed on "
+            "purpose"
         )
 
 

@@ -85,8 +85,7 @@ def check_step(path: str, stamps: IntArray) -> None:
         clock = Remedy({"clock": "log"}, "of messages take another clock")
         raise LogError(
             f"{path}: its stamps are {step:g} ns apart in the median, {1e9 / max(step, 1.0):.3g} "
-            "Hz, "
-            f"as no arm's log is; {unit}; {clock}"
+            f"Hz, as no arm's log is; {unit}; {clock}"
         )
 
 

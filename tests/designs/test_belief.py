@@ -147,15 +147,13 @@ def test_what_is_asked_for_is_what_the_prior_knows_or_what_is_named() -> None:
         asked_for(vague, ["k4", "m_p"], "it")
     assert str(refused.value) == (
         "--for m_p: it cannot tell it from zero (0.5 ± 0.35), so that no error is large or small "
-        "beside it; "
-        "leave it out"
+        "beside it; leave it out"
     )
     with pytest.raises(SettingError) as refused:
         asked_for(one, ["l1"], "it")
     assert str(refused.value) == (
         "--for l1: expected some of k1, k2, k3, k4, k5, k6, k7, m_p, found 'l1' (there are no "
-        "loaded runs); "
-        "leave it out"
+        "loaded runs); leave it out"
     )
 
 

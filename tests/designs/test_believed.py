@@ -161,8 +161,7 @@ NO_BARS = (
 )
 IMPOSSIBLE = (
     "its inertia matrix is not positive definite (k1 0.5, k3 0.0145, k5 0.196 kg m²); no arm is "
-    "like that: "
-    "identify it anew, or describe the arm in a TOML file"
+    "like that: identify it anew, or describe the arm in a TOML file"
 )
 
 

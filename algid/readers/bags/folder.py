@@ -64,8 +64,8 @@ def _listed(metadata: Path) -> list[str]:
     if mode and mode[1].upper() != "NONE":
         raise LogError(
             f"{metadata.parent}: the bag was compressed by rosbag2 (compression_mode {mode[1]}), "
-            "unreadable; "
-            "write it anew with ros2 bag convert and storage compression (mcap, zstd chunks)"
+            "unreadable; write it anew with ros2 bag convert and storage compression (mcap, zstd "
+            "chunks)"
         )
     # the one list that matters, without a YAML package: a block, one name a line, or [one, two]
     block = re.search(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*\S.*\n?)+)", text, re.MULTILINE)

@@ -226,8 +226,7 @@ class Topic:
             header_clock = Remedy({"clock": "header"}, "take the header's stamps")
             raise LogError(
                 f"{path}: topic {self.name!r}: a log time of 2^63 ns or more; expected ns since "
-                "1970; "
-                f"{header_clock}"
+                f"1970; {header_clock}"
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return SampleTable(stamps, floats, table.notices + notices)
@@ -243,8 +242,7 @@ class Topic:
                 log_clock = Remedy({"clock": "log"}, "take the recorder's times")
                 raise LogError(
                     f"{path}: topic {self.name!r}: a header stamp with {values[wrong[0]]} for "
-                    "seconds "
-                    f"or nanoseconds; expected whole numbers below 2^63 ns; {log_clock}"
+                    f"seconds or nanoseconds; expected whole numbers below 2^63 ns; {log_clock}"
                 )
         whole = np.floor(seconds)
         rest = (

@@ -89,8 +89,7 @@ def _scored(found: TorqueLog, logs: list[LogSummary], scored: Scored) -> Figure:
     whole = _shares(found)
     note = (
         f"Residual{band}, which the table of predictions scores: joint 1 {shares[0]}; joint 2 "
-        f"{shares[1]}. "
-        f"As recorded: joint 1 {whole[0]}; joint 2 {whole[1]}."
+        f"{shares[1]}. As recorded: joint 1 {whole[0]}; joint 2 {whole[1]}."
     )
     if any(2 * left > rms for left, rms in zip(found.residual_rms, found.rms, strict=True)):
         note += f" {DIFFERENTIATED}"
