@@ -134,9 +134,8 @@ def sha256_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files in the order of their names."""
     digest = hashlib.sha256()
     for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-        if (
-            file.is_file() and file.stat().st_size
-        ):  # one of none is empty, or waits for ever, as /proc/kmsg does
+        # one of none is empty, or waits for ever, as /proc/kmsg does
+        if file.is_file() and file.stat().st_size:
             with file.open("rb") as opened:
                 while chunk := opened.read(1 << 20):
                     digest.update(chunk)
@@ -169,9 +168,8 @@ def read_start(path: Path, most: int) -> bytes:
         If it cannot be read or is no regular file: a pipe would be waited for, and a device has no
         end.
     """
-    handle = os.open(
-        path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
-    )  # else opening a pipe waits already
+    # else opening a pipe waits already
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     with os.fdopen(handle, "rb") as stream:
         status = os.fstat(handle)
         if not stat.S_ISREG(status.st_mode):
@@ -272,9 +270,8 @@ def misfit(error: ValidationError) -> tuple[str, str]:
     first, *others = error.errors(include_url=False, include_context=False)
     place = ".".join(str(part) for part in first["loc"]) or "top level"
     more = f" (and {len(others)} more)" if others else ""
-    if (
-        first["type"] == "unexpected_keyword_argument"
-    ):  # the same misfit has other words in a dataclass than in a model
+    # the same misfit has other words in a dataclass than in a model
+    if first["type"] == "unexpected_keyword_argument":
         said = "extra inputs are not permitted"
     else:  # a unit or a code keeps its capitals
         words = first["msg"].partition(", unable to parse")[0]

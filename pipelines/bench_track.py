@@ -36,9 +36,8 @@ DRIVE = excitation(CASE, "wide")
 SIGMA_THETA, SIGMA_TAU = 1e-3, 1e-2
 NEAR = 0.5  # s: a change found farther from a true one is a false one
 DURATION = 4.5  # s
-FRICTION = np.array(
-    [[0.05], [0.02]]
-)  # N m, Coulomb; gravity asks up to 0.47 and 0.05 of the bare arm
+# N m, Coulomb; gravity asks up to 0.47 and 0.05 of the bare arm
+FRICTION = np.array([[0.05], [0.02]])
 Schedule = tuple[tuple[float, float], ...]
 
 FIFTY: tuple[Schedule, ...] = (
@@ -133,9 +132,8 @@ def drawn(log: Log, scene: Scene, rng: np.random.Generator) -> Log:
     tau = log.tau + SIGMA_TAU * rng.standard_normal(log.tau.shape)
     if scene.friction:
         assert log.omega is not None
-        tau = tau + FRICTION * np.tanh(
-            log.omega / 0.2
-        )  # the torque that an arm with friction needs for that motion
+        # the torque that an arm with friction needs for that motion
+        tau = tau + FRICTION * np.tanh(log.omega / 0.2)
     if scene.encoder is None:
         theta = log.theta + SIGMA_THETA * rng.standard_normal(log.theta.shape)
     else:

@@ -38,12 +38,13 @@ FILES = 20_000
 _BATCH = 500
 _SECONDS = 5.0
 _MEMORY = 1 << 30
+# it is the batch that is tried, not the choice of a model
 _QUICK = (
     "--estimator",
     "weak",
     "--model",
     "plain",
-)  # it is the batch that is tried, not the choice of a model
+)
 FAILURES = ("crash", "traceback", "hang", "silent")
 
 
@@ -150,9 +151,8 @@ def batch(source: str, seed: int, files: int) -> int:
         for name, path, log, rows in (
             _damaged(folder, seed, files) if source == "damaged" else _hostile(folder, seed, files)
         ):
-            start = (
-                time.process_time()
-            )  # a busy machine is no hang; one that waits is ended with its batch
+            # a busy machine is no hang; one that waits is ended with its batch
+            start = time.process_time()
             kind, text = outcome(path, log, rows)
             seconds = time.process_time() - start
             slowest = max(slowest, seconds)

@@ -209,9 +209,8 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
     if printable(out) != out or (printable(err) != err and not own_words):
         return "escape", repr((out + err)[-600:])
     told = bool(last) and last[-1].startswith(("algid: ", "╰"))
-    if (
-        code == 2 and not told and "inspect" not in call.arguments
-    ):  # which prints why, among the rest
+    # which prints why, among the rest
+    if code == 2 and not told and "inspect" not in call.arguments:
         return "lines", err[-600:]
     if code == 2 and "a library cannot take it" in err:
         return "library", ""

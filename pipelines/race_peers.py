@@ -328,9 +328,8 @@ def _physical(k: FloatArray, l1: float) -> dict[str, float]:
     a mass of each link is chosen.
     """
     _, k2, k3, k4, k5, b1, b2 = k
-    m2 = min(
-        2 * (k2 / _G) ** 2 / k3, 0.9 * k5 / l1**2
-    )  # half of k3 about the centre, where link 1 allows it
+    # half of k3 about the centre, where link 1 allows it
+    m2 = min(2 * (k2 / _G) ** 2 / k3, 0.9 * k5 / l1**2)
     first = k4 / _G - m2 * l1
     m1 = max(2 * first**2 / (k5 - m2 * l1**2), 1e-3)
     lc2, lc1 = k2 / _G / m2, first / m1

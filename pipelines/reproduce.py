@@ -64,9 +64,8 @@ def three_a_joint(poles: Sequence[float]) -> FloatArray:
 def placed(poles: Sequence[float]) -> FloatArray:
     """The gain L (6, 2) of `scipy.signal.place_poles`, which couples the joints."""
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", UserWarning
-        )  # its iteration does not settle for these poles
+        # its iteration does not settle for these poles
+        warnings.simplefilter("ignore", UserWarning)
         found = place_poles(A.T, C.T, np.array(poles))
     return np.asarray(found.gain_matrix.T)
 

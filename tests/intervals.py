@@ -7,9 +7,8 @@ from scipy.stats import binom
 
 from algid.arm import FloatArray
 
-AS_90 = (
-    1.6448536269514722 / 1.959963984540054
-)  # half width of a normal interval of 90 % over one of 95 %
+# half width of a normal interval of 90 % over one of 95 %
+AS_90 = 1.6448536269514722 / 1.959963984540054
 CHANCE = 1e-3  # that right intervals fail, one side and the other together
 
 

@@ -116,9 +116,8 @@ def serve() -> None:
         asked, descriptors, _, _ = socket.recv_fds(requests, LARGEST, 2)
         if not asked:
             return
-        with warnings.catch_warnings(
-            action="ignore"
-        ):  # of a fork beside the idle threads of polars and pyarrow
+        # of a fork beside the idle threads of polars and pyarrow
+        with warnings.catch_warnings(action="ignore"):
             child = os.fork()
         if child == 0:
             requests.close()

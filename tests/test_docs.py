@@ -119,9 +119,8 @@ def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
         if one.info == "sh install"
     )
     assert block.text.splitlines()[1:] == ["make demo", "make test"]
-    steps = block.text.replace("…", str(ROOT)).replace(
-        "make test", ". .venv/bin/activate"
-    )  # these are its tests
+    # these are its tests
+    steps = block.text.replace("…", str(ROOT)).replace("make test", ". .venv/bin/activate")
     done = run(steps + "which algid\nalgid --version\n", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Table 4" in done.stdout

@@ -82,9 +82,10 @@ def test_what_only_the_user_knows_is_left_open() -> None:
 
 
 def test_every_cause_has_its_text() -> None:
+    # these bring their words
     assert set(CAUSES) - set(MESSAGES) == {
         "EARLIER_CAUSE",
-    }  # these bring their words
+    }
 
 
 def test_numbers_agree_with_their_nouns() -> None:

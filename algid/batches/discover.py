@@ -136,9 +136,8 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
         If nobody may look into `folder` itself.
     """
     results = _mark(out) if Path(out).is_dir() else None
-    above = {
-        _mark(str(one)) for one in folder.resolve().parents
-    }  # a link there leads to all that there is
+    # a link there leads to all that there is
+    above = {_mark(str(one)) for one in folder.resolve().parents}
     seen = above | ({results} if results != _mark(str(folder)) else set())
     pending, links = [str(folder)], deque[str]()
     while pending or links:

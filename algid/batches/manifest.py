@@ -30,9 +30,8 @@ def is_manifest(path: Path) -> bool:
         return True
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
-    head = read_start(path, LIMITS.line_bytes).decode(
-        "utf-8-sig", errors="replace"
-    )  # logs too come by here
+    # logs too come by here
+    head = read_start(path, LIMITS.line_bytes).decode("utf-8-sig", errors="replace")
     columns = next(csv.reader(head.splitlines()[:1]), [])
     return "name" in columns and ("logs" in columns or "loaded" in columns)
 

@@ -198,9 +198,8 @@ class _Worker:
 
 def _prepare(memory_limit: int | None, temporary: Path) -> None:
     """The start of a worker's life."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C reaches the whole group; the parent decides
+    # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.environ.update(dict.fromkeys(THREADS, "1"))  # before anything loads numpy
     tempfile.tempdir = str(temporary)  # the parent removes it, however this process ends

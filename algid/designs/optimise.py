@@ -161,9 +161,8 @@ class _Search:
         """The motion that a stage ends with."""
         from scipy.optimize import minimize
 
-        @lru_cache(
-            maxsize=1
-        )  # SLSQP asks for the figure, the limits and their gradients at one x after another
+        # SLSQP asks for the figure, the limits and their gradients at one x after another
+        @lru_cache(maxsize=1)
         def evaluated(key: bytes) -> Evaluation:
             return self._evaluated(np.frombuffer(key), stage)
 

@@ -39,10 +39,11 @@ from algid.significance import SURE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
 _CLEAN = 1e-3
+# Hz and s: what is looked at, and what scales are sought in
 _FINE, _COARSE = (
     (250.0, 40.0),
     (125.0, 12.0),
-)  # Hz and s: what is looked at, and what scales are sought in
+)
 _EACH = 10.0  # s of each of several logs, at least
 _SHORTEST = 6 * WINDOW  # of motion
 _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)

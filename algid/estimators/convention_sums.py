@@ -127,10 +127,11 @@ def summed(
 
     With the second motor in its joint, and with it at the base.
     """
+    # linear without zeros
     theta, omega = (
         angles.angles(log.theta[:, log.reach : -log.reach]),
         angles.angles(log.omega),
-    )  # linear without zeros
+    )
     motion = Motion(theta, omega, omega)
     X = log.windows.columns(MODEL, motion)[:, _PLACES][:, :, kept]
     tau = log.tau[:, log.reach : -log.reach]

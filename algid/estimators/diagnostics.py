@@ -52,12 +52,13 @@ _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if paramete
 _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = sigmas(sides=1)
 """Standard deviations past a bound of physics beyond which chance is no explanation; one-sided."""
+# of a parameter's size: distance kept from a bound, until the solver keeps it
 _INSIDE = (
     1e-6,
     1e-5,
     1e-4,
     1e-3,
-)  # of a parameter's size: distance kept from a bound, until the solver keeps it
+)
 
 
 @dataclass(frozen=True)
@@ -102,9 +103,8 @@ def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
     """M22 and the determinant of M at θ2 = 0 and π."""
     c = beta[: len(shared.model.names)]
     bent = -np.angle(phasor(shared.model, c, K1)) if K1 in shared.model.names else 0.0
-    bent = (
-        bent if abs(bent) <= np.pi / 2 else bent + np.pi
-    )  # k1 itself may be negative: a convention of θ2
+    # k1 itself may be negative: a convention of θ2
+    bent = bent if abs(bent) <= np.pi / 2 else bent + np.pi
     poses = np.array([[0.0, 0.0], [bent, bent + np.pi]])
     (m11, m12), (m21, m22) = inertia(shared.model, c, poses)
     det = m11 * m22 - m12 * m21

@@ -175,13 +175,11 @@ def solve_scaled(matrix: FloatArray, rhs: FloatArray) -> Solutions:
     try:
         inverse = _inverse_where(p, regular)
     except np.linalg.LinAlgError:  # LAPACK refuses a whole batch for one singular matrix
-        regular = np.asarray(
-            np.linalg.slogdet(p).sign != 0
-        )  # the same factors, the same zero pivots
+        # the same factors, the same zero pivots
+        regular = np.asarray(np.linalg.slogdet(p).sign != 0)
         inverse = _inverse_where(p, regular)
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # next to singular: caught by the condition number
+    # next to singular: caught by the condition number
+    with np.errstate(over="ignore", invalid="ignore"):
         scaled = inverse @ (q * row)
         scaled += inverse @ (q * row - p @ scaled)
         condition = np.where(regular, _norm1(p) * _norm1(inverse), np.inf)
@@ -432,9 +430,8 @@ class Summary:
         some = np.isfinite(settled).any(axis=1)
         if some.any():
             usable = settled[some]
-            quantile = (
-                np.nanquantile if np.isnan(usable).any() else np.quantile
-            )  # the former goes row by row
+            # the former goes row by row
+            quantile = np.nanquantile if np.isnan(usable).any() else np.quantile
             quartiles[:, some] = quantile(usable, [0.25, 0.5, 0.75], axis=1)
         self._quartiles.append(quartiles)
 

@@ -160,9 +160,8 @@ def _angles_at_horizons(
 
     angles: list[FloatArray] = []
     ends = [round(horizon / step) for horizon in HORIZONS]
-    with np.errstate(
-        all="ignore"
-    ):  # an arm far from the log's may run away: its error is infinite then
+    # an arm far from the log's may run away: its error is infinite then
+    with np.errstate(all="ignore"):
         for number in range(ends[-1]):
             begin, middle, end = u[2 * number : 2 * number + 3]
             a = rate(x, begin)

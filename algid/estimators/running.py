@@ -95,9 +95,8 @@ def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, Flo
         return np.full(beta.shape, np.nan), np.full(beta.shape, np.nan)
     known = examined(fit.names, beta, S, fit.moved, fit.absent)
     std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
-    lost = np.array(
-        [status == "NOT_IDENTIFIABLE" for status in fit.status]
-    )  # the fit may know better than its sums
+    # the fit may know better than its sums
+    lost = np.array([status == "NOT_IDENTIFIABLE" for status in fit.status])
     determined = np.array(known.determined) & ~lost
     return np.where(determined, beta, np.nan), np.where(determined, std, np.nan)
 

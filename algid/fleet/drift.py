@@ -83,9 +83,8 @@ def _regressed(summed: pl.DataFrame, parameter: str, by: tuple[str, ...]) -> pl.
 
     w, wt, wtt, wy, wty, wyy, n = (summed[name].to_numpy() for name in _SUMS)
     middle = wt / w
-    sloped = (
-        wtt - wt * middle > 1e-9 * w
-    )  # logs of one instant, or a single one, have a mean and no slope
+    # logs of one instant, or a single one, have a mean and no slope
+    sloped = wtt - wt * middle > 1e-9 * w
     spread = np.where(sloped, wtt - wt * middle, np.inf)
     rise = np.where(sloped, wty - wy * middle, 0.0)
     slope = rise / spread

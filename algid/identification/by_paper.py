@@ -99,9 +99,8 @@ def _estimate(
     LogError
         Where the log is too short for the observer to settle.
     """
-    asked = settles(
-        settings.estimator
-    )  # else beside another estimator, whose settings are not its own
+    # else beside another estimator, whose settings are not its own
+    asked = settles(settings.estimator)
     window = settings.window if asked and settings.window is not None else STAGE1_WINDOW
     moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or not asked)
     names: Sequence[str] = STAGE1_SERIES if k is None else STAGE2_SERIES

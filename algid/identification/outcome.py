@@ -337,9 +337,8 @@ def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
             term=trial.term,
             kept=trial.kept,
             gain_heldout=finite(trial.prediction),
-            evidence=finite(
-                0.5 * trial.evidence
-            ),  # a Wald statistic is twice a difference of log-likelihoods
+            # a Wald statistic is twice a difference of log-likelihoods
+            evidence=finite(0.5 * trial.evidence),
             why=trial.reason,
         )
         for trial in chosen.trials

@@ -273,9 +273,8 @@ def write_fit_series(
         folder / "scored.parquet", scored_blocks(survey, model, coefficients, shift), starts
     )
     durations = [summary.duration for summary in summaries]
-    every = len(fit.logs) == len(
-        summaries
-    )  # a log too short for a window is in no fit, and nobody tells which it is
+    # a log too short for a window is in no fit, and nobody tells which it is
+    every = len(fit.logs) == len(summaries)
     if every:
         write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
     if every and has_running(fit):

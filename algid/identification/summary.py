@@ -40,9 +40,8 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
         for notice in survey.notices(log)
         if notice.code not in _said_of_fit(outcome, settings)
     ]
-    of_logs = [
-        notice.of(PurePath(log.name).name) for log, notice in noticed
-    ]  # the paths stand among the logs
+    # the paths stand among the logs
+    of_logs = [notice.of(PurePath(log.name).name) for log, notice in noticed]
     others_arms = [
         Notice("OTHER_ARM", numbers={"first": survey.logs[0].name}, logs=(log.name,))
         for log in survey.logs

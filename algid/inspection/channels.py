@@ -20,10 +20,11 @@ _DENORMAL = 1e-6
 _SPIKE = 30.0
 _TURN_BACK, _STANDS, _CLEAR = 3, 0.4, 6.0
 """Turning points: samples before and after, share of their speed, their speed over the noise."""
+# s, and in usual runs: a torque that keeps one value so long is not measured
 _DEAD, _DEAD_RUNS = (
     0.1,
     20,
-)  # s, and in usual runs: a torque that keeps one value so long is not measured
+)
 _HELD_RUNS, _HELD_SHARE = 50, 0.6
 """Changes of a torque that tell its clock, and of how many of the samples at most they are."""
 _OFF_STEP, _IN_STEP = 0.15, 0.9

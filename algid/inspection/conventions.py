@@ -29,9 +29,8 @@ from algid.notices import Notice, Remedy
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
 
-_SMALL = (
-    np.pi / 4
-)  # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
+# rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
+_SMALL = np.pi / 4
 _TOLD = 0.01  # rad: a zero closer than this is not worth a word
 _SAME = 1e-3  # of a scale or rad: as good as equal
 

@@ -117,9 +117,8 @@ def assign(
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
     others = other_joints(available, angles)
     if profile.rate is not None:
-        sources["t"] = sources[
-            profile.needed[0]
-        ]  # any column has a cell in each row that is counted
+        # any column has a cell in each row that is counted
+        sources["t"] = sources[profile.needed[0]]
         return Columns(sources, units, "ns", tuple(said), True, reading, others, profile.rate)
     return Columns(
         sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others

@@ -128,9 +128,8 @@ def _frames(
     import polars as pl
 
     done = 0
-    counted_before = (
-        most is not None
-    )  # of rows without a value, and of quotes that are left open, the whole pass tells
+    # of rows without a value, and of quotes that are left open, the whole pass tells
+    counted_before = most is not None
     if not counted_before and len(dialect.columns) > len(columns.sources):
         _check_quotes(path, kind, dialect)
     try:
@@ -142,12 +141,10 @@ def _frames(
                     "mend that row"
                 )
             done += frame.height
-            frame.drop_in_place(
-                _EXCESS
-            )  # in place: `drop` would queue behind the parsing of the next rows
-            if any(
-                frame.null_count().row(0)
-            ):  # empty lines, which are no rows, or rows without a value
+            # in place: `drop` would queue behind the parsing of the next rows
+            frame.drop_in_place(_EXCESS)
+            # empty lines, which are no rows, or rows without a value
+            if any(frame.null_count().row(0)):
                 if not counted_before and (lost := _without_values(path, kind, dialect, columns)):
                     yield frame.clear(lost)
                 counted_before = True
@@ -332,9 +329,8 @@ def _number(dialect: Dialect, columns: Columns, name: str) -> pl.Expr:
         ns = zoned.str.to_datetime(
             "%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True
         ).dt.timestamp("ns")
-        within = text.str.slice(0, 4).is_between(
-            pl.lit("1678"), pl.lit("2261")
-        )  # others wrap round
+        # others wrap round
+        within = text.str.slice(0, 4).is_between(pl.lit("1678"), pl.lit("2261"))
         return pl.when(within).then(ns).otherwise(beyond(text))
     if not dialect.padded:
         return cell

@@ -38,9 +38,8 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
     file = opened(path)
     kinds = file.kinds()
     cells_by_name = cells(kinds, file.width)
-    other = [
-        name for name in file.schema.names if name not in kinds
-    ]  # of types that hold no numbers
+    # of types that hold no numbers
+    other = [name for name in file.schema.names if name not in kinds]
     roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
     units = units_of_schema(file.schema, roots)
     columns = assign(str(path), [*cells_by_name, *other], profile, units)

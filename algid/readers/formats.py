@@ -342,9 +342,8 @@ def _head(path: Path) -> bytes:
     LogError
         If there is no such file, or it cannot be read.
     """
-    if any(
-        0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)
-    ):  # bytes that polars and results cannot name
+    # bytes that polars and results cannot name
+    if any(0xD800 <= ord(letter) <= 0xDFFF for letter in str(path)):
         raise LogError(f"{str(path)!r}: the name is not valid UTF-8; rename the log")
     try:
         if path.is_dir():

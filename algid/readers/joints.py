@@ -136,9 +136,8 @@ def moving_joints(
     Where they move, the two-link model lacks their torque. `positions` has by joint the path of
     its position, in `unit` rad.
     """
-    joints = {
-        f"joint {number}": joint for number, joint in enumerate(positions)
-    }  # no name of which is a stamp's
+    # no name of which is a stamp's
+    joints = {f"joint {number}": joint for number, joint in enumerate(positions)}
     if not joints:
         return ()
     try:

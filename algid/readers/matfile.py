@@ -57,9 +57,8 @@ class _Walk:
             self._found += 1
             kind, size = self._tag.unpack_from(content, place)
             start = place + self._tag.size
-            if (
-                kind >> 16
-            ):  # a small element: its size stands beside its type, and its four bytes in the tag
+            # a small element: its size stands beside its type, and its four bytes in the tag
+            if kind >> 16:
                 kind, size, start = kind & 0xFFFF, min(4, kind >> 16), place + 4
             if kind not in _TYPES or start + size > end:
                 raise ValueError(f"what stands at byte {place} is no element")
@@ -70,9 +69,8 @@ class _Walk:
             elif kind == _PACKED:
                 inside = self._inside(content, start, start + size)
                 self.elements(inside, 0, len(inside), depth + 1)
-            size += (
-                0 if kind == _PACKED else -size % 8
-            )  # but for packed ones, elements are padded to 8 bytes
+            # but for packed ones, elements are padded to 8 bytes
+            size += 0 if kind == _PACKED else -size % 8
             place = (
                 max(place + self._tag.size, start + size)
                 if start > place + 4

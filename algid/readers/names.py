@@ -243,10 +243,11 @@ def choose(
             ),
             None,
         )
+        # another column of the same name but for its writing or its unit
         if twin is not None and channel not in (
             "q_des1",
             "q_des2",
-        ):  # another column of the same name but for its writing or its unit
+        ):
             raise LookupError(f"{column!r} and {twin!r} are both {stem} of joint {joint}")
     units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
     foreign = {

@@ -308,9 +308,8 @@ class _Groups:
         frame = pl.scan_parquet(self.path, glob=False)
         frame = frame if most is None else frame.head(most)
         numbers = [number(name, *self.cells[source]) for name, source in columns.sources.items()]
-        middle = (
-            (len(numbers) // 2 + 1) // 2 * 2
-        )  # both joints in one lot: they may share a list column
+        # both joints in one lot: they may share a list column
+        middle = (len(numbers) // 2 + 1) // 2 * 2
         with _readable(self.path):
             # both begin here and run while the frames are being used; a joint that is looked at
             # alone leaves one lot

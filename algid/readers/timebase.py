@@ -151,9 +151,8 @@ def set_back(table: SampleTable) -> int | None:
     for run in runs:
         if run.size < _RUN:
             continue
-        before = np.arange(
-            max(0, run[0] - HORIZON - run.size), run[0]
-        )  # in time order but for late ones among them
+        # in time order but for late ones among them
+        before = np.arange(max(0, run[0] - HORIZON - run.size), run[0])
         before = before[np.argsort(stamps[before], kind="stable")]
         step = np.diff(stamps[before])
         period = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0

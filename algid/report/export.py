@@ -192,9 +192,8 @@ class JointStates:
         body += struct.pack("<I", 2)
         _align(body, 8)
         self._constant = bytes(body[8:])
-        self._values = struct.Struct(
-            "<dd2s6xdd2s6xdd" if whole else "<dd"
-        )  # each pair but the first tells its length
+        # each pair but the first tells its length
+        self._values = struct.Struct("<dd2s6xdd2s6xdd" if whole else "<dd")
         self._whole = whole
 
     def message(self, stamp_ns: int, values: Sequence[float]) -> bytes:

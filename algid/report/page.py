@@ -187,9 +187,8 @@ def _own(result: Result) -> dict[str, list[float]]:
     a loaded one's hold its payload's share.
     """
     estimates = [] if result.fit is None else result.fit.by_log
-    if len(estimates) != len(
-        result.logs
-    ):  # a log too short to be fitted has none, and which it is nobody tells
+    # a log too short to be fitted has none, and which it is nobody tells
+    if len(estimates) != len(result.logs):
         return {}
     own = [one for one, log in zip(estimates, result.logs, strict=True) if log.role == "unloaded"]
     values = {

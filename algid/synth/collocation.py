@@ -138,9 +138,8 @@ def integrate(
     states[:, 0] = state = start
     longest, done, now = LONGEST, 1, float(t[0])
     while done < t.size:
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # a window that is too long may leave all bounds
+        # a window that is too long may leave all bounds
+        with np.errstate(over="ignore", invalid="ignore"):
             # the breaks ahead within its length, at most so many, or its own end before the first
             ahead = breaks[np.searchsorted(breaks, now, side="right") :][:MOST_PIECES]
             within = ahead[ahead <= now + longest]

@@ -43,9 +43,8 @@ def write(
 def _beside(path: Path, companion: Companion | None) -> None:
     beside = path.with_name(path.name + ".truth.json")
     if companion is None:
-        beside.unlink(
-            missing_ok=True
-        )  # what an older file of this name left there is not this log's truth
+        # what an older file of this name left there is not this log's truth
+        beside.unlink(missing_ok=True)
         return
     with whole_file(beside) as temporary:
         temporary.write_text(companion.dumps() + "\n", encoding="utf-8")

@@ -103,12 +103,13 @@ def test_short_calls_travel_together_and_the_last_ones_are_shared_out(
     client: Client, cluster: _Cluster
 ) -> None:
     answers = _submit(cluster, 64)
+    # how long they take is not known yet
     assert [len(task.calls) for task in client.tasks] == [
         1,
         1,
         1,
         1,
-    ]  # how long they take is not known yet
+    ]
     sizes = client.drive(
         answers, lambda task: task.end(seconds=len(task.calls) * TASK_SECONDS / 10)
     )

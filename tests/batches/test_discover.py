@@ -190,9 +190,8 @@ def test_folders_may_be_nested_as_deep_as_the_system_takes_them(
         sweep(open_store(str(tmp_path)))
         assert open_store(str(tmp_path)).names("")[-1] == "good.csv"
     finally:
-        subprocess.run(
-            ["rm", "-rf", tmp_path / names[0]], check=True
-        )  # shutil.rmtree ends at a thousand
+        # shutil.rmtree ends at a thousand
+        subprocess.run(["rm", "-rf", tmp_path / names[0]], check=True)
     assert found.pop("good") is None
     ((name, told),) = found.items()
     if trouble is None:

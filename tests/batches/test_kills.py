@@ -155,10 +155,11 @@ def test_a_job_past_its_time_fails_until_its_log_changes(tmp_path: Path) -> None
     assert told.startswith(
         "hangs: failed: it took longer than 0.5 s; raise --timeout, and run it again with --retry-"
     )
+    # equally long
     for text, ran in (
         ("t,theta1,theta2,tau1,tau2\n", 0),
         ("t,theta1,theta2,tau1,tau3\n", 1),
-    ):  # equally long
+    ):
         if log.read_text() != text:
             log.write_text(text)
         told, _ = _start(log.parent, out, "--workers", "1").communicate()

@@ -163,9 +163,8 @@ def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(
     for content in (text, *((out.read(name) or b"").decode("latin-1") for name in names)):
         assert KEY not in content
         assert SECRET not in content
-    assert (
-        _run(served, user="OTHER:KEYS@", report=True).ran == 0
-    )  # who may read it is no part of what it is
+    # who may read it is no part of what it is
+    assert _run(served, user="OTHER:KEYS@", report=True).ran == 0
 
 
 @pytest.mark.parametrize(

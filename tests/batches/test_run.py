@@ -136,9 +136,8 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     _run(logs)
     executor = Here()
     unloaded = logs / "r1/a-unloaded.parquet"
-    shutil.copy2(
-        unloaded, logs / "r1/b-unloaded.parquet"
-    )  # the same bytes with another time of change
+    # the same bytes with another time of change
+    shutil.copy2(unloaded, logs / "r1/b-unloaded.parquet")
     _run(logs, executor)
     assert executor.ran == []
     shutil.rmtree(logs.parent / "out/r1/b.algid")

@@ -486,9 +486,8 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
             cwd=tmp_path,
         )
         assert (wrong.code, wrong.out) == (2, "")
-        assert wrong.err.startswith(f"algid: {path}: the result "), (
-            wrong.err
-        )  # the file at fault, not its log
+        # the file at fault, not its log
+        assert wrong.err.startswith(f"algid: {path}: the result "), wrong.err
 
 
 def test_the_many_options_of_identify_stand_in_panels() -> None:

@@ -106,9 +106,8 @@ def test_what_a_library_raises_names_the_file_and_the_stage(
 def test_a_fault_of_algid_is_called_one(
     run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "algid.inspection.report.format_of", lambda _path: None
-    )  # then algid's own line fails
+    # then algid's own line fails
+    monkeypatch.setattr("algid.inspection.report.format_of", lambda _path: None)
     line = (
         "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no "
         "attribute 'name'; "

@@ -91,9 +91,8 @@ def belief(box: bool) -> Belief:
 def test_drawn_arms_scatter_as_believed(box: bool) -> None:
     one = belief(box)
     drawn = one.draws(4000, seed=3)
-    std = np.sqrt(
-        np.diag(one.spread @ one.spread.T) / (3 if box else 1)
-    )  # a uniform number has variance a third
+    # a uniform number has variance a third
+    std = np.sqrt(np.diag(one.spread @ one.spread.T) / (3 if box else 1))
     np.testing.assert_allclose(one.std, std, rtol=1e-12)
     np.testing.assert_allclose(drawn.mean(axis=0), one.mean, atol=5 * std.max() / np.sqrt(4000))
     np.testing.assert_allclose(drawn.std(axis=0), std, atol=5 * std.max() / np.sqrt(8000))
@@ -138,9 +137,8 @@ def test_what_is_asked_for_is_what_the_prior_knows_or_what_is_named() -> None:
     np.testing.assert_array_equal(named.size, np.abs(one.mean))
     vague = Belief(one.shared, one.mean, 6 * one.spread, True)
     found = asked_for(vague, None, "it")
-    np.testing.assert_array_equal(
-        np.flatnonzero(~found.known), [7]
-    )  # of k4, 4 ± 1.73, it is two deviations sure
+    # of k4, 4 ± 1.73, it is two deviations sure
+    np.testing.assert_array_equal(np.flatnonzero(~found.known), [7])
     np.testing.assert_array_equal(found.wanted, found.known)
     assert found.size[3] == 4.0
     with pytest.raises(SettingError) as refused:

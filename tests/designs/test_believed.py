@@ -55,9 +55,8 @@ def test_the_spread_of_a_case_is_what_each_mass_and_friction_moves() -> None:
     np.testing.assert_array_equal(prior.lengths, [0.4, 0.3])
     assert (prior.noise, prior.doubts, prior.source) == (None, (), "mine")
     usual = of_case(CASE, "mine", None, KnownBefore()).belief.spread
-    np.testing.assert_allclose(
-        usual, 2 * belief.spread, atol=1e-14
-    )  # a fifth where nothing is told
+    # a fifth where nothing is told
+    np.testing.assert_allclose(usual, 2 * belief.spread, atol=1e-14)
 
 
 def test_what_the_user_knows_beats_the_case() -> None:

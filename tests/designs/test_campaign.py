@@ -350,8 +350,7 @@ def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
     assert value["k5"] == pytest.approx(2.0 * 0.4**2 / 3 + 1.0 * 0.4**2)
     assert "m_p" not in value
     asked = asked_for(belief, None, "arm")
-    assert not asked.wanted[
-        belief.shared.names.index("k6")
-    ]  # no friction is known, so none is asked for
+    # no friction is known, so none is asked for
+    assert not asked.wanted[belief.shared.names.index("k6")]
     with pytest.raises(SettingError, match="cannot tell it from zero"):
         asked_for(belief, ["k6"], "arm")

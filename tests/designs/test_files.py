@@ -214,9 +214,8 @@ def test_a_height_stands_in_the_json_where_there_is_one() -> None:
     assert content["limits"]["tip_height"] == -0.3
     (used,) = content["used"]
     assert (used["limit"], used["joint"], used["allowed"]) == ("tip-height", None, -0.3)
-    assert used["most"] == pytest.approx(
-        0.7 - 0.25 * 1.0
-    )  # a quarter of the metre below the stretched arm's tip
+    # a quarter of the metre below the stretched arm's tip
+    assert used["most"] == pytest.approx(0.7 - 0.25 * 1.0)
 
 
 def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:

@@ -21,9 +21,8 @@ from algid.signals.differences import POINTS, Stencil
 RATE = 40.0
 FAMILY = Fourier(1.5)
 SHARED = Shared(Model(("coulomb",), coulomb_speed=0.5), payload=True, lengths={"l1": 0.4})
-BETA = np.array(
-    [0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2, 0.25, 0.15, 0.5, 0.3]
-)  # k1 … k7, f1, f2, m_p, l2
+# k1 … k7, f1, f2, m_p, l2
+BETA = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.3, 0.2, 0.25, 0.15, 0.5, 0.3])
 
 
 def motion(seed: int = 1) -> Motion:

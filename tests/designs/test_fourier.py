@@ -47,9 +47,8 @@ def test_waves_and_their_derivatives_are_those_of_sympy(duration: float) -> None
             np.testing.assert_allclose(
                 late[order, half], mirrored, atol=1e-9 * np.abs(expected).max()
             )
-            turned = (
-                omega * whole + order * np.pi / 2
-            )  # each derivative is a quarter of a period ahead
+            # each derivative is a quarter of a period ahead
+            turned = omega * whole + order * np.pi / 2
             np.testing.assert_allclose(
                 flat[order, half], getattr(np, wave)(turned) * omega ** (order - 1.0), atol=1e-9
             )
@@ -96,10 +95,11 @@ def test_the_window_rises_and_falls_alike_with_a_jerk_that_vanishes_at_its_ends(
         (0.5, range(1, 6)),  # five at least, whatever their frequency
         (4.0, range(1, 9)),  # up to 2 Hz
         (10.0, range(1, 21)),
+        # twenty at most
         (
             60.0,
             [1, 7, 14, 20, 26, 32, 39, 45, 51, 57, 64, 70, 76, 82, 89, 95, 101, 107, 114, 120],
-        ),  # twenty at most
+        ),
     ],
 )
 def test_harmonics_reach_two_hertz_and_are_no_more_than_twenty(

@@ -180,9 +180,8 @@ def test_a_motion_is_at_rest_at_both_ends_and_its_derivatives_are_its_own(durati
 @pytest.mark.parametrize("box", [True, False])
 def test_an_arm_that_asks_for_no_torque_has_no_largest_torque_and_no_slope(box: bool) -> None:
     belief = replace(belief_of("case1"), box=box)
-    torque, more, slope = belief.load(False).largest(
-        np.zeros((2, 7, 3))
-    )  # at rest in a horizontal plane
+    # at rest in a horizontal plane
+    torque, more, slope = belief.load(False).largest(np.zeros((2, 7, 3)))
     np.testing.assert_array_equal(torque, 0.0)
     assert np.all(more < 1e-90)
     np.testing.assert_array_equal(slope, 0.0)

@@ -100,9 +100,8 @@ def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
     # corners are rounded by a millionth of the largest torque, of as many arms
     assert torque[0, True] == pytest.approx((mean + more) / 5.0, abs=1e-4)
     assert torque[0, False] == pytest.approx((-mean + more) / 5.0, abs=1e-4)
-    assert torque[1, True] == pytest.approx(
-        1.0 / 2.5, abs=1e-4
-    )  # k2, and Coriolis without sin θ2 is nothing
+    # k2, and Coriolis without sin θ2 is nothing
+    assert torque[1, True] == pytest.approx(1.0 / 2.5, abs=1e-4)
 
 
 def test_a_margin_is_taken_off_each_side() -> None:

@@ -135,12 +135,10 @@ def test_a_motion_is_drawn_back_to_exactly_what_it_may_use() -> None:
     np.testing.assert_allclose(kept(problem, x, 100.0), x / 4, rtol=1e-6)
     assert problem.excess(kept(problem, x, 100.0), 100.0) <= 1.0
     np.testing.assert_array_equal(kept(problem, x / 10, 100.0), x / 10)  # within already
-    np.testing.assert_allclose(
-        kept(problem, x / 10, 100.0, 0.9), 0.9 * x / 4, rtol=1e-6
-    )  # enlarged to that
-    np.testing.assert_array_equal(
-        kept(problem, np.zeros(4), 100.0, 0.9), 0.0
-    )  # what cannot be enlarged stays
+    # enlarged to that
+    np.testing.assert_allclose(kept(problem, x / 10, 100.0, 0.9), 0.9 * x / 4, rtol=1e-6)
+    # what cannot be enlarged stays
+    np.testing.assert_array_equal(kept(problem, np.zeros(4), 100.0, 0.9), 0.0)
 
 
 def test_a_motion_is_drawn_back_towards_rest_not_towards_zero() -> None:
@@ -177,6 +175,5 @@ def test_an_end_that_is_no_number_leaves_the_start(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("scipy.optimize.minimize", lambda *_args, **_options: Ended())
     found = module.optimise(Ball(TARGET), 100.0, 0)
     assert np.all(np.isfinite(found.x))
-    assert np.abs(found.x).max() == pytest.approx(
-        0.9, rel=1e-5
-    )  # a random start, halfway from 0.8 to 1
+    # a random start, halfway from 0.8 to 1
+    assert np.abs(found.x).max() == pytest.approx(0.9, rel=1e-5)

@@ -103,9 +103,8 @@ def test_a_drive_far_stronger_than_its_arm_is_planned_for_as_well() -> None:
     )
     strong = plan(replace(asked, duration=5.0, limits=limits))
     assert strong.open_parameters == []
-    assert (
-        100 * strong.largest < 5
-    )  # in percent: 100,000 with amplitudes in shares of the drive's limit
+    # in percent: 100,000 with amplitudes in shares of the drive's limit
+    assert 100 * strong.largest < 5
     assert max(used for _, used in strong.binding) <= 0.95 * (1 + 1e-9)
 
 

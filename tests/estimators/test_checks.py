@@ -52,9 +52,8 @@ def test_bounds_hold_for_a_real_arm_and_name_what_breaks(bench: Bench) -> None:
 
 def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
-    log = replace(
-        log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega
-    )  # less than no friction
+    # less than no friction
+    log = replace(log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega)
     free = weak.fit([lambda: [log]])
     assert [bound.bound for bound in broken_bounds(free)] == ["k6 >= 0"]
     bound = constrained(free)
@@ -84,9 +83,8 @@ def test_a_loaded_log_from_another_arm_is_told(bench: Bench) -> None:
 
 def test_prediction_of_an_exact_log_is_exact(bench: Bench) -> None:
     found = score(Model(), bench.arm.constants(), [bench.log()])
-    assert np.all(
-        found.nrmse < 1e-3
-    )  # what the first filter takes of the motion below 5 Hz, and its derivatives err
+    # what the first filter takes of the motion below 5 Hz, and its derivatives err
+    assert np.all(found.nrmse < 1e-3)
     wrong = score(Model(), 1.3 * bench.arm.constants(), [bench.log()])
     assert np.all(wrong.rmse > 3 * found.rmse)
 
@@ -94,16 +92,14 @@ def test_prediction_of_an_exact_log_is_exact(bench: Bench) -> None:
 def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
     k = load_case("case1").arm.constants()
     t = 1e-3 * np.arange(6001)
-    theta = np.stack(
-        [40 * t + np.sin(9 * t), 3 * np.sin(14 * t)]
-    )  # six turns a second, swings of 2 Hz
+    # six turns a second, swings of 2 Hz
+    theta = np.stack([40 * t + np.sin(9 * t), 3 * np.sin(14 * t)])
     omega = np.stack([40 + 9 * np.cos(9 * t), 42 * np.cos(14 * t)])
     alpha = np.stack([-81 * np.sin(9 * t), -588 * np.sin(14 * t)])
     log = Segment(0.0, 1e-3, theta, inverse_dynamics(k, theta, omega, alpha))
     assert np.all(score(Model(), k, [log]).r2 > 0.9999)
-    late = replace(
-        log, theta=log.theta[:, :-20], tau=log.tau[:, 20:]
-    )  # a torque acts 20 ms after its stamp
+    # a torque acts 20 ms after its stamp
+    late = replace(log, theta=log.theta[:, :-20], tau=log.tau[:, 20:])
     assert np.all(score(Model(), k, [late], TorqueShift(delay=0.02)).r2 > 0.9999)
     assert np.all(score(Model(), k, [late]).r2 < 0.99)
 
@@ -214,9 +210,8 @@ def test_long_run_variance_of_an_autoregression() -> None:
         scores[step] = 0.6 * scores[step - 1] + noise[step]
     variance, lags = long_run_variance(scores)
     assert lags > 5
-    assert variance[0, 0] / noise.size == pytest.approx(
-        1 / (1 - 0.6) ** 2, rel=0.15
-    )  # spectrum at zero
+    # spectrum at zero
+    assert variance[0, 0] / noise.size == pytest.approx(1 / (1 - 0.6) ** 2, rel=0.15)
 
 
 def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
@@ -250,9 +245,8 @@ def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Be
     three, five = weak.fit(sources[:3]), weak.fit(sources)
     assert (three.intervals, five.intervals) == ("sandwich", "jackknife")
     expected = bench.arm.b1 * frictions.std(ddof=1) / np.sqrt(5)
-    assert (
-        0.5 * expected < five.std[5] < 1.5 * expected
-    )  # logs weigh by how well the joint estimate fits them
+    # logs weigh by how well the joint estimate fits them
+    assert 0.5 * expected < five.std[5] < 1.5 * expected
     assert abs(five.values[5] - bench.arm.b1) < 3 * five.std[5]
     own = own_estimates(five)
     assert np.allclose([one.values[5] for one in own], bench.arm.b1 * frictions, rtol=0.02)
@@ -331,9 +325,8 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     assert broken.distance is not None
     assert broken.distance > 20
     assert not [bound for bound in broken_bounds(fit) if bound.bound == "k1 k2 >= 0"]
-    inside_out = replace(
-        fit, values=fit.values * np.array([1, 1, -1, 1, -1, 1, 1])
-    )  # det M is positive again
+    # det M is positive again
+    inside_out = replace(fit, values=fit.values * np.array([1, 1, -1, 1, -1, 1, 1]))
     (broken,) = [bound for bound in broken_bounds(inside_out) if bound.bound == "k5 >= 0"]
     assert broken.distance == pytest.approx(fit.values[4] / fit.std[4])
     both = weak.fit(
@@ -366,9 +359,8 @@ def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
             for bound in broken_bounds(replace(fit, values=values))
             if " M" in f" {bound.bound}"
         ]
-        c = np.cos(
-            np.linspace(0, np.pi, 181)
-        )  # the least lies at an end: it may not fall between two of these
+        # the least lies at an end: it may not fall between two of these
+        c = np.cos(np.linspace(0, np.pi, 181))
         M = np.array(
             [[k5 + k3 + 2 * k1 * c, k3 + k1 * c], [k3 + k1 * c, np.full_like(c, k3 + rotor)]]
         )

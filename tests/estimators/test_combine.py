@@ -57,9 +57,8 @@ def test_what_counts_as_nothing_is_left_out_of_a_pseudo_inverse() -> None:
     S = np.diag([4.0, 0.0, 1e-40, 2.0])
     S[3, 1] = S[1, 3] = 0.0
     np.testing.assert_allclose(scaled_pinv(S), np.diag([0.25, 0.0, 1e40, 0.5]), rtol=1e-12)
-    both = np.array(
-        [[1.0, 1.0], [1.0, 1.0]]
-    )  # the sum is known alone: half of its variance for each
+    # the sum is known alone: half of its variance for each
+    both = np.array([[1.0, 1.0], [1.0, 1.0]])
     np.testing.assert_allclose(scaled_pinv(both), both / 4, rtol=1e-12)
     np.testing.assert_array_equal(scaled_pinv(np.zeros((3, 3))), 0.0)
 

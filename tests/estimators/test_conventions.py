@@ -161,9 +161,8 @@ def test_what_no_log_can_tell(bench: Bench) -> None:
     assert np.where(offsets, -seen, seen) == pytest.approx(k, rel=1e-4, abs=1e-5)
     louder = judged(theta, 6 * tau)
     assert louder.best.convention == AS_READ
-    assert louder.best.k == pytest.approx(
-        6 * k, rel=1e-6
-    )  # rounding, by the condition of the columns
+    # rounding, by the condition of the columns
+    assert louder.best.k == pytest.approx(6 * k, rel=1e-6)
 
 
 def test_a_rest_that_friction_holds_accuses_no_zero(bench: Bench) -> None:

@@ -22,9 +22,8 @@ from .conftest import Bench
 
 MOVED = np.ones(2)
 NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
-SIZES = np.array(
-    [0.05, 2.0, 0.05, 2.0, 0.05, 0.3, 0.3]
-)  # k1, k3, k5; k2, k4; k6, k7 have one size each
+# k1, k3, k5; k2, k4; k6, k7 have one size each
+SIZES = np.array([0.05, 2.0, 0.05, 2.0, 0.05, 0.3, 0.3])
 VALUES = SIZES * np.array([0.8, 1.0, 1.0, -0.7, 0.9, 1.0, 0.5])
 
 
@@ -102,9 +101,8 @@ def test_a_direction_is_open_from_half_the_size_on_and_a_share_of_it_counts() ->
     for share, told in ((0.14, True), (0.16, False)):
         direction = axis(k7=np.sqrt(1 - share**2), k4=share)
         assert examine(NAMES, VALUES, information(direction), MOVED).determined[3] is told
-    faint = axis(
-        k1=np.sqrt(1 - 0.151**2), k5=0.151
-    )  # what has a part is said in one sentence with the rest
+    # what has a part is said in one sentence with the rest
+    faint = axis(k1=np.sqrt(1 - 0.151**2), k5=0.151)
     (together,) = examine(NAMES, VALUES, information(faint), MOVED).left_open
     assert together.numbers["names"] == ["k1", "k5"]
 
@@ -170,9 +168,8 @@ def test_a_part_that_repeats_has_the_freedom_of_few_logs() -> None:
     within = conclude(
         "weak", shared, logs, np.zeros(5), MOVED, coloured=True, without=np.zeros((5, 5))
     )
-    assert within.quantile == pytest.approx(
-        student.ppf(0.975, fit.freedom), rel=1e-6
-    )  # nothing differs: sandwich alone
+    # nothing differs: sandwich alone
+    assert within.quantile == pytest.approx(student.ppf(0.975, fit.freedom), rel=1e-6)
     share = np.mean(1 - np.diag(within.covariance) / np.diag(fit.covariance))
     assert 0.2 < share < 0.99
     freedom = 1 / (share**2 / 4 + (1 - share) ** 2 / fit.freedom)

@@ -84,9 +84,8 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
     start = np.array([1.1, 1.8, 3.3])
     for seed in (1, 2):
         Z, X, y = _rows(seed)
-        columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(
-            2, 7, 9, 10
-        )  # nine stretches of ten rows
+        # nine stretches of ten rows
+        columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(2, 7, 9, 10)
         logs_.append(instruments.Moments(np.einsum("axbr,aybr->baxy", columns, columns), 100, 10))
         level = np.sqrt(np.sum((y - np.einsum("q,aqr->ar", start, X)) ** 2, axis=1) / 90)
         stacked.append([part / level.reshape(2, *([1] * (part.ndim - 1))) for part in (Z, X, y)])
@@ -121,9 +120,8 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
 
     Between samples the torque is a straight line: then of second order, else of fourth.
     """
-    k = load_case("case1").arm.constants() * np.array(
-        [1, 1, 1, 1, 1, 0.05, 0.01]
-    )  # less friction: a motion less stiff
+    # less friction: a motion less stiff
+    k = load_case("case1").arm.constants() * np.array([1, 1, 1, 1, 1, 0.05, 0.01])
     errors = []
     for dt in (5e-3, 2.5e-3):
         t = np.arange(round(4 / dt)) * dt
@@ -131,9 +129,8 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
             k, lambda now: np.stack([0.6 * np.sin(3 * now), 0.2 * np.cos(4 * now)]), t
         )
         shift = late * dt
-        tau = np.stack(
-            [0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))]
-        )  # acts `shift` after its stamp
+        # acts `shift` after its stamp
+        tau = np.stack([0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))])
         piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
         windows = Windows(dt, 0.32, shift, None)
         cut = instruments._cut(piece, windows)
@@ -152,9 +149,8 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         off = np.abs(
             np.stack([simulated.theta - motion.theta[:, at], simulated.omega - motion.omega[:, at]])
         )
-        errors.append(
-            [off[..., parity::2].max(axis=2) for parity in (0, 1)]
-        )  # steps, and what lies between them
+        # steps, and what lies between them
+        errors.append([off[..., parity::2].max(axis=2) for parity in (0, 1)])
     slopes = np.log2(errors[0]) - np.log2(errors[1])
     assert np.all(slopes > order), slopes
 

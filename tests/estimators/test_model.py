@@ -82,9 +82,8 @@ def test_the_regressor_gives_the_torque_and_is_its_slope_where_the_torque_is_lin
 def test_plain_columns_are_those_of_the_arm() -> None:
     motion = _motion()
     ours = regressor(Model(), motion)
-    assert np.allclose(
-        ours, arm.regressor(motion.theta, motion.omega, motion.alpha), atol=1e-13
-    )  # rounding
+    # rounding
+    assert np.allclose(ours, arm.regressor(motion.theta, motion.omega, motion.alpha), atol=1e-13)
 
 
 def test_terms_are_named_in_one_order_and_unknown_ones_refused() -> None:
@@ -97,9 +96,8 @@ def test_terms_are_named_in_one_order_and_unknown_ones_refused() -> None:
 
 
 def test_sine_and_cosine_are_exact_at_every_angle() -> None:
-    corners = (
-        np.pi / 2 * np.arange(-40, 41)
-    )  # where the half angle's tangent has its poles and zeros
+    # where the half angle's tangent has its poles and zeros
+    corners = np.pi / 2 * np.arange(-40, 41)
     around = [
         corners,
         np.nextafter(corners, 1e9),
@@ -107,9 +105,8 @@ def test_sine_and_cosine_are_exact_at_every_angle() -> None:
         corners + 1e-8,
         corners - 1e-8,
     ]
-    wide = 1e6 * np.random.default_rng(3).standard_normal(
-        1000
-    )  # an encoder that has turned for days
+    # an encoder that has turned for days
+    wide = 1e6 * np.random.default_rng(3).standard_normal(1000)
     theta = np.concatenate([*around, wide])
     sine, cosine = sine_cosine(theta)
     unit = np.finfo(float).eps  # a unit in the last place of 1

@@ -70,9 +70,8 @@ def test_the_step_of_an_encoder_is_found_and_no_step_where_there_is_none(step: f
     np.testing.assert_allclose(found, [step, step, 0, 0], rtol=1e-9)
     few = np.repeat(np.arange(8.0), 50)  # seven changes of value are too few to tell
     assert quantum(np.stack([few, np.zeros(400)])).tolist() == [0.0, 0.0]
-    leaps = np.cumsum(
-        [1.0] * 5 + [1000.0] * 20
-    )  # 20 steps of another size beside five that could tell
+    # 20 steps of another size beside five that could tell
+    leaps = np.cumsum([1.0] * 5 + [1000.0] * 20)
     assert quantum(leaps[None]).tolist() == [0.0]
 
 

@@ -73,9 +73,8 @@ def test_a_lag_of_nothing_copies_and_a_straight_line_passes_as_it_is() -> None:
     np.testing.assert_array_equal(same, line)
     assert not np.shares_memory(same, line)
     for lag in (4.3 * DT, -4.3 * DT, 0.2 * DT):
-        np.testing.assert_allclose(
-            low_passed(line, DT, lag), line, atol=1e-12
-        )  # unchanged and in time
+        # unchanged and in time
+        np.testing.assert_allclose(low_passed(line, DT, lag), line, atol=1e-12)
 
 
 def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: Bench) -> None:

@@ -45,17 +45,17 @@ def test_angles_are_the_simulators() -> None:
     for start in range(2):
         whole = simulate(K, push, np.array([0.0, *HORIZONS]), starts[:2, start], starts[2:, start])
         for place, angles in enumerate(found):
+            # step⁴ twice
             np.testing.assert_allclose(
                 angles[:, start], whole.theta[:, place + 1], rtol=0, atol=1e-7
-            )  # step⁴ twice
+            )
 
 
 def test_the_true_arm_follows_the_log(segment: Segment) -> None:
     score = rollouts(Model(), K, [segment], 8.0)
     assert score.count[0] > score.count[1] > score.count[2] > 50
-    assert (
-        score.rmse.max() < 2e-3
-    )  # what the filter's ends and straight lines between samples leave
+    # what the filter's ends and straight lines between samples leave
+    assert score.rmse.max() < 2e-3
     assert score.distance.max() > 0.3
 
 
@@ -76,9 +76,8 @@ def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
 
 def test_a_delay_that_is_known_is_made_up_for(segment: Segment) -> None:
     late = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, 8:])
-    early = Segment(
-        0.0, DT, segment.theta[:, 8:], segment.tau[:, :-8]
-    )  # torques that act 8 samples before their stamp
+    # torques that act 8 samples before their stamp
+    early = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, :-8])
     good = rollouts(Model(), K, [late], 8.0).rmse
     np.testing.assert_allclose(
         rollouts(Model(), K, [early], 8.0, TorqueShift(delay=-8 * DT)).rmse,

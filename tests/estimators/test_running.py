@@ -31,9 +31,8 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
     found = running(fit, [4.0, 4.0], 40)
     assert has_running(fit)
     assert list(np.unique(found.log)) == [0, 1]
-    np.testing.assert_allclose(
-        found.beta[-1], fit.values, rtol=1e-6
-    )  # both are optima, found to 1e-5 deviations
+    # both are optima, found to 1e-5 deviations
+    np.testing.assert_allclose(found.beta[-1], fit.values, rtol=1e-6)
     np.testing.assert_allclose(found.half[-1], fit.quantile * fit.std, rtol=1e-6)
     first_loaded = int(np.flatnonzero(found.log)[0])
     payload = [fit.names.index(name) for name in ("m_p", "l1", "l2")]
@@ -44,9 +43,8 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
 def test_its_band_shrinks(bench: Bench) -> None:
     found = running(_fit(bench, "refined", 2, loaded=False), [4.0], 40)
     known = found.half[np.isfinite(found.half).all(axis=1)]
-    assert np.all(
-        np.diff(known, axis=0) <= 1e-3 * known[:-1]
-    )  # information adds up; its linearisation moves a little
+    # information adds up; its linearisation moves a little
+    assert np.all(np.diff(known, axis=0) <= 1e-3 * known[:-1])
     assert np.all(known[-1] < 0.5 * known[0])
 
 

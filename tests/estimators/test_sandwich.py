@@ -82,9 +82,8 @@ def test_lags_are_those_of_andrews() -> None:
         found = np.sum(scores[1:] * scores[:-1]) / np.sum(scores**2)
         alpha = 4 * found**2 / ((1 - found) ** 2 * (1 + found) ** 2)
         assert long_run_variance(scores[:, None])[1] == int(1.1447 * (alpha * 3001) ** (1 / 3))
-    total, lags = long_run_variance(
-        np.ones((8, 1))
-    )  # as correlated as can be: a quarter of the rows, and no more
+    # as correlated as can be: a quarter of the rows, and no more
+    total, lags = long_run_variance(np.ones((8, 1)))
     assert lags == 2
     assert total[0, 0] == pytest.approx(_bartlett(np.ones((8, 1)), 2)[0, 0])
     assert long_run_variance(np.zeros((8, 2)))[1] == 0

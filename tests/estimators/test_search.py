@@ -77,12 +77,13 @@ def test_a_torque_that_acts_late_or_early_is_a_delay_and_no_lag(bench: Bench) ->
             chosen.trials[0].kept,
         )
     assert found["late"] == (True, (), "delay", True)
+    # a lag would lag the more the faster the torque
     assert found["early"] == (
         True,
         (),
         "delay",
         True,
-    )  # a lag would lag the more the faster the torque
+    )
 
 
 def test_a_joint_without_a_motor_has_no_gain_to_choose(bench: Bench) -> None:

@@ -63,9 +63,8 @@ def test_the_width_of_friction_is_found(bench: Bench) -> None:
     chosen = _chosen(bench, ("coulomb",), candidates=(), kept=("coulomb",))
     assert chosen.chosen_by == "settings"
     assert chosen.model.terms == ("coulomb",)
-    assert chosen.model.coulomb_speed == pytest.approx(
-        0.05, rel=0.5
-    )  # velocities are smoothed: a widest guess
+    # velocities are smoothed: a widest guess
+    assert chosen.model.coulomb_speed == pytest.approx(0.05, rel=0.5)
 
 
 def test_what_was_asked_for_and_what_was_not_is_said_term_by_term(bench: Bench) -> None:

@@ -47,9 +47,8 @@ def test_terms_are_drawn_to_what_is_expected_and_constants_are_not() -> None:
     prior = EXPECTED.prior(np.ones(2))
     beta, share = shrink(SHARED, [_log(information, estimate)], np.zeros(9), EXPECTED, np.ones(2))
     np.testing.assert_allclose(beta[:7], estimate[:7], rtol=1e-9)
-    assert np.all(
-        share == 1.0
-    )  # offsets of 2 are far beyond what is expected: the largest spread stands
+    # offsets of 2 are far beyond what is expected: the largest spread stands
+    assert np.all(share == 1.0)
     weight = information[7:] / (information[7:] + np.diag(prior.precision))
     np.testing.assert_allclose(
         beta[7:], weight * estimate[7:] + (1 - weight) * EXPECTED.mean, rtol=1e-9
@@ -74,15 +73,13 @@ def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
         logs.append(
             LogInformation(False, np.zeros(9), S, np.sqrt(6.0) * rng.standard_normal((25, 9)))
         )
-    assert dispersion(SHARED, logs, np.zeros(9)) == pytest.approx(
-        6.0, rel=0.15
-    )  # 9 · 39 squares: ± 7.6 %
+    # 9 · 39 squares: ± 7.6 %
+    assert dispersion(SHARED, logs, np.zeros(9)) == pytest.approx(6.0, rel=0.15)
     quiet = [LogInformation(False, log.c0, log.S, log.g / 10) for log in logs]
     assert dispersion(SHARED, quiet, np.zeros(9)) == 1.0
     apart = [LogInformation(False, log.c0, log.S, log.g + rng.standard_normal(9)) for log in quiet]
-    assert dispersion(SHARED, apart, np.zeros(9)) == pytest.approx(
-        25.0, rel=0.2
-    )  # what differs from log to log alone
+    # what differs from log to log alone
+    assert dispersion(SHARED, apart, np.zeros(9)) == pytest.approx(25.0, rel=0.2)
 
 
 def test_covariances_of_one_log_and_of_many() -> None:
@@ -101,9 +98,8 @@ def test_covariances_of_one_log_and_of_many() -> None:
     found = spread(SHARED, logs, beta, prior, without)
     assert found.jackknife is not None
     for covariance in (found.jackknife, found.scores, found.stretches):
-        np.testing.assert_allclose(
-            np.diag(covariance)[:8], 1 / 1800, rtol=0.7
-        )  # 60 squares a parameter: ± 18 %
+        # 60 squares a parameter: ± 18 %
+        np.testing.assert_allclose(np.diag(covariance)[:8], 1 / 1800, rtol=0.7)
         assert np.mean(np.diag(covariance)[:8]) == pytest.approx(1 / 1800, rel=0.25)
         assert covariance[8, 8] == pytest.approx(1e-6, rel=0.01)  # held by the prior, as wide as it
     alone = spread(SHARED, logs[:1], beta, prior, beta[None])
@@ -145,9 +141,8 @@ def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
     prior = Prior(found.shrinkage.names, found.shrinkage.mean, phi * found.shrinkage.precision)
     every = weak.fit(sources, settings=same, prior=prior)
     assert every.names == found.names
-    np.testing.assert_allclose(
-        every.values[:7], found.values[:7], rtol=6e-3
-    )  # weights rest on another residual
+    # weights rest on another residual
+    np.testing.assert_allclose(every.values[:7], found.values[:7], rtol=6e-3)
     np.testing.assert_allclose(found.values[:7], bench.truth[:7], rtol=5e-3)
     friction = [found.values[found.names.index(name)] for name in ("f1", "f2")]
     np.testing.assert_allclose(friction, [0.05, 0.02], rtol=0.1)

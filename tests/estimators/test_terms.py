@@ -26,11 +26,12 @@ VALUES = {
     "asymmetry": (0.05, -0.03),
     "load": (0.05, 0.08),
     "gain": (-0.04,),
+    # k1s / k2s = l1 / g: centres of mass off their lines, zeros right
     "phases": (
         0.1626e-3,
         9.81e-3,
         0.03,
-    ),  # k1s / k2s = l1 / g: centres of mass off their lines, zeros right
+    ),
     "lag": (5e-3,),
 }
 
@@ -92,9 +93,8 @@ def test_each_term_is_found(bench: Bench, term: str, estimator: str) -> None:
     truth = np.array([values[name] for name in fit.names])
     own = [fit.names.index(name) for name in TERMS[term].names]
     assert np.all(np.abs(fit.values - truth)[own] < 0.1 * np.abs(truth[own]))
-    assert np.all(
-        np.abs(fit.values - truth) < 5 * fit.std
-    )  # nine values at most: 5 σ is one in a million
+    # nine values at most: 5 σ is one in a million
+    assert np.all(np.abs(fit.values - truth) < 5 * fit.std)
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])
@@ -127,9 +127,8 @@ def test_a_low_pass_in_time_is_the_low_pass_brought_forward(lag: float) -> None:
     passed = np.exp(2j * np.pi * hertz * (t + lag)) / (1 + 2j * np.pi * hertz * lag)
     ours = low_passed(np.sin(2 * np.pi * hertz * t), DT, lag)
     inner = slice(200, -200)
-    assert np.allclose(
-        ours[inner], passed.imag[inner], atol=5e-4
-    )  # straight lines between samples: (ω dt)² / 12
+    # straight lines between samples: (ω dt)² / 12
+    assert np.allclose(ours[inner], passed.imag[inner], atol=5e-4)
 
 
 def test_an_estimated_term_leaves_the_logs_as_they_were(bench: Bench) -> None:

@@ -40,9 +40,8 @@ def test_the_p_value_is_that_of_the_least_likely_scale_three_times_over() -> Non
         assert found.p_value[joint] == pytest.approx(p, rel=1e-9)
         x = w[joint]
         assert found.lag1[joint] == pytest.approx((x[1:] @ x[:-1]) / (x @ x), rel=1e-12)
-        assert found.kurtosis[joint] == pytest.approx(
-            kurtosis(np.concatenate([x, -x])), rel=1e-9
-        )  # about zero
+        # about zero
+        assert found.kurtosis[joint] == pytest.approx(kurtosis(np.concatenate([x, -x])), rel=1e-9)
 
 
 def test_sums_of_pieces_are_added() -> None:

@@ -72,9 +72,8 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
     covariance = np.eye(H.shape[0]) + H @ H.T
     reference = Y.T @ np.linalg.solve(covariance, Y)
     scale = np.sqrt(np.outer(np.diag(reference), np.diag(reference)))
-    rounding = (
-        np.linalg.cond(covariance) * np.finfo(float).eps
-    )  # what a dense solution resolves: 5e-9 here
+    # what a dense solution resolves: 5e-9 here
+    rounding = np.linalg.cond(covariance) * np.finfo(float).eps
     assert np.max(np.abs(S - reference) / scale) < rounding
     normal = np.block([[np.eye(240) + H.T @ H, H.T @ Y], [Y.T @ H, Y.T @ Y]])
     schur = normal[240:, 240:] - normal[240:, :240] @ np.linalg.solve(

@@ -65,9 +65,8 @@ def test_uniform_links_are_found_from_their_constants(l2: float | None) -> None:
         UNIFORM.lc2,
         UNIFORM.I2,
     )
-    np.testing.assert_allclose(
-        found, expected, rtol=1e-5
-    )  # a minimum is found to the root of rounding
+    # a minimum is found to the root of rounding
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
 @given(

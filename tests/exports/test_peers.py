@@ -198,9 +198,8 @@ def test_mujoco_slides_against_coulomb_friction() -> None:
     data = mujoco.MjData(model)
     data.qvel[:] = (3.0, -2.0)
     mujoco.mj_forward(model, data)
-    np.testing.assert_allclose(
-        data.qfrc_constraint, [-0.4, 0.3], rtol=1e-3
-    )  # MuJoCo's contact solver
+    # MuJoCo's contact solver
+    np.testing.assert_allclose(data.qfrc_constraint, [-0.4, 0.3], rtol=1e-3)
 
 
 SETS = [
@@ -223,9 +222,8 @@ def test_modules_of_both_languages_are_algids(to: str, model: Model, tmp_path: P
     tau = torque(model, c, Motion(THETA, OMEGA, ALPHA))
     assert_close(each(arm.inverse_dynamics, THETA, OMEGA, ALPHA), tau, 1e-12)
     left = acceleration(model, c, THETA, OMEGA, tau)
-    np.testing.assert_allclose(
-        left, ALPHA, rtol=0, atol=1e-10 * np.abs(ALPHA).max()
-    )  # condition of M: some hundred
+    # condition of M: some hundred
+    np.testing.assert_allclose(left, ALPHA, rtol=0, atol=1e-10 * np.abs(ALPHA).max())
     np.testing.assert_allclose(
         each(arm.forward_dynamics, THETA, OMEGA, tau), left, rtol=0, atol=1e-10 * 60
     )
@@ -248,9 +246,8 @@ def test_gravity_and_inertia_of_both_languages(to: str, tmp_path: Path) -> None:
             k, THETA, still, still
         )
         column[1] += 0.004 * row[1]
-        assert_close(
-            matrix[:, :, joint].T, column, 1e-11
-        )  # differences of torques ten times as large
+        # differences of torques ten times as large
+        assert_close(matrix[:, :, joint].T, column, 1e-11)
 
 
 def each(function: Any, *arguments: FloatArray) -> FloatArray:

@@ -69,9 +69,8 @@ def test_an_arm_from_cad_moves_as_pinocchio_says(tmp_path: Path) -> None:
     theta, omega, alpha = states(50)
     robot = pin.buildModelFromXML(CAD)
     robot.damping, data = np.zeros(2), robot.createData()
-    zero = np.array(
-        [np.pi / 2 - 1.1, 0.7 - np.pi / 2]
-    )  # of algid's angles, where the file's are zero
+    # of algid's angles, where the file's are zero
+    zero = np.array([np.pi / 2 - 1.1, 0.7 - np.pi / 2])
     q = (theta - zero[:, None] + np.pi) % (2 * np.pi) - np.pi
     found = np.array(
         [pin.rnea(robot, data, *state) for state in zip(q.T, omega.T, alpha.T, strict=True)]

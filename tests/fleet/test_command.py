@@ -148,9 +148,8 @@ def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -
         ),
     )
     assert "the clearest trend is k4 of r" in verdict(history).sentence
-    assert (
-        "the clearest trend is k1 of r, +6" in verdict(zeroed).sentence
-    )  # 0.002 a day, 30.4 days a month
+    # 0.002 a day, 30.4 days a month
+    assert "the clearest trend is k1 of r, +6" in verdict(zeroed).sentence
 
 
 def _typed(packed: dict[str, str]) -> Any:

@@ -198,9 +198,8 @@ def test_logs_that_scatter_are_judged_by_their_scatter(
     """Deviations of 3 standard deviations to both sides: 1.4826 times them is one robust
     deviation.
     """
-    robust = stats.median_abs_deviation(
-        [-3, 3, -3, 3, 0], scale="normal"
-    )  # scipy has more digits of 1.4826
+    # scipy has more digits of 1.4826
+    robust = stats.median_abs_deviation([-3, 3, -3, 3, 0], scale="normal")
     values = [1 + 0.01 * one for one in (-3, 3, -3, 3, 0, -3, 3, -3, 3, away * robust)]
     jobs = read(table([*values, 1.0]), tmp_path)
     assert jobs["k1"].median() == pytest.approx(1.0, abs=1e-12)
@@ -236,9 +235,8 @@ def test_labels_are_judged_robot_by_robot_and_only_where_there_are_any(tmp_path:
         label_payload=[0.5] * 6,
     )
     found = mislabelled(read(pl.concat([wild, calm]), tmp_path))
-    assert found.select("robot", "job").rows() == [
-        ("s", "j5")
-    ]  # 10 of its own are; 60 where one is 14.8 are not
+    # 10 of its own are; 60 where one is 14.8 are not
+    assert found.select("robot", "job").rows() == [("s", "j5")]
     some = wild.with_columns(label_payload=pl.when(pl.col("job") == "j5").then(0.5).otherwise(None))
     assert mislabelled(read(some, tmp_path))["job"].to_list() == ["j5"]
     without = (
@@ -280,10 +278,11 @@ def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path)
     ]
     assert history.jobs is not None
     assert history.jobs.select("robot", "job").rows()[:2] == [("r", "r11"), ("r", "r10")]
+    # without a date it stands last
     assert history.jobs.select("robot", "job").rows()[-1] == (
         "s",
         "s9",
-    )  # without a date it stands last
+    )
     assert [one.text for one in history.untested] == [
         (
             "No drift was looked for in 1 log without a date: stamps count from 1970, or a "

@@ -181,9 +181,8 @@ def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
     )
     jobs = pl.read_parquet(tmp_path / "jobs.parquet")
     t = np.arange(60) / 30.4375
-    found = linregress(
-        t, jobs["k2"].to_numpy()
-    )  # its error is the scatter's, which is four times the intervals'
+    # its error is the scatter's, which is four times the intervals'
+    found = linregress(t, jobs["k2"].to_numpy())
     assert last["slope_std"] == pytest.approx(found.stderr, rel=1e-9)
     assert last["p"] == pytest.approx(found.pvalue, rel=1e-6)
     calm = (
@@ -251,9 +250,8 @@ def test_the_page_escapes_names_and_asks_no_host(tmp_path: Path) -> None:
     page = (tmp_path / "fleet.html").read_text()
     assert "<script>alert" not in page
     assert "default-src 'none'" in page
-    assert (
-        pl.read_parquet(tmp_path / "fleet.parquet").height == 7 * 3
-    )  # the last log is 91 days old: in the third month
+    # the last log is 91 days old: in the third month
+    assert pl.read_parquet(tmp_path / "fleet.parquet").height == 7 * 3
 
 
 def test_a_table_without_robots_is_refused(tmp_path: Path) -> None:

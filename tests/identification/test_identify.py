@@ -252,10 +252,11 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
     logs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))
     profile = with_settings(Profile(), {"zero": "hanging"})
     result = identify(logs[:2], None, Settings(model="coulomb"), profile=profile)
+    # whichever foretells the logs left out better
     assert result.estimator in (
         "weak",
         "instruments",
-    )  # whichever foretells the logs left out better
+    )
     assert result.settings["estimator"] == "refined"
     own = identify(
         logs[:2],
@@ -268,9 +269,8 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
         assert found.estimate is not None
         assert shown.estimate is not None
         assert found.std is not None
-        assert (
-            abs(shown.estimate - found.estimate) < 0.1 * found.std
-        )  # iterations from another start
+        # iterations from another start
+        assert abs(shown.estimate - found.estimate) < 0.1 * found.std
     assert (
         f"by the {result.estimator} estimator in place of the refined one"
         in result.verdict.sentence
@@ -314,10 +314,11 @@ def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> Non
         if name in found
     )
     m22 = found["k3"] + found["j2"]
+    # eq. (2) with the rotor in M22: positive definite wherever joint 2 stands
     for cosine in (
         1,
         -1,
-    ):  # eq. (2) with the rotor in M22: positive definite wherever joint 2 stands
+    ):
         m11, m12 = (
             found["k5"] + found["k3"] + 2 * found["k1"] * cosine,
             found["k3"] + found["k1"] * cosine,
@@ -343,9 +344,8 @@ def test_a_bound_broken_by_chance_is_no_failure() -> None:
     assert not is_implausible(fit(None, 0.9, 0.3))
     assert is_implausible(fit(3.1, 0.9, 0.3))
     assert is_implausible(fit(1.0, -0.01, 0.9))
-    assert not is_implausible(
-        fit(1.0, -0.01, 0.05)
-    )  # the torque hardly varies: there is nothing to explain
+    # the torque hardly varies: there is nothing to explain
+    assert not is_implausible(fit(1.0, -0.01, 0.05))
 
 
 def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:

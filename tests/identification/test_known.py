@@ -98,9 +98,8 @@ def test_the_prior_of_a_model_is_the_results_estimate_and_the_inverse_of_its_cov
     covariance = np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     size = np.sqrt(np.diag(covariance))
     product = (prior.precision * np.outer(size, size)) @ (covariance / np.outer(size, size))
-    np.testing.assert_allclose(
-        product, np.eye(9), atol=1e-6
-    )  # correlations of .99: conditions to 1e4
+    # correlations of .99: conditions to 1e4
+    np.testing.assert_allclose(product, np.eye(9), atol=1e-6)
 
 
 def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: Result) -> None:
@@ -197,9 +196,8 @@ def test_the_first_length_is_that_of_table_1_with_its_propagated_error(weighed: 
         np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
     )
     drawn = np.array([[k1], [k2]]) + root @ draws
-    assert found[1] == pytest.approx(
-        float(np.std(9.81 * drawn[0] / drawn[1])), rel=0.03
-    )  # 8 standard errors
+    # 8 standard errors
+    assert found[1] == pytest.approx(float(np.std(9.81 * drawn[0] / drawn[1])), rel=0.03)
     assert abs(found[0] - load_case("case1").arm.l1) < 4.5 * found[1]
 
 

@@ -251,9 +251,8 @@ def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> No
     assert found is not None
     assert found.rmse == pytest.approx((0.2, 0.3))
     assert found.nrmse == pytest.approx((0.1, math.sqrt(9 / 125)))
-    assert found.r2 == pytest.approx(
-        (0.99, 0.91)
-    )  # 125 − 50²/100 = 100 is the variance left to explain
+    # 125 − 50²/100 = 100 is the variance left to explain
+    assert found.r2 == pytest.approx((0.99, 0.91))
 
 
 def found(fit: Fit, code: str) -> list[Notice]:

@@ -205,9 +205,8 @@ def test_noise_narrows_what_is_shown_of_the_torque(
         band.append((allowed / (inertia * sigma * np.sqrt(0.4 * DT) * (2 * np.pi) ** 2)) ** 0.4)
     assert 4 < min(band) < 25  # neither end of the range
     reach = np.flatnonzero(~np.isnan(block["tau1_predicted"]))[0]
-    assert reach == pytest.approx(
-        2.5 / (min(band) * DT), rel=0.1
-    )  # half a kernel is 2.5 periods; σ is estimated
+    # half a kernel is 2.5 periods; σ is estimated
+    assert reach == pytest.approx(2.5 / (min(band) * DT), rel=0.1)
 
 
 def test_information_is_added_up_by_second_and_carried_to_the_shared_parameters() -> None:
@@ -253,9 +252,8 @@ def test_a_fits_series_stand_in_its_folder(
 ) -> None:
     survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
-    residual = residual_sums(
-        np.random.default_rng(0).standard_normal((4, 4000)), DT
-    )  # torques beside it
+    # torques beside it
+    residual = residual_sums(np.random.default_rng(0).standard_normal((4, 4000)), DT)
     write_fit_series(tmp_path, fit, survey, Settings(), residual)
     names = [
         "information.parquet",

@@ -202,8 +202,7 @@ def test_simulations_by_the_true_constants_stay_on_the_log(motions: list[Simulat
     right = simulate(known(K), survey((exact, "unloaded")))
     wrong = simulate(known(1.2 * K), survey((exact, "unloaded")))
     assert list(right.logs) == ["log1"]
-    assert np.all(
-        right.total.rmse[:2] < 2e-3
-    )  # of joints that turn by radians; integration and differences
+    # of joints that turn by radians; integration and differences
+    assert np.all(right.total.rmse[:2] < 2e-3)
     assert np.all(wrong.total.rmse[:2] > 30 * right.total.rmse[:2])
     assert np.isnan(right.total.rmse[2]).all()  # no start is so long before the log's end

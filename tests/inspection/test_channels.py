@@ -124,9 +124,8 @@ def test_a_torque_at_rest_at_its_largest_or_smallest_is_at_a_limit() -> None:
     tau = np.stack([np.sin(40 * T), np.sin(40 * T)])
     tau[0, 500:900], tau[1, 500:900] = 1.5, -1.5
     assert [*channels.dead_efforts(logged(tau=tau))] == []
-    few = np.repeat(np.arange(19.0) % 7, 110)[
-        :ROWS
-    ]  # with fewer than twenty changes nothing is usual
+    # with fewer than twenty changes nothing is usual
+    few = np.repeat(np.arange(19.0) % 7, 110)[:ROWS]
     assert [*channels.dead_efforts(logged(tau=np.stack([few, few])))] == []
 
 
@@ -258,9 +257,8 @@ def test_without_velocities_angles_may_turn_six_times_or_as_physics_allows(
     theta = np.stack([np.sin(T), -turns * 2 * math.pi * T / T[-1]])
     found = [*channels.degrees(logged(theta), lambda: right)]
     assert [one.text.partition(":")[0] for one in found] == (["angles reach 38.33"] if told else [])
-    still = replace(
-        logged(theta), omega=np.zeros((2, ROWS))
-    )  # velocities that say nothing are none
+    # velocities that say nothing are none
+    still = replace(logged(theta), omega=np.zeros((2, ROWS)))
     assert bool([*channels.degrees(still, lambda: right)]) == told
 
 
@@ -296,13 +294,11 @@ def test_samples_in_a_period_are_those_of_the_faster_joint(period: float) -> Non
         # the phases are spread evenly: medians of first and second differences stand for the same
         # phase
         assert samples_a_period(logged(np.stack(pair))) == pytest.approx(period, rel=1e-3)
-    assert samples_a_period(logged(np.stack([0.01 * fast, slow]))) == pytest.approx(
-        200, rel=0.01
-    )  # of 100 periods
+    # of 100 periods
+    assert samples_a_period(logged(np.stack([0.01 * fast, slow]))) == pytest.approx(200, rel=0.01)
     assert samples_a_period(logged(np.stack([0.01 * fast, 0.5 * slow]))) == math.inf
-    assert (
-        samples_a_period(logged(np.stack([count / 16, count / 16]))) == math.inf
-    )  # no bend, no period
+    # no bend, no period
+    assert samples_a_period(logged(np.stack([count / 16, count / 16]))) == math.inf
 
 
 @pytest.mark.parametrize(("lost", "told"), [(11, 11), (40, 40), (10, 0)])

@@ -173,9 +173,8 @@ def test_noise_is_not_gravitys() -> None:
     )
     found = figures_of(replace(log, tau=log.tau + noise))
     assert 0.2 < found.explained < 0.9
-    assert (
-        0 <= found.gravity_share < 0.01
-    )  # four columns of some thousands explain one in a thousand by chance
+    # four columns of some thousands explain one in a thousand by chance
+    assert 0 <= found.gravity_share < 0.01
 
 
 @pytest.mark.parametrize(("rows", "told"), [(39, False), (40, True)])

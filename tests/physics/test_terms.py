@@ -60,9 +60,8 @@ def test_partials_are_the_differences_of_the_torque(term: str) -> None:
                 moved[order][joint] += sign * step
                 both.append(torque(model, c, Motion(moved[0], moved[1], moved[2])))
             slope = (both[0] - both[1]) / (2 * step)
-            np.testing.assert_allclose(
-                P[order, :, joint], slope, atol=1e-7
-            )  # rounding over the step
+            # rounding over the step
+            np.testing.assert_allclose(P[order, :, joint], slope, atol=1e-7)
 
 
 @pytest.mark.parametrize("term", IN_MODELS)
@@ -81,9 +80,8 @@ def test_moments_over_windows_are_those_of_the_columns(term: str) -> None:
         if name == model.lag_name:
             continue
         expected = windows.moments(Y[:, place], windows.kernels()[0])
-        np.testing.assert_allclose(
-            X[:, place], expected, rtol=1e-3, atol=1e-4
-        )  # the quadrature at 1 kHz
+        # the quadrature at 1 kHz
+        np.testing.assert_allclose(X[:, place], expected, rtol=1e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("term", [name for name in IN_MODELS if EVERY_TERM[name].timing is None])

@@ -210,9 +210,8 @@ def test_rows_that_lack_a_value_are_dropped_and_told(
     frame = arm(30, 2).with_columns(
         pl.when(pl.int_range(30).is_in(gaps)).then(None).otherwise(pl.col("q2")).alias("q2")
     )
-    frame.with_columns(t=pl.int_range(30)).write_ipc(
-        tmp_path / "log.feather"
-    )  # in ms, as nobody says
+    # in ms, as nobody says
+    frame.with_columns(t=pl.int_range(30)).write_ipc(tmp_path / "log.feather")
     tables = list(open_log(tmp_path / "log.feather").tables(10))
     kept = [row for row in range(30) if row not in gaps]
     assert [

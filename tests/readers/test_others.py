@@ -73,9 +73,8 @@ def test_joints_with_names_are_told_by_them(position: str, tmp_path: Path) -> No
         else "/joint_states/{}/effort"
     )
     frame = _arm(position, effort, ("base", "shoulder", "elbow", "wrist"))
-    frame = frame.with_columns(
-        pl.Series("/joint_commands/gripper/position", SWING)
-    )  # no joint of this topic
+    # no joint of this topic
+    frame = frame.with_columns(pl.Series("/joint_commands/gripper/position", SWING))
     frame.write_csv(tmp_path / "log.csv")
     (text,) = _told(tmp_path / "log.csv", Profile(joints=("shoulder", "elbow")))
     assert "1 other joint moves meanwhile: wrist by 0.6 rad" in text

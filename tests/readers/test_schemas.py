@@ -320,15 +320,15 @@ def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
     data, _ = protobuf_schema()
     types = protobuf.parse("arm.State", data)
     assert protobuf.walk(b"\x30\x07", "arm.State", types).find("mode") is not None
-    assert (
-        protobuf.walk(b"\x78\x07", "arm.State", types).find("mode") is not None
-    )  # an unknown field beside one left out
+    # an unknown field beside one left out
+    assert protobuf.walk(b"\x78\x07", "arm.State", types).find("mode") is not None
+    # fixed for a varint, a varint for doubles, a broken list, a list for one number
     for wrong in (
         b"\x35\0\0\0\0",
         b"\x18\x01",
         b"\x32\x02\x81\x82",
         b"\x32\x03\x02\x04\x06",
-    ):  # fixed for a varint, a varint for doubles, a broken list, a list for one number
+    ):
         with pytest.raises(MisfitError):
             protobuf.walk(wrong, "arm.State", types)
 

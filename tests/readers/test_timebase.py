@@ -172,9 +172,8 @@ def test_the_error_told_is_that_of_a_parabola(step: int, start: int) -> None:
 
 
 def test_samples_three_periods_apart_are_bridged_and_no_further() -> None:
-    stamps = (
-        np.array([0, 10, 20, 30, 60, 70, 80, 111, 121, 131]) * MS
-    )  # a gap of three periods, and one of 3.1
+    # a gap of three periods, and one of 3.1
+    stamps = np.array([0, 10, 20, 30, 60, 70, 80, 111, 121, 131]) * MS
     other = series(stamps, tau1=stamps * 1.0)
     assert other.period == 10 * MS
     asked = [

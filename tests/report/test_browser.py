@@ -88,9 +88,8 @@ def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result
     page = write_report(folder)
     seen = browser.look(page, 400)
     assert_sound(seen, page, seen.title)
-    assert seen.title.startswith(
-        "script>"
-    )  # the path's last part, shown; what it would run sets another title
+    # the path's last part, shown; what it would run sets another title
+    assert seen.title.startswith("script>")
 
 
 @pytest.mark.skipif(not RUN.exists(), reason="../shared/data is not here")

@@ -113,9 +113,8 @@ def test_the_running_estimate_ends_at_the_estimate_and_tells_when_it_strayed(
     ]
     told = re.search(r"The bands hold the truth ([\d.]+) % of the time", figure.note)
     assert told is not None
-    assert float(told[1]) == pytest.approx(
-        100 * float(np.mean(held)), rel=1e-2
-    )  # three digits are written
+    # three digits are written
+    assert float(told[1]) == pytest.approx(100 * float(np.mean(held)), rel=1e-2)
 
 
 def test_what_has_no_estimate_has_no_running_one(case_folder: Path, result: Result) -> None:

@@ -60,9 +60,8 @@ def test_intervals_are_those_of_the_results(result: Result) -> None:
     assert k1.estimate is not None
     assert k1.std is not None
     assert _values(first["x"])[0] == 0.0
-    assert first["error_x"]["array"][0] == pytest.approx(
-        1.96, rel=1e-3
-    )  # in σ: no row flattens another
+    # in σ: no row flattens another
+    assert first["error_x"]["array"][0] == pytest.approx(1.96, rel=1e-3)
     assert _values(second["x"])[0] == pytest.approx(2**0.5, rel=1e-5)
     ticks = figure.panels[0].layout["yaxis"]["ticktext"]
     assert ticks[:7] == [f"k{n}" for n in range(1, 8)]  # one row a parameter

@@ -37,9 +37,8 @@ def test_courses_share_one_scale_of_time_and_of_change() -> None:
     drawn = sparklines(
         {"a": course([1.0, 2.0, 3.0], 0.5), "b": course([10.0, 10.0], 0.75, first=1.0)}
     )
-    reach = (
-        0.1 * 0.75 + 0.9 * 1.5
-    )  # the 0.9 quantile of two rows: 0.75, and a change of 1 with its band
+    # the 0.9 quantile of two rows: 0.75, and a change of 1 with its band
+    reach = 0.1 * 0.75 + 0.9 * 1.5
     pixels = (SPARK_HEIGHT / 2 - SPARK_EDGE) / reach
     line = points(drawn["a"], "course")
     np.testing.assert_allclose(line[:, 0], [SPARK_EDGE, SPARK_WIDTH / 2, SPARK_WIDTH - SPARK_EDGE])
@@ -49,9 +48,8 @@ def test_courses_share_one_scale_of_time_and_of_change() -> None:
     band = points(drawn["a"], "band")
     upper, lower = band[:3], band[:2:-1]
     np.testing.assert_allclose(upper[:, 0], lower[:, 0])
-    np.testing.assert_allclose(
-        lower[:, 1] - upper[:, 1], [2 * 0.5 * pixels] * 3, atol=0.9
-    )  # clipped at the frame
+    # clipped at the frame
+    np.testing.assert_allclose(lower[:, 1] - upper[:, 1], [2 * 0.5 * pixels] * 3, atol=0.9)
     np.testing.assert_allclose(
         points(drawn["b"], "course"), [[SPARK_WIDTH / 2, 12.0], [SPARK_WIDTH - SPARK_EDGE, 12.0]]
     )
@@ -80,9 +78,8 @@ def test_a_lone_value_has_its_band_as_a_bar_and_nothing_is_drawn_of_nothing() ->
     np.testing.assert_allclose(np.ptp(points(drawn["lone"], "band"), axis=0)[0], 2.0)
     empty = Course(np.empty(0), np.empty(0), np.empty(0), "")
     assert sparklines({"a": empty}) == {}
-    assert set(sparklines({"a": empty, "b": course([1.0, 1.0], 0.0)})) == {
-        "b"
-    }  # no change at all: no division by it
+    # no change at all: no division by it
+    assert set(sparklines({"a": empty, "b": course([1.0, 1.0], 0.0)})) == {"b"}
 
 
 def test_what_a_drawing_says_is_text() -> None:
@@ -134,9 +131,8 @@ def test_small_changes_are_drawn_as_small_as_they_are() -> None:
     (tiny,) = bars({"a": 0.1}).values()
     width = re.search(r'<rect class="more" x="60.0" y="2" width="([\d.]+)"', tiny)
     assert width is not None
-    assert float(width[1]) == pytest.approx(
-        0.1 * 58, abs=0.05
-    )  # one percent reaches the edge, less two pixels
+    # one percent reaches the edge, less two pixels
+    assert float(width[1]) == pytest.approx(0.1 * 58, abs=0.05)
     (whole,) = bars({"a": -250.0}).values()
     assert 'x="2.0" y="2" width="58.0"' in whole
     assert 'aria-label="a: -250.00"' in whole

@@ -110,11 +110,12 @@ def test_logs_follow_one_another_a_hundredth_of_the_whole_apart(result: Result) 
     space = 0.01 * (2.0 + 3.0 + 0.5)
     assert [after[0] - before[1] for before, after in pairwise(ends)] == pytest.approx([space] * 2)
     logs = [result.log.model_copy(update={"path": f"{name}.csv"}) for name in "ab"]
+    # more series than logs
     assert [name for name, *_ in views(RANGES, logs)] == [
         "a.csv",
         "b.csv",
         "log 3",
-    ]  # more series than logs
+    ]
     shown = separators(RANGES, moved, logs)
     assert [shape["x0"] for shape in shown["shapes"]] == pytest.approx([end[0] for end in ends[1:]])
     assert [note["text"] for note in shown["annotations"]] == ["a.csv", "b.csv", "log 3"]
@@ -224,9 +225,8 @@ def test_bands_of_the_mass_matrix_are_as_wide_as_draws_of_the_constants(result: 
     ):
         edge = values(trace["y"])
         half = 0.5 * (edge[:181] - edge[:180:-1])
-        np.testing.assert_allclose(
-            half, 1.96 * part.std(axis=0), rtol=0.06
-        )  # 4,000 draws: a standard error of 1.1 %
+        # 4,000 draws: a standard error of 1.1 %
+        np.testing.assert_allclose(half, 1.96 * part.std(axis=0), rtol=0.06)
     lost: list[list[float | None]] = covariance.tolist()
     lost[place[0]][place[1]] = None
     bare = drawn(inertia(with_fit(made, covariance=lost), None))
@@ -298,9 +298,8 @@ def test_information_adds_up_and_the_note_tells_the_poorest(result: Result, tmp_
     np.testing.assert_allclose(shares.sum(axis=1), [100.0, 100.0, 0.0], rtol=1e-4)
     np.testing.assert_allclose(values(trace["x"])[:3], [1.5, 4.5, 7.5])
     assert trace["y"] == ["k1", "k2", "k3"]
-    assert (
-        figure.note == "Half of what is known of k2 comes from 0.69 % of the time."
-    )  # 3 of 434 cells
+    # 3 of 434 cells
+    assert figure.note == "Half of what is known of k2 comes from 0.69 % of the time."
     short = _parquet(
         tmp_path / "short.parquet", log=[0, 0], t=[0.0, 1.0], k1=[1.0, 2.0], k2=[2.0, 1.0]
     )
@@ -475,9 +474,8 @@ def test_a_band_that_misses_its_end_is_told_with_the_last_moment(
         == "The last band to miss its final estimate was that of k1, at 3.00 s of 5.00 s."
     )
     low, high = figure.panels[0].layout["yaxis"]["range"]
-    assert (low, high) == pytest.approx(
-        (0.2, 1.8)
-    )  # four half widths about the end hold the later part too
+    # four half widths about the end hold the later part too
+    assert (low, high) == pytest.approx((0.2, 1.8))
     known = drawn(running(path, real.model_copy(update={"truth": {"k1": 1.0, "k2": 2.3}})))
     assert known.note.endswith(" The bands hold the truth 30.0 % of the time.")  # 3 of 5, and none
     level = figure.panels[1]

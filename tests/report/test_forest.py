@@ -38,9 +38,8 @@ def test_the_truth_and_each_log_stand_where_they_belong() -> None:
     drawing = forest(GROUP, {"k1": 2.2}, {"k1": [1.0, 1.8, 9.0]}).rows["k1"]
     ring = re.search(r'class="truth" cx="([\d.]+)"', drawing)
     assert ring is not None
-    assert float(ring[1]) == pytest.approx(
-        reach(drawing)[1], abs=0.06
-    )  # the upper end of the interval
+    # the upper end of the interval
+    assert float(ring[1]) == pytest.approx(reach(drawing)[1], abs=0.06)
     dots = [float(x) for x in re.findall(r'class="log" cx="([\d.]+)"', drawing)]
     assert dots == pytest.approx([EDGE, reach(drawing)[0]], abs=0.06)
     assert f'class="log beyond" cx="{WIDTH - 2.5:g}"' in drawing  # 9.0 lies beyond the scale

@@ -45,9 +45,8 @@ def test_a_number_shows_its_significant_digits(value: float | None, digits: int,
 @given(NUMBERS, st.integers(2, 8))
 def test_a_written_number_is_the_number_rounded(value: float, digits: int) -> None:
     read = float(significant(value, digits).replace("−", "-"))
-    assert read == pytest.approx(
-        value, rel=0.5001 * 10 ** (1 - digits), abs=1e-300
-    )  # half of the last digit
+    # half of the last digit
+    assert read == pytest.approx(value, rel=0.5001 * 10 ** (1 - digits), abs=1e-300)
 
 
 def test_the_standard_deviation_decides_how_many_digits_are_worth_writing() -> None:

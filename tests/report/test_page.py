@@ -112,16 +112,14 @@ def test_foreign_text_stays_text(folder: Path, result: Result) -> None:
     write_result(hostile(result), folder / "result.json")
     text = write_report(folder).read_text(encoding="utf-8")
     own = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", text, flags=re.DOTALL)
-    own = re.sub(
-        r'<svg (?:class="forest"|viewBox="-).*?</svg>', "", own, flags=re.DOTALL
-    )  # the page's own drawings
+    # the page's own drawings
+    own = re.sub(r'<svg (?:class="forest"|viewBox="-).*?</svg>', "", own, flags=re.DOTALL)
     tags = Tags(own).found
     assert {"img", "svg", "b", "script"}.isdisjoint(tag for tag, _ in tags)
     assert not [attrs for _, attrs in tags if any(name.startswith("on") for name in attrs)]
     assert escaped(HOSTILE) in own
-    assert (
-        text.count("<script") == 5
-    )  # the data, the library, the page's own, the arm's frames and its player
+    # the data, the library, the page's own, the arm's frames and its player
+    assert text.count("<script") == 5
     for character in "\x1b\x07\u202e":
         assert character not in text
 
@@ -183,9 +181,8 @@ def test_nothing_is_lost_of_a_torque_log_in_blocks(
     cut = read_torque(case_folder / "torque.parquet")
     for log, span in whole.ranges.items():
         assert cut.ranges[log] == replace(span, period=cut.ranges[log].period)
-        assert cut.ranges[log].period == pytest.approx(
-            span.period, rel=1e-9
-        )  # a median of other stamps
+        # a median of other stamps
+        assert cut.ranges[log].period == pytest.approx(span.period, rel=1e-9)
     assert cut.extremes == whole.extremes
     np.testing.assert_array_equal(cut.motion, whole.motion)
     for name, series in whole.series[1].items():
@@ -395,8 +392,7 @@ def test_a_page_of_the_papers_method_begins_with_its_figure_and_lacks_nothing(
     assert not any(section.fold for section in document.sections)
     (table,) = [one for one in document.tables(*Depth) if one.title == "Table 4"]
     assert "was sought for this table" in table.note
-    other = result.model_copy(
-        update={"fit": None}
-    )  # which another estimator does not lack by nature
+    # which another estimator does not lack by nature
+    other = result.model_copy(update={"fit": None})
     shown = result_document(other, gallery(folder, other))
     assert [one for one in shown.content() if isinstance(one, Missing)]

@@ -48,9 +48,8 @@ def test_figures_are_saved_in_the_form_that_is_asked_for(tmp_path: Path) -> None
     assert [path.name for path in written] == ["case1-one.pdf"]
     once = written[0].read_bytes()
     assert once.startswith(b"%PDF")
-    assert (
-        save_plots(shown[:1], tmp_path, "case1")[0].read_bytes() == once
-    )  # no date, no random name
+    # no date, no random name
+    assert save_plots(shown[:1], tmp_path, "case1")[0].read_bytes() == once
 
 
 @pytest.mark.slow  # matplotlib takes fonts apart for every file
@@ -137,10 +136,11 @@ def test_closed_areas_break_where_they_are_broken() -> None:
         "fillcolor": "@green",
     }
     axes = one_panel([{**trace, "line": {"width": 0}}])
+    # the last part has a single corner
     assert [len(patch.get_xy()) - 1 for patch in axes.patches] == [
         4,
         3,
-    ]  # the last part has a single corner
+    ]
 
 
 def test_markers_steps_and_error_bars_are_those_of_the_page() -> None:

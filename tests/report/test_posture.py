@@ -56,9 +56,8 @@ def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> 
     turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
     assert turned is not None
     first = torque.series[0]["theta1"][1]
-    assert float(turned[1]) == pytest.approx(
-        -np.degrees(first[np.isfinite(first)][0]), abs=1e-3
-    )  # SVG turns clockwise
+    # SVG turns clockwise
+    assert float(turned[1]) == pytest.approx(-np.degrees(first[np.isfinite(first)][0]), abs=1e-3)
 
 
 def test_the_drawing_holds_the_arm_all_along_its_motion_and_its_limit_and_little_more() -> None:

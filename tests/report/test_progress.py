@@ -122,9 +122,8 @@ def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) 
     for stage in stages:
         done = [(done, total) for told, done, total in calls if told == stage and total]
         assert all(0 <= one <= total for one, total in done)
-        if done and not (
-            stage == "series" and estimator == "refined"
-        ):  # whose last one is the first log's alone
+        # whose last one is the first log's alone
+        if done and not (stage == "series" and estimator == "refined"):
             assert done[-1] == (samples, samples)
 
 

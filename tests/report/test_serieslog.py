@@ -42,9 +42,8 @@ def test_k7_is_singular_where_its_own_equation_is(tmp_path: Path) -> None:
 def test_the_window_is_the_paper_methods_own_setting(tmp_path: Path) -> None:
     path = write(tmp_path / "e.parquet", k1=np.ones(4000))
     assert read_series(path, {"estimator": "paper", "window": 1.0}).window == 1.0
-    assert (
-        read_series(path, {"estimator": "weak", "window": 0.4}).window == 2.0
-    )  # 0.4 s is the weak form's
+    # 0.4 s is the weak form's
+    assert read_series(path, {"estimator": "weak", "window": 0.4}).window == 2.0
     assert read_series(path, {"estimator": "paper", "window": None}).window == 2.0
 
 

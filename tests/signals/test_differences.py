@@ -55,9 +55,8 @@ def test_noise_behind_a_held_torque_is_whitened() -> None:
     assert abs(white.var() - 1) < 0.03  # four standard errors of 40,000 squares
     for joint in white.T:
         assert abs(joint[1:] @ joint[:-1] / joint.size) < 4.5 / np.sqrt(joint.size)
-    assert (
-        abs(held_torque(noise)[0, 2:-1] @ held_torque(noise)[0, 1:-2]) / 20000 > 0.05
-    )  # what there was to whiten
+    # what there was to whiten
+    assert abs(held_torque(noise)[0, 2:-1] @ held_torque(noise)[0, 1:-2]) / 20000 > 0.05
 
 
 def test_a_delay_near_half_a_sample_stays_on_one_stencil() -> None:

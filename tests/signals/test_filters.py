@@ -28,9 +28,8 @@ def test_velocity_is_right_below_a_quarter_of_the_bandwidth(hertz: float) -> Non
     reach = half_length(1e-3, 40.0)
     velocity = correlate(np.sin(2 * np.pi * hertz * t)[None], differentiator(1e-3, 40.0))[0]
     truth = 2 * np.pi * hertz * np.cos(2 * np.pi * hertz * t[reach:-reach])
-    assert (
-        np.abs(velocity - truth).max() < 1e-3 * 2 * np.pi * hertz
-    )  # the ripple at a quarter is 4e-4
+    # the ripple at a quarter is 4e-4
+    assert np.abs(velocity - truth).max() < 1e-3 * 2 * np.pi * hertz
 
 
 def test_correlation_agrees_with_numpy() -> None:
@@ -133,9 +132,8 @@ def test_the_smoother_passes_what_is_slow_halves_its_bandwidth_and_stops_at_70_d
     gain = np.abs(response)
     assert gain[0] == pytest.approx(1, abs=1e-12)
     assert gain[1] == pytest.approx(1, abs=2e-3)
-    assert gain[2] == pytest.approx(
-        0.5, abs=0.01
-    )  # the window's middle lies on the ideal filter's edge
+    # the window's middle lies on the ideal filter's edge
+    assert gain[2] == pytest.approx(0.5, abs=0.01)
     assert 20 * np.log10(gain[3:].max()) < -70
 
 

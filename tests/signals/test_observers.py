@@ -25,9 +25,8 @@ DT = 1e-3
 
 def test_gain_places_the_poles_of_the_paper() -> None:
     found = np.sort(np.linalg.eigvals(A - observer_gain(PAPER_POLES) @ C).real)
-    np.testing.assert_allclose(
-        found, np.sort(PAPER_POLES), rtol=1e-4
-    )  # close poles: eigenvalues lose digits
+    # close poles: eigenvalues lose digits
+    np.testing.assert_allclose(found, np.sort(PAPER_POLES), rtol=1e-4)
 
 
 @pytest.mark.parametrize("poles", [PAPER_POLES, (-50 + 20j, -50 - 20j, -60, -80, -90, -100)])
@@ -37,9 +36,8 @@ def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex,
     gain = observer_gain(poles)
 
     def rate(now: float, x: np.ndarray) -> np.ndarray:
-        y = np.array(
-            [np.interp(now, t, angle) for angle in theta]
-        )  # linear between samples, as assumed
+        # linear between samples, as assumed
+        y = np.array([np.interp(now, t, angle) for angle in theta])
         return (A - gain @ C) @ x + gain @ y
 
     start = np.array([theta[0, 0], 0, 0, theta[1, 0], 0, 0])
@@ -124,9 +122,8 @@ def test_no_joint_disturbs_the_other() -> None:
 def test_a_ramp_ends_at_its_slope() -> None:
     t = DT * np.arange(1000)
     found = LuenbergerObserver(DT).velocities(np.stack([2.0 * t, -0.5 * t + 1.0]))
-    np.testing.assert_allclose(
-        found[:, -1], [2.0, -0.5], rtol=1e-6
-    )  # type 1: the filter has no error of position
+    # type 1: the filter has no error of position
+    np.testing.assert_allclose(found[:, -1], [2.0, -0.5], rtol=1e-6)
 
 
 @pytest.mark.parametrize(

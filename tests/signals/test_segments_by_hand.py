@@ -91,9 +91,8 @@ def test_a_stamp_within_a_thousandth_of_a_period_lies_on_the_grid(off: float, ta
     ms = [float(n) for n in range(30)]
     ms[17] += off
     log = log_at(ms)
-    bent = replace(
-        log, theta=log.theta**3 + np.arange(30) ** 2
-    )  # no line: what is put in between differs
+    # no line: what is put in between differs
+    bent = replace(log, theta=log.theta**3 + np.arange(30) ** 2)
     (whole,) = found(bent)
     assert np.array_equal(whole.theta[:, 17], bent.theta[:, 17]) is taken
 
@@ -111,9 +110,8 @@ def test_missing_samples_are_those_of_the_cubic_through_four_neighbours() -> Non
     assert values.shape == (2, 30)
     nodes = [kept.index(n) for n in (10, 11, 14, 15)]
     cubic = BarycentricInterpolator(np.array([10.0, 11.0, 14.0, 15.0]), log.theta[:, nodes].T)
-    np.testing.assert_allclose(
-        values[:, 12:14], cubic(np.array([12.0, 13.0])).T, atol=1e-9
-    )  # rounding of stamps
+    # rounding of stamps
+    np.testing.assert_allclose(values[:, 12:14], cubic(np.array([12.0, 13.0])).T, atol=1e-9)
     np.testing.assert_allclose(values[:, :12], log.theta[:, :12], atol=1e-9)
 
 
@@ -150,9 +148,8 @@ def test_velocities_come_along_or_stay_away() -> None:
     log = log_at(ms, omega=True)
     for part in segments([log]):
         assert part.omega is not None
-        line = np.stack(
-            [0.25 * part.t + 4.0, 4.0 * part.t - 0.25]
-        )  # the cubic through a line is the line
+        # the cubic through a line is the line
+        line = np.stack([0.25 * part.t + 4.0, 4.0 * part.t - 0.25])
         np.testing.assert_allclose(part.omega, line, atol=1e-9)
     assert all(part.omega is None for part in segments([replace(log, omega=None)]))
 

@@ -30,9 +30,8 @@ def test_a_pendulum_swings_as_jacobi_s_elliptic_sine() -> None:
 
 
 def test_corners_between_and_on_samples_are_met() -> None:
-    corners = np.array(
-        [0.1, 0.25, 0.2501, 0.7]
-    )  # a push that begins and ends: velocity and angle in closed form
+    # a push that begins and ends: velocity and angle in closed form
+    corners = np.array([0.1, 0.25, 0.2501, 0.7])
     t = np.linspace(0, 1, 11)
     levels = np.array([0.0, 3.0, -7.0, 2.0, 0.0])
 

@@ -91,9 +91,8 @@ def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
     assert np.abs(error).max() <= 0.5 + 1e-9
     assert omega is None
     np.testing.assert_array_equal(tau, motion().tau)
-    if (
-        bits == 20
-    ):  # fine lines: the error is uniform, of variance a twelfth, whose square has variance 1 / 180
+    # fine lines: the error is uniform, of variance a twelfth, whose square has variance 1 / 180
+    if bits == 20:
         squares = error**2
         assert abs(squares.mean() - 1 / 12) < 5 * np.sqrt(1 / 180 / squares.size)
         assert abs(error.mean()) < 5 * np.sqrt(1 / 12 / error.size)
@@ -126,9 +125,8 @@ def test_jitter_is_as_large_as_asked_and_keeps_the_order() -> None:
     error = t - np.arange(t.size) / rate
     assert error[0] == 0
     low, high = chi2.ppf([RARE / 2, 1 - RARE / 2], t.size - 1)
-    assert (
-        low < np.sum(error**2) / std**2 < high
-    )  # clipped at 4.5 standard deviations, which takes 1e-4 of them away
+    # clipped at 4.5 standard deviations, which takes 1e-4 of them away
+    assert low < np.sum(error**2) / std**2 < high
     wild = sample_times(rate, 20.0, Sensors(jitter=1.0, seed=2))
     assert np.diff(wild).min() >= 0.1 / rate - 1e-9  # 0.45 to either side leave a tenth
     assert np.abs(wild - np.arange(wild.size) / rate).max() <= 0.45 / rate + 1e-9

@@ -158,9 +158,8 @@ def test_an_uncertain_arm_adds_its_share_to_the_variance() -> None:
     )
     cells = joined(cells_of(segments([log]), ARM, sure.m_p))
     J = cells.sensitivity(ARM, np.full(len(cells), sure.m_p)).sum(axis=0) / cells.A.sum()
-    assert sure.std**2 == pytest.approx(
-        1 / cells.A.sum(), rel=0.1
-    )  # cells at both ends are left out
+    # cells at both ends are left out
+    assert sure.std**2 == pytest.approx(1 / cells.A.sum(), rel=0.1)
     assert wide.std**2 - sure.std**2 == pytest.approx(float(J @ covariance @ J), rel=0.1)
 
 
@@ -267,9 +266,8 @@ def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
     form.
     """
     model = Model(("phases",))
-    k = np.array(
-        [0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05]
-    )  # arg K1 = arg K2: θ1's zero is right
+    # arg K1 = arg K2: θ1's zero is right
+    k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05])
     noise = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-2))
     arm = IdentifiedArm(model, k, 0.4, 0.3, noise, 0.0, 0.05, 0.07)
     added = dict(zip(model.names, arm.unit.tolist(), strict=True))

@@ -66,9 +66,8 @@ def brute(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[i
 
 
 @settings(max_examples=60)
-@example(
-    seed=10_000, count=13, shortest=3, penalty=3.0
-)  # a start that was given up before its better might stand
+# a start that was given up before its better might stand
+@example(seed=10_000, count=13, shortest=3, penalty=3.0)
 @given(
     seed=st.integers(0, 10_000),
     count=st.integers(3, 13),

@@ -112,10 +112,11 @@ def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
     rows = change_table(made).rows
     assert [row[3] for row in rows] == ["+0.2500", "-0.1500"]
     assert [row[1:3] for row in rows] == [("1.000", "[0.900, 1.100]"), ("2.000", "[1.900, 2.100]")]
+    # what the arm held at the start is no change
     assert [row[5] for row in rows] == [
         "1.020",
         "1.900",
-    ]  # what the arm held at the start is no change
+    ]
     assert "Truth at, s" not in [
         column.heading for column in change_table(track([0.1, 0.2])).columns
     ]

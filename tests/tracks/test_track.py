@@ -154,9 +154,8 @@ def test_cuts_are_the_best_ones() -> None:
         both = list(pairwise(edges))
         return sum(10.0 - B[a:b].sum() ** 2 / A[a:b].sum() for a, b in both)
 
-    best = min(
-        ([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost
-    )  # by trying every pair
+    # by trying every pair
+    best = min(([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost)
     assert cuts(A, B, penalty=10.0, shortest=3) == best[1:-1] == [8, 16]
 
 

@@ -51,7 +51,6 @@ PHASES = Term(
     ),
     inertial=True,
     sines=(("k1s", "k1"), ("k2s", "k2"), ("k4s", "k4")),
-    spread=PriorSpread(
-        0.5, "cosine", 0.02
-    ),  # rad: a bent gripper; most arms have an encoder's error
+    # rad: a bent gripper; most arms have an encoder's error
+    spread=PriorSpread(0.5, "cosine", 0.02),
 )

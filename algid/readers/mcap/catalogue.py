@@ -276,9 +276,8 @@ def _indexed(file: File, chunk: ChunkIndex) -> Iterator[tuple[int, int]]:
     if listed == chunk.message_index_length:
         return
     start = chunk.chunk_start_offset + chunk.chunk_length
-    for record in framing.walk(
-        file, start, _end(chunk)
-    ):  # what stands there though it is not listed
+    # what stands there though it is not listed
+    for record in framing.walk(file, start, _end(chunk)):
         channel, size = struct.unpack("<HI", file.read(record.start, 6))
         if record.code != framing.MESSAGE_INDEX or (
             size and channel not in chunk.message_index_offsets

@@ -161,11 +161,12 @@ class Layout:
         octets, columns = table.view(np.uint8), Fields()
         for name, at in (self.fields or {}).items():
             start, rows = self.lead + at.offset, octets.shape[0]
+            # in base 128, the lowest seven bits first
             if at.kind in (
                 "varint",
                 "unsigned",
                 "zigzag",
-            ):  # in base 128, the lowest seven bits first
+            ):
                 digits = (octets[:, start : start + at.width] & 0x7F).astype(np.uint64)
                 total = np.bitwise_or.reduce(
                     digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1
@@ -346,9 +347,8 @@ class ColumnDecoder(Decoder):
                         self.without(one.lacks)
                     else:
                         yield rows[left[:1]], one.read(table[left[:1]])
-                    left = left[
-                        1:
-                    ]  # one by one from here: what is remembered must not grow with the file
+                    # one by one from here: what is remembered must not grow with the file
+                    left = left[1:]
                     continue
                 known.append(one)
                 self._words += one.words.size

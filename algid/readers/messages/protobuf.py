@@ -95,9 +95,8 @@ def _implicit(file: Any) -> bool:
 
 
 def _field(one: Any, implicit: bool) -> ProtobufField:
-    oneof = (
-        one.oneof_index if one.HasField("oneof_index") else None
-    )  # an optional field of proto3 has one of its own
+    # an optional field of proto3 has one of its own
+    oneof = one.oneof_index if one.HasField("oneof_index") else None
     presence = int(one.options.features.field_presence)
     implicit = presence == _IMPLICIT if presence else implicit
     message = one.type_name.lstrip(".")

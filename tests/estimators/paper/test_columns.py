@@ -68,9 +68,8 @@ def test_columns_are_the_integrals_of_polynomial_motions(start: float) -> None:
     theta, omega = np.stack([at(q1), at(q2)]), np.stack([at(sp.diff(q1, s)), at(sp.diff(q2, s))])
     found = columns(theta, omega, np.stack([at(one) for one in torques]), dt)
     for name, expected in exact.items():
-        np.testing.assert_allclose(
-            getattr(found, name), expected, atol=1e-8
-        )  # Simpson's dt⁴ and rounding
+        # Simpson's dt⁴ and rounding
+        np.testing.assert_allclose(getattr(found, name), expected, atol=1e-8)
 
 
 def test_coupling_and_gravity_are_integrated_to_fourth_order() -> None:
@@ -179,9 +178,8 @@ def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles(
     nothing = summary.estimates()
     assert np.isnan(nothing).all()
     nan = np.nan
-    summary.add(
-        _series([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5)
-    )  # what is not settled counts nothing
+    # what is not settled counts nothing
+    summary.add(_series([99, 1, 2, 3, 4], [9, nan, 5, 5, 5], [nan] * 5))
     estimate, wander = summary.estimates()
     np.testing.assert_allclose(estimate, [2.5, 5, nan])
     np.testing.assert_allclose(wander, [0.5 * (3.25 - 1.75), 0, nan])
@@ -189,8 +187,7 @@ def test_an_estimate_is_the_median_of_medians_and_wanders_by_half_its_quartiles(
     summary.add(_series([0, 3, 3, 3, 3], [0, 1, 1, 1, 1], [nan] * 5))
     estimate, wander = summary.estimates()
     np.testing.assert_allclose(estimate, [3, 3, nan])  # medians 2.5, 7, 3 and 5, 1
-    np.testing.assert_allclose(
-        wander, [0.5 * (5 - 2.75), 0.5 * (4 - 2), nan]
-    )  # between windows more than within
+    # between windows more than within
+    np.testing.assert_allclose(wander, [0.5 * (5 - 2.75), 0.5 * (4 - 2), nan])
     assert wanders(estimate, wander).tolist() == [False, False, True]
     assert wanders(np.array([-1.0, 1.0]), np.array([1.0, 1.1])).tolist() == [False, True]

@@ -64,9 +64,8 @@ def test_initial_conditions_do_not_matter() -> None:
     k = case.arm.constants()
     moving = simulate(k, wide_multi_sine(case.arm), T, np.array([0.4, -1.0]), np.array([2.0, -3.0]))
     found = stage1(moving.theta, moving.omega, moving.tau, DT)
-    np.testing.assert_allclose(
-        found.k[:, -1], k, rtol=1e-3
-    )  # fast motion at 1 kHz: the integrals' own error
+    # fast motion at 1 kHz: the integrals' own error
+    np.testing.assert_allclose(found.k[:, -1], k, rtol=1e-3)
 
 
 def test_an_arm_that_hangs_still_is_singular_everywhere() -> None:
@@ -100,9 +99,8 @@ def test_systems_of_any_scale_are_solved_alike() -> None:
     scaled = matrix * rows[:, None, None] * columns[None, :, None]
     rhs = rows[:, None] * np.einsum("ijn,jn->in", matrix, x)
     found = solve_scaled(scaled, rhs)
-    np.testing.assert_allclose(
-        found.x * columns[:, None], x, rtol=1e-10
-    )  # condition numbers to 1e3, times rounding
+    # condition numbers to 1e3, times rounding
+    np.testing.assert_allclose(found.x * columns[:, None], x, rtol=1e-10)
     expected = np.linalg.cond(np.moveaxis(matrix, -1, 0))
     assert np.all(found.condition < 200 * expected)
 
