@@ -41,38 +41,49 @@ def urdf(arm: Description) -> str:
 
     def joint(one: Joint, parent: str, child: str, at: float, turn: float = 0.0) -> str:
         turned = f' rpy="{_numbers(0, -turn, 0)}"' if turn else ""
+        losses = f'damping="{_numbers(one.damping)}" friction="{_numbers(one.friction)}"'
         return (
-            f'  <joint name="{one.name}" type="continuous">\n    <parent link="{parent}"/>\n'
-            f'    <child link="{child}"/>\n    <origin xyz="{_numbers(at, 0, 0)}"{turned}/>\n    '
-            f"<axis "
-            f'xyz="{_axis(arm)}"/>\n'
-            f'    <dynamics damping="{_numbers(one.damping)}" '
-            f'friction="{_numbers(one.friction)}"/>\n  </joint>\n'
+            f'  <joint name="{one.name}" type="continuous">\n'
+            f'    <parent link="{parent}"/>\n'
+            f'    <child link="{child}"/>\n'
+            f'    <origin xyz="{_numbers(at, 0, 0)}"{turned}/>\n'
+            f'    <axis xyz="{_axis(arm)}"/>\n'
+            f"    <dynamics {losses}/>\n"
+            "  </joint>\n"
         )
 
     def link(name: str, one: Link) -> str:
         xx, yy, zz = map(_numbers, one.tensor)
         return (
-            f'  <link name="{name}">\n    <inertial>\n      <origin '
-            f'xyz="{_centre(arm, one)}"/>\n'
+            f'  <link name="{name}">\n'
+            "    <inertial>\n"
+            f'      <origin xyz="{_centre(arm, one)}"/>\n'
             f'      <mass value="{_numbers(one.mass)}"/>\n'
             f'      <inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/>\n'
-            "    </inertial>\n    <visual>\n      <origin "
-            f'xyz="{_numbers(one.length / 2, 0, 0)}"/>\n'
-            f'      <geometry><box size="{_box(one)}"/></geometry>\n    </visual>\n  </link>\n'
+            "    </inertial>\n"
+            "    <visual>\n"
+            f'      <origin xyz="{_numbers(one.length / 2, 0, 0)}"/>\n'
+            f'      <geometry><box size="{_box(one)}"/></geometry>\n'
+            "    </visual>\n"
+            "  </link>\n"
         )
 
     return (
-        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<robot name="{arm.name}">\n  <link '
-        'name="base"/>\n'
+        '<?xml version="1.0"?>\n'
+        f"{_comment(arm, remarks)}\n"
+        f'<robot name="{arm.name}">\n'
+        '  <link name="base"/>\n'
         + joint(joints[0], "base", "link1", 0.0, arm.turn)
         + link("link1", first)
         + joint(joints[1], "link1", "link2", first.length)
         + link("link2", second)
-        + '  <joint name="tip_mount" type="fixed">\n    <parent link="link2"/>\n    <child '
-        'link="tip"/>\n'
-        f'    <origin xyz="{_numbers(second.length, 0, 0)}"/>\n  </joint>\n  <link '
-        'name="tip"/>\n</robot>\n'
+        + '  <joint name="tip_mount" type="fixed">\n'
+        '    <parent link="link2"/>\n'
+        '    <child link="tip"/>\n'
+        f'    <origin xyz="{_numbers(second.length, 0, 0)}"/>\n'
+        "  </joint>\n"
+        '  <link name="tip"/>\n'
+        "</robot>\n"
     )
 
 
@@ -81,12 +92,19 @@ def sdf(arm: Description) -> str:
     (first, second), joints, remarks = _rotorless(arm, "SDF")
 
     def joint(one: Joint, parent: str, child: str) -> str:
+        losses = (
+            f"<damping>{_numbers(one.damping)}</damping>"
+            f"<friction>{_numbers(one.friction)}</friction>"
+        )
         return (
-            f'    <joint name="{one.name}" type="revolute">\n      <parent>{parent}</parent>\n'
-            f"      <child>{child}</child>\n      <axis>\n        <xyz>{_axis(arm)}</xyz>\n"
-            f"        <dynamics><damping>{_numbers(one.damping)}</damping>"
-            f"<friction>{_numbers(one.friction)}</friction></dynamics>\n      </axis>\n    "
-            "</joint>\n"
+            f'    <joint name="{one.name}" type="revolute">\n'
+            f"      <parent>{parent}</parent>\n"
+            f"      <child>{child}</child>\n"
+            "      <axis>\n"
+            f"        <xyz>{_axis(arm)}</xyz>\n"
+            f"        <dynamics>{losses}</dynamics>\n"
+            "      </axis>\n"
+            "    </joint>\n"
         )
 
     def link(name: str, base: str, at: float, one: Link, turn: float = 0.0) -> str:
@@ -95,24 +113,29 @@ def sdf(arm: Description) -> str:
             f"<ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz>"
         )
         return (
-            f'    <link name="{name}">\n      <pose '
-            f'relative_to="{base}">{_numbers(at, 0, 0, 0, -turn, 0)}</pose>\n'
-            f"      <inertial>\n        <pose>{_centre(arm, one)} {_numbers(0, 0, 0)}</pose>\n"
-            f"        <mass>{_numbers(one.mass)}</mass>\n        <inertia>{inertia}</inertia>\n   "
-            "   </inertial>\n"
-            f'      <visual name="{name}">\n        '
-            f"<pose>{_numbers(one.length / 2, 0, 0, 0, 0, 0)}</pose>\n"
-            f"        <geometry><box><size>{_box(one)}</size></box></geometry>\n      </visual>\n "
-            "   </link>\n"
+            f'    <link name="{name}">\n'
+            f'      <pose relative_to="{base}">{_numbers(at, 0, 0, 0, -turn, 0)}</pose>\n'
+            "      <inertial>\n"
+            f"        <pose>{_centre(arm, one)} {_numbers(0, 0, 0)}</pose>\n"
+            f"        <mass>{_numbers(one.mass)}</mass>\n"
+            f"        <inertia>{inertia}</inertia>\n"
+            "      </inertial>\n"
+            f'      <visual name="{name}">\n'
+            f"        <pose>{_numbers(one.length / 2, 0, 0, 0, 0, 0)}</pose>\n"
+            f"        <geometry><box><size>{_box(one)}</size></box></geometry>\n"
+            "      </visual>\n"
+            "    </link>\n"
         )
 
+    tip = f"<pose>{_numbers(second.length, 0, 0, 0, 0, 0)}</pose>"
     return (
-        f'<?xml version="1.0"?>\n{_comment(arm, remarks)}\n<sdf version="1.9">\n  <model '
-        f'name="{arm.name}">\n'
+        '<?xml version="1.0"?>\n'
+        f"{_comment(arm, remarks)}\n"
+        '<sdf version="1.9">\n'
+        f'  <model name="{arm.name}">\n'
         + link("link1", "__model__", 0.0, first, arm.turn)
         + link("link2", "link1", first.length, second)
-        + '    <frame name="tip" '
-        f'attached_to="link2"><pose>{_numbers(second.length, 0, 0, 0, 0, 0)}</pose></frame>\n'
+        + f'    <frame name="tip" attached_to="link2">{tip}</frame>\n'
         + joint(joints[0], "world", "link1")
         + joint(joints[1], "link1", "link2")
         + "  </model>\n</sdf>\n"
@@ -139,19 +162,28 @@ def mjcf(arm: Description) -> str:
             f'size="{_numbers(0.03 * one.length)}" contype="0" conaffinity="0"/>\n'
         )
 
+    gravity = _numbers(0, 0, -arm.coefficients.model.gravity)
     return (
-        f'{_comment(arm, remarks)}\n<mujoco model="{arm.name}">\n  <compiler angle="radian"/>\n'
-        f'  <option gravity="{_numbers(0, 0, -arm.coefficients.model.gravity)}" integrator="RK4" '
-        f'timestep="{_numbers(TIMESTEP)}"/>\n  <worldbody>\n    '
-        f'<body name="link1"{_turned(arm)}>\n      '
-        f"{joint(joints[0])}\n"
-        f'{link(first, "      ")}      <body name="link2" pos="{_numbers(first.length, 0, 0)}">\n'
+        f"{_comment(arm, remarks)}\n"
+        f'<mujoco model="{arm.name}">\n'
+        '  <compiler angle="radian"/>\n'
+        f'  <option gravity="{gravity}" integrator="RK4" timestep="{_numbers(TIMESTEP)}"/>\n'
+        "  <worldbody>\n"
+        f'    <body name="link1"{_turned(arm)}>\n'
+        f"      {joint(joints[0])}\n"
+        f"{link(first, 6 * ' ')}"
+        f'      <body name="link2" pos="{_numbers(first.length, 0, 0)}">\n'
         f"        {joint(joints[1])}\n"
-        f'{link(second, "        ")}        <site name="tip" '
-        f'pos="{_numbers(second.length, 0, 0)}"/>\n'
-        "      </body>\n    </body>\n  </worldbody>\n  <actuator>\n"
-        '    <motor name="motor1" joint="joint1"/>\n    <motor name="motor2" joint="joint2"/>\n'
-        "  </actuator>\n</mujoco>\n"
+        f"{link(second, 8 * ' ')}"
+        f'        <site name="tip" pos="{_numbers(second.length, 0, 0)}"/>\n'
+        "      </body>\n"
+        "    </body>\n"
+        "  </worldbody>\n"
+        "  <actuator>\n"
+        '    <motor name="motor1" joint="joint1"/>\n'
+        '    <motor name="motor2" joint="joint2"/>\n'
+        "  </actuator>\n"
+        "</mujoco>\n"
     )
 
 
