@@ -206,6 +206,11 @@ class Log:
             if channel is not None and channel.shape != (2, rows):
                 raise ValueError(f"{name} must have shape (2, {rows}), got {channel.shape}")
 
+    def __repr__(self) -> str:
+        """Where it came from, how many samples it has, and how long it is, without its numbers."""
+        seconds = self.duration if len(self) else 0.0
+        return f"Log({self.origin.path!r}, N = {len(self):,}, {seconds:g} s)"
+
     @classmethod
     def from_arrays(
         cls,

@@ -65,6 +65,12 @@ def _sections(thing: object) -> dict[str, set[str]]:
     }
 
 
+def test_a_log_shows_no_arrays() -> None:
+    t = 0.01 * np.arange(1201)
+    log = algid.Log.from_arrays(t, np.zeros((2, 1201)), np.zeros((2, 1201)), name="run 1")
+    assert repr(log) == "Log('run 1', N = 1,201, 12 s)"
+
+
 def test_a_log_is_written_to_a_path_that_is_text(tmp_path: Path) -> None:
     log, _ = algid.synthesise("case1", duration=0.1)
     algid.write_log(str(tmp_path / "a.mcap"), log)
