@@ -22,6 +22,7 @@ from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate
@@ -219,7 +220,9 @@ def _held(here: scenes.Scene) -> dict[str, float]:
     log = Segment(0.0, 1 / scenes.RATE, motion.theta, here.bare.tau)
     bias = {}
     for hold in ("zoh", "foh"):
-        fit = refined.fit([lambda: [log]], settings=weak.WeakSettings(hold=hold))
+        fit = refined.fit(
+            [lambda: [log]], settings=weak.WeakSettings(shift=TorqueShift(hold == "zoh"))
+        )
         bias[hold] = float(100 * np.abs(fit.values[5:7] / k[5:7] - 1).max())
     return bias
 

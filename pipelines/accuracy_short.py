@@ -29,6 +29,7 @@ from algid.identification.by_likelihood import without_nothing
 from algid.model import Model
 from algid.settings import Settings
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 from algid.synth.excitation import Hold, SampledTorque, wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import case_of
@@ -93,7 +94,7 @@ def draw(job: tuple[str, str, int]) -> tuple[list[bool], tuple[str, ...], str]:
 
 
 def _fitted(sources: Sequence[Source], kind: Kind) -> tuple[Fit, Selection]:
-    weak = WeakSettings(bandwidth=60.0, hold=kind.hold)
+    weak = WeakSettings(bandwidth=60.0, shift=TorqueShift(kind.hold == "zoh"))
     if kind.terms is not None:
         return _refined(sources, Selection(Model(kind.terms), delay=False), weak)
     fit, chosen = _refined(sources, select(sources, (), weak), weak)

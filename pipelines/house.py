@@ -113,12 +113,13 @@ def _with_found(node: ast.AST) -> bool:
 
 
 def _is_settings(node: ast.ClassDef) -> bool:
+    """Whether a class holds a hold and a delay in s; that one is estimated is no setting of it."""
     own = {
-        one.target.id
+        one.target.id: ast.unparse(one.annotation)
         for one in node.body
         if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name)
     }
-    return "delay" in own and bool(own & {"hold", "torque_hold"})
+    return own.get("delay") == "float" and bool(own.keys() & {"hold", "torque_hold"})
 
 
 def _literals() -> Iterator[tuple[str, str]]:

@@ -82,8 +82,8 @@ def doubted_without_motor(
 
 def _delayed(fit: Fit, settings: WeakSettings) -> WeakSettings:
     """The settings with the fit's delay, where it has one."""
-    delay = settings.delay if fit.delay is None else fit.delay
-    return replace(settings, estimate_delay=False, delay=delay)
+    known = replace(settings, estimate_delay=False)
+    return known if fit.delay is None else known.delayed(fit.delay)
 
 
 def _doubt(

@@ -200,8 +200,8 @@ def _moved(better: Fit, least: Fit) -> float:
 def _of(fit: Fit, settings: WeakSettings) -> tuple[WeakSettings, float]:
     """The settings with the fit's model and delay, and that delay in s."""
     shared = fit.shared
-    base = settings.delay if fit.delay is None else fit.delay
-    own = replace(settings, model=shared.model, delay=base, estimate_delay=shared.delay)
+    base = settings.shift.delay if fit.delay is None else fit.delay
+    own = replace(settings.delayed(base), model=shared.model, estimate_delay=shared.delay)
     return own, base
 
 

@@ -114,8 +114,8 @@ def fit(
     settings = settings or WeakSettings()
     start = weak.fit(unloaded, loaded, settings, lengths, prior) if start is None else start
     shared = start.shared
-    base = float(start.values[len(settings.model.names)]) if shared.delay else settings.delay
-    settings = replace(settings, delay=base)
+    base = float(start.values[len(settings.model.names)]) if shared.delay else settings.shift.delay
+    settings = settings.delayed(base)
     following = followed([*unloaded, *loaded], settings)
     logs: list[LogInformation] = []
     for kind, sources in ((False, unloaded), (True, loaded)):
@@ -459,10 +459,8 @@ def endogeneity(
     is returned, of which `algid.significance.chance` makes a p value. None where the windows cannot
     be simulated. Of a long log the first pieces are looked at.
     """
-    if fit.shared.delay:
-        settings = replace(
-            settings, delay=float(fit.values[len(settings.model.names)]), estimate_delay=False
-        )
+    if fit.delay is not None:
+        settings = replace(settings.delayed(fit.delay), estimate_delay=False)
     largest = None
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:

@@ -34,7 +34,6 @@ from algid.estimators.widths import Width, has_width, likeliest_width
 from algid.notices import Notice
 from algid.progress import Progress
 from algid.signals.differences import Stencil
-from algid.signals.shift import TorqueShift
 
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
@@ -192,10 +191,9 @@ def _opened(
     noise: NoiseLevels | None,
 ) -> Iterator[LogEvidence]:
     def stencil(dt: float, c: FloatArray) -> Stencil:
-        held = settings.hold == "zoh"
-        delay = float(c[-1]) if shared.delay else settings.delay
-        shift = TorqueShift(held, delay).at(dt) - shared.model.lag(c)
-        return Stencil(dt, shift, held=held)
+        given = settings.shift
+        shift = replace(given, delay=float(c[-1])) if shared.delay else given
+        return Stencil(dt, shift.at(dt) - shared.model.lag(c), held=shift.held)
 
     for source in sources:
         log = LogEvidence(source, loaded, shared, stencil, noise)

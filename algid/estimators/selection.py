@@ -136,8 +136,8 @@ class _Look:
     def moved(self, grams: Grams, terms: Sequence[str]) -> _Look:
         """At what the sub-model with `terms` gives."""
         at = grams.coefficients(terms)
-        delay = self.settings.delay + at[False][CHANGE]
-        moved = replace(self, settings=replace(self.settings, delay=delay), at=at)
+        delay = self.settings.shift.delay + at[False][CHANGE]
+        moved = replace(self, settings=self.settings.delayed(delay), at=at)
         for shape, shaped in _SHAPED.items():
             if shaped & set(terms):
                 now = getattr(self.settings.model, shape)
@@ -264,9 +264,9 @@ def _lowest(x: FloatArray, y: Sequence[float]) -> float:
 
 def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) -> Selection:
     """The selection with a lag in place of a negative delay where that fits better."""
-    if not (chosen.delay and _LAG) or look.settings.delay >= start.settings.delay:
+    if not (chosen.delay and _LAG) or look.settings.shift.delay >= start.settings.shift.delay:
         return chosen
-    timely = replace(look, settings=replace(look.settings, delay=start.settings.delay))
+    timely = replace(look, settings=look.settings.delayed(start.settings.shift.delay))
     others = without_delay(terms)
     if (
         timely.grams(others).cost >= look.grams(others).cost

@@ -61,7 +61,7 @@ def fit(
     held = () if known is None else known.names
     first = logs.normals(_with_terms(settings, ()), {})
     terms = offered([normal for _, normal in first], held)
-    estimates_delay = settings.estimate_delay or settings.delay == 0
+    estimates_delay = settings.estimate_delay or settings.shift.delay == 0
     settings = replace(_with_terms(settings, terms), estimate_delay=estimates_delay)
     settings = resting(unloaded, loaded, settings)
     shared = Shared(settings.model, estimates_delay, bool(loaded), dict(lengths or {}))
@@ -131,7 +131,7 @@ def _found(
     held: Sequence[str],
     moved: FloatArray,
 ) -> Fit:
-    base = settings.delay
+    base = settings.shift.delay
     at: dict[bool, FloatArray] = {}
     normals = logs.normals(settings, at)
     bare, burdened = (
@@ -149,7 +149,7 @@ def _found(
             }
             if shared.delay:
                 base = float(beta[len(settings.model.names)])
-                settings = replace(settings, delay=base)
+                settings = settings.delayed(base)
             normals = logs.normals(settings, at)
         expected = expectation(shared, first, settings, beta, held)
         share = share if number else np.ones(len(expected.names))
@@ -195,7 +195,7 @@ def expectation(
     )  # a joint without a motor carries a load like the other's
     inertia = float(abs(beta[shared.names.index(K3)]))
     late = (
-        0.5 * normals[0].dt if settings.hold == "foh" else 0.0
+        0.0 if settings.shift.held else 0.5 * normals[0].dt
     )  # a torque held by a digital controller
     rows = []
     for term in (*shared.model.terms, *(DELAYS if shared.delay else ())):

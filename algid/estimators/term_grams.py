@@ -257,7 +257,7 @@ class Grams:
         slope = scaled_pinv(self._total[np.ix_(rest, rest)]) @ self._total[rest, column]
         size = np.sqrt(np.max([np.diag(covariance) for covariance in beside], axis=0))
         return Lateness(
-            self.settings.delay + float(value[own[0]]),
+            self.settings.shift.delay + float(value[own[0]]),
             float(np.sqrt(max(variance, 0.0))),
             0.5 * self._dt,
             float(np.max(np.abs(slope) / np.maximum(size, 1e-300))),

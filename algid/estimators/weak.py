@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from algid.estimators.too_short import TooShortError
 from algid.model import K2, K4, Model
 from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
+from algid.signals.shift import AT_ONCE, TorqueShift
 
 Source = Callable[[], Iterable[Segment]]
 Gathered = TypeVar("Gathered")
@@ -68,11 +69,9 @@ class WeakSettings:
         Length of a window; a record shorter than four windows gets shorter ones.
     bandwidth : float, Hz, or None for the log's own velocities
         Of the zero-phase differentiator behind k1's column.
-    hold : "foh" or "zoh"
-        Whether the torque moved evenly from sample to sample, or was held from each sample to the
-        next.
-    delay : float, s
-        After how long a logged torque acts; where the estimate of it starts with `estimate_delay`.
+    shift : TorqueShift
+        After how long a logged torque acts; its delay is where the estimate of it starts with
+        `estimate_delay`.
     estimate_delay : bool
     rest : (2,) float, rad/s
         Speeds of the joints, RMS over a window, below which a joint stands: dry friction holds it
@@ -82,10 +81,13 @@ class WeakSettings:
     model: Model = field(default_factory=Model)
     window: float = 0.4
     bandwidth: float | None = 40.0
-    hold: Literal["foh", "zoh"] = "foh"
-    delay: float = 0.0
+    shift: TorqueShift = AT_ONCE
     estimate_delay: bool = False
     rest: tuple[float, float] | None = None
+
+    def delayed(self, delay: float) -> WeakSettings:
+        """The same with a delay of the torque, s."""
+        return replace(self, shift=replace(self.shift, delay=delay))
 
 
 def fit(
@@ -124,11 +126,11 @@ def fit(
             _normals(loaded, settings, at[1]),
         )
         beta, logs = first_estimate(shared, normals, loaded_normals, prior)
-        base, change = settings.delay, 0.0
+        base, change = settings.shift.delay, 0.0
         if shared.delay:
             change = float(beta[len(model.names)])
             beta, logs = _from(shared, beta, logs, base)
-            settings = replace(settings, delay=base + change)
+            settings = settings.delayed(base + change)
         before, at = at, [None, None] if model.linear else _linearisation(shared, beta, logs)
         settled = all(
             new is None
@@ -414,15 +416,14 @@ def overlapping(
             bandwidth = settings.bandwidth
             if bandwidth is not None:
                 bandwidth = max(min(bandwidth, 0.2 / piece.dt), 6.0 / window)
-            shift = settings.delay + (0.5 * piece.dt if settings.hold == "zoh" else 0.0)
-            windows = Windows(piece.dt, window, shift, bandwidth)
+            windows = Windows(piece.dt, window, settings.shift.at(piece.dt), bandwidth)
         fresh = len(piece)
         if piece.continues and before is not None:
             piece = _prefixed(before, piece, windows.overlap + left_over)
         left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
         yield (
-            replace(piece, tau=held_torque(piece.tau)) if settings.hold == "zoh" else piece,
+            replace(piece, tau=held_torque(piece.tau)) if settings.shift.held else piece,
             windows,
             fresh,
         )

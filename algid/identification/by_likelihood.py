@@ -53,6 +53,7 @@ from algid.results import Result
 from algid.runtime import beside
 from algid.settings import Settings
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 
 NOTHING = 2.0
 """Standard deviations: a coefficient nearer to zero is not distinguished from it."""
@@ -278,7 +279,8 @@ def _shrunk(
     """The fit with every term shrunk in place of the `refuted` one's, and its model."""
     by_logs = chosen.hold_by == "logs"  # by a likelihood that does not hold: a term tells the delay
     hold: Hold = "foh" if by_logs else chosen.hold
-    shaped = replace(ours, model=chosen.shapes or chosen.model, hold=hold)
+    shift = replace(ours.shift, held=hold == "zoh")
+    shaped = replace(ours, model=chosen.shapes or chosen.model, shift=shift)
     every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
     nothing = absent(settings.effort, every.names)
     known = without(prior, nothing)
@@ -311,7 +313,7 @@ def residual_of(
         return pooled(fit.residual)
     weak_settings = _weak_settings(settings, chosen)
     if fit.delay is not None:
-        weak_settings = replace(weak_settings, delay=fit.delay, estimate_delay=False)
+        weak_settings = replace(weak_settings.delayed(fit.delay), estimate_delay=False)
     unloaded, loaded = _passes(survey, settings)
     sums = [
         weak.residuals(moving, weak_settings, torque_coefficients(fit, role))
@@ -408,8 +410,7 @@ def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     ours = weak.WeakSettings(
         model=chosen.model,
         bandwidth=None if own_velocities else settings.bandwidth,
-        hold=chosen.hold,
-        delay=settings.delay,
+        shift=TorqueShift(chosen.hold == "zoh", settings.delay),
         estimate_delay=chosen.delay,
     )
     return ours if settings.window is None else replace(ours, window=settings.window)

@@ -14,6 +14,7 @@ from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
 from algid.signals.differences import POINTS
 from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate
@@ -111,7 +112,7 @@ def test_a_held_torque_does_not_bias_friction(bench: Bench) -> None:
     t, k = np.arange(1501) * DT, bench.arm.constants()
     torque = SampledTorque(t, bench.bare.tau[:, :1501], "zoh")
     log = Segment(0.0, DT, simulate(k, torque, t).theta, torque.tau)
-    held = refined.fit([lambda: [log]], settings=WeakSettings(hold="zoh")).values
+    held = refined.fit([lambda: [log]], settings=WeakSettings(shift=TorqueShift(held=True))).values
     assert np.allclose(held[5:7], k[5:7], rtol=5e-4)
     smooth = refined.fit([lambda: [log]]).values
     assert np.abs(smooth[5:7] / k[5:7] - 1).max() > 2e-3  # what half a sample does

@@ -104,7 +104,7 @@ def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source
     model = Model(tuple(term for term in terms.split() if term in MODEL_TERMS))
     hold: Literal["foh", "zoh"] = "zoh" if "hold" in terms else "foh"
     delay = "delay" in terms
-    settings = WeakSettings(model, hold=hold, estimate_delay=delay)
+    settings = WeakSettings(model, shift=TorqueShift(hold == "zoh"), estimate_delay=delay)
     if estimator != "refined":
         return (weak if estimator == "weak" else instruments).fit(unloaded, loaded, settings)
     return refined.fit(unloaded, loaded, settings)
