@@ -9,6 +9,10 @@ the torque's largest value, of both joints:
 - drive: the arm gets what lies within the limit, the log holds the whole torque.
 - true: the arm gets what the log holds, which stands at the limit. Nothing may be left out.
 
+With ``--sound`` it counts the logs without a limit of which samples would be left out: those of
+`pipelines.real_arms` (joints and sensors with 18 kinds of errors) and of `pipelines.accuracy_hold`
+(random binary torques, slow and held ones, with and without an encoder of twelve bits).
+
 Asked: intervals of k1 … k7 that hold the truth in 90 % or more, no log that is Good, and of true
 limits none that loses a sample.
 """
@@ -22,11 +26,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.estimators.saturation import saturation_of
 from algid.identification.identify import identify
 from algid.log import Log
+from algid.signals.segments import Segment, segments
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
-from pipelines.accuracy_scenes import case_of
+from pipelines import accuracy_hold, real_arms
+from pipelines.accuracy_scenes import ENCODER_STEP, case_of
 
 RATE, DURATION = 1000.0, 10.0
 SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
@@ -108,6 +115,22 @@ def line(cause: str, level: float, arms: Sequence[str], seeds: int, verbose: boo
     )
 
 
+def sound(arms: int) -> str:
+    """How many logs without a limit have one by mistake."""
+    logs: list[list[Segment]] = []
+    for key in accuracy_hold.ROWS:
+        for held in (True, False):
+            whole = accuracy_hold.scene(key, held, accuracy_hold.FIRST_ARM)
+            logs.append(list(segments([whole.log(np.random.default_rng(1))])))
+            t, tau, step = whole.truth.t, whole.truth.tau, ENCODER_STEP
+            coarse = Log.from_arrays(t, np.round(whole.truth.theta / step) * step, tau)
+            logs.append(list(segments([coarse])))
+    made = real_arms.scenes(list(real_arms.ROWS), list(range(11, 11 + arms)))
+    logs += [[one.log(np.random.default_rng(1))] for one in made.values()]
+    wrong = sum(bool(saturation_of(one).limits) for one in logs)
+    return f"Logs without a limit of which samples would be left out: {wrong} of {len(logs)}"
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print a Markdown table."""
     parser = argparse.ArgumentParser(
@@ -118,7 +141,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--levels", default="0.6,0.8")
     parser.add_argument("--causes", default=",".join(CAUSES))
     parser.add_argument("--verbose", action="store_true")
+    parser.add_argument("--sound", action="store_true")
     wanted = parser.parse_args(arguments)
+    if wanted.sound:
+        print(sound(len(wanted.arms.split(","))))
+        return
     print(
         "| cut off by | at | logs | told | left out, % | coverage, % | worst, σ | Good | Failed |"
     )
