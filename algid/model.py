@@ -84,6 +84,9 @@ class Model:
         0 for an arm that moves in a horizontal plane: parameters that weigh have no column then.
     coulomb_speed, stribeck_speed : float, rad/s
         Widths of friction: see `algid.physics.motion.Widths`.
+    by_torque : bool
+        Whether friction by load is in proportion to all other torque of the joint, and not to its
+        inertia and weight alone. Only the weak form's estimates are compared under both.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class Model:
     gravity: float = 9.81
     coulomb_speed: float = 0.2
     stribeck_speed: float = 0.3
+    by_torque: bool = False
 
     def __post_init__(self) -> None:
         unknown = [term for term in self.terms if term not in TERMS]
@@ -110,7 +114,7 @@ class Model:
     @property
     def compiled(self) -> Compiled:
         """Its columns and their derivatives."""
-        return _compiled(self.terms, self.gravity != 0)
+        return _compiled(self.terms, self.gravity != 0, self.by_torque)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -181,7 +185,7 @@ class Compiled:
     ----------
     names : of the columns
     columns : of all terms; several may belong to one name
-    loads : places of the columns that are the joints' load
+    loads : places of the columns to which friction by load is in proportion
     """
 
     names: tuple[str, ...]
@@ -296,12 +300,13 @@ def _at_rest(column: TorqueColumn, joint: int) -> Expression:
 
 
 @lru_cache(maxsize=256)
-def _compiled(terms: tuple[str, ...], gravity: bool) -> Compiled:
+def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compiled:
     own = [*ALWAYS, *(TERMS[term] for term in terms)]
     parameters = [one for term in own for one in term.parameters if gravity or not one.weighs]
     names = tuple(one.name for one in parameters)
     columns = tuple(column for term in own for column in term.columns if column.parameter in names)
-    loads = [name for term in own if term.inertial for name in term.names]
+    others = [term for term in own if term.linear and not term.lags] if by_torque else []
+    loads = [name for term in own if term.inertial or term in others for name in term.names]
     return Compiled(names, columns, tuple(names.index(name) for name in loads if name in names))
 
 
@@ -358,7 +363,8 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
 
 def loads_of(model: Model) -> tuple[str, ...]:
     """Names of the columns that are the joints' load, which a payload changes."""
-    return tuple(model.names[place] for place in model.compiled.loads)
+    own = _compiled(model.terms, model.gravity != 0, by_torque=False)
+    return tuple(own.names[place] for place in own.loads)
 
 
 def phasor(model: Model, c: FloatArray, name: str) -> complex:

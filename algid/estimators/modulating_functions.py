@@ -30,7 +30,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
-from algid.model import TERMS, Model, Motion, attributes, gains, loads_of, torque
+from algid.model import TERMS, Model, Motion, attributes, gains, torque
 from algid.physics.expressions import Product, Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
@@ -269,14 +269,18 @@ class Windows:
     def _dissipated(
         self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray
     ) -> Iterator[tuple[str, int, FloatArray]]:
-        """Name, joint and |L| tanh(ω / ω_s) (N,) of each parameter by load; `c` gives load L."""
+        """Name, joint and |L| tanh(ω / ω_s) (N,) of each parameter by load; `c` gives load L.
+
+        Where friction is by the torque, L is all torque but that friction.
+        """
         shared = attributes(model, "by_load")
         if not shared:
             return
-        rigid = replace(model, terms=tuple(term for term in model.terms if TERMS[term].inertial))
-        value, loads = model.values(c), loads_of(rigid)
-        k = np.array([value[name] if name in loads else 0.0 for name in rigid.names])
-        load = torque(rigid, k, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
+        loads = {model.names[place] for place in model.compiled.loads}
+        terms = tuple(term for term in model.terms if loads & set(TERMS[term].names))
+        bearing, value = replace(model, terms=terms), model.values(c)
+        k = np.array([value[name] if name in loads else 0.0 for name in bearing.names])
+        load = torque(bearing, k, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
         for name, joint in shared:
             yield name, joint, np.abs(load[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
 

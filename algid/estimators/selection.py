@@ -123,7 +123,8 @@ class _Look:
 
     def grams(self, terms: Sequence[str], **shape: float) -> Grams:
         """Normal equations with the columns of `terms`."""
-        model = replace(self.settings.model, terms=without_delay(terms), **shape)
+        plain = replace(self.settings.model, terms=without_delay(terms))
+        model = replace(plain, **shape)  # type: ignore[arg-type]
         return Grams(self.logs, replace(self.settings, model=model), self.at)
 
     def shaped(self, shape: str, values: FloatArray, terms: Sequence[str]) -> _Look:

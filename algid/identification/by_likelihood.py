@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from algid.errors import LogError
-from algid.estimators import exogeneity, instruments, motorless, shrunk, weak
+from algid.estimators import exogeneity, instruments, load_scatter, motorless, shrunk, weak
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
@@ -212,7 +212,11 @@ def run_fit(
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
-        elif fit.shared.model != chosen.model:  # the fit has found the width of friction's step
+        else:
+            fit = _unsure_of_load(fit, unloaded, loaded, ours, settings, known)
+        if (
+            not chosen.shrunk and fit.shared.model != chosen.model
+        ):  # the fit has found the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
             sums.clear()
         better = _of_motorless(fit, survey, settings, chosen, prior)
@@ -228,6 +232,24 @@ def run_fit(
         ) from error
     fit = averaged_over_bodies(with_body(fit))
     return constrained(fit) if settings.constrain else fit, sums, chosen
+
+
+def _unsure_of_load(
+    fit: Fit,
+    unloaded: Sequence[Pass],
+    loaded: Sequence[Pass],
+    ours: weak.WeakSettings,
+    settings: Settings,
+    known: Prior | None,
+) -> Fit:
+    """The fit, where its residual is not white, with what friction by load leaves open."""
+    if fit.whiteness is None or fit.whiteness.white:
+        return fit
+
+    def refit(model: Model) -> Fit:
+        return weak.fit(unloaded, loaded, replace(ours, model=model), settings.lengths, known)
+
+    return load_scatter.widened(fit, refit)
 
 
 _BY_NOTHING = "left out: it was judged beside constants near nothing"
@@ -287,6 +309,12 @@ def _shrunk(
     least = shrunk.fit(unloaded, loaded, shaped, settings.lengths, known)
     fit = exogeneity.settled(least, unloaded, loaded, shaped)
     fit = scattered(fit, least, unloaded, loaded, shaped, settings.lengths, known)
+
+    def refit(model: Model) -> Fit:
+        # every term is offered anew: a model's shapes and its friction by load are what it tells
+        return shrunk.fit(unloaded, loaded, replace(shaped, model=model), settings.lengths, known)
+
+    fit = load_scatter.widened(fit, refit, least)
     fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True), *fit.notes))
     terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
     trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)
