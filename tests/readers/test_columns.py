@@ -251,7 +251,7 @@ def test_joints_told_that_stand_there_twice_or_not_at_all() -> None:
     ):
         choose(columns, ("x", "y"))
     assert choose(columns, ("/a/x", "y")).columns["theta1"] == "/a/x/position"
-    with pytest.raises(LookupError, match="joints there are: none that can be told by their names"):
+    with pytest.raises(LookupError, match="joints there are: none that their names show"):
         choose(["t", "alpha", "beta"], ("1", "2"))
     with pytest.raises(
         LookupError, match=re.escape("'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8")
