@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -288,7 +289,7 @@ class _Rows:
             parts.append((windows, piece, np.concatenate([X[:, :-1], H, X[:, -1:]], axis=1)))
         return replace(self, parts=tuple(parts))
 
-    @property
+    @cached_property
     def gram(self) -> FloatArray:
         """Gram matrices (B, 2, p, p) by stretch and joint."""
         return np.concatenate([grams(X, OVERLAP) for _, _, X in self.parts])
@@ -384,20 +385,20 @@ def _best_level(
     levels = levels[(beyond >= _FEWEST) & (beyond <= _MOST * tau.size)]
     if not levels.size:
         return None
-    total = rows.with_candidates(joint, _beyond(levels)).gram.sum(axis=0)
-    S = np.einsum("a,axy->xy", before.weights, total)
-    own = np.r_[0 : before.rest.size - 1, S.shape[0] - 1]
-    columns = slice(before.rest.size - 1, S.shape[0] - 1)
-    cross = S[columns][:, own]
+    S = np.einsum("a,axy->xy", before.weights, rows.gram.sum(axis=0))
+    cross, squares = np.zeros((levels.size, S.shape[0])), np.zeros(levels.size)
+    candidates = _beyond(levels)
+    for windows, piece, X in rows.parts:
+        moments = windows.torque_moments(candidates(piece.tau[joint], piece.dt))
+        cross += before.weights[joint] * moments @ X[joint].T
+        squares += before.weights[joint] * np.sum(moments**2, axis=1)
     left = cross @ before.rest
     across = cross[:, :-1]
-    size = np.diag(S)[columns] - np.einsum("mx,xy,my->m", across, before.P, across)
-    least = 1e-9 * np.diag(S)[columns] + 1e-300
+    size = squares - np.einsum("mx,xy,my->m", across, before.P, across)
+    least = 1e-9 * squares + 1e-300
     gain = np.where(size > least, left**2 / np.maximum(size, least), 0.0)
     best = int(np.argmax(gain))
-    return float(levels[best]), float(
-        gain[best] / (before.rest @ S[np.ix_(own, own)] @ before.rest)
-    )
+    return float(levels[best]), float(gain[best] / (before.rest @ S @ before.rest))
 
 
 def _beyond(levels: FloatArray) -> Candidates:
