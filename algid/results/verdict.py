@@ -147,7 +147,7 @@ def _failure(result: Result) -> str | None:
     if is_implausible(result):
         return _contradiction(result.fit)
     usable, count = sum(found.usable for found in result.estimates.values()), len(result.estimates)
-    if not any(_is_identified(found) for found in result.estimates.values()):
+    if not usable or not any(map(_tells, result.estimates.values())):
         words = sorted(
             {STATUS_WORDS.get(found.status, "absent") for found in result.estimates.values()}
         )
@@ -155,6 +155,11 @@ def _failure(result: Result) -> str | None:
     if usable < LEAST_USABLE * count:
         return f"only {usable} of {counted(count, 'parameter')} could be identified"
     return next((one.text for one in _worse_than_constant(result.fit)), None)
+
+
+def _tells(found: Estimate) -> bool:
+    """Whether it has a number whose interval, however wide, is not merely around zero."""
+    return found.estimate is not None and found.status != "NOT_SIGNIFICANT"
 
 
 def _is_identified(found: Estimate) -> bool:
