@@ -18,8 +18,11 @@ setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check --no-compile -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
+
+# Tests start some hundred processes: each would compile algid's modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 # A test process a core: threads of BLAS beside it only wait for each other.
 test test-slow test-processor test-pythons: export OPENBLAS_NUM_THREADS = 1
