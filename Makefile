@@ -36,14 +36,15 @@ test-slow: setup
 
 # Sums in another order, as other processors take them: two of OpenBLAS's kernels that are not the default here, and
 # NumPy without AVX2 and AVX-512.
+NUMERICAL ?= tests/test_arm.py tests/estimators tests/signals tests/synth \
+  $(addprefix tests/tracks/test_, track.py cells.py change_points.py) \
+  $(addprefix tests/identification/test_, identify.py known.py outcome.py series.py streaming.py \
+    validate.py velocities.py)
 test-processor: setup
 	@for kernel in $${KERNELS:-$$($(BIN)/python -m pipelines.kernels)}; do \
 	  echo "== OpenBLAS's kernels for $$kernel"; \
 	  OPENBLAS_CORETYPE=$$kernel NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4 AVX512_ICL AVX512_SPR" \
-	  $(BIN)/python -m pytest tests/test_arm.py tests/estimators tests/signals tests/synth \
-	    $(addprefix tests/tracks/test_, track.py cells.py change_points.py) \
-	    $(addprefix tests/identification/test_, identify.py known.py outcome.py series.py streaming.py \
-	      validate.py velocities.py) || exit; \
+	  $(BIN)/python -m pytest $(NUMERICAL) || exit; \
 	done
 
 check: lint test
