@@ -13,10 +13,14 @@ from algid.notices import Notice, Remedy
 from algid.signals.segments import segments
 
 CODE = "CLIPPED_TORQUE"
+LOOKED_AT = 1 << 18
+"""Samples at the beginning of a log that tell of its limits."""
 
 
 def saturation(log: Log, *, gravity: float = 9.81, effort: str | None = None) -> Saturation:
     """The limits that cut off torques of a log, and the joints whose limits are sound.
+
+    The beginning of a log tells them, at most `LOOKED_AT` samples.
 
     Parameters
     ----------
@@ -28,7 +32,7 @@ def saturation(log: Log, *, gravity: float = 9.81, effort: str | None = None) ->
     """
     if effort == "external" or len(log) < 2 or CODE in log.origin.reading.accepted:
         return UNSEEN
-    return saturation_of(list(segments([log])), gravity)
+    return saturation_of(list(segments([log.part(0, LOOKED_AT)])), gravity)
 
 
 @dataclass
