@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from importlib import resources
 
-from algid.options import flag
+from algid.api.choices import with_lists
+from algid.options import PROFILE, SETTINGS, flag, options_of
 
 
 class GuideTopic(StrEnum):
@@ -102,10 +103,18 @@ def _units() -> Iterator[Sequence[str]]:
         yield f"`{unit.name}`", ", ".join(unit.quantities), unit.spellings.replace(" ", ", ")
 
 
+def _options(taker: str) -> Iterator[Sequence[str]]:
+    yield "option", "what it says"
+    for one in options_of(taker):
+        yield f"`{flag(one.name)}`", with_lists(one.help).replace("|", "\\|")
+
+
 TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
     "<!-- terms -->": _terms,
     "<!-- estimators -->": _estimators,
     "<!-- formats -->": _formats,
     "<!-- units -->": _units,
+    "<!-- settings -->": lambda: _options(SETTINGS),
+    "<!-- profile -->": lambda: _options(PROFILE),
 }
 """Rows of a table by the mark in whose place it stands."""

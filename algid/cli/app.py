@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperCommand
 
 from algid import __version__
-from algid.cli.completion import with_lists
+from algid.api.choices import with_lists
 from algid.cli.output import say
 from algid.errors import SettingError
 from algid.exits import epilog

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-from algid.api.choices import CASES, terms, written
+from algid.api.choices import CASES
 
 Completion = Callable[[str], list[str]]
 
@@ -36,20 +36,6 @@ def refusing_checks() -> list[str]:
     from algid.profile import Check
 
     return list(get_args(Check))
-
-
-LISTS: Mapping[str, Callable[[], list[str]]] = {
-    "<terms>": lambda: terms()[2:],
-    "<written>": written,
-}
-"""What stands in a help for names that only a registry tells, which is read where help is shown."""
-
-
-def with_lists(text: str) -> str:
-    """A help with the names that its marks stand for."""
-    for mark, known in LISTS.items():
-        text = text.replace(mark, ", ".join(known())) if mark in text else text
-    return text
 
 
 def of_profile(setting: str, channel: str | None = None) -> Completion:

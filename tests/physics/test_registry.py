@@ -2,6 +2,8 @@
 itself.
 
 A term, a unit, a format, a check with its notice, and an estimator are added, three terms left out.
+Options of how to identify and of a log's meaning are added: an entry, and the field that holds its
+type and default.
 """
 
 from __future__ import annotations
@@ -185,6 +187,79 @@ print("all follow", here)
 """
 
 
+OPTION_TRIAL = """
+import json
+from pathlib import Path
+from typer.testing import CliRunner
+import algid
+from algid.api.guide import text_of
+from algid.cli.app import COMMANDS, gathered
+from algid.notices import Remedy
+from typer.main import get_command
+
+app = gathered(COMMANDS)
+def called(*words):
+    done = CliRunner().invoke(app, [*map(str, words)])
+    return done.exit_code, " ".join(done.stdout.replace("│", " ").split()), done.exception
+def option(command, name):
+    return next(one for one in get_command(app).commands[command].params if one.name == name)
+
+# help, and completion, of every verb that takes it
+for command in ("identify", "batch"):
+    shown = called(command, "--help")[1]
+    assert "--toy-level" in shown and "How much the toy plays." in shown, shown
+for command in ("identify", "batch", "inspect", "convert", "validate", "track"):
+    shown = called(command, "--help")[1]
+    assert "--toy-side" in shown and "Where the toy stands." in shown, shown
+    side = option(command, "toy_side")
+    assert [word.value for word in side.shell_complete(None, "r")] == ["right"]
+    line = option(command, "set")
+    assert [word.value for word in line.shell_complete(None, "toy_s")] == ["toy_side="]
+fleet = {one.name for one in get_command(app).commands["fleet"].params}
+assert fleet and not {"toy_level", "toy_side"} & fleet
+# guide
+assert "| `--toy-level` | How much the toy plays. |" in text_of("python")
+assert "| `--toy-side` | Where the toy stands. |" in text_of("python")
+# messages and remedies
+assert Remedy({"toy_side": "right"}).flags == ("--toy-side", "right")
+assert Remedy({"toy_side": "right"}).lines == 'toy_side = "right"'
+assert Remedy({"toy_level": 2.0}).flags == ("--toy-level", "2.0")
+# Python: keywords, and what is refused
+log = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide")[0]
+algid.write_log(Path("arm.csv"), log)
+done = algid.identify(
+    "arm.csv", estimator="weak", model="plain", toy_level=2.0, toy_side="right"
+)
+assert done.settings["toy_level"] == 2.0 and done.profile == {"toy_side": "right"}
+for wrong, message in (
+    ({"toy_level": 9.0}, "--toy-level: expected a number from 0 to 5, found 9.0"),
+    ({"toy_side": "up"}, "toy_side"),
+    ({"toy_sidee": "up"}, "did you mean toy_side?"),
+):
+    try:
+        algid.identify("arm.csv", **wrong)
+    except algid.AlgidError as error:
+        assert message in str(error), error
+    else:
+        raise AssertionError(wrong)
+# a file of a profile, the command line, and the flag over the file
+Path("algid.toml").write_text('toy_side = "right"\\n')
+plain = ("identify", "arm.csv", "--estimator", "weak", "--model", "plain", "--no-report", "--force")
+plain += ("--profile", "algid.toml")
+for words, level, side in (
+    ((), 1.0, "right"),
+    (("--toy-level", "0.5", "--toy-side", "left"), 0.5, "left"),
+):
+    status, _, error = called(*plain, *words)
+    assert status in (0, 3), error
+    made = json.loads(Path("arm.algid/result.json").read_text())
+    assert made["settings"]["toy_level"] == level and made["profile"]["toy_side"] == side
+status, _, error = called(*plain, "--toy-side", "up")
+assert status and "--toy-side (profile: toy_side)" in str(error), (status, error)
+print("all follow", algid.__file__)
+"""
+
+
 def inserted(path: Path, before: str, text: str) -> None:
     """Put `text` before the one place where `before` stands."""
     content = path.read_text(encoding="utf-8")
@@ -216,12 +291,64 @@ def add_toys(package: Path) -> None:
     inserted(methods, "from typing import TYPE", "from importlib import import_module\n")
 
 
+def add_options(package: Path) -> None:
+    """An option of how to identify and one of what a log means, each with its field."""
+    options = package / "options.py"
+    inserted(
+        options,
+        '    Option("constrain", _FIT',
+        '    Option("toy_level", _FIT, "How much the toy plays.", range=(0.0, 5.0)),\n',
+    )
+    inserted(
+        options,
+        '    Option("drive", _LOG',
+        '    Option("toy_side", _LOG, "Where the toy stands."),\n',
+    )
+    inserted(
+        package / "settings.py", "    constrain: bool = False\n", "    toy_level: float = 1.0\n"
+    )
+    inserted(
+        package / "profile.py",
+        '    drive: Literal["joint", "base"]',
+        '    toy_side: Literal["left", "right"] = "left"\n',
+    )
+
+
+def copied(folder: Path) -> Path:
+    """A copy of the package in `folder`."""
+    return Path(
+        shutil.copytree(
+            Path(algid.__file__).parent,
+            folder / "algid",
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
+    )
+
+
+def all_follow(package: Path, trial: str) -> None:
+    """Run `trial` against a copy of the package, whose warnings are errors."""
+    place = package.parent
+    environment = {**os.environ, "PYTHONPATH": str(place), "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", trial],
+        env=environment,
+        cwd=place,
+        capture_output=True,
+        text=True,
+    )
+    assert f"all follow {package}" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_an_option_added_shows_wherever_options_are_named(tmp_path: Path) -> None:
+    package = copied(tmp_path)
+    add_options(package)
+    all_follow(package, OPTION_TRIAL)
+
+
 @pytest.mark.slow
 def test_entries_added_and_left_out_need_nothing_else_touched(tmp_path: Path) -> None:
-    package = tmp_path / "algid"
-    shutil.copytree(
-        Path(algid.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
-    )
+    package = copied(tmp_path)
     folder = package / "physics" / "terms"
     (folder / "toy.py").write_text(TOY)
     registry = folder / "__init__.py"
@@ -237,12 +364,4 @@ def test_entries_added_and_left_out_need_nothing_else_touched(tmp_path: Path) ->
     )
     registry.write_text(text.replace("    COULOMB,\n", "    COULOMB,\n    TOY,\n"))
     add_toys(package)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", TRIAL],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
-    assert f"all follow {package}" in done.stdout, done.stdout + done.stderr
+    all_follow(package, TRIAL)
