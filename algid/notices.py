@@ -470,6 +470,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "times in {column!r} are taken for {unit}, which makes {rate:.3g} Hz, too slow for an arm "
         "in motion"
     ),
+    "NO_LINE_END": (
+        "row {row:,}, the last, has no line end: its last number may be cut off, so the row was "
+        "left out"
+    ),
     "EMPTY_CELLS": "{count} of {rows:# row|rows} dropped for want of a value",
     # of checks
     "EFFORT_ZERO": "{channel} is zero in every sample",

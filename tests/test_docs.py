@@ -13,12 +13,17 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import subprocess
+import sys
+import tomllib
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 import algid
+from algid.api.guide import SUMMARIES
 from pipelines.docs import pages
 from pipelines.typed import run
 
@@ -139,6 +144,86 @@ def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path
     )
     assert sorted(named) == sorted(set(algid.__all__) - {"__version__"})
     assert "<!--" not in "".join(path.read_text() for path in (tmp_path / "pages").iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("mkdocs") is None, reason="needs the extra docs")
+def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    """Its configuration, its docstrings, every link and every heading that a link names."""
+    pages(tmp_path / "build/docs-pages")
+    for folder in ("algid", "pipelines"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    build = ["mkdocs", "build", "--strict", "--quiet", "-f", "pipelines/mkdocs.yml"]
+    done = subprocess.run(
+        [sys.executable, "-m", *build], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    reference = (tmp_path / "build/docs/reference.html").read_text("utf-8")
+    assert all(f'id="{home}.{name}"' in reference for name, home in algid._HOMES.items())
+
+
+LINK = re.compile(r"\]\(([^)\s]+)\)|(?:href|src|srcset)=\"([^\"]+)\"")
+
+
+def leading_nowhere(page: Path) -> list[str]:
+    """The links of a page to files or headings that are not there, by GitHub's anchors."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    wrong = []
+    for link in (one or other for one, other in LINK.findall(text)):
+        if re.match(r"\w+:", link):
+            continue
+        place, _, anchor = link.partition("#")
+        target = page.parent / place if place else page
+        if not target.is_file() or (anchor and anchor not in anchors(target.read_text("utf-8"))):
+            wrong.append(link)
+    return wrong
+
+
+def anchors(text: str) -> set[str]:
+    """The headings as links name them: small letters, a hyphen for each blank."""
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", one).strip().lower().replace(" ", "-") for one in headings}
+
+
+def test_every_link_of_a_page_leads_somewhere(tmp_path: Path) -> None:
+    pages(tmp_path)
+    at_root = [ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY", "CHANGELOG")]
+    every = [*at_root, *PAGES.values(), *tmp_path.glob("*.md")]
+    assert {str(page): leading_nowhere(page) for page in every if leading_nowhere(page)} == {}
+
+
+def test_the_readme_and_the_site_lead_to_every_topic(tmp_path: Path) -> None:
+    pages(tmp_path)
+    topics = set(PAGES) - {"README"}
+    readme = PAGES["README"].read_text("utf-8")
+    assert set(re.findall(r"\(algid/guide/(\w+)\.md\)", readme)) == topics
+    assert set(re.findall(r"\((\w+)\.md\)", (tmp_path / "index.md").read_text())) == {
+        *topics,
+        "reference",
+    }
+    assert "[`algid guide warnings`](warnings.md)" in (tmp_path / "report.md").read_text()
+
+
+def test_a_link_that_leads_nowhere_is_seen(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text('# A `b` c!\n[x](#a-b-c) [y](#d) [z](other.md) <a href="page.md#e">\n')
+    assert leading_nowhere(page) == ["#d", "other.md", "page.md#e"]
+
+
+def test_the_sites_configuration_names_what_is_there() -> None:
+    """The folders of the makefile, the theme and plugins of the extra ``docs``, every page."""
+    text = (ROOT / "pipelines/mkdocs.yml").read_text("utf-8")
+    made = (ROOT / "pipelines/docs.mk").read_text("utf-8")
+    said = dict(re.findall(r"^(\w+): ([^#\n]+?) *(?:#.*)?$", text, re.MULTILINE))
+    assert (said["docs_dir"], said["site_dir"]) == ("../build/docs-pages", "../build/docs")
+    assert "pipelines.docs build/docs-pages\n" in made
+    assert "mkdocs build --strict --quiet --config-file pipelines/mkdocs.yml" in made
+    extra = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    needed = " ".join(extra["optional-dependencies"]["docs"])
+    assert "mkdocs-material" in needed
+    assert "mkdocstrings[python]" in needed
+    listed = re.findall(r"^  - (\w+)\.md$", text, re.MULTILINE)
+    assert listed == ["index", *SUMMARIES, "reference"]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ from algid.notices import Notice
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.dialect import Dialect, detect
-from algid.readers.frames import NO_COMPANION, beyond, flat_reader
+from algid.readers.frames import NO_COMPANION, WholeRows, beyond, flat_reader
+from algid.readers.last_row import LastRow, ends_with_a_line, judged
 from algid.readers.text import (
     NUL_AMONG_ROWS,
     end_of_lines,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from algid.profile import Profile
+    from algid.readers.frames import Frame
 
 _EXCESS = "excess"
 
@@ -123,7 +125,7 @@ def _rows_in(text: bytes, comment: str | None) -> int:
 
 def _frames(
     path: Path, kind: str, dialect: Dialect, columns: Columns, rows: int, most: int | None
-) -> Iterator[pl.DataFrame]:
+) -> Iterator[Frame]:
     """Frames of about `rows` rows, over the first `most` rows where that is given."""
     import polars as pl
 
@@ -134,6 +136,9 @@ def _frames(
         _check_quotes(path, kind, dialect)
     try:
         for frame in _parsed(path, kind, dialect, columns, rows, most):
+            if isinstance(frame, WholeRows):
+                yield frame
+                return
             if frame[_EXCESS].any():
                 row = done + (frame[_EXCESS].arg_max() or 0) + 1
                 raise LogError(
@@ -269,17 +274,24 @@ def _check_quotes(path: Path, kind: str, dialect: Dialect) -> None:
 
 def _parsed(
     path: Path, kind: str, dialect: Dialect, columns: Columns, rows: int, most: int | None
-) -> Iterator[pl.DataFrame]:
+) -> Iterator[Frame]:
+    """Frames with the column of excess; at the end a row that is left out, if it may break off."""
     scan = partial(_scan, dialect, columns, most)
-    if kind == "csv" and dialect.separator and end_of_lines(path) is None:
+    if kind == "csv" and dialect.separator and ends_with_a_line(path):
         yield from scan(path, dialect.skip).collect_batches(chunk_size=rows)
         return
-    skip = dialect.skip
+    last = max(dialect.columns.index(column) for column in columns.sources.values())
+    skip, before = dialect.skip, b""
     for text in whole_lines(path, kind):
+        if not text.endswith(b"\n"):
+            row = judged(text, before, dialect, last)
+            if row is not LastRow.WHOLE:
+                yield WholeRows.left_out(columns, lost=row is LastRow.CUT)
+                return
         if not dialect.separator:  # runs of blanks become one tab
             text = re.sub(rb"(?m)^\t|\t(?=\r?$)", b"", re.sub(rb"[ \t]+", b"\t", text))
         yield scan(io.BytesIO(text), skip).collect()
-        skip = 0
+        skip, before = 0, text
 
 
 def _scan(

@@ -164,6 +164,7 @@ def _units(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
 def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
     """By column "Int64", "Float64" or "String", as far as the first lines tell."""
     lines = _lines(path, head)[found.skip :]
+    lines = lines[:-1] or lines  # the last may break off in the middle of a number
     rows = [
         split(line, found.separator)
         for line in lines

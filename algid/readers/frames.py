@@ -32,12 +32,18 @@ if TYPE_CHECKING:
 class WholeRows:
     """Channels (N,) of the rows that have every value.
 
-    How many more had not, among them the last one.
+    How many more had not, and whether the last row is left out: among those that are lost, or
+    beside them where nobody knows whether it breaks off.
     """
 
     columns: Mapping[str, NDArray[Any]]
     lost: int = 0
     cut_off: bool = False
+
+    @classmethod
+    def left_out(cls, columns: Columns, *, lost: bool) -> WholeRows:
+        """No row where the last one would stand: it breaks off, or it may."""
+        return cls(dict.fromkeys(columns.sources, np.empty(0)), int(lost), cut_off=True)
 
 
 if TYPE_CHECKING:
@@ -322,26 +328,32 @@ def _complete(
     LogError
         Where no row is complete.
     """
-    rows, lost, cut_off = 0, 0, False
-    held: Mapping[str, NDArray[Any]] | None = None
+    rows, lost = 0, 0
+    held: WholeRows | None = None
     for frame in frames:
         if held is not None:
-            yield held, ()
-        read = frame if isinstance(frame, WholeRows) else _whole_rows(frame)
-        held, cut_off = read.columns, read.cut_off
-        rows += held["t"].size + read.lost
-        lost += read.lost
+            yield held.columns, ()
+        held = frame if isinstance(frame, WholeRows) else _whole_rows(frame)
+        rows += held.columns["t"].size + held.lost
+        lost += held.lost
     if held is None:
         return
-    if lost == 1 and cut_off:
-        yield held, (Notice("CUT_OFF", numbers={"case": "row", "row": rows}, lossy=True),)
-    elif lost:
-        if lost == rows:
-            raise LogError(
-                f"{path}: no row has a value in every column that is needed; put the signals on "
-                "common stamps"
-            )
-        numbers = {"count": lost, "rows": rows}
-        yield held, (Notice("EMPTY_CELLS", numbers=numbers, lossy=True),)
-    else:
-        yield held, ()
+    if lost == rows > 0 and not (lost == 1 and held.cut_off):
+        raise LogError(
+            f"{path}: no row has a value in every column that is needed; put the signals on "
+            "common stamps"
+        )
+    yield held.columns, _of_gaps(rows, lost, held)
+
+
+def _of_gaps(rows: int, lost: int, last: WholeRows) -> tuple[Notice, ...]:
+    """What to say of so many rows, of which some are lost, and of the last frame of them."""
+    doubtful = last.cut_off and not last.lost
+    if lost == 1 and last.cut_off and not doubtful:
+        return (Notice("CUT_OFF", numbers={"case": "row", "row": rows}, lossy=True),)
+    notices = []
+    if lost:
+        notices.append(Notice("EMPTY_CELLS", numbers={"count": lost, "rows": rows}, lossy=True))
+    if doubtful:
+        notices.append(Notice("NO_LINE_END", numbers={"row": rows + 1}, note=True))
+    return tuple(notices)

@@ -32,7 +32,7 @@ ROWS = [f"{row / 100},{row % 7},{row % 5},{row % 3},{row % 2}" for row in range(
 
 def csv(folder: Path, *lines: str) -> Path:
     path = folder / "log.csv"
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join([*lines, ""]))
     return path
 
 

@@ -67,7 +67,7 @@ def test_empty_lines_are_no_rows(tmp_path: Path) -> None:
 
 
 def test_rows_without_a_value_are_counted_in_compressed_text(tmp_path: Path) -> None:
-    text = "\n".join([HEAD, *ROWS[:500], *[",,,,"] * 20, "", *ROWS[520:]])
+    text = "\n".join([HEAD, *ROWS[:500], *[",,,,"] * 20, "", *ROWS[520:], ""])
     (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
     assert lost(read_log(tmp_path / "log.csv.gz")) == [
         "20 of 1,000 rows dropped for want of a value"
