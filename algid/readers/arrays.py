@@ -16,7 +16,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
-from algid.readers.frames import flat_reader, number, of_numbers
+from algid.readers.frames import flat_reader, number, of_numbers, timed_by_index
 from algid.readers.hdf5 import arrays_of
 from algid.readers.jsonlines import frame_of_lines
 from algid.readers.matfile import check_elements
@@ -74,6 +74,7 @@ def open_content(
     import polars as pl
 
     schema = content.schema
+    profile = timed_by_index(profile, schema)
     try:
         columns = assign(path, schema.names(), profile, units or {})
     except LogError as error:

@@ -12,7 +12,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
-from algid.readers.frames import cells, flat_reader, number, of_numbers
+from algid.readers.frames import cells, flat_reader, number, of_numbers, timed_by_index
 from algid.readers.ipc import claims
 from algid.readers.natives import natively
 from algid.readers.parquet import units_of_schema
@@ -42,6 +42,7 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
     other = [name for name in file.schema.names if name not in kinds]
     roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
     units = units_of_schema(file.schema, roots)
+    profile = timed_by_index(profile, kinds)
     columns = assign(str(path), [*cells_by_name, *other], profile, units)
     for name, source in columns.sources.items():
         if source in other:

@@ -19,6 +19,7 @@ from algid.notices import Notice, Remedy
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.columns import Columns
 from algid.readers.joints import moving_joints
+from algid.readers.names import has_a_time
 from algid.readers.table import SampleTable
 from algid.units import ANGLE, NANOSECONDS
 
@@ -125,6 +126,23 @@ def cells(
                 cast("pl.DataType", kind.inner),
             )
     return by_name
+
+
+INDEX = "__index_level_0__"
+"""What pandas calls an index without a name where a frame becomes Arrow or Parquet."""
+
+
+def timed_by_index(profile: Profile, kinds: Mapping[str, pl.DataType]) -> Profile:
+    """The profile with an index of dates or durations for the time.
+
+    As it is where a column has a time's name, the user says another, or there is no such index.
+    """
+    kind = kinds.get(INDEX)
+    if kind is None or not kind.is_temporal():
+        return profile
+    if profile.time is not None or profile.rate is not None or has_a_time(kinds):
+        return profile
+    return profile.model_copy(update={"time": INDEX})
 
 
 def of_numbers(path: str, columns: Columns, kinds: Mapping[str, pl.DataType]) -> Columns:

@@ -409,6 +409,11 @@ def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, st
     return kept
 
 
+def has_a_time(columns: Iterable[str]) -> bool:
+    """Whether a column is a time by its name."""
+    return _time({column: take_apart(column) for column in columns}) is not None
+
+
 def _time(parts: dict[str, Name]) -> str | None:
     plain = {column.strip().strip('"').strip().lower(): column for column in reversed(list(parts))}
     for name in TIMES:

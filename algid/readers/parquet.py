@@ -24,7 +24,16 @@ from algid.notices import Notice
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
 from algid.readers.footer import Footer, FooterError, Pages, page_header, parsed
-from algid.readers.frames import NO_COMPANION, WholeRows, cells, flat_reader, number, of_numbers
+from algid.readers.frames import (
+    INDEX,
+    NO_COMPANION,
+    WholeRows,
+    cells,
+    flat_reader,
+    number,
+    of_numbers,
+    timed_by_index,
+)
 from algid.readers.stated import in_metadata
 from algid.words import counted
 
@@ -63,7 +72,8 @@ def _of_plain_numbers(path: Path, profile: Profile) -> TableReader | None:
         return None
     names = list(schema.names)
     nested = any(pa.types.is_nested(kind) for kind in schema.types)
-    if nested or len(set(names)) < len(names):
+    dated = INDEX in names and pa.types.is_temporal(schema.field(INDEX).type)
+    if nested or dated or len(set(names)) < len(names):
         return None
     _refuse_wide(path, names)
     companion = _companion(path, metadata)
@@ -94,6 +104,7 @@ def _of_any_cells(path: Path, profile: Profile) -> TableReader:
 
     schema = schema_of(path)
     _refuse_wide(path, schema)
+    profile = timed_by_index(profile, schema)
 
     def width(column: str) -> int:
         _check_pages(path, {column}, most=1)

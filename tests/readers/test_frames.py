@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from algid.errors import LogError
+from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log
 
@@ -127,6 +128,28 @@ def test_dates_and_durations_are_times_in_ns(name: str, form: str, tmp_path: Pat
         log = read_log(tmp_path / f"log.{form}", profile)
         assert log.stamp_ns.tolist() == [first + k * 1_000_000 for k in range(9)]
         assert log.origin.reading.time_unit == "ns"
+
+
+@pytest.mark.parametrize("form", [*WRITERS, "memory"])
+@pytest.mark.parametrize("name", STAMPS)
+def test_an_index_of_dates_without_a_name_is_the_time(name: str, form: str, tmp_path: Path) -> None:
+    """As pandas hands over and writes an index: under a name of its own."""
+    values, kind, first = STAMPS[name]
+    frame = arm(9, 2).with_columns(pl.Series("__index_level_0__", values, kind))
+    dated = frame.drop("t")
+
+    def read(frame: pl.DataFrame) -> Log:
+        if form == "memory":
+            return read_log(frame.to_arrow())
+        WRITERS[form](frame, tmp_path / f"log.{form}")
+        return read_log(tmp_path / f"log.{form}")
+
+    assert read(dated).stamp_ns.tolist() == [first + k * 1_000_000 for k in range(9)]
+    # a column that is named after a time comes first
+    assert read(frame).stamp_ns.tolist() == [k * 1_000_000 for k in range(9)]
+    # numbers of rows are no time
+    with pytest.raises(LogError, match="no column for t; found"):
+        read(dated.with_columns(pl.int_range(9).alias("__index_level_0__")))
 
 
 @pytest.mark.parametrize("form", WRITERS)

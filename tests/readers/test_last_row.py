@@ -38,7 +38,7 @@ def read(path: Path, text: str) -> tuple[int, list[tuple[str, bool]]]:
     return kept, [(notice.code, notice.lossy) for notice in log.notices]
 
 
-WHOLE = (ROWS, [])
+WHOLE: tuple[int, list[tuple[str, bool]]] = (ROWS, [])
 CUT = (ROWS - 1, [("CUT_OFF", True)])
 DOUBTFUL = (ROWS - 1, [("NO_LINE_END", False)])
 
