@@ -18,7 +18,9 @@ _HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 def visible(text: str, longest: int = LONGEST) -> str:
     """`text` with every invisible character escaped, cut to a length of `longest`."""
     shown = "".join(map(_shown, text[:longest]))
-    return shown if len(text) <= longest else shown + "…"
+    if len(text) > longest:
+        shown += "…"
+    return shown
 
 
 def printable(text: str) -> str:
@@ -40,13 +42,11 @@ def _shown(character: str) -> str:
     if unicodedata.category(character) not in _HIDDEN:
         return character
     code = ord(character)
-    return (
-        f"\\x{code:02x}"
-        if code < 0x100
-        else f"\\u{code:04x}"
-        if code < 0x10000
-        else f"\\U{code:08x}"
-    )
+    if code < 0x100:
+        return f"\\x{code:02x}"
+    if code < 0x10000:
+        return f"\\u{code:04x}"
+    return f"\\U{code:08x}"
 
 
 def file_name(path: str) -> str:
@@ -56,9 +56,9 @@ def file_name(path: str) -> str:
 
 def joined(words: list[str]) -> str:
     """The words as a list in a sentence: a, b and c."""
-    return (
-        words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""
-    )
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def unit_text(unit: str) -> str:
@@ -84,6 +84,18 @@ LARGEST_FIXED = 1e6
 MOST_DIGITS = 8
 
 
+def formatted(value: float | None, form: str) -> str:
+    """`value` as the format `form` writes it, a dash where there is none."""
+    if value is None:
+        return ABSENT
+    return f"{value:{form}}"
+
+
+def yes_or_no(value: bool) -> str:
+    """A truth value in a table."""
+    return "yes" if value else "no"
+
+
 def significant(value: float | None, digits: int = 5) -> str:
     """`value` with that many significant digits.
 
@@ -98,12 +110,9 @@ def significant(value: float | None, digits: int = 5) -> str:
     exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])  # once rounded
     if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
         return f"{value:.{max(digits - 1 - exponent, 0)}f}"
-    mantissa = (
-        f"{value / 10.0**exponent:.{digits - 1}f}"
-        if abs(exponent) < 300
-        else f"{value:.{digits - 1}e}"
-    )
-    return f"{mantissa}e{exponent}" if "e" not in mantissa else mantissa
+    if abs(exponent) >= 300:  # ten to that power is no number
+        return f"{value:.{digits - 1}e}"
+    return f"{value / 10.0**exponent:.{digits - 1}f}e{exponent}"
 
 
 def resolved(value: float | None, std: float | None) -> str:

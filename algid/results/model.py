@@ -10,7 +10,7 @@ settings give the same bytes.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
@@ -206,9 +206,19 @@ class TorquePrediction(_Model):
     rmse_rest: tuple[float | None, float | None] | None = None
     rmse_held: tuple[float | None, float | None] | None = None
 
+    @property
+    def band(self) -> str:
+        """The bandwidth in which it is scored, behind a noun; empty where an old result has none.
+
+        Such as " below 60 Hz".
+        """
+        if self.bandwidth is None:
+            return ""
+        return f" below {self.bandwidth:g} Hz"
+
     def unexplained(self, least: float) -> tuple[int, ...]:
         """Joints, 1 or 2, with R² below `least` and a residual above `TRIFLE` of their torque."""
-        of_load = self.nrmse if self.of_load is None else self.of_load
+        of_load = self.of_load or self.nrmse
         pairs = zip((1, 2), self.r2, of_load, strict=True)
         return tuple(joint for joint, r2, of in pairs if r2 < least and of > TRIFLE)
 
@@ -258,6 +268,11 @@ class FitSummary(_Model):
                 f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}"
             )
         return self
+
+    @property
+    def prediction(self) -> TorquePrediction | None:
+        """How well torque is predicted: of other logs where that was tried, else of those used."""
+        return self.cross_validation or self.residual
 
     def covariance_of(self, names: Sequence[str]) -> Any:
         """Covariance (n, n) of the parameters `names`, numpy.
@@ -324,11 +339,10 @@ class Result(_Model):
     @model_validator(mode="before")
     @classmethod
     def _verdict_is_made_anew(cls, content: Any) -> Any:
-        return (
-            {k: v for k, v in content.items() if k != "verdict"}
-            if isinstance(content, dict)
-            else content
-        )
+        if isinstance(content, dict):
+            content = dict(content)
+            content.pop("verdict", None)
+        return content
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -359,9 +373,16 @@ class Result(_Model):
         return next((self.parameters[name] for name in DELAYS if name in self.parameters), None)
 
     @property
+    def torque_model(self) -> TorqueModel | None:
+        """The terms of the torque that were fitted; None of an estimator that has no choice."""
+        if self.fit is None:
+            return None
+        return self.fit.model
+
+    @property
     def estimates(self) -> dict[str, Estimate]:
         """All estimates by name: constants, loaded constants, payload."""
-        return {**self.parameters, **self.loaded, **self.payload}
+        return self.parameters | self.loaded | self.payload
 
     @property
     def complete(self) -> bool:
@@ -384,45 +405,43 @@ class Result(_Model):
         """The estimates as a polars frame: parameter, estimate, std, low, high, unit, status."""
         import polars as pl
 
-        ends = [one.ci95 or (None, None) for one in self.estimates.values()]
+        rows = []
+        for name, one in self.estimates.items():
+            low, high = one.ci95 or (None, None)
+            rows.append((name, one.estimate, one.std, low, high, one.unit, one.status.value))
+        number = pl.Float64
         columns = {
-            "parameter": list(self.estimates),
-            "estimate": [one.estimate for one in self.estimates.values()],
-            "std": [one.std for one in self.estimates.values()],
-            "low": [low for low, _ in ends],
-            "high": [high for _, high in ends],
-            "unit": [one.unit for one in self.estimates.values()],
-            "status": [one.status.value for one in self.estimates.values()],
+            "parameter": pl.String,
+            "estimate": number,
+            "std": number,
+            "low": number,
+            "high": number,
+            "unit": pl.String,
+            "status": pl.String,
         }
-        numbers = dict.fromkeys(("estimate", "std", "low", "high"), pl.Float64)
-        return pl.DataFrame(columns, schema_overrides=numbers)
+        return pl.DataFrame(rows, schema=columns, orient="row")
 
     def __dir__(self) -> list[str]:
         """What is algid's, and not what is pydantic's."""
-        kinds = [kind for kind in type(self).__mro__ if issubclass(kind, Result)]
-        own = {
-            name for kind in kinds for name in vars(kind) if not name.startswith(("_", "model_"))
-        }
-        return sorted(own | set(type(self).model_fields))
+        own = set(type(self).model_fields)
+        for kind in type(self).__mro__:
+            if issubclass(kind, Result):
+                own |= {name for name in vars(kind) if not name.startswith(("_", "model_"))}
+        return sorted(own)
 
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same, whatever else either can do."""
         return isinstance(other, Result) and dict(self) == dict(other)
 
     def __str__(self) -> str:
-        rows = [("parameter", "estimate", "std", "unit", "status"), *self._rows()]
-        widths = [max(len(row[column]) for row in rows) for column in range(5)]
-        judged = self.verdict
-        lines = [
-            f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}",
-            visible(judged.sentence, 1000),
-        ]
+        rows = list(self._rows())
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = [self._subject, visible(self.verdict.sentence, 1000)]
         for row in rows:
-            name, value, std, unit, status = (
-                cell.ljust(width) for cell, width in zip(row, widths, strict=True)
-            )
-            numbers = (cell.strip().rjust(len(cell)) for cell in (value, std))
-            lines.append("  ".join((name, *numbers, unit, status)).rstrip())
+            line = ""
+            for cell, width, align in zip(row, widths, "<>><<", strict=True):
+                line += f"{cell:{align}{width}}  "
+            lines.append(line.rstrip())
         return "\n".join(lines)
 
     __repr__ = __str__
@@ -431,24 +450,24 @@ class Result(_Model):
         """For notebooks."""
         from algid.results.notebook import html_of
 
-        return html_of(
-            self, f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{self._others}"
-        )
+        return html_of(self, self._subject)
 
     @property
-    def _others(self) -> str:
-        return f" and {len(self.more_logs)} more" if self.more_logs else ""
+    def _subject(self) -> str:
+        """Whose estimate it is, and of which logs."""
+        others = f" and {len(self.more_logs)} more" if self.more_logs else ""
+        return f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{others}"
 
     def _rows(self) -> Iterator[tuple[str, str, str, str, str]]:
+        """The head of a table of the estimates, and its rows."""
+        yield "parameter", "estimate", "std", "unit", "status"
         for name, one in self.estimates.items():
-            value = "-" if one.estimate is None else f"{one.estimate:.6g}"
-            yield (
-                name,
-                value,
-                "-" if one.std is None else f"{one.std:.2g}",
-                one.unit,
-                one.status.value,
-            )
+            value = std = "-"
+            if one.estimate is not None:
+                value = f"{one.estimate:.6g}"
+            if one.std is not None:
+                std = f"{one.std:.2g}"
+            yield name, value, std, one.unit, one.status.value
 
 
 def result_schema() -> dict[str, Any]:
@@ -569,30 +588,36 @@ def _check(result: Result) -> None:
                 "2^63 ns"
             )
     fit = result.fit
-    tables = [result.estimates, result.paper_payload, *(fit.by_log if fit is not None else ())]
-    for name, one in (pair for table in tables for pair in table.items()):
+    _check_estimates(result.estimates)
+    _check_estimates(result.paper_payload)
+    if fit is None:
+        return
+    for estimates in fit.by_log:
+        _check_estimates(estimates)
+    for name, level in fit.noise.items():
+        _check_size(f"fit.noise.{name:.60}", level, positive=True)
+    if fit.model is not None:
+        for term in fit.model.terms:
+            if term not in TERMS:
+                raise SettingError(
+                    f"fit.model.terms: expected some of {', '.join(TERMS)}, found {term!r:.60}"
+                )
+    if len(set(fit.covariance_names)) < len(fit.covariance_names):
+        raise SettingError("fit.covariance_names: expected each once")
+    for place, row in enumerate(fit.covariance):
+        _check_size(f"fit.covariance.{place}.{place}", row[place], positive=True)
+    _check_covariance(fit)
+
+
+def _check_estimates(estimates: Mapping[str, Estimate]) -> None:
+    """Raises `SettingError` where one is of a size that no identification gives."""
+    for name, one in estimates.items():
         _check_size(f"{name!r:.60}: estimate", one.estimate)
         if max(abs(one.estimate or 0.0), one.std or 0.0) > LIMITS.largest_value:
             raise SettingError(
                 f"{name!r:.60}: expected a number below {LIMITS.largest_value:g} in size"
             )
         _check_size(f"{name!r:.60}: std", one.std, positive=True)
-    if fit is None:
-        return
-    for name, level in fit.noise.items():
-        _check_size(f"fit.noise.{name:.60}", level, positive=True)
-    unknown = [
-        term for term in (fit.model.terms if fit.model is not None else ()) if term not in TERMS
-    ]
-    if unknown:
-        raise SettingError(
-            f"fit.model.terms: expected some of {', '.join(TERMS)}, found {unknown[0]!r:.60}"
-        )
-    if len(set(fit.covariance_names)) < len(fit.covariance_names):
-        raise SettingError("fit.covariance_names: expected each once")
-    for place, row in enumerate(fit.covariance):
-        _check_size(f"fit.covariance.{place}.{place}", row[place], positive=True)
-    _check_covariance(fit)
 
 
 def _check_covariance(fit: FitSummary) -> None:
@@ -618,34 +643,27 @@ def _check_covariance(fit: FitSummary) -> None:
 
 def _check_size(place: str, value: float | None, *, positive: bool = False) -> None:
     """Raise `SettingError` for a number so small that it cannot be divided by, or negative."""
-    if value is not None and (
-        0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0)
-    ):
-        least = f"{1 / LIMITS.largest_value:g}"
-        what = f"0, or {least} or more" if positive else f"0, or {least} or more in size"
-        raise SettingError(f"{place}: expected {what}, found {value:g}")
+    if value is None:
+        return
+    expected = f"0, or {1 / LIMITS.largest_value:g} or more"
+    if not positive:
+        expected += " in size"
+    if 0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0):
+        raise SettingError(f"{place}: expected {expected}, found {value:g}")
 
 
 def _current(content: dict[str, Any]) -> dict[str, Any]:
     """A result of an earlier schema in this one: sentences become notices without numbers."""
     if content["schema_version"] == SCHEMA_VERSION:
         return content
-    kept = {
-        name: value
-        for name, value in content.items()
-        if name not in ("warnings", "notes", "causes")
-    }
-    causes = [
-        Notice(
-            "EARLIER_CAUSE",
-            one["cause"],
-            remedies=(from_flags(one["flags"]),) if one.get("flags") else (),
-        )
-        for one in content.get("causes", [])
-    ]
-    said = [
-        Notice("EARLIER", text, note=key == "notes")
-        for key in ("warnings", "notes")
-        for text in content.get(key, [])
-    ]
-    return kept | {"schema_version": SCHEMA_VERSION, "notices": [*causes, *said]}
+    current = dict(content)
+    notices = []
+    for one in current.pop("causes", []):
+        remedies = []
+        if one.get("flags"):
+            remedies.append(from_flags(one["flags"]))
+        notices.append(Notice("EARLIER_CAUSE", one["cause"], remedies=tuple(remedies)))
+    for key in ("warnings", "notes"):
+        is_note = key == "notes"
+        notices += [Notice("EARLIER", text, note=is_note) for text in current.pop(key, [])]
+    return current | {"schema_version": SCHEMA_VERSION, "notices": notices}
