@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Sequence
 
 from algid.arm import CONSTANT_NAMES as ARM
 from algid.model import DELAYS, PARAMETERS, SINES
@@ -34,13 +34,15 @@ def brief(result: Result, place: str = "") -> list[str]:
     """
     judged = result.verdict
     head = _wrapped(f"{judged.word}: {visible(judged.headline)}.")
-    body = ["", *_estimates(result), *_terms(result), *_prediction(result)]
-    tail = [*_notes(judged.notes), *([f"Report: {place}"] if place else [])]
+    body = [""] + _estimates(result) + _terms(result) + _prediction(result)
+    tail = _notes(judged.notes)
+    if place:
+        tail.append(f"Report: {place}")
     command = run_first(judged.command)
     if len(command) > MOST_COMMAND:
         command = _added(result)
     room = HEIGHT - len(head) - len(body) - len(tail) - len(command)
-    return [*head, *_reasons(judged, room), *command, *body, *tail]
+    return head + _reasons(judged, room) + command + body + tail
 
 
 def _added(result: Result) -> list[str]:
@@ -58,9 +60,11 @@ def run_first(command: str | None) -> list[str]:
         return []
     words = [shlex.quote(word) for word in shlex.split(command)]
     lines, line = [], "Run first:"
-    for place, word in enumerate(words):
-        last = place == len(words) - 1
-        if len(line) + 1 + len(word) + (0 if last else 2) > WIDTH and line.strip():
+    for place, word in enumerate(words, start=1):
+        length = len(line) + 1 + len(word)
+        if place < len(words):  # a space and a backslash may follow
+            length += 2
+        if length > WIDTH and line.strip():
             lines.append(f"{line} \\")
             line = "   "
         line = f"{line} {word}"
@@ -72,39 +76,51 @@ def _wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
     return lines_of(text, WIDTH, first, rest)
 
 
-def _reasons(judged: Verdict, room: int) -> Iterator[str]:
+def _reasons(judged: Verdict, room: int) -> list[str]:
     """As many first reasons as fit, each whole, and the number of the others."""
-    shown = 0
+    shown: list[str] = []
+    left = list(judged.reasons)
     for reason in judged.reasons[:MOST_REASONS]:
         lines = _wrapped(f"{visible(reason.text, 1000)} [{reason.code}]", " • ", "   ")
-        last = shown + 1 == len(judged.reasons)
-        if len(lines) > room - (0 if last else 1):
+        needed = len(shown) + len(lines)
+        if len(left) > 1:  # the others are counted on a line
+            needed += 1
+        if needed > room:
             break
-        yield from lines
-        room -= len(lines)
-        shown += 1
-    left = judged.reasons[shown:]
+        shown += lines
+        left.pop(0)
     if left:
-        codes = ", ".join(dict.fromkeys(one.code for one in left))
-        text = f"• {counted(len(left), 'more reason')}, with -v: {codes}"
-        yield f" {textwrap.shorten(text, WIDTH - 1, placeholder=' …')}"
+        text = f"• {counted(len(left), 'more reason')}, with -v: {_codes(left)}"
+        shown.append(f" {textwrap.shorten(text, WIDTH - 1, placeholder=' …')}")
+    return shown
 
 
-def _estimates(result: Result) -> Iterator[str]:
+def _codes(notices: Iterable[Notice]) -> str:
+    """Their codes, each once."""
+    return ", ".join(dict.fromkeys(one.code for one in notices))
+
+
+def _estimates(result: Result) -> list[str]:
     """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning."""
     errors, phasors = _errors(result), moments(result)
     constants = {name: one for name, one in result.parameters.items() if name in ARM}
+    lines = []
     for name, estimate in (constants | result.payload).items():
         if name in phasors:
-            yield from _moment(name, phasors[name], estimate)
+            lines += _moment(name, phasors[name], estimate)
             continue
-        number = ABSENT if estimate.estimate is None else _with_half(estimate)
-        error = f"{errors[name]:>8}" if errors else ""
-        line = f"{visible(name):<4}{number:>19} {unit_text(estimate.unit):<10}{error} "
-        words = PARAMETERS[name].meaning.partition(", ")[0] if name in PARAMETERS else ""
+        number, error, words = ABSENT, "", ""
+        if estimate.estimate is not None:
+            number = _with_half(estimate)
+        if errors:
+            error = f"{errors[name]:>8}"
         if estimate.status is not Status.OK:
             words = estimate.status.value
-        yield from _wrapped(f"{line}{words}", rest=" " * len(line))
+        elif name in PARAMETERS:
+            words = PARAMETERS[name].meaning.partition(", ")[0]
+        line = f"{visible(name):<4}{number:>19} {unit_text(estimate.unit):<10}{error} "
+        lines += _wrapped(f"{line}{words}", rest=" " * len(line))
+    return lines
 
 
 def _moment(name: str, moment: Moment, estimate: Estimate) -> list[str]:
@@ -114,8 +130,10 @@ def _moment(name: str, moment: Moment, estimate: Estimate) -> list[str]:
         half = significant(moment.quantile * moment.std, 2)
     symbol, number = f"|{name.upper()}|", f"{resolved(moment.size, moment.std)} ± {half}"
     line = f"{symbol:<4}{number:>19} {unit_text(moment.unit):<10} "
-    status = "" if estimate.status is Status.OK else f" {estimate.status.value}"
-    return _wrapped(f"{line}at {moment.angle_text}{status}", rest=" " * len(line))
+    words = f"at {moment.angle_text}"
+    if estimate.status is not Status.OK:
+        words += f" {estimate.status.value}"
+    return _wrapped(f"{line}{words}", rest=" " * len(line))
 
 
 def _with_half(estimate: Estimate) -> str:
@@ -131,28 +149,44 @@ def _errors(result: Result) -> dict[str, str]:
     """By parameter its error in percent of the truth; empty of a log that does not know it."""
     if not result.truth:
         return {}
-    errors = dict.fromkeys(result.estimates, "")
-    for name, true in result.truth.items():
-        estimate = result.estimates[name].estimate if name in errors else None
-        if estimate is not None and true:
-            share = 100 * (estimate - true) / abs(true)
-            errors[name] = f"{share:+.2g} %" if abs(share) >= LEAST_ERROR else "<0.01 %"
+    errors = {}
+    for name, one in result.estimates.items():
+        true = result.truth.get(name)
+        errors[name] = ""
+        if one.estimate is not None and true:
+            share = 100 * (one.estimate - true) / abs(true)
+            errors[name] = "<0.01 %" if abs(share) < LEAST_ERROR else f"{share:+.2g} %"
     return errors
 
 
 def _terms(result: Result) -> list[str]:
     """The terms of the torque beside eq. (1), and their coefficients."""
-    model = None if result.fit is None else result.fit.model
-    terms = [] if model is None else list(model.terms)
-    phasors = moments(result)
-    shown = {*ARM, *(sine for sine, name in SINES.items() if name in phasors)}
-    others = {name: one for name, one in result.parameters.items() if name not in shown}
+    if result.fit is None:
+        return []
+    terms: list[str] = []
+    if result.torque_model is not None:
+        terms += result.torque_model.terms
+    others = _beside_constants(result)
     if not terms and not others:
-        return [] if result.fit is None else ["Terms kept: none"]
+        return ["Terms kept: none"]
     terms += [name for name in DELAYS if name in others and name not in terms]
-    numbers = [f"{name} {_with_half(estimate)}" for name, estimate in others.items()]
-    beside = f" ({', '.join(numbers)})" if numbers else ""
-    return _at_most(2, f"Terms kept: {', '.join(terms)}{beside}")
+    text = f"Terms kept: {', '.join(terms)}"
+    if others:
+        numbers = [f"{name} {_with_half(estimate)}" for name, estimate in others.items()]
+        text += f" ({', '.join(numbers)})"
+    return _at_most(2, text)
+
+
+def _beside_constants(result: Result) -> dict[str, Estimate]:
+    """The parameters of optional terms, but the sine parts that a moment's angle shows."""
+    others = dict(result.parameters)
+    for name in ARM:
+        others.pop(name, None)
+    phasors = moments(result)
+    for sine, name in SINES.items():
+        if name in phasors:
+            others.pop(sine, None)
+    return others
 
 
 def _at_most(lines: int, text: str) -> list[str]:
@@ -162,17 +196,14 @@ def _at_most(lines: int, text: str) -> list[str]:
 
 def _prediction(result: Result) -> list[str]:
     """How well the torque is predicted, of other logs where that was tried."""
-    fit = result.fit
-    prediction = None if fit is None else fit.cross_validation or fit.residual
-    if prediction is None:
+    if result.fit is None or result.fit.prediction is None:
         return []
-    band = "" if prediction.bandwidth is None else f" below {prediction.bandwidth:g} Hz"
-    first, second = (share_text(r2) for r2 in prediction.r2)
-    return [f"R² of the torque{band}: joint 1 {first}, joint 2 {second}"]
+    prediction = result.fit.prediction
+    first, second = map(share_text, prediction.r2)
+    return [f"R² of the torque{prediction.band}: joint 1 {first}, joint 2 {second}"]
 
 
-def _notes(notes: Iterable[Notice]) -> list[str]:
-    codes = [one.code for one in notes]
-    if not codes:
+def _notes(notes: Sequence[Notice]) -> list[str]:
+    if not notes:
         return []
-    return _at_most(1, f"Data notes ({len(codes)}): {', '.join(dict.fromkeys(codes))}")
+    return _at_most(1, f"Data notes ({len(notes)}): {_codes(notes)}")

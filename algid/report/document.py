@@ -90,33 +90,37 @@ class Table:
 
     def without_empty(self) -> Table:
         """The table less the columns that hold nothing."""
-        return self.only(
-            [
-                i
-                for i in range(len(self.columns))
-                if any(row[i] not in (ABSENT, "") for row in self.rows)
-            ]
-        )
+        kept = []
+        for place in range(len(self.columns)):
+            if any(row[place] not in (ABSENT, "") for row in self.rows):
+                kept.append(place)
+        return self.only(kept)
 
     def without(self, headings: Collection[str]) -> Table:
         """The table less the columns of those headings."""
-        return self.only(
-            [place for place, column in enumerate(self.columns) if column.heading not in headings]
-        )
+        kept = []
+        for place, column in enumerate(self.columns):
+            if column.heading not in headings:
+                kept.append(place)
+        return self.only(kept)
 
     def doubted(self) -> Table:
         """The table as part of a result that failed."""
-        kinds = [
-            replace(c, kind="doubtful status") if c.kind == "status" else c for c in self.columns
-        ]
-        return replace(self, columns=tuple(kinds))
+        columns = []
+        for column in self.columns:
+            if column.kind == "status":
+                column = replace(column, kind="doubtful status")
+            columns.append(column)
+        return replace(self, columns=tuple(columns))
 
     def narrower(self) -> Table | None:
         """The table less the column that is missed least; None where all are needed."""
-        least = max(range(len(self.columns)), key=lambda i: self.columns[i].rank, default=None)
-        if least is None or self.columns[least].rank == 0:
+        ranks = [column.rank for column in self.columns]
+        if max(ranks, default=0) == 0:
             return None
-        return self.only([i for i in range(len(self.columns)) if i != least])
+        kept = list(range(len(ranks)))
+        kept.remove(ranks.index(max(ranks)))
+        return self.only(kept)
 
     def only(self, kept: Sequence[int]) -> Table:
         """The table with the columns `kept`."""

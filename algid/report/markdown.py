@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from algid.report.document import Depth, Document, Table
 from algid.text import visible
@@ -20,33 +21,37 @@ def markdown(document: Document) -> str:
         "",
         f"{GRADE_SIGNS[judged.grade]} **{judged.word}**: {escaped(visible(judged.headline))}.",
         "",
-        *(f"- {escaped(visible(reason.sentence))}" for reason in judged.reasons),
-        "",
-        *(["Run first:", "", *_code(judged.command), ""] if judged.command else []),
-        *map(markdown_table, document.tables(Depth.TERMINAL, Depth.MARKDOWN)),
     ]
+    for reason in judged.reasons:
+        lines.append(f"- {escaped(visible(reason.sentence))}")
+    lines.append("")
+    if judged.command:
+        lines += ["Run first:", ""] + _code(judged.command) + [""]
+    lines += map(markdown_table, document.tables(Depth.TERMINAL, Depth.MARKDOWN))
     folded = document.tables(Depth.FOLDED)
     if folded:
-        lines += [
-            "<details><summary>Logs and provenance</summary>",
-            "",
-            *map(markdown_table, folded),
-            "</details>",
-        ]
+        lines += ["<details><summary>Logs and provenance</summary>", ""]
+        lines += map(markdown_table, folded)
+        lines.append("</details>")
     return "\n".join(lines) + "\n"
 
 
 def markdown_table(table: Table) -> str:
     """One table with its title and note."""
-    cells = [
-        [escaped(cell) for cell in row]
-        for row in ([column.heading for column in table.columns], *table.rows)
-    ]
-    cells.insert(1, ["--:" if column.kind == "number" else ":--" for column in table.columns])
-    note = ["", escaped(table.note)] if table.note else []
-    return "\n".join(
-        [f"**{escaped(table.title)}**", "", *(f"| {' | '.join(row)} |" for row in cells), *note, ""]
-    )
+    headings, alignments = [], []
+    for column in table.columns:
+        headings.append(column.heading)
+        alignments.append("--:" if column.kind == "number" else ":--")
+    lines = [f"**{escaped(table.title)}**", "", _row(headings), f"| {' | '.join(alignments)} |"]
+    lines += map(_row, table.rows)
+    if table.note:
+        lines += ["", escaped(table.note)]
+    lines.append("")
+    return "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(map(escaped, cells))} |"
 
 
 def escaped(text: str) -> str:
@@ -56,5 +61,6 @@ def escaped(text: str) -> str:
 
 def _code(text: str) -> list[str]:
     """A block of code that no row of backticks in `text` can end."""
-    fence = "`" * max(3, 1 + max((len(run) for run in re.findall("`+", text)), default=0))
+    longest = max(map(len, re.findall("`+", text)), default=0)
+    fence = "`" * max(3, longest + 1)
     return [f"{fence}sh", text, fence]

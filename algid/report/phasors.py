@@ -24,7 +24,7 @@ from algid.arm import FloatArray
 from algid.model import SINES
 from algid.results import Estimate, Result
 from algid.significance import NORMAL
-from algid.text import ABSENT, resolved, significant
+from algid.text import resolved, significant
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,14 @@ class Moment:
     @property
     def half(self) -> float | None:
         """Half the 95 % interval of the angle in degrees."""
-        return None if self.angle_std is None else self.quantile * self.angle_std
+        if self.angle_std is None:
+            return None
+        return self.quantile * self.angle_std
 
     @property
     def angle_text(self) -> str:
         """The angle with its ±, in degrees."""
-        half = ABSENT if self.half is None else significant(self.half, 2)
-        return f"{resolved(self.angle, self.angle_std)}° ± {half}°"
+        return f"{resolved(self.angle, self.angle_std)}° ± {significant(self.half, 2)}°"
 
 
 def moments(result: Result) -> dict[str, Moment]:
@@ -58,23 +59,24 @@ def moments(result: Result) -> dict[str, Moment]:
 
     None of straight arms, nor where the phases are shrunk to nothing.
     """
-    model = None if result.fit is None else result.fit.model
-    shrunk = () if model is None else model.shrunk
+    shrunk: list[str] = []
+    if result.torque_model is not None:
+        shrunk = result.torque_model.shrunk
     by_name = {}
     for sine, name in SINES.items():
-        both = [result.parameters.get(one) for one in (name, sine)]
-        if None in both or sine in shrunk:
-            continue
-        moment = _moment(result, name, sine, *both)  # type: ignore[arg-type]
-        if moment is not None:
-            by_name[name] = moment
+        if sine not in shrunk:
+            moment = _moment(result, name, sine)
+            if moment is not None:
+                by_name[name] = moment
     return by_name
 
 
-def _moment(
-    result: Result, name: str, sine: str, cosine_part: Estimate, sine_part: Estimate
-) -> Moment | None:
-    if cosine_part.estimate is None or sine_part.estimate is None:
+def _moment(result: Result, name: str, sine: str) -> Moment | None:
+    """The moment of a cosine part `name` and its sine part; None where one is not known."""
+    cosine_part, sine_part = result.parameters.get(name), result.parameters.get(sine)
+    if cosine_part is None or cosine_part.estimate is None:
+        return None
+    if sine_part is None or sine_part.estimate is None:
         return None
     K = complex(cosine_part.estimate, sine_part.estimate)
     C = _covariance(result, name, sine)
@@ -93,7 +95,9 @@ def _covariance(result: Result, *names: str) -> FloatArray | None:
     if result.fit is None:
         return None
     C: FloatArray = result.fit.covariance_of(names)
-    return C if np.isfinite(C).all() else None
+    if not np.isfinite(C).all():
+        return None
+    return C
 
 
 def _quantile(found: Estimate) -> float:

@@ -6,7 +6,7 @@ Foreign text never passes as markup; colours follow the console (`NO_COLOR`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from algid.report.brief import run_first
 from algid.report.document import Column, Depth, Document, Table
@@ -49,9 +49,9 @@ def print_verdict(judged: Verdict, console: Console, most: int | None = None) ->
     points.add_column(overflow="fold")
     for reason in judged.reasons[:most]:
         points.add_row(" •", Text.assemble(visible(reason.sentence), (f" [{reason.code}]", "dim")))
-    left = len(judged.reasons[most:]) if most is not None else 0
+    left = judged.reasons[len(judged.reasons[:most]) :]
     if left:
-        points.add_row("", f"and {counted(left, 'more reason')}, with -v and in the report")
+        points.add_row("", f"and {counted(len(left), 'more reason')}, with -v and in the report")
     if points.row_count:
         console.print(points)
     if judged.command:
@@ -69,10 +69,8 @@ def print_table(table: Table, console: Console) -> None:
     from rich.text import Text
 
     while True:
-        columns = [
-            (column.heading, *cells)
-            for column, *cells in zip(table.columns, *table.rows, strict=True)
-        ]
+        headings = tuple(column.heading for column in table.columns)
+        columns = list(zip(headings, *table.rows, strict=True))
         widths = [max(map(cell_len, column)) for column in columns]
         wanted = Measurement.get(
             console, console.options.update(width=10_000), rich_table(table, widths)
@@ -97,8 +95,13 @@ def _least(column: Column, cells: tuple[str, ...]) -> int:
     """Least width that breaks no number of a column, and no word but those longer than any."""
     from rich.cells import cell_len
 
-    words = [min(cell_len(word), LONGEST_WORD) for cell in cells for word in cell.split()]
-    return max([*words, *(map(cell_len, cells[1:]) if column.kind == "number" else ())], default=1)
+    least = 1
+    for cell in cells:
+        for word in cell.split():
+            least = max(least, min(cell_len(word), LONGEST_WORD))
+    if column.kind == "number":
+        least = max(least, max(map(cell_len, cells[1:]), default=0))
+    return least
 
 
 def _narrowed(widths: list[int], least: list[int], room: int) -> list[int]:
@@ -127,13 +130,13 @@ def rich_table(table: Table, widths: Sequence[int]) -> RichTable:
         collapse_padding=True,
     )
     for column, width in zip(table.columns, widths, strict=True):
-        right = column.kind == "number"
-        made.add_column(
-            Text(column.heading), justify="right" if right else "left", overflow="fold", width=width
-        )
+        side: Literal["right", "left"] = "right" if column.kind == "number" else "left"
+        made.add_column(Text(column.heading), justify=side, overflow="fold", width=width)
     for row in table.rows:
-        cells = zip(table.columns, row, strict=True)
-        made.add_row(*(Text(cell, _style(column.kind, cell)) for column, cell in cells))
+        cells = []
+        for column, cell in zip(table.columns, row, strict=True):
+            cells.append(Text(cell, _style(column.kind, cell)))
+        made.add_row(*cells)
     return made
 
 
@@ -142,4 +145,6 @@ def _style(kind: str, cell: str) -> str:
         return "bold red"
     if kind == "status":
         return "green" if cell == Status.OK.value else "bold yellow"
-    return "bold" if kind == "name" else ""
+    if kind == "name":
+        return "bold"
+    return ""
