@@ -16,7 +16,7 @@ business; here they are put in order once a model (`Compiled`) and evaluated alo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 
@@ -51,25 +51,40 @@ __all__ = [
     "sine_cosine",
 ]
 
-EVERY_TERM = {term.name: term for term in (*ALWAYS, *OPTIONAL)}
+
+def names_of(terms: Iterable[Term]) -> tuple[str, ...]:
+    """Names of the parameters of some terms, in order."""
+    names: list[str] = []
+    for term in terms:
+        names += term.names
+    return tuple(names)
+
+
+EVERY_TERM = {term.name: term for term in ALWAYS + OPTIONAL}
 TERMS = {term.name: term for term in OPTIONAL if not term.delays}
 """Terms that a model may have; a delay acts before a model does, on the log's times."""
-DELAYS = tuple(name for term in OPTIONAL if term.delays for name in term.names)
+DELAYS = names_of(term for term in OPTIONAL if term.delays)
 CHOICES = tuple(term.name for term in OPTIONAL)
 """Names that ``--model`` takes."""
-PARAMETERS: dict[str, Parameter] = {
-    one.name: one
-    for one in (*(one for term in EVERY_TERM.values() for one in term.parameters), *PAYLOAD, *BODY)
-}
-COLUMN_NAMES = tuple(name for term in (*ALWAYS, *TERMS.values()) for name in term.names)
+PARAMETERS: dict[str, Parameter] = {}
+for _term in EVERY_TERM.values():
+    PARAMETERS |= {parameter.name: parameter for parameter in _term.parameters}
+PARAMETERS |= {parameter.name: parameter for parameter in PAYLOAD + BODY}
 UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
-RIGID = tuple(name for term in ALWAYS if term.inertial for name in term.names)
-SINES = {own: of for term in TERMS.values() for own, of in term.sines}
+COLUMN_NAMES = names_of(ALWAYS) + names_of(TERMS.values())
+RIGID = names_of(term for term in ALWAYS if term.inertial)
+SINES: dict[str, str] = {}
 """Parameters that are the sine part of another."""
+for _term in TERMS.values():
+    SINES |= _term.sines
+SINE_OF = {cosine: sine for sine, cosine in SINES.items()}
+"""The sine parts of the parameters that have one."""
 MOMENTS = (K1, K2, K4)
 """The constants k1, k2 and k4, which are phasors with their sine parts: K = k + i ks."""
 LARGEST_PHASE = np.pi / 4
 """rad: beyond, a phase is another convention."""
+_JOINT_PAIRS = ((0, 0), (0, 1), (1, 0), (1, 1))
+"""A torque's joint and an angle's joint."""
 _SIGN_TRIALS = 4  # as many patterns as the signs of two loads have
 
 
@@ -134,9 +149,7 @@ class Model:
     @property
     def iterated(self) -> tuple[str, ...]:
         """Names of the coefficients in which the torque is not linear."""
-        return tuple(
-            name for term in self.terms if not TERMS[term].linear for name in TERMS[term].names
-        )
+        return names_of(TERMS[name] for name in self.terms if not TERMS[name].linear)
 
     @cached_property
     def lag_name(self) -> str | None:
@@ -144,14 +157,16 @@ class Model:
 
         None where there is no such term.
         """
-        return next(
-            (name for term in self.terms if TERMS[term].lags for name in TERMS[term].names),
-            None,
-        )
+        for name in self.terms:
+            if TERMS[name].lags:
+                return TERMS[name].names[0]
+        return None
 
     def lag(self, c: FloatArray) -> float:
         """The time constant in s of the torque's low-pass; 0 without."""
-        return 0.0 if self.lag_name is None else float(c[self.names.index(self.lag_name)])
+        if self.lag_name is None:
+            return 0.0
+        return float(c[self.names.index(self.lag_name)])
 
     def expand(self, c: FloatArray) -> FloatArray:
         """Coefficients of all `COLUMN_NAMES`: zero where a column is switched off."""
@@ -223,17 +238,14 @@ class Compiled:
         return {
             (order, row, angle): self._derivative(f"{signal}{angle + 1}", row)
             for order, signal in enumerate(("theta", "omega", "alpha"))
-            for row in range(2)
-            for angle in range(2)
+            for row, angle in _JOINT_PAIRS
         }
 
     @cached_property
     def inertia(self) -> Mapping[tuple[int, int], Weighted]:
         """What multiplies the accelerations, by torque's joint and angle's joint."""
         return {
-            (row, angle): self._derivative(f"alpha{angle + 1}", row)
-            for row in range(2)
-            for angle in range(2)
+            (row, angle): self._derivative(f"alpha{angle + 1}", row) for row, angle in _JOINT_PAIRS
         }
 
     @cached_property
@@ -242,12 +254,13 @@ class Compiled:
         return self._weighted(_at_rest, 0), self._weighted(_at_rest, 1)
 
     def _entries(self, of: Callable[[TorqueColumn, int], Expression]) -> tuple[Entry, ...]:
-        return tuple(
-            (joint, self.place[column.parameter], entry)
-            for column in self.columns
-            for joint in range(2)
-            if (entry := of(column, joint))
-        )
+        entries = []
+        for column in self.columns:
+            for joint in range(2):
+                entry = of(column, joint)
+                if entry:
+                    entries.append((joint, self.place[column.parameter], entry))
+        return tuple(entries)
 
     def _derivative(self, signal: str, joint: int) -> Weighted:
         return self._weighted(lambda column, row: _slope(column, row, signal), joint)
@@ -262,10 +275,12 @@ class Compiled:
     def only(self, weighted: Weighted, places: Iterable[int]) -> Weighted:
         """What the columns at `places` give of it."""
         wanted = set(places)
-        kept = {
-            p: tuple(pair for pair in pairs if pair[0] in wanted) for p, pairs in weighted.items()
-        }
-        return {product: pairs for product, pairs in kept.items() if pairs}
+        kept = {}
+        for product, pairs in weighted.items():
+            own = tuple(pair for pair in pairs if pair[0] in wanted)
+            if own:
+                kept[product] = own
+        return kept
 
     @cached_property
     def of_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
@@ -275,12 +290,11 @@ class Compiled:
     @cached_property
     def beside_load(self) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
         """The same of the other columns."""
-        return self._parts([place for place in range(len(self.names)) if place not in self.loads])
+        return self._parts(set(range(len(self.names))).difference(self.loads))
 
-    def _parts(self, places: Iterable[int]) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
-        own = tuple(places)
-        inertia = tuple(self.only(weighted, own) for weighted in self.inertia.values())
-        return inertia, tuple(self.only(weighted, own) for weighted in self.rest)
+    def _parts(self, places: Collection[int]) -> tuple[tuple[Weighted, ...], tuple[Weighted, ...]]:
+        inertia = tuple(self.only(weighted, places) for weighted in self.inertia.values())
+        return inertia, tuple(self.only(weighted, places) for weighted in self.rest)
 
 
 @cache
@@ -301,13 +315,18 @@ def _at_rest(column: TorqueColumn, joint: int) -> Expression:
 
 @lru_cache(maxsize=256)
 def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compiled:
-    own = [*ALWAYS, *(TERMS[term] for term in terms)]
-    parameters = [one for term in own for one in term.parameters if gravity or not one.weighs]
-    names = tuple(one.name for one in parameters)
-    columns = tuple(column for term in own for column in term.columns if column.parameter in names)
-    others = [term for term in own if term.linear and not term.lags] if by_torque else []
-    loads = [name for term in own if term.inertial or term in others for name in term.names]
-    return Compiled(names, columns, tuple(names.index(name) for name in loads if name in names))
+    names: list[str] = []
+    columns: list[TorqueColumn] = []
+    loads: list[int] = []
+    for term in ALWAYS + tuple(TERMS[name] for name in terms):
+        is_load = term.inertial or (by_torque and term.linear and not term.lags)
+        for parameter in term.parameters:
+            if gravity or not parameter.weighs:
+                if is_load:
+                    loads.append(len(names))
+                names.append(parameter.name)
+        columns += (column for column in term.columns if column.parameter in names)
+    return Compiled(tuple(names), tuple(columns), tuple(loads))
 
 
 def summed(weighted: Weighted, c: FloatArray, values: Values) -> FloatArray | float:
@@ -349,7 +368,8 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         raise ValueError(
             f"the regressor of {', '.join(model.terms)} depends on the coefficients, got none"
         )
-    c = np.zeros(len(model.names)) if c is None else c
+    if c is None:
+        c = np.zeros(len(model.names))
     compiled = model.compiled
     values = Values(motion, model.shape)
     Y = np.zeros((2, len(compiled.names), motion.theta.shape[1]))
@@ -375,20 +395,20 @@ def phasor(model: Model, c: FloatArray, name: str) -> complex:
     place = model.compiled.place
     if name not in place:
         return 0j
-    sine = next((own for own, of in SINES.items() if of == name and own in place), None)
-    return complex(c[place[name]], 0.0 if sine is None else c[place[sine]])
+    sine = SINE_OF.get(name, "")
+    if sine not in place:
+        return complex(c[place[name]])
+    return complex(c[place[name]], c[place[sine]])
 
 
 def phasor_of(values: Mapping[str, float], name: str) -> complex:
     """The moment `name` of coefficients by name as a phasor; what they lack is 0."""
-    sine = next((own for own, of in SINES.items() if of == name), "")
-    return complex(values.get(name, 0.0), values.get(sine, 0.0))
+    return complex(values.get(name, 0.0), values.get(SINE_OF.get(name, ""), 0.0))
 
 
 def moments_of(values: Mapping[str, float]) -> tuple[complex, complex, complex]:
     """The moments k1, k2 and k4 of coefficients by name as phasors; what they lack is 0."""
-    first, second, fourth = (phasor_of(values, name) for name in MOMENTS)
-    return first, second, fourth
+    return phasor_of(values, K1), phasor_of(values, K2), phasor_of(values, K4)
 
 
 def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | None:
@@ -397,18 +417,18 @@ def length_by_coupling(values: Mapping[str, float], gravity: float) -> float | N
     It has the sign of k1 k2: an arm's is positive. None without gravity, k1 or k2.
     """
     first, second, _ = moments_of(values)
-    sign = np.sign(first.real * second.real)
-    return gravity * abs(first) / abs(second) * float(sign) if gravity and sign else None
+    sign = float(np.sign(first.real * second.real))
+    if not gravity or not sign:
+        return None
+    return gravity * abs(first) / abs(second) * sign
 
 
 def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
     """Pairs of a parameter of the model's columns and the joint on which it acts as `kind`."""
-    return [
-        pair
-        for term in model.terms
-        for pair in getattr(TERMS[term], kind)
-        if pair[0] in model.compiled.place
-    ]
+    pairs: list[tuple[str, int]] = []
+    for term in model.terms:
+        pairs += getattr(TERMS[term], kind)
+    return [pair for pair in pairs if pair[0] in model.compiled.place]
 
 
 def gains(model: Model, c: FloatArray) -> FloatArray:
@@ -518,8 +538,11 @@ def damping(model: Model, c: FloatArray) -> FloatArray:
     """
     rest = Motion(np.zeros((2, 1)), np.zeros((2, 1)), np.zeros((2, 1)))
     values = Values(rest, model.shape)
-    sums = [summed(model.compiled.partials[1, joint, joint], c, values) for joint in range(2)]
-    return np.array([float(np.squeeze(one)) for one in sums])
+    damped = np.empty(2)
+    for joint in range(2):
+        slope = summed(model.compiled.partials[1, joint, joint], c, values)
+        damped[joint] = float(np.squeeze(slope))
+    return damped
 
 
 def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
@@ -528,7 +551,7 @@ def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
     `c` is (q,), or (q, ...) for arms of their own at each sample.
     """
     values = Values(Motion(theta, theta, theta), model.shape)
-    M = np.empty((2, 2, *theta.shape[1:]))
+    M = np.empty((2, 2) + theta.shape[1:])
     for entry, weighted in model.compiled.inertia.items():
         M[entry] = summed(weighted, c, values)
     return M
@@ -568,12 +591,9 @@ def acceleration(
     if not by_load:
         for joint in range(2):
             left[joint] -= summed(compiled.rest[joint], c, values)
-        a, b, d, e = (summed(weighted, c, values) for weighted in compiled.inertia.values())
-        return _solved(a, b, d, e, left)
-    (inertia_of_load, rest_of_load), (inertia_beside, rest_beside) = (
-        compiled.of_load,
-        compiled.beside_load,
-    )
+        return _solved([summed(one, c, values) for one in compiled.inertia.values()], left)
+    inertia_of_load, rest_of_load = compiled.of_load
+    inertia_beside, rest_beside = compiled.beside_load
     M = [summed(weighted, c, values) for weighted in inertia_of_load]
     R = [summed(weighted, c, values) for weighted in inertia_beside]
     n = np.zeros_like(left)
@@ -586,26 +606,18 @@ def acceleration(
     signs = np.sign(left)
     for _ in range(_SIGN_TRIALS):
         D = 1 + share * signs
-        first, second = (
-            (D[0] * M[0] + R[0], D[0] * M[1] + R[1]),
-            (D[1] * M[2] + R[2], D[1] * M[3] + R[3]),
-        )
-        alpha = _solved(*first, *second, left - D * n)
-        after = np.sign(
-            np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n
-        )
+        first_row = [D[0] * M[0] + R[0], D[0] * M[1] + R[1]]
+        second_row = [D[1] * M[2] + R[2], D[1] * M[3] + R[3]]
+        alpha = _solved(first_row + second_row, left - D * n)
+        load = np.stack([M[0] * alpha[0] + M[1] * alpha[1], M[2] * alpha[0] + M[3] * alpha[1]]) + n
+        after = np.sign(load)
         if np.array_equal(after, signs):
             break
         signs = after
     return alpha
 
 
-def _solved(
-    a: FloatArray | float,
-    b: FloatArray | float,
-    c: FloatArray | float,
-    d: FloatArray | float,
-    right: FloatArray,
-) -> FloatArray:
-    """X (2, N) with [[a, b], [c, d]] x = right."""
+def _solved(matrix: Sequence[FloatArray | float], right: FloatArray) -> FloatArray:
+    """X (2, N) with [[a, b], [c, d]] x = right, of a matrix a, b, c, d."""
+    a, b, c, d = matrix
     return np.stack([d * right[0] - b * right[1], a * right[1] - c * right[0]]) / (a * d - b * c)

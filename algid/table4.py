@@ -14,20 +14,20 @@ from algid.results import Table4Row
 UNLOADED_ROWS = STAGE1_NAMES
 LOADED_ROWS = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
 UNITS = {
-    row: PARAMETER_UNITS[row.partition("+")[0]] for row in (*UNLOADED_ROWS, *LOADED_ROWS, "m_p")
+    row: PARAMETER_UNITS[row.partition("+")[0]] for row in UNLOADED_ROWS + LOADED_ROWS + ("m_p",)
 }
 """By row, in their order: that of its first constant."""
 
 
 def unloaded_rows(k: FloatArray) -> dict[str, float]:
     """The first six rows from k1 … k7 (7,)."""
-    k1, k2, k3, k4, k5, k6, _ = (float(value) for value in k)
+    k1, k2, k3, k4, k5, k6, _ = k.tolist()
     return dict(zip(UNLOADED_ROWS, (k5 + k3, k1, k3, k6, k4, k2), strict=True))
 
 
 def loaded_rows(k: FloatArray) -> dict[str, float]:
     """The next five rows from the loaded arm's constants (7,)."""
-    k1, k2, k3, k4, k5, _, _ = (float(value) for value in k)
+    k1, k2, k3, k4, k5, _, _ = k.tolist()
     return dict(zip(LOADED_ROWS, (k5 + k3, k1, k3, k4, k2), strict=True))
 
 
@@ -48,7 +48,9 @@ def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, flo
     if truth is None:
         return {}
     constants = dict(zip(CONSTANT_NAMES, truth.arm.constants().tolist(), strict=True))
-    return constants | ({"m_p": payload, "l1": truth.arm.l1, "l2": truth.arm.l2} if payload else {})
+    if not payload:
+        return constants
+    return constants | {"m_p": payload, "l1": truth.arm.l1, "l2": truth.arm.l2}
 
 
 def paper_errors(truth: Truth | None) -> dict[str, float]:
@@ -60,11 +62,13 @@ def paper_errors(truth: Truth | None) -> dict[str, float]:
     if truth.case not in case_names():
         return {}
     case = load_case(truth.case)
-    return case.paper_error_percent if case.arm == truth.arm else {}
+    if case.arm != truth.arm:
+        return {}
+    return case.paper_error_percent
 
 
 def table4(
-    found: Mapping[str, float],
+    estimates: Mapping[str, float],
     std: Mapping[str, float],
     true: Mapping[str, float],
     paper: Mapping[str, float],
@@ -72,8 +76,10 @@ def table4(
     """The twelve rows; what was not estimated, or is not known, is null."""
     rows = []
     for name, unit in UNITS.items():
-        estimate, truth = finite(found.get(name)), true.get(name)
-        error = None if estimate is None or not truth else 100 * abs(estimate / truth - 1)
+        estimate, truth = finite(estimates.get(name)), true.get(name)
+        error = None
+        if estimate is not None and truth:
+            error = 100 * abs(estimate / truth - 1)
         spread, of_paper = finite(std.get(name)), paper.get(name)
         rows.append(
             Table4Row(
@@ -96,4 +102,6 @@ def finite(value: float | None) -> float | None:
     """
     if value is None or not abs(value) <= LIMITS.largest_value:
         return None
-    return float(value) if abs(value) * LIMITS.largest_value >= 1 else 0.0
+    if abs(value) * LIMITS.largest_value < 1:
+        return 0.0
+    return float(value)

@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import islice, product
-from math import copysign, pi, remainder
+from itertools import product
+from math import ceil, copysign, pi, remainder
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ _MOST_GRIDS = 100
 _GRID = np.array(list(product((0.0, -0.5, 0.5, -1.0, 1.0), repeat=2)))  # its middle first
 _SCALES = (0.1, 400.0)  # from turns (0.16) to the motors behind large gears
 _WIDEST = 40.0  # rad: no scale is tried under which a joint would move further
-_EXACT = (180 / pi, 1 / (2 * pi), *range(2, 401))
+_EXACT = (180 / pi, 1 / (2 * pi)) + tuple(range(2, 401))
 """Scales of their own right: degrees, turns, whole gears."""
 _NEAR = 0.01  # of a scale: how near one of those it is tried for them
 
@@ -88,7 +88,7 @@ class Candidate:
     ----------
     family : Convention, without its zeros
     zero : those, in rad
-    names : of `ZEROED`, those that the log may tell
+    names : of `ZEROED`, those that the log may determine
     k : (q,), what is found for them
     covariance : (q, q), of `k`
     left : (2,), share of each recorded torque's mean square that is not explained
@@ -113,9 +113,8 @@ class Candidate:
     @cached_property
     def demands(self) -> dict[str, float]:
         """What physics demands, and how many standard deviations the log is on the right side."""
-        return _demands(
-            dict(zip(self.names, self.k.tolist(), strict=True)), self.covariance, self.speed
-        )
+        k = dict(zip(self.names, self.k.tolist(), strict=True))
+        return _demands(k, self.covariance, self.speed)
 
     @property
     def broken(self) -> dict[str, float]:
@@ -125,8 +124,9 @@ class Candidate:
     @property
     def convincing(self) -> bool:
         """Whether this is a real arm: inertias determined, no bound broken, torque explained."""
-        inertial = (self.demands[name] for name in _INERTIAL if name in self.demands)
-        return not self.broken and min(inertial) > MET and float(self.left.max()) < EXPLAINED
+        if self.broken or float(self.left.max()) >= EXPLAINED:
+            return False
+        return all(self.demands.get(name, np.inf) > MET for name in _INERTIAL)
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,9 @@ def tried_together(
 ) -> Candidate | None:
     """Candidate of one convention from the logs of one arm; None if the logs are too short."""
     log = _trials(logs, gravity)
-    return None if log is None else log.under(convention)
+    if log is None:
+        return None
+    return log.under(convention)
 
 
 def zeroed_together(
@@ -204,20 +206,31 @@ def zeroed_together(
 ) -> Candidate | None:
     """The same under the zeros that fit best, whatever those of `family`."""
     log = _trials(logs, gravity)
-    return None if log is None else log.zeroed(family)
+    if log is None:
+        return None
+    return log.zeroed(family)
 
 
 def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
-    """What tries conventions on those of the logs that may tell any."""
+    """Fits under any convention of those of the logs that are usable, and of one arm."""
     usable = [log for log in logs if log.usable]
-    usable = usable[:: -(-len(usable) // MOST_LOGS)] if usable else usable
-    if not usable or len({log.passive for log in usable}) > 1:
+    if not usable:
         return None
-    motors = [joint for joint in (0, 1) if joint + 1 != usable[0].passive]
-    if not all(any(np.any(log.tau[joint]) for log in usable) for joint in motors):
+    usable = usable[:: ceil(len(usable) / MOST_LOGS)]
+    passive = usable[0].passive
+    driven = np.zeros(2, dtype=bool)
+    if passive is not None:
+        driven[passive - 1] = True  # no motor's torque is asked for there
+    for log in usable:
+        if log.passive != passive:
+            return None
+        driven |= np.any(log.tau, axis=1)
+    if not driven.all():
         return None
     trials = _Trials(usable, gravity)
-    return trials if trials.seconds >= _SHORTEST else None
+    if trials.seconds < _SHORTEST:
+        return None
+    return trials
 
 
 def _of_a_bent_arm(judged: Judgement, log: _Trials) -> Judgement:
@@ -231,18 +244,25 @@ def _of_a_bent_arm(judged: Judgement, log: _Trials) -> Judgement:
     if not judged.alone or (best.family == AS_READ and small):
         return judged
     bent = log.bent()
-    return judged if bent is None or bent > best.score + log.apart else replace(judged, alone=False)
+    if bent is None or bent > best.score + log.apart:
+        return judged
+    return replace(judged, alone=False)
 
 
-def _judged(found: Sequence[Candidate], apart: float) -> Judgement:
-    as_read = next(one for one in found if one.family == AS_READ and one.zero == AS_READ.zero)
-    ranked = sorted(found, key=lambda one: one.score)
-    possible = list(islice((one for one in ranked if not one.broken), 2))
-    if not possible:
+def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
+    as_read = next(one for one in candidates if one.convention == AS_READ)
+    best = None
+    for candidate in sorted(candidates, key=lambda one: one.score):
+        if candidate.broken:
+            continue
+        if best is None:
+            best = candidate
+            continue
+        alone = best.convincing and candidate.score - best.score > apart
+        return Judgement(as_read, best, alone)
+    if best is None:
         return Judgement(as_read, as_read, alone=False)
-    best = possible[0]
-    alone = best.convincing and all(other.score - best.score > apart for other in possible[1:])
-    return Judgement(as_read, best, alone)
+    return Judgement(as_read, best, best.convincing)
 
 
 def seconds_of_each(count: int, longest: float = _FINE[1]) -> float:
@@ -266,14 +286,19 @@ class _Windowed:
     @property
     def seconds(self) -> float:
         """How long the logs move, in s."""
-        each = zip(self.logs, self.moving, strict=True)
-        return sum(log.theta.shape[1] * log.dt * float(kept.mean()) for log, kept in each)
+        seconds = 0.0
+        for log, kept in zip(self.logs, self.moving, strict=True):
+            seconds += log.theta.shape[1] * log.dt * float(kept.mean())
+        return seconds
 
     def summed(self, angles: Convention) -> tuple[ConventionSums, ConventionSums]:
         """Sums with the second motor in its joint, and with it at the base."""
-        pairs = [summed(angles, *log) for log in zip(self.logs, self.moving, strict=True)]
-        joint, base = (together(sums) for sums in zip(*pairs, strict=True))
-        return joint, base
+        at_joint, at_base = [], []
+        for log, kept in zip(self.logs, self.moving, strict=True):
+            joint, base = summed(angles, log, kept)
+            at_joint.append(joint)
+            at_base.append(base)
+        return together(at_joint), together(at_base)
 
 
 def _least(scores: Callable[[FloatArray], FloatArray], start: FloatArray) -> FloatArray:
@@ -301,13 +326,16 @@ class _Trials:
         self._fine = _Windowed.of(logs, *_FINE)
         self._coarse = _Windowed.of(logs, *_COARSE)
         self.seconds = self._fine.seconds
-        kept = [gravity or not PARAMETERS[name].weighs for name in COLUMNS]
         self._passive = logs[0].passive
-        self._free = np.eye(len(COLUMNS))[:, kept]
-        self._zeros = [
-            (turn, half) for half in (0.0, pi) for turn in (_QUARTERS if gravity else _QUARTERS[:1])
-        ]
-        self._names = tuple(name for name in ZEROED if gravity or not PARAMETERS[name].weighs)
+        self._names = ZEROED
+        self._free = np.eye(len(COLUMNS))
+        turns: Sequence[float] = _QUARTERS
+        if not gravity:
+            self._names = tuple(name for name in ZEROED if not PARAMETERS[name].weighs)
+            weighs = np.array([PARAMETERS[name].weighs for name in COLUMNS])
+            self._free = np.delete(self._free, weighs, axis=1)
+            turns = (0.0,)
+        self._zeros = [(turn, half) for half in (0.0, pi) for turn in turns]
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two distinct conventions differ."""
         self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
@@ -327,15 +355,15 @@ class _Trials:
         for families in _families(self._passive):
             yield from self._with_zeros(families, self._zeros)
 
-    def shifted(self, found: Sequence[Candidate]) -> Iterator[Candidate]:
+    def shifted(self, discrete: Sequence[Candidate]) -> Iterator[Candidate]:
         """Conventions of least residual when both zeros are free, with the zeros that fit best."""
-        scored = [
-            pair
-            for each in _families(self._passive)
-            for pair in zip(self._scores(each, self._fine), each, strict=True)
-        ]
-        for _, family in sorted(scored, key=lambda pair: pair[0])[:_SHIFTED]:
-            yield from self._with_free_zero(family, found)
+        families: list[Convention] = []
+        scores: list[float] = []
+        for each in _families(self._passive):
+            families += each
+            scores += self._scores(each, self._fine)
+        for place in np.argsort(scores, kind="stable")[:_SHIFTED]:
+            yield from self._with_free_zero(families[place], discrete)
 
     def scaled(self) -> Iterator[Candidate]:
         """Scales of both angles, or of one, of least residual at the log's own signs and order."""
@@ -352,19 +380,20 @@ class _Trials:
     ) -> Iterator[Candidate]:
         """Each family of the same angles and drive with each of the zeros."""
         sums = self._sums(families[0], self._fine)
-        fitted = self._solved(sums, families, np.stack([self._place(zero) for zero in zeros]))
-        scores = _sizes(np.maximum(fitted[1], LEAST)).tolist()
-        for (family, zero), c, left, covariance, score in zip(
-            product(families, zeros), *fitted, scores, strict=True
-        ):
-            yield Candidate(family, zero, self._names, c, covariance, left, score, sums.speed)
+        T = np.stack([self._place(zero) for zero in zeros])
+        c, left, covariance = self._solved(sums, families, T)
+        scores = _sizes(np.maximum(left, LEAST)).tolist()
+        for n, (family, zero) in enumerate(product(families, zeros)):
+            yield Candidate(
+                family, zero, self._names, c[n], covariance[n], left[n], scores[n], sums.speed
+            )
 
     def _with_free_zero(
-        self, family: Convention, found: Sequence[Candidate]
+        self, family: Convention, discrete: Sequence[Candidate]
     ) -> Iterator[Candidate]:
-        """The zeros that fit best, where they leave far less than those that were found."""
+        """The zeros that fit best, where they leave far less than the discrete ones."""
         (free,) = self._with_zeros([family], [self._best_zero(family)])
-        if free.score < min(one.score for one in found if one.family == family) - self.apart:
+        if free.score < min(one.score for one in discrete if one.family == family) - self.apart:
             yield free
 
     def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
@@ -377,20 +406,21 @@ class _Trials:
 
         None where one is no phase.
         """
-        free = self._solved(self._sums(AS_READ, self._fine), [AS_READ], self._free[None])
-        c = self._free @ free[0][0]
-        moments = [c[COLUMNS.index(name) :][:2] for name in MOMENTS]
-        turned = [np.arctan2(abs(sine), cosine) for cosine, sine in moments if cosine or sine]
-        return float(_sizes(free[1])[0]) if max(turned, default=0.0) <= LARGEST_PHASE else None
+        sums = self._sums(AS_READ, self._fine)
+        free, left, _ = self._solved(sums, [AS_READ], self._free[None])
+        c = self._free @ free[0]
+        places = np.array([COLUMNS.index(name) for name in MOMENTS])
+        cosine, sine = c[places], c[places + 1]  # both 0 of a moment without a column
+        if np.any(np.arctan2(np.abs(sine), cosine) > LARGEST_PHASE):
+            return None
+        return float(_sizes(left)[0])
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
         sums = self._sums(family, self._fine)
         c = self._free @ self._solved(sums, [family], self._free[None])[0][0]
-        of_one, of_two = COLUMNS.index(K4), COLUMNS.index(K1)  # each with its sine part next
-        start = np.array(
-            [np.arctan2(c[of_one + 1], c[of_one]), np.arctan2(c[of_two + 1], c[of_two])]
-        )
+        places = np.array([COLUMNS.index(K4), COLUMNS.index(K1)])  # each with its sine part next
+        start = np.arctan2(c[places + 1], c[places])
 
         def scores(zeros: FloatArray) -> FloatArray:
             T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])
@@ -418,10 +448,11 @@ class _Trials:
             around = [scale / step, scale / step**0.5, scale, scale * step**0.5, scale * step]
             scale = min(around, key=lambda scale: score(scale, self._fine))
             step = step**0.5
-        near = [whole for whole in _EXACT if abs(scale / whole - 1) < _NEAR]
-        nearest = min(near, key=lambda whole: abs(scale / whole - 1), default=scale)
-        exact = score(nearest, self._fine) < score(scale, self._fine) + self.apart
-        return _scaled_by(nearest if exact else scale, joints)
+        nearest = min(_EXACT, key=lambda whole: abs(scale / whole - 1))
+        near = abs(scale / nearest - 1) < _NEAR
+        if near and score(nearest, self._fine) < score(scale, self._fine) + self.apart:
+            scale = nearest
+        return _scaled_by(scale, joints)
 
     def _solved(
         self, sums: ConventionSums, families: Sequence[Convention], T: FloatArray
@@ -465,22 +496,18 @@ def _families(passive: int | None = None) -> Iterator[list[Convention]]:
     ):
         angles = Convention(swapped=swapped, signs=(1, sign), absolute=absolute, base=base)
         torques = product((False, True), (1, -1), (1, -1))
-        every = [
-            replace(angles, torques_swapped=swap, torque_signs=(one, two))
-            for swap, one, two in torques
-        ]
-        if passive is None:
+        every = []
+        for swap, one, two in torques:
+            signs = (one, two)
+            if passive is None or (not swap and signs[passive - 1] > 0):
+                every.append(replace(angles, torques_swapped=swap, torque_signs=signs))
+        if passive is None or not base:
             yield every
-        elif not base:
-            yield [
-                one
-                for one in every
-                if not one.torques_swapped and one.torque_signs[passive - 1] > 0
-            ]
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:
-    return Convention(scale=(scale if joints[0] else 1.0, scale if joints[1] else 1.0))
+    """Divides the angles of the joints with a 1, and leaves those with a 0."""
+    return Convention(scale=(scale ** joints[0], scale ** joints[1]))
 
 
 def _grid(travel: FloatArray) -> list[float]:
@@ -495,12 +522,9 @@ def _grid(travel: FloatArray) -> list[float]:
 
 def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> dict[str, float]:
     """What physics demands of the coefficients, in standard deviations on its right side."""
-    place = {name: number for number, name in enumerate(k)}
 
     def distance(value: float, slopes: dict[str, float]) -> float:
-        slope = np.zeros(len(k))
-        for name, share in slopes.items():
-            slope[place[name]] = share
+        slope = np.array([slopes.get(name, 0.0) for name in k])
         return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
 
     k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]
@@ -520,6 +544,6 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
     }
     if K2 not in k:
         return distances | {"k1 > 0": distance(k1, {K1: 1})}
-    first, second, fourth = (distance(k[name], {name: 1}) for name in MOMENTS)
+    first, second = distance(k1, {K1: 1}), distance(k[K2], {K2: 1})
     both = copysign(min(abs(first), abs(second)), first * second)
-    return distances | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": fourth}
+    return distances | {"k1 k2 > 0": both, "k2 > 0": second, "k4 > 0": distance(k[K4], {K4: 1})}

@@ -25,7 +25,7 @@ from algid.arm import FloatArray
 from algid.criteria import AT_REST
 from algid.estimators.conventions import Convention
 from algid.estimators.modulating_functions import OVERLAP, Windows
-from algid.model import SINES, Model
+from algid.model import SINE_OF, SINES, Model
 from algid.physics.motion import Motion
 from algid.physics.terms.coulomb import COULOMB
 from algid.physics.terms.offset import OFFSET
@@ -33,11 +33,14 @@ from algid.physics.terms.phases import PHASES
 from algid.physics.terms.rotor import ROTOR
 from algid.signals.filters import correlate, differentiator, half_length
 
-MODEL = Model(tuple(term.name for term in (COULOMB, OFFSET, ROTOR, PHASES)), coulomb_speed=0.1)
+MODEL = Model((COULOMB.name, OFFSET.name, ROTOR.name, PHASES.name), coulomb_speed=0.1)
 ZEROED = tuple(name for name in MODEL.names if name not in SINES)
-_SINE_OF = {of: sine for sine, of in SINES.items()}
-COLUMNS = tuple(one for name in ZEROED for one in (name, _SINE_OF.get(name)) if one is not None)
+COLUMNS: list[str] = []
 """The columns of `MODEL`, each sine part behind the one whose it is."""
+for _name in ZEROED:
+    COLUMNS.append(_name)
+    if _name in SINE_OF:
+        COLUMNS.append(SINE_OF[_name])
 _PLACES = [MODEL.names.index(name) for name in COLUMNS]
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
@@ -86,9 +89,8 @@ def thinned(
     """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
     width = max(1, round(1 / (rate * dt)))
     count = min(theta.shape[1], round(longest / dt)) // width
-    theta, tau = (
-        signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau)
-    )
+    theta = theta[:, : count * width].reshape(2, count, width).mean(axis=2)
+    tau = tau[:, : count * width].reshape(2, count, width).mean(axis=2)
     dt *= width
     bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
     windows = Windows(dt, WINDOW, 0.0, bandwidth)
@@ -111,13 +113,13 @@ def together(sums: Sequence[ConventionSums]) -> ConventionSums:
     """The sums of several logs of one arm."""
     weight = np.array([one.independent for one in sums])
     squares = np.array([one.speed**2 for one in sums])
-    return ConventionSums(
-        np.sum([one.gram for one in sums], axis=0),
-        np.sum([one.cross for one in sums], axis=0),
-        np.sum([one.power for one in sums], axis=0),
-        np.sqrt(weight @ squares / max(float(weight.sum()), 1e-300)),
-        float(weight.sum()),
-    )
+    gram, cross, power = sums[0].gram, sums[0].cross, sums[0].power
+    for one in sums[1:]:
+        gram = gram + one.gram
+        cross = cross + one.cross
+        power = power + one.power
+    speed = np.sqrt(weight @ squares / max(float(weight.sum()), 1e-300))
+    return ConventionSums(gram, cross, power, speed, float(weight.sum()))
 
 
 def summed(
@@ -127,29 +129,20 @@ def summed(
 
     With the second motor in its joint, and with it at the base.
     """
-    # linear without zeros
-    theta, omega = (
-        angles.angles(log.theta[:, log.reach : -log.reach]),
-        angles.angles(log.omega),
-    )
+    theta = angles.angles(log.theta[:, log.reach : -log.reach])
+    omega = angles.angles(log.omega)  # linear without zeros
     motion = Motion(theta, omega, omega)
     X = log.windows.columns(MODEL, motion)[:, _PLACES][:, :, kept]
     tau = log.tau[:, log.reach : -log.reach]
     torques = log.windows.moments(tau, log.kernels[0])[:, kept]
     speed = np.sqrt(np.mean(omega**2, axis=1))
     independent = X.shape[2] / OVERLAP
-    drives = (X, np.stack([X[0] - X[1], X[1]]))
-    sums = [
-        ConventionSums(
-            Y @ Y.swapaxes(1, 2),
-            Y @ torques.T,
-            np.sum(torques**2, axis=1),
-            speed,
-            independent,
-        )
-        for Y in drives
-    ]
-    return sums[0], sums[1]
+    power = np.sum(torques**2, axis=1)
+
+    def of_columns(Y: FloatArray) -> ConventionSums:
+        return ConventionSums(Y @ Y.swapaxes(1, 2), Y @ torques.T, power, speed, independent)
+
+    return of_columns(X), of_columns(np.stack([X[0] - X[1], X[1]]))
 
 
 def solved(
@@ -164,14 +157,15 @@ def solved(
     joint (1 or 2) is none: what is left there is a share of what acts on it, summed over the
     columns, as constants near nothing leave nothing of it.
     """
-    motorless = None if passive is None else passive - 1
-    order = np.array([[1, 0] if family.torques_swapped else [0, 1] for family in families])
+    order = np.array([(0, 1)] * len(families))
+    order[[family.torques_swapped for family in families]] = (1, 0)
     signs = np.array([family.torque_signs for family in families])
     cross = signs[:, :, None] * sums.cross[[0, 1], :, order]
     power = np.repeat(np.maximum(sums.power, _LEAST_POWER)[order], T.shape[0], axis=0)
     gram = np.tile(T.swapaxes(1, 2)[:, None] @ sums.gram @ T[:, None], (len(families), 1, 1, 1))
     aimed = np.einsum("zxi,fax->fzai", T, cross).reshape(len(power), 2, -1)
-    if motorless is not None:
+    if passive is not None:
+        motorless = passive - 1
         power[:, motorless] = power[:, 1 - motorless]
     weight = 1 / power
     ridge = 1e-12 * np.eye(T.shape[2])
@@ -183,7 +177,7 @@ def solved(
         c = np.einsum("zij,za,zaj->zi", inverse, weight, aimed)
         model = np.einsum("zi,zaij,zj->za", c, gram, c)
         squares = power - 2 * np.einsum("zai,zi->za", aimed, c) + model
-        if motorless is not None:
+        if passive is not None:
             acting = np.einsum("zaii,zi->za", gram, c**2)[:, motorless]
             power[:, motorless] = np.maximum(acting, _LEAST_POWER)
             squares[:, motorless] = model[:, motorless]

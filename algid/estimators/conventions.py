@@ -13,7 +13,7 @@ work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): its own equations are the difference o
 second joint's. Only order, relative sign, reference and scale of the angles need a pass of their
 own.
 
-**What no log can tell** (tests prove each):
+**What no log can determine** (tests prove each):
 
 - θ → −θ, τ → −τ, δ1 → π − δ1, δ2 → −δ2: the arm seen from behind. All signs flipped is the same as
   θ1 from the other horizontal, the constants are the same, and half of the conventions need not be
@@ -56,21 +56,22 @@ class Convention:
 
     def angles(self, theta: FloatArray) -> FloatArray:
         """Angles (2, N) in rad under algid's convention out of those that were read."""
-        first, second = theta[::-1] if self.swapped else theta
-        first, second = (
-            first * (self.signs[0] / self.scale[0]),
-            second * (self.signs[1] / self.scale[1]),
-        )
-        return (
-            np.stack([first, second - first if self.absolute else second])
-            + np.array(self.zero)[:, None]
-        )
+        if self.swapped:
+            theta = theta[::-1]
+        first = theta[0] * (self.signs[0] / self.scale[0])
+        second = theta[1] * (self.signs[1] / self.scale[1])
+        if self.absolute:
+            second = second - first
+        return np.stack([first, second]) + np.array(self.zero)[:, None]
 
     def torques(self, tau: FloatArray) -> FloatArray:
         """Torques (2, N) at the joints in N m out of those that were read."""
-        first, second = tau[::-1] if self.torques_swapped else tau
-        first, second = self.torque_signs[0] * first, self.torque_signs[1] * second
-        return np.stack([first + second if self.base else first, second])
+        if self.torques_swapped:
+            tau = tau[::-1]
+        first, second = self.torque_signs[0] * tau[0], self.torque_signs[1] * tau[1]
+        if self.base:
+            first = first + second
+        return np.stack([first, second])
 
     def mirrored(self) -> Convention:
         """The same arm seen from behind: another convention with the same constants."""

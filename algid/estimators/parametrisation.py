@@ -20,12 +20,12 @@ from functools import cached_property
 import numpy as np
 
 from algid.arm import FloatArray, payload_phasors
-from algid.model import DELAYS, PARAMETERS, SINES, Model
+from algid.model import DELAYS, PARAMETERS, SINE_OF, SINES, Model
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.physics.terms.rigid import K1, K2
 
 BODY_PARAMETERS = tuple(one.name for one in BODY)
-PAYLOAD_PARAMETERS = tuple(one.name for one in (*PAYLOAD, *BODY))
+PAYLOAD_PARAMETERS = tuple(one.name for one in PAYLOAD) + BODY_PARAMETERS
 # which z adds to which coefficient, and its part: the moments are phasors
 _Z_OF = {name: one.payload for name, one in PARAMETERS.items() if one.payload is not None}
 _LOADED = {name: (z, "real") for name, z in _Z_OF.items()}
@@ -58,15 +58,17 @@ class Shared:
     @cached_property
     def log_names(self) -> tuple[str, ...]:
         """Names of the coefficients of one log."""
-        return self.model.names + (DELAYS if self.delay else ())
+        if self.delay:
+            return self.model.names + DELAYS
+        return self.model.names
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the shared parameters."""
         if not self.payload:
             return self.log_names
-        own = (*(one.name for one in PAYLOAD if one.name not in self.lengths), *self.body)
-        return self.log_names + own
+        free = tuple(one.name for one in PAYLOAD if one.name not in self.lengths)
+        return self.log_names + free + self.body
 
     def physical(self, beta: FloatArray) -> tuple[float, float, complex, float]:
         """m_p, l1, the payload's place x + i y, and its inertia."""
@@ -84,8 +86,8 @@ class Shared:
         turn = 0.0
         place = self.model.compiled.place
         for name, sign in ((K2, 1.0), (K1, -1.0)):
-            sine = next((own for own, of in SINES.items() if of == name and own in place), None)
-            if sine is None or name not in place:
+            sine = SINE_OF.get(name, "")
+            if sine not in place or name not in place:
                 return 0.0, np.zeros(len(self.log_names))
             K = complex(beta[place[name]], beta[place[sine]])
             turn += sign * float(np.angle(K))

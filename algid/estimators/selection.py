@@ -21,13 +21,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
+from math import ceil
 from typing import Literal
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.hold import Hold, Lateness
-from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training, term_names
+from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import (
     CHOICES,
@@ -37,6 +38,7 @@ from algid.model import (
     SINES,
     TERMS,
     Model,
+    names_of,
     without_delay,
 )
 from algid.physics.motion import Widths
@@ -51,10 +53,14 @@ FIRST_TERMS = tuple(name for name, term in TERMS.items() if term.usual)
 _WIDTHS = np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32])  # rad/s
 _FADES = np.array([0.1, 0.3, 0.9])  # rad/s
 _NEAR = np.array([0.7, 0.84, 1.0, 1.2, 1.44])  # of a shape found before
-_SHAPED = {
-    shape.name: {name for name, term in TERMS.items() if shape.name in term.shapes}
-    for shape in fields(Widths)
-}
+
+
+def _terms_of(shape: str) -> set[str]:
+    """Names of the terms whose columns depend on a shape of friction."""
+    return {name for name, term in TERMS.items() if shape in term.shapes}
+
+
+_SHAPED = {shape.name: _terms_of(shape.name) for shape in fields(Widths)}
 _RELINEARISED = {name for name in CHOICE if not EVERY_TERM[name].linear or EVERY_TERM[name].timing}
 MOST_LOGS = 100
 """Logs of a kind, evenly spread, that are looked at."""
@@ -110,7 +116,9 @@ class Selection:
     @property
     def undecided(self) -> Lateness | None:
         """The torque's lateness, if the logs were to choose its hold and do not determine it."""
-        return self.late if self.hold_by == "logs" and self.late and not self.late.decided else None
+        if self.hold_by != "logs" or self.late is None or self.late.decided:
+            return None
+        return self.late
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +148,7 @@ class _Look:
         delay = self.settings.shift.delay + at[False][CHANGE]
         moved = replace(self, settings=self.settings.delayed(delay), at=at)
         for shape, shaped in _SHAPED.items():
-            if shaped & set(terms):
+            if not shaped.isdisjoint(terms):
                 now = getattr(self.settings.model, shape)
                 moved = moved.shaped(shape, now * _NEAR, terms)
         return moved
@@ -148,7 +156,7 @@ class _Look:
 
 def needs_shape(terms: Sequence[str]) -> bool:
     """Whether some of `terms` have a width or a speed that is to be found."""
-    return bool(set(terms) & set[str]().union(*_SHAPED.values()))
+    return any(not shaped.isdisjoint(terms) for shaped in _SHAPED.values())
 
 
 def select(
@@ -183,42 +191,50 @@ def select(
     logs = _training(unloaded, loaded)
     if not all(log.driven for log in logs):
         candidates = [term for term in candidates if term not in _OF_BOTH_TORQUES]
-    # At the constants, and at the shapes of friction, that a model of the most common terms gives.
-    look = _Look(tuple(logs), settings, {False: {}, True: {}}).shaped(
-        "coulomb_speed", _WIDTHS, FIRST_TERMS
-    )
-    at = look.grams(FIRST_TERMS).coefficients((*FIRST_TERMS, *_DELAY))
-    linear = {
-        kind: {name: c for name, c in values.items() if name != CHANGE}
-        for kind, values in at.items()
-    }
-    start = replace(look, at=linear)
-    if _SHAPED["stribeck_speed"]:
-        start = start.shaped("stribeck_speed", _FADES, (*FIRST_TERMS, *_SHAPED["stribeck_speed"]))
+    start = _start(logs, settings)
     look, fixed, before = start, tuple(kept), None
-    everything = tuple(dict.fromkeys((*candidates, *kept)))
+    everything = tuple(dict.fromkeys(tuple(candidates) + fixed))
     searches: list[_Search] = []
     for _ in range(_ROUNDS):
         grams = look.grams(everything)
-        searches.append(
-            _Search(grams, tuple(term for term in candidates if term not in fixed), fixed, absent)
-        )
+        free = tuple(term for term in candidates if term not in fixed)
+        searches.append(_Search(grams, free, fixed, absent))
         terms = searches[-1].run()
         if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
             break
         look, before = look.moved(grams, terms), terms
-        fixed = tuple(dict.fromkeys((*fixed, *(term for term in terms if term in _DELAY))))
+        for term in _DELAY:
+            if term in terms and term not in fixed:
+                fixed += (term,)
     model = replace(look.settings.model, terms=without_delay(terms))
     delayed = len(model.terms) < len(terms)
     shapes = start.settings.model
     late = grams.lateness(terms)
     if not candidates:
         return Selection(model, delayed, shapes=shapes, late=late)
-    trials = tuple(
-        searches[0 if term in _DELAY else -1].trial(term, terms, kept) for term in everything
-    )
-    chosen = Selection(model, delayed, "logs", trials, grams.held_out, shapes, late=late)
+    trials = []
+    for term in everything:
+        search = searches[-1]
+        if term in _DELAY:
+            search = searches[0]
+        trials.append(search.trial(term, terms, kept))
+    chosen = Selection(model, delayed, "logs", tuple(trials), grams.held_out, shapes, late=late)
     return _as_lag(start, look, terms, chosen)
+
+
+def _start(logs: Sequence[Training], settings: WeakSettings) -> _Look:
+    """Constants and shapes of friction that a model of the most common terms gives."""
+    look = _Look(tuple(logs), settings, {False: {}, True: {}}).shaped(
+        "coulomb_speed", _WIDTHS, FIRST_TERMS
+    )
+    at = look.grams(FIRST_TERMS).coefficients(FIRST_TERMS + _DELAY)
+    for values in at.values():
+        del values[CHANGE]
+    start = replace(look, at=at)
+    fading = tuple(_SHAPED["stribeck_speed"])
+    if fading:
+        start = start.shaped("stribeck_speed", _FADES, FIRST_TERMS + fading)
+    return start
 
 
 def lateness(
@@ -246,7 +262,7 @@ def _training(unloaded: Sequence[Source], loaded: Sequence[Source]) -> list[Trai
     """Some logs of each kind, at most `MOST_LOGS` and evenly spread, ready for the choice."""
     logs = []
     for is_loaded, sources in ((False, unloaded), (True, loaded)):
-        step = max(1, -(-len(sources) // MOST_LOGS))  # rounded up
+        step = max(1, ceil(len(sources) / MOST_LOGS))
         logs += [Training.of(source, is_loaded) for source in sources[::step]]
     return logs
 
@@ -269,15 +285,16 @@ def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) 
         return chosen
     timely = replace(look, settings=look.settings.delayed(start.settings.shift.delay))
     others = without_delay(terms)
-    if (
-        timely.grams(others).cost >= look.grams(others).cost
-    ):  # both with the torque's slope, the one shifted before
+    # both with the torque's slope, the one shifted before
+    if timely.grams(others).cost >= look.grams(others).cost:
         return chosen
-    trials = tuple(
-        replace(trial, term=_LAG[0]) if trial.term in _DELAY else trial for trial in chosen.trials
-    )
-    model = replace(chosen.model, terms=(*chosen.model.terms, *_LAG))
-    return replace(chosen, model=model, delay=False, trials=trials)
+    trials = []
+    for trial in chosen.trials:
+        if trial.term in _DELAY:
+            trial = replace(trial, term=_LAG[0])
+        trials.append(trial)
+    model = replace(chosen.model, terms=chosen.model.terms + _LAG)
+    return replace(chosen, model=model, delay=False, trials=tuple(trials))
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,23 +308,27 @@ class _Search:
 
     def evidence(self, terms: Sequence[str], beside: Sequence[str]) -> float:
         """Evidence of `terms` less its price."""
-        wald, count, stretches = self.grams.wald(terms, [*beside, *terms])
+        wald, count, stretches = self.grams.wald(terms, list(beside) + list(terms))
         price = count * (np.log(stretches) + 2 * np.log(max(2, len(self.candidates))))
         # The noise is estimated too, from as many stretches.
         return float(stretches * np.log1p(max(wald, 0.0) / stretches) - price)
 
     def gain(self, terms: Sequence[str], beside: Sequence[str]) -> float:
         """The share by which the held-out squares fall."""
-        return 1 - self.grams.held_out_squares([*beside, *terms]) / self.grams.held_out_squares(
-            beside
-        )
+        without, with_terms = self._held_out(terms, beside)
+        return 1 - with_terms / without
+
+    def _held_out(self, terms: Sequence[str], beside: Sequence[str]) -> tuple[float, float]:
+        """The held-out squares without `terms`, and with them."""
+        together = list(beside) + list(terms)
+        return self.grams.held_out_squares(beside), self.grams.held_out_squares(together)
 
     def beyond_sampling(self, terms: Sequence[str], beside: Sequence[str]) -> bool:
         """Whether the held-out squares fall by more than what the log's stamps leave open.
 
         A simulator's log has no noise, and what its integration and sampling leave is no term.
         """
-        without, with_terms = map(self.grams.held_out_squares, (beside, [*beside, *terms]))
+        without, with_terms = self._held_out(terms, beside)
         return without - with_terms > self.grams.open_squares
 
     def agreed(self, terms: Sequence[str], beside: Sequence[str]) -> bool:
@@ -316,9 +337,10 @@ class _Search:
 
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are plausible."""
-        value = self.grams.coefficients([*among, *terms])[False]
-        names = {name for term in terms for name in term_names(term)} - set(self.absent)
-        for name in names & value.keys():
+        value = self.grams.coefficients(list(among) + list(terms))[False]
+        for name in names_of(EVERY_TERM[term] for term in terms):
+            if name in self.absent or name not in value:
+                continue
             low, high = PARAMETERS[name].plausible
             if not low <= value[name] <= high:
                 return False
@@ -336,47 +358,44 @@ class _Search:
         return kept
 
     def _addition(self, kept: list[str]) -> list[str]:
-        left = [
-            term for term in self.candidates if term not in kept and _need(term) in (None, *kept)
-        ]
+        left = [term for term in self.candidates if term not in kept and _has_need(term, kept)]
         for count in range(1, _TOGETHER + 1):
-            better = [
-                (self.evidence(terms, kept), list(terms)) for terms in combinations(left, count)
-            ]
-            better = [
-                (evidence, terms)
-                for evidence, terms in better
-                if evidence > 0 and self.agreed(terms, kept)
-            ]
+            better = []
+            for terms in combinations(left, count):
+                evidence = self.evidence(terms, kept)
+                if evidence > 0 and self.agreed(terms, kept):
+                    better.append((evidence, list(terms)))
             if better:
                 return max(better)[1]
         return []
 
     def _removal(self, kept: list[str]) -> str | None:
-        needed = {_need(term) for term in kept}
-        free = [term for term in kept if term not in self.fixed and term not in needed]
+        needed = {EVERY_TERM[term].needs for term in kept}
         poor = []
-        for term in free:
+        for term in kept:
+            if term in self.fixed or term in needed:
+                continue
             others = [other for other in kept if other != term]
             evidence = self.evidence([term], others)
             if evidence <= 0 or not self.agreed([term], others):
                 poor.append((evidence, term))
-        return min(poor)[1] if poor else None
+        if not poor:
+            return None
+        return min(poor)[1]
 
     def trial(self, term: str, kept: Sequence[str], asked: Sequence[str]) -> TermTrial:
         """What became of a term, beside those that were kept."""
-        beside = [other for other in kept if other != term and _need(other) != term]
-        if term in asked:
-            return TermTrial(
-                term, True, self.gain([term], beside), self.evidence([term], beside), "asked for"
-            )
-        if _need(term) not in (None, *beside):
-            return TermTrial(term, False, 0.0, 0.0, f"left out: no meaning without {_need(term)}")
+        beside = [other for other in kept if other != term and EVERY_TERM[other].needs != term]
+        if term not in asked and not _has_need(term, beside):
+            reason = f"left out: no meaning without {EVERY_TERM[term].needs}"
+            return TermTrial(term, False, 0.0, 0.0, reason)
         gain, evidence = self.gain([term], beside), self.evidence([term], beside)
-        if term in kept:
+        if term in asked:
+            reason = "asked for"
+        elif term in kept:
             reason = "kept: predicts better what was left out, and is evident"
         elif evidence <= 0:
-            reason = "left out: the logs cannot tell it from nothing"
+            reason = "left out: not significant"
         elif gain <= 0:
             reason = "left out: predicts no better what was left out"
         elif not self.beyond_sampling([term], beside):
@@ -385,8 +404,10 @@ class _Search:
             reason = "left out: its value would contradict physics"
         else:
             reason = "left out: other terms explain the same"
-        return TermTrial(term, term in kept, gain, evidence, reason)
+        return TermTrial(term, term in kept or term in asked, gain, evidence, reason)
 
 
-def _need(term: str) -> str | None:
-    return EVERY_TERM[term].needs
+def _has_need(term: str, terms: Collection[str]) -> bool:
+    """Whether the term without which `term` has no meaning, if there is one, is among `terms`."""
+    needed = EVERY_TERM[term].needs
+    return needed is None or needed in terms

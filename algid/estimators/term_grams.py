@@ -8,12 +8,13 @@ G       Gram matrices of a log by stretch, joints weighed, the torque last  (B, 
 ======  ==================================================================  ====================
 
 Loaded logs share every coefficient with unloaded ones save k1 … k5, so that friction is one where
-both kinds tell it and no payload need be guessed. Joints weigh by the residual of all columns
+both kinds determine it and no payload need be guessed. Joints weigh by the residual of all columns
 together, log by log, whatever the sub-model, so that sub-models compare.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -27,7 +28,7 @@ from algid.estimators.hold import Lateness
 from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
-from algid.model import DELAYS, EVERY_TERM, loads_of, without_delay
+from algid.model import DELAYS, EVERY_TERM, loads_of, names_of, without_delay
 from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
 
@@ -43,11 +44,6 @@ _STAMPS = 0.01
 """Of a period: what stamps leave open at least, also in the log of a simulator."""
 CHANGE = next(iter(DELAYS), "change of the delay")
 """The column of a change of the delay."""
-
-
-def term_names(term: str) -> tuple[str, ...]:
-    """Names of the coefficients of a term, or of the delay."""
-    return EVERY_TERM[term].names
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +64,10 @@ class Training:
     @property
     def driven(self) -> bool:
         """Whether both joints have a torque."""
-        return all(any(piece.tau[joint].any() for piece in self.pieces) for joint in (0, 1))
+        moved = np.zeros(2, dtype=bool)
+        for piece in self.pieces:
+            moved |= np.any(piece.tau, axis=1)
+        return bool(moved.all())
 
     def segments(self) -> Iterable[Segment]:
         """The pieces, as a source gives them."""
@@ -100,12 +99,12 @@ class Grams:
         self, logs: Sequence[Training], settings: WeakSettings, at: Mapping[bool, Coefficients]
     ) -> None:
         self.settings = settings = replace(settings, estimate_delay=True)
-        self.names = (*settings.model.names, CHANGE)
-        loads = loads_of(settings.model)
-        self._rigid = [place for place, name in enumerate(self.names) if name in loads]
+        columns = settings.model.names
+        self.names = (*columns, CHANGE)
+        self._rigid = np.flatnonzero(np.isin(self.names, loads_of(settings.model)))
         normals, periods = [], []
         for log in logs:
-            here = np.array([at[log.loaded].get(name, 0.0) for name in settings.model.names])
+            here = np.array([at[log.loaded].get(name, 0.0) for name in columns])
             normal = normal_equations(log.segments, settings, here, log.known)
             if normal is not None:
                 normals.append((log.loaded, normal))
@@ -115,28 +114,24 @@ class Grams:
                 "no log is long enough: expected at least a second of samples without a gap"
             )
         self._dt = max(normal.dt for _, normal in normals)
-        self.kinds = {loaded for loaded, _ in normals}
+        logs_of = Counter(loaded for loaded, _ in normals)
+        self.kinds = set(logs_of)
         self._both = len(self.kinds) == 2
         self.size = len(self.names) + self._both * len(self._rigid)
         self._weigh(normals)
         of_delay = self.names.index(CHANGE)
-        self.open_squares = sum(
-            (_STAMPS * dt) ** 2 * float(gram[:, of_delay, of_delay].sum())
-            for gram, dt in zip(self._logs, periods, strict=True)
-        )
-        whole = all(
-            sum(loaded is kind for loaded, _ in normals) >= _FEWEST_LOGS for kind in self.kinds
-        )
-        self.held_out: Literal["logs", "blocks"] = "logs" if whole else "blocks"
-        parts = 1 if whole else _FOLDS
-        self._folds = np.array(
-            [
-                part.sum(axis=0)
-                for gram in self._logs
-                for part in np.array_split(gram, parts)
-                if len(part)
-            ]
-        )
+        self.open_squares = 0.0
+        for gram, dt in zip(self._logs, periods, strict=True):
+            self.open_squares += (_STAMPS * dt) ** 2 * float(gram[:, of_delay, of_delay].sum())
+        self.held_out: Literal["logs", "blocks"] = "logs"
+        parts = 1
+        if min(logs_of.values()) < _FEWEST_LOGS:
+            self.held_out = "blocks"
+            parts = _FOLDS
+        folds = []
+        for gram in self._logs:
+            folds += [part.sum(axis=0) for part in np.array_split(gram, parts) if len(part)]
+        self._folds = np.array(folds)
         self._total = self._folds.sum(axis=0)
         self._squares: dict[tuple[int, ...], float] = {}
         self._spreads: dict[
@@ -144,7 +139,7 @@ class Grams:
         ] = {}
 
     def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
-        weights: list[FloatArray] = [np.ones(2) for _ in normals]
+        weights = np.ones((len(normals), 2))
         whole = [normal.gram.sum(axis=0) for _, normal in normals]
         for _ in range(_REWEIGHTINGS):
             total = np.zeros((self.size + 1, self.size + 1))
@@ -152,20 +147,17 @@ class Grams:
                 rows = self._rows(loaded)
                 total[rows] += np.einsum("a,baxy->xy", w, normal.gram)
             p = _solved(total, np.arange(self.size))
-            weights = [
-                row_weights(gram, np.append(-p[self._places(loaded)], 1.0), normal.rows)
-                for (loaded, normal), gram in zip(normals, whole, strict=True)
-            ]
+            for place, (loaded, normal) in enumerate(normals):
+                signs = np.append(-p[self._places(loaded)], 1.0)
+                weights[place] = row_weights(whole[place], signs, normal.rows)
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
         share = 2.0 / OVERLAP
-        self._logs = [
-            self._wide(loaded, np.einsum("a,baxy->bxy", share * w, normal.gram))
-            for (loaded, normal), w in zip(normals, weights, strict=True)
-        ]
-        self.cost = -sum(
-            share * float(normal.rows @ np.log(w))
-            for (_, normal), w in zip(normals, weights, strict=True)
-        )
+        self._logs: list[FloatArray] = []
+        self.cost = 0.0
+        for (loaded, normal), w in zip(normals, weights, strict=True):
+            gram = np.einsum("a,baxy->bxy", share * w, normal.gram)
+            self._logs.append(self._wide(loaded, gram))
+            self.cost -= share * float(normal.rows @ np.log(w))
 
     def _places(self, loaded: bool) -> IntArray:
         """Where a log's coefficients stand in p."""
@@ -187,9 +179,8 @@ class Grams:
 
     def _columns(self, terms: Iterable[str], *others: str) -> IntArray:
         """Places in p of eq. (1), of `terms`, and of `others` by name."""
-        names = {name for term in terms for name in term_names(term)}.union(others)
-        names |= {name for term in ALWAYS for name in term.names}
-        return np.array(self._named(names))
+        own = names_of(EVERY_TERM[term] for term in terms)
+        return self._named(names_of(ALWAYS) + own + others)
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
         """The sub-model's coefficients by name, of unloaded (False) and of loaded logs (True).
@@ -197,11 +188,10 @@ class Grams:
         A kind of which there is no log has those of the other.
         """
         p = _solved(self._total, self._columns(terms))
-        by_kind = {
+        return {
             kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True))
-            for kind in self.kinds
+            for kind in (False, True)
         }
-        return {kind: by_kind.get(kind, next(iter(by_kind.values()))) for kind in (False, True)}
 
     def held_out_squares(self, terms: Iterable[str]) -> float:
         """Sum of squared prediction errors of moments of logs or blocks, each from the others."""
@@ -209,14 +199,11 @@ class Grams:
         key = tuple(columns.tolist())  # each sub-model is asked for beside every term that it lacks
         if key not in self._squares:
             rest = self._total - self._folds
-            p = np.einsum(
-                "nij,nj->ni",
-                scaled_pinvs(rest[:, columns[:, None], columns]),
-                rest[:, columns, -1],
-            )
+            inverse = scaled_pinvs(rest[:, columns[:, None], columns])
+            p = np.einsum("nij,nj->ni", inverse, rest[:, columns, -1])
             v = np.concatenate([-p, np.ones((len(p), 1))], axis=1)
-            own = [*columns.tolist(), -1]
-            kept = self._folds[np.ix_(range(len(p)), own, own)]
+            own = np.append(columns, -1)
+            kept = self._folds[np.ix_(np.arange(len(p)), own, own)]
             self._squares[key] = float(np.einsum("ni,nij,nj->", v, kept, v, optimize=True))
         return self._squares[key]
 
@@ -235,12 +222,13 @@ class Grams:
         if key not in self._spreads:
             self._spreads[key] = self._spread(columns)
         value, covariances, stretches = self._spreads[key]
-        names = {name for term in terms for name in term_names(term)}
+        names = names_of(EVERY_TERM[term] for term in terms)
         own = np.flatnonzero(np.isin(columns, self._named(names)))
-        solutions = [
-            float(value[own] @ scaled_pinv(S[np.ix_(own, own)]) @ value[own]) for S in covariances
-        ]
-        return min(solutions), own.size, float(stretches)
+        statistics = []
+        for S in covariances:
+            inverse = scaled_pinv(S[np.ix_(own, own)])
+            statistics.append(float(value[own] @ inverse @ value[own]))
+        return min(statistics), own.size, float(stretches)
 
     def lateness(self, terms: Iterable[str]) -> Lateness:
         """How late the torque acts in the sub-model with `terms`.
@@ -249,29 +237,26 @@ class Grams:
         """
         columns = self._columns(without_delay(terms), CHANGE)
         value, covariances, _ = self._spread(columns)
-        own = np.flatnonzero(columns == self.names.index(CHANGE))
-        variance = max(float(covariance[own[0], own[0]]) for covariance in covariances)
+        own = int(np.flatnonzero(columns == self.names.index(CHANGE))[0])
+        variance = float(np.max(covariances, axis=0)[own, own])
         # what a delay that is left out adds to the others, beside their deviations
-        rest, column = np.delete(columns, own), columns[own[0]]
+        rest, column = np.delete(columns, own), columns[own]
         _, beside, _ = self._spread(rest)
         slope = scaled_pinv(self._total[np.ix_(rest, rest)]) @ self._total[rest, column]
-        size = np.sqrt(np.max([np.diag(covariance) for covariance in beside], axis=0))
+        size = np.sqrt(np.diag(np.max(beside, axis=0)))
         return Lateness(
-            self.settings.shift.delay + float(value[own[0]]),
+            self.settings.shift.delay + float(value[own]),
             float(np.sqrt(max(variance, 0.0))),
             0.5 * self._dt,
             float(np.max(np.abs(slope) / np.maximum(size, 1e-300))),
         )
 
-    def _named(self, names: set[str]) -> list[int]:
+    def _named(self, names: Sequence[str]) -> IntArray:
         """Places in p of coefficients by name, the loaded arm's with them."""
-        basic = [place for place, name in enumerate(self.names) if name in names]
-        loaded = [
-            len(self.names) + row
-            for row, place in enumerate(self._rigid)
-            if self.names[place] in names
-        ]
-        return [*basic, *(loaded if self._both else [])]
+        wanted = np.array([name in names for name in self.names])
+        if self._both:
+            wanted = np.append(wanted, wanted[self._rigid])
+        return np.flatnonzero(wanted)
 
     def _spread(self, columns: IntArray) -> tuple[FloatArray, tuple[FloatArray, FloatArray], int]:
         """Least squares on `columns`, plain and sandwich covariance, independent stretches."""
@@ -279,17 +264,13 @@ class Grams:
         value = inverse @ self._total[columns, -1]
         meat, stretches = np.zeros_like(inverse), 0
         for gram in self._logs:
-            variance, lags = long_run_variance(
-                gram[:, columns, -1] - gram[:, columns[:, None], columns] @ value
-            )
+            scores = gram[:, columns, -1] - gram[:, columns[:, None], columns] @ value
+            variance, lags = long_run_variance(scores)
             meat += variance
             stretches += len(gram) // (lags + 1)
         stretches = max(stretches, len(columns) + 2)
-        return (
-            value,
-            (inverse, inverse @ meat @ inverse * (stretches / (stretches - len(columns)))),
-            stretches,
-        )
+        sandwich = inverse @ meat @ inverse * (stretches / (stretches - len(columns)))
+        return value, (inverse, sandwich), stretches
 
 
 def _solved(gram: FloatArray, columns: IntArray) -> FloatArray:

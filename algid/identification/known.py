@@ -9,7 +9,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.estimators.combine import Prior
-from algid.estimators.parametrisation import Shared
+from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.source import Role
 from algid.model import (
@@ -17,7 +17,7 @@ from algid.model import (
     K2,
     K3,
     K5,
-    SINES,
+    SINE_OF,
     Model,
     length_by_coupling,
     moments_of,
@@ -27,7 +27,6 @@ from algid.model import (
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
-from algid.physics.parameters import BODY, PAYLOAD
 from algid.results import Result
 from algid.settings import Settings
 from algid.signals.shift import TorqueShift
@@ -39,20 +38,21 @@ FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
 def model_of(result: Result) -> Model:
     """The torque's model behind a result.
 
-    a result that names none was made with what its settings ask for.
+    A result that names none was made with what its settings ask for.
     """
     settings = Settings.of(result.settings)
-    model = None if result.fit is None else result.fit.model
-    if model is None:
+    if result.fit is None or result.fit.model is None:
         return Model(without_delay(settings.terms), settings.gravity)
+    model = result.fit.model
     return Model(tuple(model.terms), settings.gravity, model.coulomb_speed, model.stribeck_speed)
 
 
 def shift_of(result: Result) -> TorqueShift:
     """After how long a logged torque acts: hold, and delay."""
-    delay = result.delay
-    seconds = None if delay is None else delay.estimate
-    return Settings.of(result.settings).torque_shift(seconds)
+    settings = Settings.of(result.settings)
+    if result.delay is None:
+        return settings.torque_shift(None)
+    return settings.torque_shift(result.delay.estimate)
 
 
 def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
@@ -107,30 +107,30 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     ResultError
         If one of them has no estimate.
     """
-    values = {
-        name: estimate.estimate
-        for name, estimate in {**result.parameters, **result.payload}.items()
-    }
-    for name in absent(Settings.of(result.settings).effort, model.names):
-        values[name] = 0.0
-    wanted = [*model.names, *((one.name for one in PAYLOAD) if role == "loaded" else ())]
-    values |= given_lengths(result)
-    missing = next((name for name in wanted if values.get(name) is None), None)
-    if missing is not None:
-        raise ResultError(
-            f"{file}: the result has no {missing}; identify it from logs that determine it"
-        )
-    known = {name: float(value) for name, value in values.items() if value is not None}
-    if role != "loaded":
-        return np.array([known[name] for name in model.names])
-    shared = Shared(model, payload=True, body=tuple(one.name for one in BODY if one.name in known))
-    return shared.coefficients(np.array([known[name] for name in shared.names]), loaded=True)
+    known: dict[str, float] = {}
+    for name, one in (result.parameters | result.payload).items():
+        if one.estimate is not None:
+            known[name] = one.estimate
+    known |= dict.fromkeys(absent(Settings.of(result.settings).effort, model.names), 0.0)
+    known |= given_lengths(result)
+    loaded = role == "loaded"
+    body = tuple(name for name in BODY_PARAMETERS if name in known)
+    shared = Shared(model, payload=loaded, body=body)
+    for name in shared.names:
+        if name not in known:
+            raise ResultError(
+                f"{file}: the result has no {name}; identify it from logs that determine it"
+            )
+    return shared.coefficients(np.array([known[name] for name in shared.names]), loaded)
 
 
 def given_lengths(result: Result) -> dict[str, float]:
     """The link lengths in m that the result was made with."""
-    lengths = {name: result.settings.get(name) for name in ("l1", "l2")}
-    return {name: value for name, value in lengths.items() if value is not None}
+    lengths = {}
+    for name in ("l1", "l2"):
+        if result.settings.get(name) is not None:
+            lengths[name] = result.settings[name]
+    return lengths
 
 
 def wrong_inertia(values: Mapping[str, float]) -> str | None:
@@ -153,7 +153,7 @@ def has_error_bar(result: Result, name: str) -> bool:
 def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[str]) -> FloatArray:
     """Covariance (n, n) of the parameters `names`: zero for those that are not `uncertain`."""
     covariance = np.zeros((len(names), len(names)))
-    rows = [row for row, name in enumerate(names) if name in uncertain]
+    rows = np.flatnonzero(np.isin(names, list(uncertain))).tolist()
     if rows and result.fit is not None:
         covariance[np.ix_(rows, rows)] = result.fit.covariance_of([names[row] for row in rows])
     return covariance
@@ -162,16 +162,14 @@ def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[st
 def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     """l1 = g |K1| / |K2| in m and its derivatives by the constants.
 
-    None where the result tells neither.
+    None if the result leaves it open.
 
     K = k + i ks are the moments as phasors. Of an arm whose links are straight l1 has the sign of
     k1 / k2, so that a wrong one shows.
     """
     gravity = Settings.of(result.settings).gravity
-    both = (K1, K2)
-    sines = [own for own, of in SINES.items() if of in both]
-    names = [name for name in (*both, *sines) if has_error_bar(result, name)]
-    if not gravity or not set(both) <= set(names):
+    names = [name for name in (K1, K2, SINE_OF[K1], SINE_OF[K2]) if has_error_bar(result, name)]
+    if not gravity or not {K1, K2} <= set(names):
         return None
     value = {name: result.parameters[name].estimate or 0.0 for name in names}
     l1 = length_by_coupling(value, gravity)
@@ -181,19 +179,18 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     slopes = {}
     for name, moment, power in ((K1, first, 1), (K2, second, -1)):
         slopes[name] = power * l1 * moment.real / abs(moment) ** 2
-        for sine in (own for own in sines if SINES[own] == name):
-            slopes[sine] = power * l1 * moment.imag / abs(moment) ** 2
+        slopes[SINE_OF[name]] = power * l1 * moment.imag / abs(moment) ** 2
     return l1, {name: slopes[name] for name in names}
 
 
 def first_length(result: Result) -> tuple[float, float] | None:
-    """l1 = g |K1| / |K2| and its standard deviation, in m; None where the result tells neither."""
+    """l1 = g |K1| / |K2| and its standard deviation, in m; None if the result leaves it open."""
     length_and_slopes = by_constants(result)
     if length_and_slopes is None or result.fit is None:
         return None
     l1, slopes = length_and_slopes
     covariance = result.fit.covariance_of(list(slopes))
-    slope = np.array(list(slopes.values()))
+    slope = np.fromiter(slopes.values(), dtype=np.float64)
     return l1, float(np.sqrt(slope @ covariance @ slope))
 
 
@@ -210,15 +207,14 @@ def payload_length(result: Result) -> tuple[float, float] | None:
 
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
     """Notices of given lengths that contradict the result's own, or its l1 = g k1 / k2."""
-    identified = {
-        name: (one.estimate, one.std)
-        for name, one in result.payload.items()
-        if name in ("l1", "l2")
-    }
+    identified: dict[str, tuple[float | None, float | None]] = {}
+    for name in ("l1", "l2"):
+        if name in result.payload:
+            identified[name] = (result.payload[name].estimate, result.payload[name].std)
     by_constants = first_length(result)
     if by_constants is not None:
         identified["l1"] = by_constants
-    one = []
+    notices = []
     for name, given in lengths.items():
         estimate, std = identified.get(name, (None, None))
         if estimate is None or not std:
@@ -232,5 +228,5 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
                 "estimate": estimate,
                 "std": std,
             }
-            one.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
-    return tuple(one)
+            notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
+    return tuple(notices)

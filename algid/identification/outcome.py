@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
@@ -14,11 +14,7 @@ from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit, own_estimates
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
-from algid.estimators.prediction import (
-    PredictionScore,
-    cross_validate,
-    score,
-)
+from algid.estimators.prediction import PredictionScore, cross_validate, score
 from algid.estimators.selection import Selection
 from algid.identification.by_likelihood import Predictions
 from algid.identification.predicted import prediction
@@ -53,6 +49,15 @@ class Identified:
     fit: results.FitSummary | None = None
     notices: list[Notice] = field(default_factory=list)
 
+    def distrusted(self) -> Identified:
+        """The same with no status OK left."""
+        return replace(
+            self,
+            parameters=distrusted(self.parameters),
+            loaded=distrusted(self.loaded),
+            payload=distrusted(self.payload),
+        )
+
 
 def outcome_of(
     fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection
@@ -62,35 +67,56 @@ def outcome_of(
     estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
     estimates |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
     estimates = with_significance(estimates)
-    gone = {*fit.absent, *absent(settings.effort, CONSTANT_NAMES)}
-    estimates = {name: one for name, one in estimates.items() if name not in gone}
-    payload = {name: estimates.pop(name) for name in PAYLOAD_PARAMETERS if name in estimates}
+    gone = set(fit.absent) | set(absent(settings.effort, CONSTANT_NAMES))
+    parameters, payload = {}, {}
+    for name, one in estimates.items():
+        if name in gone:
+            continue
+        if name in PAYLOAD_PARAMETERS:
+            payload[name] = one
+        else:
+            parameters[name] = one
     rows, stds = table_rows(fit)
-    held = [name for name in LOADED_ROWS if not gone & set(_LOADED[name])]
-    combined = {name: unknown(TABLE_UNITS[name]) for name in held if survey.loaded}
-    for name in combined.keys() & rows.keys():
-        status = "OK" if fit.converged else "NOT_CONVERGED"
-        combined[name] = estimate(
-            rows[name], stds[name], fit.quantile * stds[name], TABLE_UNITS[name], status
-        )
+    combined = {}
+    if survey.loaded:
+        combined = _loaded_rows(fit, rows, stds, gone)
     summary = fit_summary(fit, predictions, survey, settings, chosen)
-    if is_implausible(summary):
-        estimates, combined, payload = (
-            distrusted(group) for group in (estimates, combined, payload)
-        )
-    notices = [*fit_warnings(fit)]
+    notices = list(fit_warnings(fit))
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("NO_CROSS_VALIDATION"))
-    return Identified(
-        parameters=estimates,
+    outcome = Identified(
+        parameters=parameters,
         loaded=combined,
         payload=payload,
         rows=rows,
         estimator=fit.estimator,
         stds=stds,
         fit=summary,
-        notices=[*notices, *fit_notes(summary)],
+        notices=notices + list(fit_notes(summary)),
     )
+    if is_implausible(summary):
+        return outcome.distrusted()
+    return outcome
+
+
+def _loaded_rows(
+    fit: Fit, rows: Mapping[str, float], stds: Mapping[str, float], gone: set[str]
+) -> dict[str, Estimate]:
+    """Estimates of the loaded arm's rows of Table 4, save those with a constant that is `gone`."""
+    status = "OK"
+    if not fit.converged:
+        status = "NOT_CONVERGED"
+    combined = {}
+    for name in LOADED_ROWS:
+        unit = TABLE_UNITS[name]
+        if not gone.isdisjoint(_LOADED[name]):
+            continue
+        if name in rows:
+            half = fit.quantile * stds[name]
+            combined[name] = estimate(rows[name], stds[name], half, unit, status)
+        else:
+            combined[name] = unknown(unit)
+    return combined
 
 
 def is_implausible(summary: results.FitSummary) -> bool:
@@ -101,21 +127,20 @@ def is_implausible(summary: results.FitSummary) -> bool:
     torque that hardly varies leaves R² nothing to explain, nor does a joint that is hardly driven;
     there the residual has to be a tenth of what acts on the joint at least.
     """
-    if any(
-        bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND
-        for bound in summary.broken_bounds
-    ):
-        return True
+    for bound in summary.broken_bounds:
+        if bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND:
+            return True
     judged = summary.cross_validation or summary.residual
     return judged is not None and bool(judged.unexplained(least=0.0))
 
 
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
     """The estimates with no status OK left."""
-    return {
-        name: one.model_copy(update={"status": Status.IMPLAUSIBLE}) if one.usable else one
-        for name, one in group.items()
-    }
+    changed = dict(group)
+    for name, one in group.items():
+        if one.usable:
+            changed[name] = one.model_copy(update={"status": Status.IMPLAUSIBLE})
+    return changed
 
 
 def _estimates(
@@ -129,7 +154,8 @@ def _estimates(
 
     Without `statuses`, those whose deviation is infinite are not identifiable.
     """
-    statuses = statuses or ["OK" if np.isfinite(std) else "NOT_IDENTIFIABLE" for std in stds]
+    if not statuses:
+        statuses = np.where(np.isfinite(stds), "OK", "NOT_IDENTIFIABLE").tolist()
     return {
         name: estimate(value, std, quantile * std, UNITS[name], status)
         for name, value, std, status in zip(names, values, stds, statuses, strict=True)
@@ -154,16 +180,15 @@ def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
 
     An inertia or a length is never zero.
     """
-    return {
-        name: one.model_copy(update={"status": Status.NOT_SIGNIFICANT})
-        if one.status is Status.OK and name not in NEVER_ZERO and _holds_zero(one)
-        else one
-        for name, one in group.items()
-    }
+    changed = dict(group)
+    for name, one in group.items():
+        if one.status is Status.OK and name not in NEVER_ZERO and _holds_zero(one):
+            changed[name] = one.model_copy(update={"status": Status.NOT_SIGNIFICANT})
+    return changed
 
 
-def _holds_zero(found: Estimate) -> bool:
-    low, high = found.ci95 or (None, None)
+def _holds_zero(one: Estimate) -> bool:
+    low, high = one.ci95 or (None, None)
     return low is not None and high is not None and low <= 0 <= high
 
 
@@ -174,11 +199,13 @@ def unknown(unit: str) -> Estimate:
     )
 
 
-# of which constants each row of Table 4 is the sum; loaded ones hold the payload's share
-_ROWS, _LOADED = (
-    {row: [name for name in row.split("+") if name in CONSTANT_NAMES] for row in rows}
-    for rows in (UNLOADED_ROWS, LOADED_ROWS)
-)
+def _constants_in(row: str) -> list[str]:
+    """The constants of whose sum a row of Table 4 is; a loaded one holds the payload's share."""
+    return [name for name in row.split("+") if name in CONSTANT_NAMES]
+
+
+_ROWS = {row: _constants_in(row) for row in UNLOADED_ROWS}
+_LOADED = {row: _constants_in(row) for row in LOADED_ROWS}
 
 
 def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
@@ -188,24 +215,26 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
     """
     rows: dict[str, float] = {}
     stds: dict[str, float] = {}
-    lost = {
-        name
-        for name, status in zip(fit.names, fit.status, strict=True)
-        if status == "NOT_IDENTIFIABLE"
-    }
-    for loaded in (False, True) if fit.shared.payload else (False,):
+    kinds = [(False, _ROWS)]
+    if fit.shared.payload:
+        kinds.append((True, _LOADED))
+    lost = [place for place, status in enumerate(fit.status) if status == "NOT_IDENTIFIABLE"]
+    unusable = {fit.names[place] for place in lost}
+    for loaded, constants_of in kinds:
         jacobian = fit.shared.jacobian(fit.values, loaded)
         coefficients = fit.shared.coefficients(fit.values, loaded)
-        for name, constants in (_LOADED if loaded else _ROWS).items():
-            if set(constants) & set(fit.absent):
+        for name, constants in constants_of.items():
+            weight = np.isin(fit.shared.log_names, constants).astype(np.float64)
+            has_columns = weight.sum() == len(constants)
+            if name in unusable or not has_columns or not set(constants).isdisjoint(fit.absent):
                 continue
-            weight = np.array([float(one in constants) for one in fit.shared.log_names])
-            spread = fit.spread(weight @ jacobian) if weight.sum() == len(constants) else np.inf
-            if np.isfinite(spread) and name not in lost:
+            spread = fit.spread(weight @ jacobian)
+            if np.isfinite(spread):
                 rows[name], stds[name] = float(weight @ coefficients), spread
-    if fit.shared.payload and np.isfinite(fit.std[fit.names.index("m_p")]):
-        rows["m_p"] = float(fit.values[fit.names.index("m_p")])
-        stds["m_p"] = float(fit.std[fit.names.index("m_p")])
+    if fit.shared.payload:
+        place = fit.names.index("m_p")
+        if np.isfinite(fit.std[place]):
+            rows["m_p"], stds["m_p"] = float(fit.values[place]), float(fit.std[place])
     return rows, stds
 
 
@@ -214,37 +243,18 @@ def fit_summary(
 ) -> results.FitSummary:
     """The statistical part of a result."""
     residual, crossed = _predicted(fit, predictions, survey, settings)
-    lost, tests, repeated = np.isinf(fit.std), fit.whiteness, repeatability(fit)
-    there = [place for place, name in enumerate(fit.names) if name not in fit.absent]
-    noise, endogeneity = {}, {}
-    if fit.noise:
-        levels = np.sqrt(np.mean(np.square([[*one.theta, *one.tau] for one in fit.noise]), axis=0))
-        noise = dict(zip(("theta1", "theta2", "tau1", "tau2"), levels.tolist(), strict=True))
-    if fit.endogeneity is not None:
-        # as many coefficients were looked at as a log has (Bonferroni)
-        p_value = chance(fit.endogeneity, len(fit.shared.log_names))
-        endogeneity["largest"] = results.Endogeneity(
-            statistic=fit.endogeneity, p_value=p_value, endogenous=p_value < LEVEL
-        )
+    cross_validation = None
+    if crossed is not None:
+        cross_validation = prediction(crossed)
+    names, covariance = _covariance(fit)
     return results.FitSummary(
-        noise=noise,
-        covariance_names=[fit.names[place] for place in there],
-        covariance=[
-            [finite(value) for value in row]
-            for row in np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
-        ],
+        noise=_noise(fit),
+        covariance_names=names,
+        covariance=covariance,
         intervals=fit.intervals,
         iterations=fit.iterations,
         converged=fit.converged,
-        whiteness={
-            f"tau{joint + 1}": results.WhitenessTest(
-                white=tests.joint_white[joint],
-                p_value=finite(float(tests.p_value[joint])),
-                lag1_correlation=float(tests.lag1[joint]),
-            )
-            for joint in range(2)
-            if tests is not None
-        },
+        whiteness=_whiteness(fit),
         unidentifiable=[one.text for one in fit.unidentifiable],
         model=results.TorqueModel(
             terms=list(chosen.model.terms),
@@ -256,28 +266,85 @@ def fit_summary(
         ),
         terms=_terms(fit, chosen),
         torque_hold=_torque_hold(chosen),
-        broken_bounds=[
-            results.Bound(
-                bound=b.bound,
-                value=b.value,
-                distance_sigma=None if fit.beyond_errors else b.distance,
-            )
-            for b in broken_bounds(fit)
-            if b.distance is None or b.distance > fit.quantile  # else its 95 % interval keeps it
-        ],
-        endogeneity=endogeneity,
+        broken_bounds=_bounds(fit),
+        endogeneity=_endogeneity(fit),
         by_log=[
             _estimates(fit.shared.log_names, own.values, own.std, fit.quantile)
             for own in own_estimates(fit)
         ],
         residual=prediction(residual),
-        cross_validation=None if crossed is None else prediction(crossed),
-        repeatability=None
-        if repeated is None
-        else results.Repeatability(
-            masses=repeated.masses.tolist(), std=repeated.std, ci95=repeated.ci95
-        ),
+        cross_validation=cross_validation,
+        repeatability=_repeatability(fit),
         torque_gain=_torque_gain(fit, settings.payload_mass),
+    )
+
+
+def _noise(fit: Fit) -> dict[str, float]:
+    """Standard deviations of angles and torques, root mean squares over the logs."""
+    if not fit.noise:
+        return {}
+    levels = [np.append(one.theta, one.tau) for one in fit.noise]
+    level = np.sqrt(np.mean(np.square(levels), axis=0))
+    return dict(zip(("theta1", "theta2", "tau1", "tau2"), level.tolist(), strict=True))
+
+
+def _covariance(fit: Fit) -> tuple[list[str], list[list[float | None]]]:
+    """Names of the parameters that the torque holds, and their covariance."""
+    there = [place for place, name in enumerate(fit.names) if name not in fit.absent]
+    lost = np.isinf(fit.std)
+    covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
+    known = [[finite(value) for value in row] for row in covariance]
+    return [fit.names[place] for place in there], known
+
+
+def _whiteness(fit: Fit) -> dict[str, results.WhitenessTest]:
+    """The tests of both joints' residuals; empty where none was made."""
+    tests = fit.whiteness
+    if tests is None:
+        return {}
+    by_joint = {}
+    for joint in range(2):
+        by_joint[f"tau{joint + 1}"] = results.WhitenessTest(
+            white=tests.joint_white[joint],
+            p_value=finite(float(tests.p_value[joint])),
+            lag1_correlation=float(tests.lag1[joint]),
+        )
+    return by_joint
+
+
+def _bounds(fit: Fit) -> list[results.Bound]:
+    """Bounds of physics that the estimates break beyond their 95 % intervals."""
+    bounds = []
+    for broken in broken_bounds(fit):
+        distance = broken.distance
+        if distance is not None and not distance > fit.quantile:
+            continue
+        if fit.beyond_errors:
+            distance = None
+        bounds.append(
+            results.Bound(bound=broken.bound, value=broken.value, distance_sigma=distance)
+        )
+    return bounds
+
+
+def _endogeneity(fit: Fit) -> dict[str, results.Endogeneity]:
+    """The largest disagreement of instruments and least squares; empty where it was not tested."""
+    statistic = fit.endogeneity
+    if statistic is None:
+        return {}
+    # as many coefficients were looked at as a log has (Bonferroni)
+    p_value = chance(statistic, len(fit.shared.log_names))
+    test = results.Endogeneity(statistic=statistic, p_value=p_value, endogenous=p_value < LEVEL)
+    return {"largest": test}
+
+
+def _repeatability(fit: Fit) -> results.Repeatability | None:
+    """Scatter of the payload's mass over the loaded logs; None of fewer than it takes."""
+    repeated = repeatability(fit)
+    if repeated is None:
+        return None
+    return results.Repeatability(
+        masses=repeated.masses.tolist(), std=repeated.std, ci95=repeated.ci95
     )
 
 
@@ -294,9 +361,8 @@ def _predicted(
             own += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
     if not settings.cross_validate:
         return own, None
-    unloaded, loaded = (
-        [partial(survey.segments, log) for log in kind] for kind in (survey.unloaded, survey.loaded)
-    )
+    unloaded = [partial(survey.segments, log) for log in survey.unloaded]
+    loaded = [partial(survey.segments, log) for log in survey.loaded]
     return own, cross_validate(fit, unloaded, loaded, settings.torque_shift())
 
 
@@ -304,14 +370,18 @@ def _expected(fit: Fit, chosen: Selection) -> list[str]:
     """Coefficients of terms that were not chosen: each is what the logs and a prior agree on."""
     if fit.shrinkage is not None:
         return list(fit.shrinkage.names)
-    return [name for name in DELAYS if name in fit.names and chosen.undecided is not None]
+    if chosen.undecided is None:
+        return []
+    return [name for name in DELAYS if name in fit.names]
 
 
 def _torque_hold(chosen: Selection) -> results.TorqueHold:
-    """What was asked of the torque's hold, what was used, and what the logs tell."""
-    late = chosen.late if chosen.hold_by == "logs" else None
-    asked: Literal["auto", "foh", "zoh"] = chosen.hold if chosen.hold_by == "settings" else "auto"
-    if late is None:
+    """What was asked of the torque's hold, what was used, and what the logs show."""
+    asked: Literal["auto", "foh", "zoh"] = "auto"
+    if chosen.hold_by == "settings":
+        asked = chosen.hold
+    late = chosen.late
+    if late is None or chosen.hold_by != "logs":
         return results.TorqueHold(asked=asked, used=chosen.hold)
     return results.TorqueHold(
         asked=asked,
@@ -326,7 +396,7 @@ def _torque_hold(chosen: Selection) -> results.TorqueHold:
 
 
 def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
-    """What the logs said of each term they chose from, or of those that were given."""
+    """Worth of each term that the logs chose from, or of those that were given."""
     if not chosen.trials:
         return [
             results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned)

@@ -9,7 +9,7 @@ slope   ∂a/∂β                                  (Q,)      mixed
 ======  =====================================  ========  =======
 
 With centres of mass turned by δ off the lines and zeros off by ε: arg K2 − arg K1 = ε1, and arg K1
-= δ2 + ε2, of which no torque tells the parts. arg K4 − ε1 is where the load of joint 1 lies that
+= δ2 + ε2, whose parts no torque separates. arg K4 − ε1 is where the load of joint 1 lies that
 turns with link 1.
 """
 
@@ -20,7 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.diagnostics import bent
 from algid.estimators.fit import Fit
-from algid.model import K1, K2, K4, SINES, phasor
+from algid.model import K1, K2, K4, SINE_OF, SINES, phasor
 from algid.notices import Notice
 
 
@@ -30,7 +30,9 @@ def phase_note(fit: Fit) -> Notice | None:
     A shrunk fit has every term: there the links are straight where the sine parts are together
     consistent with nothing.
     """
-    if not set(SINES) & set(fit.names) or (fit.shrinkage is not None and not bent(fit)):
+    if not set(SINES) & set(fit.names):
+        return None
+    if fit.shrinkage is not None and not bent(fit):
         return None
     second, of_second = _argument(fit, K1)
     numbers = {"second": _in_degrees(fit, second, of_second)}
@@ -40,18 +42,17 @@ def phase_note(fit: Fit) -> Notice | None:
         first, of_first = whole - second, of_whole - of_second
         numbers["first"] = _in_degrees(fit, first, of_first)
         numbers["load"] = _in_degrees(fit, load - first, of_load - of_first)
-    code = "PHASES" if "first" in numbers else "PHASE"
-    return Notice(code, numbers=numbers, note=True)
+        return Notice("PHASES", numbers=numbers, note=True)
+    return Notice("PHASE", numbers=numbers, note=True)
 
 
 def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
     """Argument of the moment `name` and its slope (Q,)."""
     K = phasor(fit.shared.model, fit.values[: len(fit.shared.model.names)], name)
     slope = np.zeros(len(fit.names))
-    sine = next(own for own, of in SINES.items() if of == name)
     square = max(abs(K) ** 2, 1e-300)
     slope[fit.names.index(name)] = -K.imag / square
-    slope[fit.names.index(sine)] = K.real / square
+    slope[fit.names.index(SINE_OF[name])] = K.real / square
     return float(np.angle(K)), slope
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import PurePath
 
 from algid import __version__
-from algid.identification.outcome import Identified, distrusted
+from algid.identification.outcome import Identified
 from algid.identification.survey import Survey
+from algid.log import Truth
 from algid.notices import Notice, merged
 from algid.results import Result
 from algid.settings import Settings
@@ -20,43 +20,36 @@ A time base that is too short by the samples it lacks falsifies accelerations by
 """
 
 
-def _said_of_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
-    """Codes of checks of single logs that the fit of all of them says better."""
-    phases = any(one.code in ("PHASES", "PHASE") for one in outcome.notices)
-    weightless = settings.effort is not None
-    return (*(("ZERO_OFFSET",) * phases), *(("GRAVITY_COMPENSATED",) * weightless))
+def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
+    """Codes of checks of single logs that the fit of all of them makes more precisely."""
+    codes = []
+    if any(one.code in ("PHASES", "PHASE") for one in outcome.notices):
+        codes.append("ZERO_OFFSET")
+    if settings.effort is not None:
+        codes.append("GRAVITY_COMPENSATED")
+    return tuple(codes)
 
 
 def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
     """The result of `outcome` on a survey's logs, the first log first."""
     truth = survey.logs[0].origin.truth
-    payload = next(
-        (log.origin.truth.payload if log.origin.truth else None for log in survey.loaded), None
-    )
-    first, *others = [survey.summary(log) for log in survey.logs]
-    noticed = [
-        (log, notice)
-        for log in survey.logs
-        for notice in survey.notices(log)
-        if notice.code not in _said_of_fit(outcome, settings)
-    ]
-    # the paths stand among the logs
-    of_logs = [notice.of(PurePath(log.name).name) for log, notice in noticed]
-    others_arms = [
-        Notice("OTHER_ARM", numbers={"first": survey.logs[0].name}, logs=(log.name,))
-        for log in survey.logs
-        if truth and log.origin.truth and log.origin.truth.arm != truth.arm
-    ]
-    if any(
-        one.code in CONTRADICTED and one.code not in log.origin.reading.accepted
-        for log, one in noticed
-    ):
-        outcome = replace(
-            outcome,
-            parameters=distrusted(outcome.parameters),
-            loaded=distrusted(outcome.loaded),
-            payload=distrusted(outcome.payload),
-        )
+    payload = None
+    if survey.loaded and survey.loaded[0].origin.truth:
+        payload = survey.loaded[0].origin.truth.payload
+    replaced = _replaced_by_fit(outcome, settings)
+    of_logs: list[Notice] = []
+    lost = contradicted = False
+    for log in survey.logs:
+        for notice in survey.notices(log):
+            if notice.code in replaced:
+                continue
+            of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
+            lost |= notice.lossy
+            if notice.code in CONTRADICTED and notice.code not in log.origin.reading.accepted:
+                contradicted = True
+    if contradicted:
+        outcome = outcome.distrusted()
+    summaries = [survey.summary(log) for log in survey.logs]
     return Result(
         version=__version__,
         estimator=outcome.estimator or settings.estimator,
@@ -68,8 +61,19 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
         truth=true_parameters(truth, payload),
         fit=outcome.fit,
         settings=settings.as_json(),
-        log=first,
-        more_logs=others,
-        data_lost=any(notice.lossy for _, notice in noticed),
-        notices=[*merged(of_logs), *others_arms, *outcome.notices],
+        log=summaries[0],
+        more_logs=summaries[1:],
+        data_lost=lost,
+        notices=list(merged(of_logs)) + _other_arms(survey, truth) + outcome.notices,
     )
+
+
+def _other_arms(survey: Survey, truth: Truth | None) -> list[Notice]:
+    """A notice of each synthetic log that another arm than the first log's made."""
+    notices = []
+    for log in survey.logs:
+        own = log.origin.truth
+        if truth and own and own.arm != truth.arm:
+            numbers = {"first": survey.logs[0].name}
+            notices.append(Notice("OTHER_ARM", numbers=numbers, logs=(log.name,)))
+    return notices

@@ -1,9 +1,9 @@
-"""What a validation found, as tables and as JSON."""
+"""How well a result predicts logs, as tables and as JSON."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,25 +48,21 @@ class Validated:
     @property
     def predictions(self) -> dict[str, TorquePrediction | None]:
         """The prediction of each log, then of all."""
-        return {**self.logs, EVERY: self.total}
+        return self.logs | {EVERY: self.total}
 
     @property
     def simulated(self) -> dict[str, list[dict[str, Any]]]:
         """By log, then of all, a row each horizon; empty where nothing was simulated."""
         if self.simulation is None:
             return {}
-        every = {**self.simulation.logs, EVERY: self.simulation.total}
+        every = self.simulation.logs | {EVERY: self.simulation.total}
         return {name: _rows(one) for name, one in every.items()}
 
     def as_json(self) -> str:
         """All of it as the text of a JSON file."""
-        predictions = {
-            name: None if one is None else one.model_dump(mode="json")
-            for name, one in self.predictions.items()
-        }
         content: dict[str, Any] = {
-            "logs": predictions,
-            "total": predictions.pop(EVERY),
+            "logs": {name: _as_json(one) for name, one in self.logs.items()},
+            "total": _as_json(self.total),
             "over": self.over,
         }
         if self.simulated:
@@ -81,25 +77,29 @@ class Validated:
 
     def _called(self) -> dict[str, str]:
         """What tables call the logs: their files' names where those tell them apart."""
-        short = {name: file_name(name) for name in self.logs}
-        apart = len(set(short.values())) == len(short)
-        return {
-            **(short if apart else {name: visible(name) for name in self.logs}),
-            EVERY: EVERY,
-        }
+        called = {name: file_name(name) for name in self.logs}
+        if len(set(called.values())) < len(called):
+            called = {name: visible(name) for name in self.logs}
+        return called | {EVERY: EVERY}
 
     def _predicted(self) -> Table:
         rows: list[tuple[str, ...]] = []
         called = self._called()
         for name, one in self.predictions.items():
             if one is None:
-                rows.append((called[name], "too short", *[ABSENT] * 3))
+                rows.append((called[name], "too short", ABSENT, ABSENT, ABSENT))
                 continue
-            for joint, figures in enumerate(zip(one.rmse, one.nrmse, one.r2, strict=True), start=1):
-                rows.append((called[name], str(joint), *(significant(f, 4) for f in figures)))
-        note = "" if self.total is None else f"Filter: {self.total.filter}."
-        if self.total is not None and (states := by_state(self.total)):
-            note += f" RMSE of all logs: {states}."
+            for joint in range(2):
+                rmse = significant(one.rmse[joint], 4)
+                nrmse = significant(one.nrmse[joint], 4)
+                r2 = significant(one.r2[joint], 4)
+                rows.append((called[name], str(joint + 1), rmse, nrmse, r2))
+        note = ""
+        if self.total is not None:
+            note = f"Filter: {self.total.filter}."
+            states = by_state(self.total)
+            if states:
+                note += f" RMSE of all logs: {states}."
         return _table(
             "Torque prediction", ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²"), rows, note
         )
@@ -109,11 +109,13 @@ class Validated:
         called = self._called()
         for name, horizons in self.simulated.items():
             for row in horizons:
+                horizon, starts = f"{row['horizon']:g}", str(row["starts"])
                 for joint in range(2):
-                    pair = [row[kind][joint] for kind in ("rmse", "moved")]
-                    known = [_number(one) if row["starts"] else ABSENT for one in pair]
-                    place = (f"{row['horizon']:g}", str(row["starts"]), str(joint + 1))
-                    rows.append((called[name], *place, *known))
+                    rmse = moved = ABSENT
+                    if row["starts"]:
+                        rmse = _number(row["rmse"][joint])
+                        moved = _number(row["moved"][joint])
+                    rows.append((called[name], horizon, starts, str(joint + 1), rmse, moved))
         headings = ("Log", "Horizon, s", "States", "Joint", "RMSE, rad", "Moved, rad")
         return _table("Angles of the arm simulated forward", headings, rows)
 
@@ -121,22 +123,40 @@ class Validated:
 def _table(
     title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]], note: str = ""
 ) -> Table:
-    columns = (Column(headings[0], "name"), *(Column(one, "number") for one in headings[1:]))
-    return Table(title, columns, tuple(rows), note)
+    columns = [Column(headings[0], "name")]
+    columns += [Column(one, "number") for one in headings[1:]]
+    return Table(title, tuple(columns), tuple(rows), note)
+
+
+def _as_json(one: TorquePrediction | None) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    return one.model_dump(mode="json")
 
 
 def _rows(one: RolloutScore) -> list[dict[str, Any]]:
     """A horizon a row; None where there is no start, or where the simulation runs away."""
+    rmse, moved = one.rmse, one.distance
+    rows = []
+    for place, horizon in enumerate(HORIZONS):
+        rows.append(
+            {
+                "horizon": horizon,
+                "starts": int(one.count[place]),
+                "rmse": [_finite(value) for value in rmse[place]],
+                "moved": [_finite(value) for value in moved[place]],
+            }
+        )
+    return rows
 
-    def numbers(pair: Iterable[float]) -> list[float | None]:
-        return [float(value) if np.isfinite(value) else None for value in pair]
 
-    rows = zip(HORIZONS, one.count.tolist(), one.rmse, one.distance, strict=True)
-    return [
-        {"horizon": horizon, "starts": int(count), "rmse": numbers(rmse), "moved": numbers(moved)}
-        for horizon, count, rmse, moved in rows
-    ]
+def _finite(value: float) -> float | None:
+    if not np.isfinite(value):
+        return None
+    return float(value)
 
 
 def _number(value: float | None) -> str:
-    return "without bounds" if value is None else f"{value:.4g}"
+    if value is None:
+        return "without bounds"
+    return f"{value:.4g}"

@@ -13,9 +13,9 @@ import pytest
 from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.selection import CHOICE, _lowest, select
-from algid.estimators.term_grams import Grams, Training, term_names
+from algid.estimators.term_grams import Grams, Training
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import Model
+from algid.model import EVERY_TERM, Model, names_of
 from algid.signals.segments import Segment
 
 from .conftest import Bench
@@ -156,7 +156,7 @@ def test_a_term_that_is_there_predicts_what_was_left_out_and_is_far_from_nothing
     )
 
     def squares(terms: tuple[str, ...]) -> float:
-        asked = {name for term in terms for name in term_names(term)}
+        asked = set(names_of(EVERY_TERM[term] for term in terms))
         kept = [n for n, name in enumerate(grams.names) if name[0] == "k" or name in asked]
         G = grams._total
         own = G[np.ix_(kept, kept)]
