@@ -1,4 +1,4 @@
-"""What tells that estimates are wrong: bounds of physics, terms without worth, logs of another arm.
+"""Signs of wrong estimates: bounds of physics, terms without worth, logs of another arm.
 
 Physics demands a positive definite mass matrix, no negative friction, mass, inertia k5 or length.
 M(θ) is positive definite for every θ2 where M22 > 0 and det M > 0; the determinant is concave in
@@ -53,12 +53,7 @@ _NUDGE = 1e-6  # of a parameter's size: step of the differences
 FAR_BEYOND = sigmas(sides=1)
 """Standard deviations past a bound of physics beyond which chance is no explanation; one-sided."""
 # of a parameter's size: distance kept from a bound, until the solver keeps it
-_INSIDE = (
-    1e-6,
-    1e-5,
-    1e-4,
-    1e-3,
-)
+_INSIDE = (1e-6, 1e-5, 1e-4, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -102,9 +97,9 @@ def _parameter(place: int, beta: FloatArray) -> float:
 def _mass(shared: Shared, beta: FloatArray) -> tuple[float, float, float]:
     """M22 and the determinant of M at θ2 = 0 and π."""
     c = beta[: len(shared.model.names)]
-    bent = -np.angle(phasor(shared.model, c, K1)) if K1 in shared.model.names else 0.0
-    # k1 itself may be negative: a convention of θ2
-    bent = bent if abs(bent) <= np.pi / 2 else bent + np.pi
+    bent = -float(np.angle(phasor(shared.model, c, K1)))
+    if abs(bent) > np.pi / 2:
+        bent += np.pi  # k1 itself may be negative: a convention of θ2
     poses = np.array([[0.0, 0.0], [bent, bent + np.pi]])
     (m11, m12), (m21, m22) = inertia(shared.model, c, poses)
     det = m11 * m22 - m12 * m21
@@ -118,9 +113,10 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     what the model lacks.
     """
     size = sizes(fit.names, fit.values)
-    shrunk = () if fit.shrinkage is None else fit.shrinkage.names
-    spreads = zip(fit.names, fit.std, strict=True)
-    unknown = {name for name, std in spreads if np.isinf(std)} | {*shrunk, *fit.absent}
+    unknown = {fit.names[place] for place in np.flatnonzero(np.isinf(fit.std))}
+    unknown |= set(fit.absent)
+    if fit.shrinkage is not None:
+        unknown |= set(fit.shrinkage.names)
     open_ones = {f"{name} >= 0" for name in unknown}
     if {K1, K2} & set(fit.absent):
         open_ones.add("k1 k2 >= 0")
@@ -133,7 +129,10 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
             continue
         slope = _slope(bound, fit.values, size)
         deviation = float(np.sqrt(max(0.0, float(slope @ fit.covariance @ slope))))
-        broken.append(BrokenBound(name, value, -value / deviation if deviation > 0 else None))
+        distance = None
+        if deviation > 0:
+            distance = -value / deviation
+        broken.append(BrokenBound(name, value, distance))
     return broken
 
 
@@ -147,24 +146,24 @@ def length_by_constants(fit: Fit) -> tuple[float, float] | None:
     """
     if fit.shared.model.gravity == 0 or {K1, K2} & set(fit.absent):
         return None
-    places = [fit.names.index(name) for name in (K1, K2)]
-    if np.any(np.isinf(fit.std[places])) or not fit.values[places[1]]:
+    first, second = fit.names.index(K1), fit.names.index(K2)
+    if np.any(np.isinf(fit.std[[first, second]])) or not fit.values[second]:
         return None
 
     def length(beta: FloatArray) -> float:
-        k1, k2 = (phasor(fit.shared.model, beta, name) for name in (K1, K2))
-        sign = 1.0 if (k1 * k2.conjugate()).real >= 0 else -1.0
-        return sign * fit.shared.model.gravity * abs(k1) / abs(k2)
+        k1, k2 = phasor(fit.shared.model, beta, K1), phasor(fit.shared.model, beta, K2)
+        sign = np.copysign(1.0, (k1 * k2.conjugate()).real)
+        return float(sign * fit.shared.model.gravity * abs(k1) / abs(k2))
 
     slope = _slope(length, fit.values, sizes(fit.names, fit.values))
     return length(fit.values), float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))
 
 
 def _slope(bound: Callable[[FloatArray], float], beta: FloatArray, size: FloatArray) -> FloatArray:
-    steps = _NUDGE * np.diag(size)
-    return np.array(
-        [(bound(beta + step) - bound(beta - step)) / (2 * step.max()) for step in steps]
-    )
+    slope = np.empty(beta.size)
+    for place, step in enumerate(_NUDGE * np.diag(size)):
+        slope[place] = (bound(beta + step) - bound(beta - step)) / (2 * step.max())
+    return slope
 
 
 def constrained(fit: Fit) -> Fit:
@@ -200,16 +199,15 @@ def constrained(fit: Fit) -> Fit:
     ) -> float:
         return bound(fit.values + scale * x) / slope - inside
 
-    held = [
-        (bound, float(np.linalg.norm(_slope(bound, fit.values, size) * size)))
-        for bound in bounds(fit.shared).values()
-    ]
+    held = []
+    for bound in bounds(fit.shared).values():
+        steepness = float(np.linalg.norm(_slope(bound, fit.values, size) * size))
+        held.append((bound, steepness or 1.0))
     x, disobeyed = np.zeros(scale.size), enforced
     options = {"maxiter": 500, "ftol": 1e-12}
     for inside in _INSIDE:
         demands = [
-            {"type": "ineq", "fun": partial(margin, bound, slope or 1.0, inside)}
-            for bound, slope in held
+            {"type": "ineq", "fun": partial(margin, bound, slope, inside)} for bound, slope in held
         ]
         unit = 1 + abs(cost(x, 1.0)[0])  # the solver's tolerances are absolute
         solution = minimize(
@@ -228,19 +226,19 @@ def constrained(fit: Fit) -> Fit:
         if not disobeyed:
             return moved.noted(Notice("CONSTRAINED", numbers={"bounds": _named(enforced)}))
     note = Notice("NOT_FEASIBLE", numbers={"bounds": _named(disobeyed)})
-    status: tuple[Status, ...] = tuple(
-        "NOT_CONVERGED" if word == "OK" else "NOT_IDENTIFIABLE" for word in fit.status
-    )
+    after: dict[str, Status] = {"OK": "NOT_CONVERGED"}
+    status = tuple(after.get(word, "NOT_IDENTIFIABLE") for word in fit.status)
     return replace(fit, converged=False, status=status).noted(note)
 
 
 def _named(bounds: Sequence[BrokenBound]) -> list[str]:
-    return [
-        b.bound
-        if b.distance is None
-        else f"{b.bound} ({b.distance:.2g} standard deviations beyond)"
-        for b in bounds
-    ]
+    names = []
+    for one in bounds:
+        name = one.bound
+        if one.distance is not None:
+            name += f" ({one.distance:.2g} standard deviations beyond)"
+        names.append(name)
+    return names
 
 
 _UNLIKE = 0.5  # of the larger of two values: more than any error of a model that is of use
@@ -278,19 +276,23 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     fit.
     """
     shared = Shared(model)
-    if not all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in range(2)):
-        return None  # without a motor a joint's equation is solved by nothing
-    both = [place for place, name in enumerate(model.names) if name in (K1, K2, K3)]
-    both_joints = []
-    for joint in range(2):
-        grams = [normal.gram[:, joint] for normal in normals]
+    for normal in normals:
+        if not normal.gram[:, :, -1, -1].any(axis=0).all():
+            return None  # without a motor a joint's equation is solved by nothing
+    both = np.flatnonzero(np.isin(model.names, (K1, K2, K3)))
+
+    def of_joint(joint: int) -> tuple[FloatArray, FloatArray]:
+        """What one joint's equation gives for the constants of both, and their variances."""
         nothing = np.zeros(len(model.names))
-        c, covariance, _ = by_themselves(
-            shared,
-            [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]) for gram in grams],
-        )
-        both_joints.append((c[both], np.diag(covariance)[both]))
-    (first, of_first), (second, of_second) = both_joints
+        logs = []
+        for normal in normals:
+            gram = normal.gram[:, joint]
+            logs.append(LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]))
+        c, covariance, _ = by_themselves(shared, logs)
+        return c[both], np.diag(covariance)[both]
+
+    first, of_first = of_joint(0)
+    second, of_second = of_joint(1)
     distance = np.abs(first - second) / np.sqrt(of_first + of_second + 1e-300)
     unlike = np.abs(first - second) > _UNLIKE * np.maximum(np.abs(first), np.abs(second))
     worst = int(np.argmax(np.where(unlike, distance, 0.0)))
@@ -356,17 +358,18 @@ def payload_distance(fit: Fit) -> float | None:
     best. Where they agree it is χ² with as many degrees of freedom as constants less those of the
     payload.
     """
-    kinds = [[log for log in fit.logs if log.loaded is kind] for kind in (False, True)]
-    if not fit.shared.payload or not all(kinds):
+    unloaded = [log for log in fit.logs if not log.loaded]
+    loaded = [log for log in fit.logs if log.loaded]
+    if not (fit.shared.payload and unloaded and loaded):
         return None
-    unloaded, loaded = (by_themselves(fit.shared, logs) for logs in kinds)
-    if not (unloaded[2] and loaded[2]):
+    c, covariance, determined = by_themselves(fit.shared, unloaded)
+    c_loaded, covariance_loaded, determined_loaded = by_themselves(fit.shared, loaded)
+    if not (determined and determined_loaded):
         return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
-    arm = Prior.of(fit.shared.log_names, unloaded[0], unloaded[1])
-    information = LogInformation(
-        True, loaded[0], scaled_pinv(loaded[1])[None], np.zeros_like(loaded[0])[None]
-    )
+    arm = Prior.of(fit.shared.log_names, c, covariance)
+    S = scaled_pinv(covariance_loaded)
+    information = LogInformation(True, c_loaded, S[None], np.zeros_like(c_loaded)[None])
     _, _, value = combine(fit.shared, [information], fit.values, arm)
     return max(0.0, normal_exceeded(float(chi2_tail(freedom, max(0.0, -2 * value)))))
 
@@ -386,9 +389,9 @@ class MassScatter:
 def repeatability(fit: Fit) -> MassScatter | None:
     """How far the payload differs from run to run.
 
-    None with fewer than two loaded logs, or none that tell it.
+    None with fewer than two loaded logs, or if one does not determine it.
 
-    Each loaded log is fitted for m_p, the arm and the lengths held as all logs tell them. The
+    Each loaded log is fitted for m_p, the arm and the lengths held as all logs have them. The
     interval is that of the standard deviation of normal numbers, by χ² of n − 1: wide where there
     are few runs.
     """
@@ -405,11 +408,10 @@ def repeatability(fit: Fit) -> MassScatter | None:
             return None
         change = fit.shared.coefficients(fit.values, True) - log.c0
         masses.append(fit.values[place] + float(slope @ (g - S @ change)) / information)
-    n = len(masses)
+    freedom = len(masses) - 1
     std = float(np.std(masses, ddof=1))
-    low, high = (
-        std * float(np.sqrt((n - 1) / chi2_exceeded(n - 1, tail))) for tail in (0.025, 0.975)
-    )
+    low = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.025)))
+    high = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.975)))
     return MassScatter(np.array(masses), std, (low, high))
 
 
@@ -417,10 +419,14 @@ def by_themselves(
     shared: Shared, logs: Sequence[LogInformation]
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Coefficients (q,) of logs of one kind, their sandwich (q, q), whether all are determined."""
-    S = np.sum([log.total[0] for log in logs], axis=0)
+    size = len(shared.log_names)
+    S, y = np.zeros((size, size)), np.zeros(size)
+    for log in logs:
+        of_log, g = log.total
+        S = S + of_log
+        y = y + (g + of_log @ log.c0)
     inverse = scaled_pinv(S)
-    c = inverse @ np.sum([log.total[1] + log.total[0] @ log.c0 for log in logs], axis=0)
-    meat, _ = sandwich(
-        Shared(shared.model, shared.delay), [replace(log, loaded=False) for log in logs], c
-    )
+    c = inverse @ y
+    plain = [replace(log, loaded=False) for log in logs]
+    meat, _ = sandwich(Shared(shared.model, shared.delay), plain, c)
     return c, inverse @ meat @ inverse, bool(np.linalg.matrix_rank(inverse @ S) == len(c))

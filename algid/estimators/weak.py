@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import TypeVar
 
 import numpy as np
@@ -121,34 +122,40 @@ def fit(
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
     at: list[FloatArray | None] = [None, None]
     for _ in range(_PASSES):
-        normals, loaded_normals = (
-            _normals(unloaded, settings, at[0]),
-            _normals(loaded, settings, at[1]),
-        )
+        normals = _normals(unloaded, settings, at[0])
+        loaded_normals = _normals(loaded, settings, at[1])
         beta, logs = first_estimate(shared, normals, loaded_normals, prior)
         base, change = settings.shift.delay, 0.0
         if shared.delay:
             change = float(beta[len(model.names)])
             beta, logs = _from(shared, beta, logs, base)
             settings = settings.delayed(base + change)
-        before, at = at, [None, None] if model.linear else _linearisation(shared, beta, logs)
-        settled = all(
-            new is None
-            or (old is not None and bool(np.all(np.abs(new - old)[iterated] < _SETTLED)))
-            for old, new in zip(before, at, strict=True)
-        )
+        settled = True
+        if not model.linear:
+            before, at = at, _linearisation(shared, beta, logs)
+            settled = _has_settled(before, at, iterated)
         every = normals + loaded_normals
         if settled and abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every):
             break
     moved = np.max([normal.moved for normal in every], axis=0)
-    without = (
-        _left_out(shared, normals, loaded_normals, prior, base, beta)
-        if len(every) >= FEWEST_LOGS
-        else None
-    )
+    without = None
+    if len(every) >= FEWEST_LOGS:
+        without = _left_out(shared, normals, loaded_normals, prior, base, beta)
     return with_body(
         conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
     )
+
+
+def _has_settled(
+    before: Sequence[FloatArray | None], after: Sequence[FloatArray | None], iterated: list[int]
+) -> bool:
+    """Whether the coefficients in which the torque is not linear have hardly moved."""
+    for old, new in zip(before, after, strict=True):
+        if new is None:
+            continue
+        if old is None or not np.all(np.abs(new - old)[iterated] < _SETTLED):
+            return False
+    return True
 
 
 def _left_out(
@@ -161,20 +168,19 @@ def _left_out(
 ) -> FloatArray:
     """Estimates (n, Q) without each log, every other one weighed anew.
 
-    `base` is the delay, in s, from which the passes tell a change; without the only log of its
+    `base` is the delay, in s, from which the passes estimate a change; without the only log of its
     kind stands `beta`.
     """
-    arms, burdened = _solved_without_each(unloaded, False), _solved_without_each(loaded, True)
     every, every_loaded = _solved_together(unloaded, False), _solved_together(loaded, True)
+    pairs = [(rest, every_loaded) for rest in _solved_without_each(unloaded, False)]
+    pairs += [(every, rest) for rest in _solved_without_each(loaded, True)]
     estimates = []
-    for place in range(len(unloaded) + len(loaded)):
-        of_loaded = place - len(unloaded)
-        rest = arms[place] if of_loaded < 0 else every
-        rest_loaded = burdened[of_loaded] if of_loaded >= 0 else every_loaded
+    for rest, rest_loaded in pairs:
         if (unloaded and rest is None) or (loaded and rest_loaded is None):
             estimates.append(beta)
             continue
-        start, others = _from(shared, *_started(shared, rest, rest_loaded, prior), base)
+        start, others = _started(shared, rest, rest_loaded, prior)
+        start, others = _from(shared, start, others, base)
         estimates.append(combine(shared, others, start, prior)[0])
     return np.array(estimates)
 
@@ -184,7 +190,11 @@ def _solved_together(normals: Sequence[Normal], loaded: bool) -> Solved | None:
     if not normals:
         return None
     c, logs = solve(normals, loaded)
-    S, g = (np.sum(part, axis=0) for part in zip(*(log.total for log in logs), strict=True))
+    S, g = np.zeros((c.size, c.size)), np.zeros(c.size)
+    for log in logs:
+        log_S, log_g = log.total
+        S += log_S
+        g += log_g
     return c, [LogInformation(loaded, c, S[None], g[None])]
 
 
@@ -227,11 +237,10 @@ def _linearisation(
 ) -> list[FloatArray | None]:
     """Model coefficients at which the next pass linearises unloaded and loaded logs."""
     count = len(shared.model.names)
-    coefficients = [
-        next((log.c0[:count] for log in logs if log.loaded is loaded), None)
-        for loaded in (False, True)
-    ]
-    return [beta[:count] if coefficients[0] is None else coefficients[0], coefficients[1]]
+    at: list[FloatArray | None] = [beta[:count], None]
+    for log in reversed(logs):  # the first log of each kind stands in the end
+        at[log.loaded] = log.c0[:count]
+    return at
 
 
 def _normals(
@@ -245,8 +254,12 @@ def first_estimate(
     shared: Shared, unloaded: list[Normal], loaded: list[Normal], prior: Prior | None
 ) -> tuple[FloatArray, list[LogInformation]]:
     """Shared parameters from which `conclude` starts, and each log's likelihood."""
-    arm = solve(unloaded) if unloaded else None
-    return _started(shared, arm, solve(loaded, loaded=True) if loaded else None, prior)
+    arm, loaded_arm = None, None
+    if unloaded:
+        arm = solve(unloaded)
+    if loaded:
+        loaded_arm = solve(loaded, loaded=True)
+    return _started(shared, arm, loaded_arm, prior)
 
 
 def _started(
@@ -267,13 +280,9 @@ def _started(
     if loaded is None:
         raise TooShortError(f"no loaded {too_short}")
     c, under_load = loaded
-    together = LogInformation(
-        True,
-        c,
-        np.concatenate([log.S for log in under_load]),
-        np.concatenate([log.g for log in under_load]),
-    )
-    return first_payload(shared, arm, together), logs + under_load
+    S = np.concatenate([log.S for log in under_load])
+    g = np.concatenate([log.g for log in under_load])
+    return first_payload(shared, arm, LogInformation(True, c, S, g)), logs + under_load
 
 
 def _from(
@@ -285,7 +294,9 @@ def _from(
     place = len(shared.model.names)
 
     def whole(values: FloatArray) -> FloatArray:
-        return np.where(np.arange(values.size) == place, values + base, values)
+        values = values.copy()
+        values[place] += base
+        return values
 
     return whole(beta), [replace(log, c0=whole(log.c0)) for log in logs]
 
@@ -331,7 +342,9 @@ def normal_equations(
             samples += fresh
             low = np.minimum(low, piece.theta.min(axis=1))
             high = np.maximum(high, piece.theta.max(axis=1))
-            kept = None if known is None else known.setdefault((number, len(piece)), {})
+            kept = None
+            if known is not None:
+                kept = known.setdefault((number, len(piece)), {})
             X = windows.equations(settings.model, piece, settings.estimate_delay, at, kept)
             if not X.shape[2]:
                 continue
@@ -341,9 +354,9 @@ def normal_equations(
                 X = np.where(moving[:, None], X, 0.0)
             rows += moving.sum(axis=1)
             sums.add(grams(X, OVERLAP))
-        return (
-            Normal(sums.values(), dt, samples, rows, high - low) if rows.any() else None
-        ), longest
+        if not rows.any():
+            return None, longest
+        return Normal(sums.values(), dt, samples, rows, high - low), longest
 
     return _with_window(gather, settings.window)
 
@@ -371,33 +384,43 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
         longest = spacing = 0.0
 
         def add_up() -> None:
-            together = np.concatenate(rows, axis=1) if rows else np.empty((4, 0))
-            if together.shape[1] >= 2 * OVERLAP:
+            if _count(rows) >= 2 * OVERLAP:
+                together = np.concatenate(rows, axis=1)
                 gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
             rows.clear()
 
         for piece, windows, _ in overlapping(source(), settings, window):
             longest = max(longest, _seconds(piece))
-            if not piece.continues or sum(part.shape[1] for part in rows) >= PIECE_SAMPLES:
+            if not piece.continues or _count(rows) >= PIECE_SAMPLES:
                 add_up()
             spacing = windows.step * windows.dt
             X = windows.equations(settings.model, piece, False, c)
-            rows.append(np.concatenate([X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1]), X[:, -1]]))
+            residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
+            rows.append(np.concatenate([residual, X[:, -1]]))
         add_up()
         return gathered, longest
 
     return pooled(_with_window(gather, settings.window))
 
 
+def _count(rows: Iterable[FloatArray]) -> int:
+    """How many windows the parts (4, R) have together."""
+    return sum(part.shape[1] for part in rows)
+
+
 def _with_window(gather: Callable[[float], tuple[Gathered, float]], window: float) -> Gathered:
     """Gather by windows of `window` s, or shorter if the longest piece holds fewer than four."""
     gathered, longest = gather(window)
-    return gather(longest / 4)[0] if 0 < longest < 4 * window else gathered
+    if 0 < longest < 4 * window:
+        gathered, _ = gather(longest / 4)
+    return gathered
 
 
 def _seconds(piece: Segment) -> float:
-    """Seconds of a piece that is not too short for a window."""
-    return len(piece) * piece.dt if len(piece) >= _SHORTEST else 0.0
+    """Seconds of a piece, 0 of one that is too short for a window."""
+    if len(piece) < _SHORTEST:
+        return 0.0
+    return len(piece) * piece.dt
 
 
 def overlapping(
@@ -410,7 +433,8 @@ def overlapping(
     before: Segment | None = None
     windows: Windows | None = None
     left_over = 0
-    window = settings.window if window is None else window
+    if window is None:
+        window = settings.window
     for piece in pieces(segments, PIECE_SAMPLES):
         if windows is None:
             bandwidth = settings.bandwidth
@@ -422,32 +446,37 @@ def overlapping(
             piece = _prefixed(before, piece, windows.overlap + left_over)
         left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
-        yield (
-            replace(piece, tau=held_torque(piece.tau)) if settings.shift.held else piece,
-            windows,
-            fresh,
-        )
+        if settings.shift.held:
+            piece = replace(piece, tau=held_torque(piece.tau))
+        yield piece, windows, fresh
 
 
 def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
     """The piece with the last `overlap` samples of the one before."""
     first = max(len(before) - overlap, 0)
-    both = [
-        np.concatenate([old[:, first:], new], axis=1)
-        for old, new in ((before.theta, piece.theta), (before.tau, piece.tau))
-    ]
-    omega, reference = (
-        None if old is None or new is None else np.concatenate([old[:, first:], new], axis=1)
-        for old, new in ((before.omega, piece.omega), (before.reference, piece.reference))
+
+    def joined(old: FloatArray, new: FloatArray) -> FloatArray:
+        return np.concatenate([old[:, first:], new], axis=1)
+
+    omega = reference = None
+    if before.omega is not None and piece.omega is not None:
+        omega = joined(before.omega, piece.omega)
+    if before.reference is not None and piece.reference is not None:
+        reference = joined(before.reference, piece.reference)
+    return replace(
+        piece,
+        start=piece.start - (len(before) - first) * piece.dt,
+        theta=joined(before.theta, piece.theta),
+        tau=joined(before.tau, piece.tau),
+        omega=omega,
+        reference=reference,
     )
-    start = piece.start - (len(before) - first) * piece.dt
-    return replace(piece, start=start, theta=both[0], tau=both[1], omega=omega, reference=reference)
 
 
 def grams(X: FloatArray, rows: int) -> FloatArray:
     """Gram matrices (B, 2, m, m) of X (2, m, R), by stretches of `rows` rows."""
     size, count = X.shape[1:]
-    stretches = -(-count // rows)
+    stretches = ceil(count / rows)
     padded = np.zeros((2, size, stretches * rows))
     padded[:, :, :count] = X
     parts = padded.reshape(2, size, stretches, rows).transpose(2, 0, 1, 3)
@@ -461,32 +490,29 @@ def solve(
 
     The rows of a joint weigh by its own residual, log by log.
     """
-    weights: list[FloatArray] = [np.ones(2) for _ in normals]
+    whole = [normal.gram.sum(axis=0) for normal in normals]
+    weights = np.ones((len(normals), 2))
     c: FloatArray = np.zeros(normals[0].gram.shape[-1] - 1)
     for _ in range(_REWEIGHTINGS):
-        total = np.sum(
-            [
-                np.einsum("a,axy->xy", w, n.gram.sum(axis=0))
-                for w, n in zip(weights, normals, strict=True)
-            ],
-            axis=0,
-        )
+        total = np.zeros((c.size + 1, c.size + 1))
+        for w, gram in zip(weights, whole, strict=True):
+            total += np.einsum("a,axy->xy", w, gram)
         c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
-        weights = [row_weights(n.gram.sum(axis=0), np.append(-c, 1.0), n.rows) for n in normals]
+        for place, normal in enumerate(normals):
+            weights[place] = row_weights(whole[place], np.append(-c, 1.0), normal.rows)
     logs = []
     for normal, w in zip(normals, weights, strict=True):
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
         gram = np.einsum("a,baxy->bxy", w * (2.0 / OVERLAP), normal.gram)
-        logs.append(
-            LogInformation(loaded, c, gram[:, :-1, :-1], gram[:, :-1, -1] - gram[:, :-1, :-1] @ c)
-        )
+        S = gram[:, :-1, :-1]
+        logs.append(LogInformation(loaded, c, S, gram[:, :-1, -1] - S @ c))
     return c, logs
 
 
 def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> FloatArray:
     """Shared parameters (Q,): the payload that fits the loaded logs best for a given arm (q,).
 
-    Masses are tried in turn, with the link lengths that k2 and k4 of both arms tell for each
+    Masses are tried in turn, each with the link lengths that follow from k2 and k4 of both arms
     (Table 2). `loaded` is the sum over the loaded logs, linearised at the loaded arm's own
     coefficients.
     """
@@ -495,15 +521,19 @@ def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> Fl
     # A prior far tighter than the loaded logs holds the arm.
     hold = Prior.of(shared.log_names, arm, scaled_pinv(loaded.total[0]) * 1e-4)
     for mass in _FIRST_MASSES:
-        guess = {"m_p": mass} | {
-            length: _length_of(shared, loaded.c0 - arm, mass, name)
-            for length, name in (("l1", K4), ("l2", K2))
+        change = loaded.c0 - arm
+        guess = {
+            "m_p": mass,
+            "l1": _length_of(shared, change, mass, K4),
+            "l2": _length_of(shared, change, mass, K2),
         }
-        start = np.concatenate([arm, [guess[name] for name in shared.names[arm.size :]]])
+        start = np.append(arm, [guess[name] for name in shared.names[arm.size :]])
         beta, _, value = combine(shared, [loaded], start, hold)
         if value > best_value and np.all(beta[arm.size :] > 0):
             best, best_value = beta, value
-    return start if best is None else best
+    if best is None:
+        return start
+    return best
 
 
 def _length_of(shared: Shared, change: FloatArray, mass: float, name: str) -> float:
@@ -511,4 +541,6 @@ def _length_of(shared: Shared, change: FloatArray, mass: float, name: str) -> fl
     if name not in shared.log_names:
         return _FIRST_LENGTH
     length = float(change[shared.log_names.index(name)]) / (mass * shared.model.gravity)
-    return length if 0.01 < length < 10 else _FIRST_LENGTH
+    if not 0.01 < length < 10:
+        return _FIRST_LENGTH
+    return length

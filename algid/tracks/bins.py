@@ -1,4 +1,4 @@
-"""What short cells of a log tell of the payload: sums over whitened rows that are linear in it.
+"""Information of short cells of a log on the payload: sums of whitened rows that are linear in it.
 
 Errors in variables are whitened as in `algid.estimators.whitening`, so that the rows' noise is
 white whatever the angles' noise does to neighbouring torques. With the payload's column g = Y d, d
@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ CELL = 0.02  # s
 _PIECE_SAMPLES = 16384
 SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 COULOMB = TERMS["coulomb"]
-FRICTION = (K6, K7, *COULOMB.names)
+FRICTION = (K6, K7) + COULOMB.names
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +93,21 @@ class IdentifiedArm:
     def by_shape(self) -> FloatArray:
         """Derivatives (2 + b, q) of `unit` by l1, l2 and the uncertain parts of payload `body`."""
         shared, beta = self._loaded
-        T = shared.jacobian(beta, True)
-        return np.stack([T[:, shared.names.index(name)] for name in ("l1", "l2", *self.body)])
+        places = [shared.names.index(name) for name in ("l1", "l2") + self.body]
+        return shared.jacobian(beta, True).T[places]
 
     @property
     def _loaded(self) -> tuple[Shared, FloatArray]:
         """Parameters of the arm with a payload of 1 kg."""
-        across = bool(set(SINES) & set(self.model.names))
-        shared = Shared(self.model, payload=True, body=(*(("y_p",) if across else ()), "J_p"))
-        one = {"m_p": 1.0, "l1": self.l1, "l2": self.l2, "y_p": self.y, "J_p": self.gyration**2}
-        return shared, np.concatenate([self.k, [one[name] for name in shared.names[self.k.size :]]])
+        of_payload = [1.0, self.l1, self.l2]
+        body: tuple[str, ...] = ()
+        if not set(SINES).isdisjoint(self.model.names):
+            body += ("y_p",)
+            of_payload.append(self.y)
+        body += ("J_p",)
+        of_payload.append(self.gyration**2)
+        shared = Shared(self.model, payload=True, body=body)
+        return shared, np.append(self.k, of_payload)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,19 +140,20 @@ class Cells:
 
     def part(self, first: int, last: int) -> Cells:
         """Cells `first` to `last` - 1."""
-        return self._with({name: getattr(self, name)[first:last] for name in SUMS})
+        return replace(self, **{name: getattr(self, name)[first:last] for name in SUMS})
 
     def weighted(self, weights: FloatArray) -> Cells:
         """The cells with the sums of each times its weight (C,), rows and torques aside."""
-
-        def by_cell(x: FloatArray) -> FloatArray:
-            return np.asarray(weights.reshape(-1, *[1] * (x.ndim - 1)) * x)
-
-        return self._with({name: by_cell(getattr(self, name)) for name in "ABSEND"})
-
-    def _with(self, sums: Mapping[str, FloatArray]) -> Cells:
-        every = {name: getattr(self, name) for name in SUMS} | dict(sums)
-        return Cells(**every, friction=self.friction)
+        by_column, by_matrix = weights[:, None], weights[:, None, None]
+        return replace(
+            self,
+            A=weights * self.A,
+            B=weights * self.B,
+            S=by_column * self.S,
+            E=weights * self.E,
+            N=by_matrix * self.N,
+            D=by_column * self.D,
+        )
 
     @property
     def mass(self) -> float:
@@ -171,8 +178,10 @@ SUMS = tuple(one.name for one in fields(Cells) if one.name != "friction")
 
 def joined(parts: Sequence[Cells]) -> Cells:
     """Cells one after another."""
-    sums = {name: np.concatenate([getattr(part, name) for part in parts]) for name in SUMS}
-    return Cells(**sums, friction=parts[0].friction)
+    sums: dict[str, Any] = {}
+    for name in SUMS:
+        sums[name] = np.concatenate([getattr(part, name) for part in parts])
+    return replace(parts[0], **sums)
 
 
 def cells_of(
@@ -180,7 +189,7 @@ def cells_of(
 ) -> list[Cells]:
     """Cells of each piece of a log, linearised for a payload of `mass` kg.
 
-    They are linearised `settle` times more at the trajectory found.
+    They are linearised `settle` times more, each time at the trajectory of the fit before.
     """
     c, cells = arm.k + mass * arm.unit, []
     for piece in pieces(segments, _PIECE_SAMPLES):
@@ -208,7 +217,8 @@ def _sums(
     count = e.size // (2 * step)
 
     def by_cell(rows: FloatArray) -> FloatArray:
-        return rows[..., : count * 2 * step].reshape(*rows.shape[:-1], count, 2 * step).sum(axis=-1)
+        whole = rows[..., : count * 2 * step]
+        return whole.reshape(rows.shape[:-1] + (count, 2 * step)).sum(axis=-1)
 
     first = piece.start + piece.dt * (stencil.torques(len(piece)).start + step * np.arange(count))
     return Cells(
@@ -233,7 +243,7 @@ def arm_of(
 
     Behind the q constants stand l1, l2 and what is uncertain of the payload's body.
 
-    Noise levels are the result's; where it has none, the log's first stretch tells them.
+    Noise levels are the result's; where it has none, those of the log's first stretch.
 
     Raises
     ------
@@ -248,35 +258,38 @@ def arm_of(
     model = model_of(result)
     prior = prior_of(result, model)
     y, gyration = _body(result)
-    weighed = result.payload["m_p"].estimate if "m_p" in result.payload else None
-    body = tuple(name for name in BODY_PARAMETERS if weighed and has_error_bar(result, name))
-    lengths = [
-        n for n, given in (("l1", l1), ("l2", l2)) if given is None and has_error_bar(result, n)
-    ]
-    covariance = _covariance_of(
-        result, (*prior.names, "l1", "l2", *body), (*prior.names, *lengths, *body)
-    )
+    body: tuple[str, ...] = ()
+    if _of_payload(result, "m_p"):
+        body = tuple(name for name in BODY_PARAMETERS if has_error_bar(result, name))
+    uncertain = prior.names + body
+    for name, given in (("l1", l1), ("l2", l2)):
+        if given is None and has_error_bar(result, name):
+            uncertain += (name,)
+    covariance = _covariance_of(result, prior.names + ("l1", "l2") + body, uncertain)
     constants = _by_constants(result, l1)
-    if constants is not None:
-        covariance = _with_first_length(covariance, prior.names, constants[1])
-    known = IdentifiedArm(
-        model,
-        prior.mean,
-        _length(result, "l1", l1) if constants is None else constants[0],
-        _length(result, "l2", l2),
-        noise_of(result) or first_guess(first.theta, first.tau),
-        shift_of(result).at(first.dt),
-        y,
-        gyration,
-        body,
+    if constants is None:
+        first_link = _length(result, "l1", l1)
+    else:
+        first_link, slopes = constants
+        covariance = _with_first_length(covariance, prior.names, slopes)
+    arm = IdentifiedArm(
+        model=model,
+        k=prior.mean,
+        l1=first_link,
+        l2=_length(result, "l2", l2),
+        noise=noise_of(result) or first_guess(first.theta, first.tau),
+        shift=shift_of(result).at(first.dt),
+        y=y,
+        gyration=gyration,
+        body=body,
     )
-    return known, covariance
+    return arm, covariance
 
 
 def _by_constants(result: Result, given: float | None) -> tuple[float, dict[str, float]] | None:
     """l1 = g |K1| / |K2| in m and its derivatives by the constants.
 
-    None where l1 is given, or the payload tells it better.
+    None where l1 is given, or the payload determines it better.
     """
     if given is not None or result.settings.get("l1") is not None:
         return None
@@ -306,10 +319,12 @@ def _covariance_of(result: Result, names: Sequence[str], uncertain: Sequence[str
     assert result.fit is not None
     if "J_p" not in uncertain:
         return covariance_of(result, names, uncertain)
-    weighed = "m_p" in result.fit.covariance_names
-    more = (*names, "m_p")
-    covariance = covariance_of(result, more, (*uncertain, "m_p") if weighed else uncertain)
-    J, m_p = (result.payload[name].estimate or 0.0 for name in ("J_p", "m_p"))
+    more = list(names) + ["m_p"]
+    open_ones = set(uncertain)
+    if "m_p" in result.fit.covariance_names:
+        open_ones.add("m_p")
+    covariance = covariance_of(result, more, open_ones)
+    J, m_p = _of_payload(result, "J_p"), _of_payload(result, "m_p")
     T = np.eye(len(names), len(more))
     row = names.index("J_p")
     T[row, [row, -1]] = 1 / m_p, -J / m_p**2  # of J_p / m_p
@@ -320,35 +335,42 @@ def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[Identifie
     """The arm and its covariance (p, p) with columns of Coulomb friction, zero if it had none."""
     if COULOMB.name in arm.model.terms:
         return arm, covariance
-    model = replace(arm.model, terms=(*arm.model.terms, COULOMB.name))
-    places = [model.names.index(name) for name in arm.model.names]
+    model = replace(arm.model, terms=arm.model.terms + (COULOMB.name,))
+    places = np.array([model.names.index(name) for name in arm.model.names])
     k = np.zeros(len(model.names))
     k[places] = arm.k
     others = covariance.shape[0] - len(places)  # lengths, and what the payload's body adds
-    places += list(range(k.size, k.size + others))
-    wider = np.zeros((k.size + others,) * 2)
+    size = k.size + others
+    places = np.append(places, np.arange(k.size, size))
+    wider = np.zeros((size, size))
     wider[np.ix_(places, places)] = covariance
     return replace(arm, model=model, k=k), wider
 
 
 def _body(result: Result) -> tuple[float, float]:
     """Offset and radius of gyration in m of the result's payload, assumed for all objects."""
-    y, J, m_p = (
-        float(result.payload[name].estimate or 0.0) if name in result.payload else 0.0
-        for name in ("y_p", "J_p", "m_p")
-    )
-    return y, float(np.sqrt(max(J, 0.0) / m_p)) if m_p > 0 else 0.0
+    y, J, m_p = (_of_payload(result, name) for name in ("y_p", "J_p", "m_p"))
+    if m_p <= 0:
+        return y, 0.0
+    return y, float(np.sqrt(max(J, 0.0) / m_p))
+
+
+def _of_payload(result: Result, name: str) -> float:
+    """The estimate of one of the payload's parameters, 0 where the result has none."""
+    if name not in result.payload:
+        return 0.0
+    return float(result.payload[name].estimate or 0.0)
 
 
 def _length(result: Result, name: str, given: float | None) -> float:
-    known = [
-        given,
-        result.settings.get(name),
-        result.payload[name].estimate if name in result.payload else None,
-    ]
-    length = next((value for value in known if value is not None), None)
-    if length is None:
+    """A link's length: the one given, else the one the result was made with, else its estimate."""
+    if given is not None:
+        return float(given)
+    if result.settings.get(name) is not None:
+        return float(result.settings[name])
+    estimated = result.payload.get(name)
+    if estimated is None or estimated.estimate is None:
         raise ResultError(
             f"{result.log.path}: its result has no {name}; give the link's length with {flag(name)}"
         )
-    return float(length)
+    return estimated.estimate
