@@ -70,9 +70,12 @@ class KnownBefore:
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are given, in m."""
-        return {
-            name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None
-        }
+        lengths = {}
+        if self.l1 is not None:
+            lengths["l1"] = self.l1
+        if self.l2 is not None:
+            lengths["l2"] = self.l2
+        return lengths
 
 
 def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
@@ -119,13 +122,22 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
     """
     case = replace(case, arm=replace(case.arm, **knowns.lengths))
     arm = case.arm
-    mass = case.payload if knowns.payload is None else knowns.payload
-    body = {"y_p": case.place[1], "J_p": case.inertia}
-    shaped = tuple(name for name, value in body.items() if value)
-    bent = bool(arm.sines().any()) or "y_p" in shaped
-    model = Model((PHASES,) if bent else (), gravity=arm.g)
-    shared = _shared(model, mass or None, loaded, source, knowns, shaped)
-    more = 1 + (WRONG if knowns.error is None else knowns.error)
+    mass, error = case.payload, WRONG
+    if knowns.payload is not None:
+        mass = knowns.payload
+    if knowns.error is not None:
+        error = knowns.error
+    body: list[str] = []
+    if case.place[1]:
+        body.append("y_p")
+    if case.inertia:
+        body.append("J_p")
+    terms: tuple[str, ...] = ()
+    if arm.sines().any() or "y_p" in body:
+        terms = (PHASES,)
+    model = Model(terms, gravity=arm.g)
+    shared = _shared(model, mass or None, loaded, source, knowns, tuple(body))
+    more = 1 + error
     wrong = [  # the parameters are linear in each mass and friction
         (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
         (replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
@@ -134,10 +146,10 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
         (arm, more * mass),
     ]
     mean = _parameters(shared, case, arm, mass)
-    spread = np.stack([_parameters(shared, case, *other) - mean for other in wrong], axis=1)
-    return BelievedArm(
-        source, Belief(shared, mean, spread, box=True), np.array([arm.l1, arm.l2]), None
-    )
+    others = [_parameters(shared, case, other, its_mass) for other, its_mass in wrong]
+    spread = np.stack(others, axis=1) - mean[:, None]
+    belief = Belief(shared, mean, spread, box=True)
+    return BelievedArm(source, belief, np.array([arm.l1, arm.l2]), None)
 
 
 def _shared(
@@ -153,17 +165,24 @@ def _shared(
             f"{source}: it knows no payload for the loaded runs; give {flag('payload')} KG, or "
             f"{flag('runs')} 1,0"
         )
-    payload = bool(mass) if loaded is None else loaded
-    return Shared(model, payload=payload, lengths=knowns.lengths, body=body if payload else ())
+    if loaded is None:
+        loaded = bool(mass)
+    if not loaded:
+        body = ()
+    return Shared(model, payload=loaded, lengths=knowns.lengths, body=body)
 
 
 def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray:
     """Parameters (Q,) of an arm and its payload, an object of the shape that the case's has."""
     x, y = case.place
+    if x is None:
+        x = arm.l2
+    inertia = case.inertia
+    if case.payload:
+        inertia *= mass / case.payload
     value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
     value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
-    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2 if x is None else x, "y_p": y}
-    value |= {"J_p": case.inertia * (mass / case.payload if case.payload else 1.0)}
+    value |= {"m_p": mass, "l1": arm.l1, "l2": x, "y_p": y, "J_p": inertia}
     return np.array([value[name] for name in shared.names])
 
 
@@ -177,19 +196,19 @@ def _of_result(
     shared = _shared(model, value.get("m_p"), loaded, source, replace(knowns, **lengths), body)
     # what is estimated with the constants takes of their precision
     shared = replace(shared, delay=all(has_error_bar(result, name) for name in DELAYS))
-    missing = next((name for name in shared.names if name not in value), None)
-    if missing is not None:
-        remedy = (
-            f"give {flag(missing)}"
-            if missing in ("l1", "l2")
-            else "identify it from logs that determine it"
-        )
-        raise ResultError(f"{source}: the result has no {missing}; {remedy}")
+    for name in shared.names:
+        if name not in value:
+            remedy = "identify it from logs that determine it"
+            if name in ("l1", "l2"):
+                remedy = f"give {flag(name)}"
+            raise ResultError(f"{source}: the result has no {name}; {remedy}")
     mean = np.array([value[name] for name in shared.names])
-    exact = {"m_p"} if knowns.payload is not None else set()
+    exact = set()
+    if knowns.payload is not None:
+        exact.add("m_p")
     spread = _spread(result, source, shared.names, mean, exact, knowns.error)
     reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
-    doubts = (*left_out, *contradictions(result, knowns.lengths))
+    doubts = left_out + contradictions(result, knowns.lengths)
     belief = Belief(shared, mean, spread, box=False)
     return BelievedArm(source, belief, reach, noise_of(result), doubts)
 
@@ -199,9 +218,10 @@ def _estimates(result: Result, payload: float | None) -> dict[str, float]:
 
     An object of another mass is shaped like the one that was identified.
     """
-    value = {
-        name: one.estimate for name, one in result.estimates.items() if one.estimate is not None
-    }
+    value = {}
+    for name, one in result.estimates.items():
+        if one.estimate is not None:
+            value[name] = one.estimate
     if payload is None:
         return value
     if "J_p" in value:
@@ -211,11 +231,12 @@ def _estimates(result: Result, payload: float | None) -> dict[str, float]:
 
 def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
     """The model less the terms that no regressor holds, and a notice of them."""
-    spare = [term for term in model.terms if term in _UNPLANNED]
-    if not spare:
+    planned = tuple(term for term in model.terms if term not in _UNPLANNED)
+    if planned == model.terms:
         return model, ()
-    left = Notice("TERMS_LEFT_OUT", numbers={"terms": [TERMS[term].title for term in spare]})
-    return replace(model, terms=tuple(term for term in model.terms if term not in spare)), (left,)
+    titles = [TERMS[term].title for term in model.terms if term in _UNPLANNED]
+    left = Notice("TERMS_LEFT_OUT", numbers={"terms": titles})
+    return replace(model, terms=planned), (left,)
 
 
 def _spread(
@@ -240,18 +261,18 @@ def _spread(
     bare = [name for name in names if name not in known]
     without = [name for name in bare if name not in given]
     if without and error is None:
-        why = (
-            f"the result of {flag('estimator')} {result.estimator} has no error bars"
-            if result.fit is None
-            else f"the result leaves {', '.join(without)} without error bars"
-        )
+        why = f"the result leaves {', '.join(without)} without error bars"
+        if result.fit is None:
+            why = f"the result of {flag('estimator')} {result.estimator} has no error bars"
         raise ResultError(
             f"{source}: {why}; identify from logs that determine them, or say how wrong it may be: "
             f"{flag('prior_error')}"
         )
+    if error is None:
+        error = WRONG
     for name in bare:
         row = names.index(name)
-        covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2
+        covariance[row, row] = (error * mean[row] / SURE) ** 2
     size = np.maximum(np.abs(mean), 1e-12)
     eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     return size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))

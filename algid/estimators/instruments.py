@@ -30,8 +30,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import islice
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ from algid.signals.filters import correlate, differentiator, half_length, smooth
 from algid.signals.segments import Segment
 
 _ROUNDS = 4
-_STRIDE = 2  # windows overlap four-fold: more tell hardly more, and each is simulated
+_STRIDE = 2  # windows overlap four-fold: more add little, and each is simulated
 _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarter of a radian
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
@@ -112,26 +112,26 @@ def fit(
         If no log is long enough for a window, or there is neither an unloaded log nor a prior.
     """
     settings = settings or WeakSettings()
-    start = weak.fit(unloaded, loaded, settings, lengths, prior) if start is None else start
+    if start is None:
+        start = weak.fit(unloaded, loaded, settings, lengths, prior)
     shared = start.shared
-    base = float(start.values[len(settings.model.names)]) if shared.delay else settings.shift.delay
-    settings = settings.delayed(base)
-    following = followed([*unloaded, *loaded], settings)
+    if shared.delay:
+        settings = settings.delayed(float(start.values[len(settings.model.names)]))
+    following = followed(list(unloaded) + list(loaded), settings)
     logs: list[LogInformation] = []
     for kind, sources in ((False, unloaded), (True, loaded)):
         if not sources:
             continue
         c = shared.coefficients(start.values, kind)
-        if (
-            shared.delay
-        ):  # the windows are shifted by what is known of it: its column tells a change
-            c[-1] = 0.0
+        if shared.delay:
+            c[-1] = 0.0  # the windows are shifted by what is known: the column is a change's
         informations = _solved(sources, settings, c, kind, following)
         if informations is None:
             return replace(start.marked("NOT_CONVERGED"), converged=False)
         logs += informations
     if shared.delay:
-        logs = [replace(log, c0=np.append(log.c0[:-1], log.c0[-1] + base)) for log in logs]
+        known = settings.shift.delay
+        logs = [replace(log, c0=np.append(log.c0[:-1], log.c0[-1] + known)) for log in logs]
     return conclude("instruments", shared, logs, start.values, start.moved, prior, coloured=True)
 
 
@@ -148,14 +148,16 @@ def _solved(
     """
     logs: list[LogInformation] = []
     for _ in range(_ROUNDS):
-        gathered = moments(sources, settings, c, following=following)
-        if any(one is None or gone_astray(one) for one in gathered):
-            return None
-        sums = [one for one in gathered if one is not None and one.rows]
+        sums = []
+        for one in moments(sources, settings, c, following=following):
+            if one is None or gone_astray(one):
+                return None
+            if one.rows:
+                sums.append(one)
         if not sums:
             return None
         better, logs = solve(sums, c, loaded)
-        S = np.sum([log.total[0] for log in logs], axis=0)
+        S, _ = _added(logs)
         step = better - c
         c = better
         if float(step @ S @ step) < SETTLED_SIMULATED**2:
@@ -167,14 +169,18 @@ def solve(
     sums: Sequence[Moments], c: FloatArray, loaded: bool
 ) -> tuple[FloatArray, list[LogInformation]]:
     """Shared coefficients (q,) from weights at `c`, and each log's projected likelihood at them."""
-    weights = [_weights(one, c) for one in sums]
-    logs = [_information(one, weight, c, loaded) for one, weight in zip(sums, weights, strict=True)]
-    S, g = (np.sum(part, axis=0) for part in zip(*(log.total for log in logs), strict=True))
+    S, g = _added([projected(one, c, loaded) for one in sums])
     better = c + scaled_pinv(S) @ g
-    weights = [_weights(one, better) for one in sums]
-    return better, [
-        _information(one, weight, better, loaded) for one, weight in zip(sums, weights, strict=True)
-    ]
+    return better, [projected(one, better, loaded) for one in sums]
+
+
+def _added(logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
+    """Information S (q, q) and score g (q,) of all logs."""
+    S, g = logs[0].total
+    for log in logs[1:]:
+        log_S, log_g = log.total
+        S, g = S + log_S, g + log_g
+    return S, g
 
 
 def _weights(sums: Moments, c: FloatArray) -> FloatArray:
@@ -218,16 +224,18 @@ def moments(
     At most `most` pieces of a log are looked at. The windows of many pieces are simulated side by
     side: a step costs the same for few as for many.
     """
-    gathered: list[_Sums | None] = [_Sums() for _ in sources]
+    gathered = [_Sums() for _ in sources]
     for batch in _batches(sources, settings, most):
-        by = _side_by_side if following is None else partial(_explained, following)
-        for (number, _, _), (both, good, moves) in zip(batch, by(batch, settings, c), strict=True):
-            sums = gathered[number]
-            if not moves:
-                gathered[number] = None
-            elif sums is not None:
-                sums.add(both, good)
-    return [None if sums is None else sums.total() for sums in gathered]
+        if following is None:
+            instruments = _side_by_side(batch, settings, c)
+        else:
+            instruments = _explained(following, batch, settings, c)
+        for (number, _, _), (both, good, moves) in zip(batch, instruments, strict=True):
+            if moves:
+                gathered[number].add(both, good)
+            else:
+                gathered[number].moves = False
+    return [sums.total() for sums in gathered]
 
 
 @dataclass(eq=False)
@@ -237,6 +245,7 @@ class _Sums:
     grams: BlockSums = field(default_factory=BlockSums)
     rows: int = 0
     astray: int = 0
+    moves: bool = True
 
     def add(self, both: FloatArray, good: NDArray[np.bool_]) -> None:
         """Add instruments and columns (2, 2 q + 1, R) of windows; only `good` ones (R,) count."""
@@ -244,7 +253,10 @@ class _Sums:
         self.astray += int(np.sum(np.logical_not(good)))
         self.grams.add(weak.grams(np.where(good, both, 0.0), OVERLAP // _STRIDE))
 
-    def total(self) -> Moments:
+    def total(self) -> Moments | None:
+        """The sums; None where the coefficients do not move the arm."""
+        if not self.moves:
+            return None
         if not self.rows:
             return Moments(np.zeros((0, 2, 1, 1)), 0, 0)
         return Moments(self.grams.values(), self.rows, self.astray)
@@ -292,14 +304,29 @@ def _side_by_side(
     """
     model = settings.model
     linear = c[: len(model.names)]
-    cut = [_cut(piece, windows) for _, piece, windows in batch]
-    counts = [angles.shape[1] for angles, *_ in cut]
-    dt = np.repeat([windows.dt for _, _, windows in batch], counts)
-    together = (np.concatenate(part, axis=1) for part in zip(*cut, strict=True))
-    moved = _simulated(model, linear, dt, *together)
+    theta, omega, tau, measured, dt = [], [], [], [], []
+    for _, piece, windows in batch:
+        cut = _cut(piece, windows)
+        theta.append(cut.theta)
+        omega.append(cut.omega)
+        tau.append(cut.tau)
+        measured.append(cut.measured)
+        dt.append(np.full(cut.theta.shape[1], windows.dt))
+    moved = _simulated(
+        model,
+        linear,
+        np.concatenate(dt),
+        _Cut(
+            np.concatenate(theta, axis=1),
+            np.concatenate(omega, axis=1),
+            np.concatenate(tau, axis=1),
+            np.concatenate(measured, axis=1),
+        ),
+    )
     last = 0
-    for (_, piece, windows), count in zip(batch, counts, strict=True):
-        own = slice(last, last := last + count)
+    for (_, piece, windows), periods in zip(batch, dt, strict=True):
+        own = slice(last, last + periods.size)
+        last = own.stop
         columns = windows.equations(model, piece, settings.estimate_delay, linear)
         plain = Windows(windows.dt, windows.length, 0.0, None)
         motion = moved.end_to_end(own, windows.dt)
@@ -321,7 +348,9 @@ def _explained(
             return made[:, :, ::_STRIDE]
 
         X, motion = equations(piece), following.motion(piece)
-        Z = np.zeros_like(X) if motion is None else equations(motion)
+        Z = np.zeros_like(X)
+        if motion is not None:
+            Z = equations(motion)
         both = np.concatenate([Z[:, :-1], X], axis=1)
         both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
         yield both, np.full(X.shape[2], motion is not None), True
@@ -334,11 +363,25 @@ def _moving(windows: Windows, piece: Segment, settings: WeakSettings) -> NDArray
     return windows.square_speeds(piece)[:, ::_STRIDE] >= np.square(settings.rest)[:, None]
 
 
-def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Every `_STRIDE`-th window of L samples, R in all.
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """R windows of L samples, cut from logs.
 
-    Gives angles and velocities (2, R) at their starts, torques (2, R, L + 1) and angles (2, R, L).
+    Parameters
+    ----------
+    theta, omega : (2, R), angles and velocities at their starts
+    tau : (2, R, L + 1)
+    measured : (2, R, L), angles
     """
+
+    theta: FloatArray
+    omega: FloatArray
+    tau: FloatArray
+    measured: FloatArray
+
+
+def _cut(piece: Segment, windows: Windows) -> _Cut:
+    """Every `_STRIDE`-th window of a piece."""
     length, margin = OVERLAP * windows.step, windows.margin
     starts = margin + np.arange(
         0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64
@@ -347,7 +390,8 @@ def _cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, Floa
     at = np.clip(instants - windows.shift / windows.dt, 0, len(piece) - 1)
     before = np.minimum(at.astype(np.int64), len(piece) - 2)
     tau = piece.tau[:, before] + (at - before) * (piece.tau[:, before + 1] - piece.tau[:, before])
-    return *_started(piece, windows, starts), tau, piece.theta[:, instants[:, :-1]]
+    theta, omega = _started(piece, windows, starts)
+    return _Cut(theta, omega, tau, piece.theta[:, instants[:, :-1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -369,21 +413,13 @@ class _Simulated:
 
     def end_to_end(self, own: slice, dt: float) -> Segment:
         """Some of the windows, of samples `dt` s apart, one after another."""
-        theta, tau, omega = (
-            signal[:, own].reshape(2, -1) for signal in (self.theta, self.tau, self.omega)
-        )
+        theta = self.theta[:, own].reshape(2, -1)
+        tau = self.tau[:, own].reshape(2, -1)
+        omega = self.omega[:, own].reshape(2, -1)
         return Segment(0.0, dt, theta, tau, omega)
 
 
-def _simulated(
-    model: Model,
-    c: FloatArray,
-    dt: FloatArray,
-    theta: FloatArray,
-    omega: FloatArray,
-    tau: FloatArray,
-    measured: FloatArray,
-) -> _Simulated:
+def _simulated(model: Model, c: FloatArray, dt: FloatArray, cut: _Cut) -> _Simulated:
     """The motion that windows cut from logs would have had, of samples `dt` (R,) s apart.
 
     Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
@@ -393,9 +429,9 @@ def _simulated(
     stride = _stride(float(dt[0]))
     h = stride * dt
     inside = np.arange(stride) / stride
-    acts = np.ascontiguousarray(
-        np.moveaxis(tau[:, :, :: stride // 2], 2, 0)
-    )  # where the method asks for it
+    theta, omega, tau, measured = cut.theta, cut.omega, cut.tau, cut.measured
+    # the torque where the method asks for it
+    acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))
     thetas, omegas = np.empty_like(measured), np.empty_like(measured)
     for step, sample in enumerate(range(0, measured.shape[2], stride)):
         rates = []
@@ -411,7 +447,7 @@ def _simulated(
         faster = omega + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
         thetas[:, :, sample : sample + stride] = _cubic(theta, ahead, h * omega, h * faster, inside)
         omegas[:, :, sample : sample + stride] = _cubic(omega, faster, h * a1, h * a4, inside)
-        theta, omega = (np.clip(signal, -1e6, 1e6) for signal in (ahead, faster))
+        theta, omega = np.clip(ahead, -1e6, 1e6), np.clip(faster, -1e6, 1e6)
     good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
     moves = _inert(model, c, thetas[:, :, ::stride])
     # A window that ran away is left out; products of its velocities would overflow.
@@ -423,9 +459,8 @@ def _cubic(
     start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray
 ) -> FloatArray:
     """Cubic Hermite (2, R, S) at shares `s` (S,) of a step, from end values and rates (2, R)."""
-    weights = np.stack(
-        [1 - s**2 * (3 - 2 * s), s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (s - 1)]
-    )
+    rise_of_end = s**2 * (3 - 2 * s)
+    weights = np.stack([1 - rise_of_end, rise_of_end, s * (1 - s) ** 2, s**2 * (s - 1)])
     return np.einsum("war,ws->ars", np.stack([start, end, rise, last]), weights)
 
 
@@ -437,11 +472,9 @@ def _started(
         assert piece.omega is not None  # `Windows.equations` has asked for it
         return piece.theta[:, starts], piece.omega[:, starts]
     reach = half_length(piece.dt, windows.bandwidth)
-    theta, omega = (
-        correlate(piece.theta, kernel(piece.dt, windows.bandwidth))[:, starts - reach]
-        for kernel in (smoother, differentiator)
-    )
-    return theta, omega
+    theta = correlate(piece.theta, smoother(piece.dt, windows.bandwidth))
+    omega = correlate(piece.theta, differentiator(piece.dt, windows.bandwidth))
+    return theta[:, starts - reach], omega[:, starts - reach]
 
 
 def _inert(model: Model, c: FloatArray, theta: FloatArray) -> NDArray[np.bool_]:
@@ -466,14 +499,10 @@ def endogeneity(
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-        looked_at = sources[:: -(-len(sources) // _MOST_EXAMINED)]
+        looked_at = sources[:: ceil(len(sources) / _MOST_EXAMINED)]
         following = followed(looked_at, settings)
         gathered = moments(looked_at, settings, c, _EXAMINED, following)
-        sums = [
-            one
-            for one in gathered
-            if one is not None and one.rows and one.astray <= _FEWEST * one.rows
-        ]
+        sums = [one for one in gathered if one is not None and one.rows and not gone_astray(one)]
         if sums:
             largest = max(largest or 0.0, _apart(sums, c, kind))
     return largest
@@ -484,7 +513,8 @@ def _apart(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> float:
     squares = [_only_least_squares(one, q) for one in sums]
     least, _ = solve(squares, c, loaded)
     better, logs = solve(sums, c, loaded)
-    inverse = scaled_pinv(np.sum([log.total[0] for log in logs], axis=0))
+    S, _ = _added(logs)
+    inverse = scaled_pinv(S)
     meat = np.sum([long_run_variance(log.g)[0] for log in logs], axis=0)
     std = np.sqrt(np.maximum(np.diag(inverse @ meat @ inverse), 0.0))
     determined = std < np.abs(better) + np.abs(least)  # what neither determines is not apart

@@ -43,13 +43,13 @@ def examine(
     gravity : float, m/s^2
         0 for an arm in a horizontal plane.
     effort : str, as in a profile
-        An external torque is nothing where nothing pulls, and tells no convention.
+        An external torque is zero where nothing pulls, and obeys no convention.
     whole : bool
         False where `log` is the beginning of a longer one.
     alone : bool
         False where the conventions of several logs are judged together: see `mends`.
     known : Saturation
-        What motion tells of the limits of torques, where that is known already.
+        Limits of torques that the motion shows, where they are known already.
 
     Returns
     -------
@@ -60,27 +60,40 @@ def examine(
         return ()
     tried = cache(partial(judged, log, gravity=gravity > 0))
     external = effort == "external"
-    known = saturation(log, gravity=gravity, effort=effort) if known is None else known
-    every = (
-        *(() if external else efforts(log, known)),
-        *(() if external else dead_efforts(log)),
-        *held_efforts(log),
-        *angles(log),
-        *degrees(log, lambda: is_right(tried())),
-        *spikes(log),
-        *sampling(log),
-        *rests(log, whole),
-    )
-    found = [yielding(notice, log.origin.reading.accepted) for notice in every]
-    if external or any(finding.refuse for finding in found):
-        return tuple(found)
-    mended = mend(log, tried()) if alone else None
+    if known is None:
+        known = saturation(log, gravity=gravity, effort=effort)
+    every: list[Notice] = []
+    if not external:
+        every += efforts(log, known)
+        every += dead_efforts(log)
+    every += held_efforts(log)
+    every += angles(log)
+    every += degrees(log, lambda: is_right(tried()))
+    every += spikes(log)
+    every += sampling(log)
+    every += rests(log, whole)
+    notices = [yielding(notice, log.origin.reading.accepted) for notice in every]
+    if external or any(notice.refuse for notice in notices):
+        return tuple(notices)
+    mended = None
+    if alone:
+        mended = mend(log, tried())
     if mended is not None:
-        found.append(mended.notice)
-    elif gravity > 0 and (figures := dynamic_figures(log)) is not None:
-        suspicion = gravity_findings(figures)
-        found += [] if suspicion is None else [advised(log, suspicion)]
-    return tuple(found)
+        notices.append(mended.notice)
+    elif gravity > 0:
+        notices += _of_gravity(log)
+    return tuple(notices)
+
+
+def _of_gravity(log: Log) -> list[Notice]:
+    """What the torque at rest says against how angles were read; empty where nothing does."""
+    figures = dynamic_figures(log)
+    if figures is None:
+        return []
+    suspicion = gravity_findings(figures)
+    if suspicion is None:
+        return []
+    return [advised(log, suspicion)]
 
 
 def noticed(
@@ -99,14 +112,15 @@ def noticed(
     LogError
         If a check forbids the use of a log that is all there.
     """
-    findings = examine(log, gravity=gravity, effort=effort, whole=whole, alone=alone, known=known)
-    refused = next((finding for finding in findings if finding.refuse), None)
-    if refused is not None and whole:
-        raise LogError(f"{log.origin.path}: {refused.code}: {refused.clause}")
-    looked_at = 0 if whole else round(log.duration)
-    return tuple(
-        replace(one, text="", numbers={**one.numbers, "looked_at": looked_at}, refuse=False)
-        if looked_at
-        else replace(one, refuse=False)
-        for one in findings
-    )
+    notices = []
+    for notice in examine(
+        log, gravity=gravity, effort=effort, whole=whole, alone=alone, known=known
+    ):
+        if notice.refuse and whole:
+            raise LogError(f"{log.origin.path}: {notice.code}: {notice.clause}")
+        looked_at = round(log.duration)
+        if looked_at and not whole:
+            numbers = dict(notice.numbers) | {"looked_at": looked_at}
+            notice = replace(notice, text="", numbers=numbers)
+        notices.append(replace(notice, refuse=False))
+    return tuple(notices)

@@ -31,8 +31,9 @@ from algid.words import counted
 
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _SMALL = np.pi / 4
-_TOLD = 0.01  # rad: a zero closer than this is not worth a word
+_MENTIONED = 0.01  # rad: a zero that is off by less is not mentioned
 _SAME = 1e-3  # of a scale or rad: as good as equal
+_DEGREES, _TURNS = 180 / pi, 1 / (2 * pi)  # scales of angles that are no motor's
 
 
 class Read(Protocol):
@@ -89,7 +90,7 @@ def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
     """Every convention tried on a log.
 
-    None where it is too short or too slow to tell, or a torque is none.
+    None where it is too short or too slow, or a torque is zero throughout.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
 
 
 def judged_together(logs: Iterable[Recorded | None], *, gravity: bool = True) -> Judgement | None:
-    """The same of logs of one arm, of which None tells nothing."""
+    """The same of logs of one arm, those that are None left out."""
     return judge_together([log for log in logs if log is not None], gravity=gravity)
 
 
@@ -120,129 +121,143 @@ def recorded(log: Log, seconds: float = math.inf) -> Recorded | None:
     return Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive)
 
 
-def is_right(found: Judgement | None) -> bool:
+def is_right(judgement: Judgement | None) -> bool:
     """Whether physics holds for a log as it was read, and for no other convention."""
-    return found is not None and found.alone and found.best.convention == AS_READ
+    return judgement is not None and judgement.alone and judgement.best.convention == AS_READ
 
 
-def mend(log: Read, found: Judgement | None) -> Mend | None:
+def mend(log: Read, judgement: Judgement | None) -> Mend | None:
     """What sets a log right that physics contradicts as it was read.
 
-    None where it is right, or the log does not tell.
+    None where it is right, or the log leaves it open.
 
     Parameters
     ----------
     log : Log, as it was read
-    found : what `judged` says of it
+    judgement : of `judged`
     """
-    if found is None or not found.alone or found.best.convention == AS_READ:
+    if judgement is None or not judgement.alone or judgement.best.convention == AS_READ:
         return None
-    convention = min(
-        (found.best.convention, found.best.convention.mirrored()),
-        key=lambda one: len(list(_clauses(one))),
-    )
+    convention = judgement.best.convention
+    mirrored = convention.mirrored()
+    if len(list(_clauses(mirrored))) < len(list(_clauses(convention))):
+        convention = mirrored
+    only_zeros = replace(convention, zero=(0.0, 0.0)) == AS_READ
     words = " and ".join(_clauses(convention))
-    if convention.mirrored().zero == (0.0, 0.0) and replace(convention, zero=(0.0, 0.0)) == AS_READ:
+    if only_zeros and convention.mirrored().zero == (0.0, 0.0):
         words = (
             "all signs are turned round, or θ1 counts from the other horizontal (the same arm "
             "seen from behind)"
         )
-    broken = min(found.as_read.broken.items(), key=lambda one: one[1], default=None)
-    if broken is None:
-        left, then = (100 * float(one.left.max()) for one in (found.as_read, found.best))
-        contradiction = f"{left:.3g} % of a torque stays unexplained, {then:.2g} % then"
-    else:
-        name, distance = broken
-        missed = counted(round(-distance), "standard deviation")
-        contradiction = f"it demands {name}, which the log misses by {missed}"
-    small = all(abs(angle) < _SMALL for angle in convention.zero)
+    small = max(abs(angle) for angle in convention.zero) < _SMALL
     return Mend(
         words,
-        contradiction,
+        _contradiction(judgement),
         _settings(convention, log),
-        another=not small or replace(convention, zero=(0.0, 0.0)) != AS_READ,
+        another=not (small and only_zeros),
     )
+
+
+def _contradiction(judgement: Judgement) -> str:
+    """What physics says against the convention that the log was read by."""
+    broken = judgement.as_read.broken
+    if not broken:
+        left = 100 * float(judgement.as_read.left.max())
+        then = 100 * float(judgement.best.left.max())
+        return f"{left:.3g} % of a torque stays unexplained, {then:.2g} % then"
+    name = min(broken, key=lambda name: broken[name])
+    missed = counted(round(-broken[name]), "standard deviation")
+    return f"it demands {name}, which the log misses by {missed}"
 
 
 def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> list[Mend | None]:
     """What sets each of several logs of one arm right: see `mend`.
 
-    They are judged together. Where that does not tell, each is judged by itself, and accused of
-    another convention only: what a single run alleges of zeros may be friction.
+    They are judged together. Where that leaves it open, each is judged alone, and only for another
+    convention: in a single run, friction can look like zeros that are off.
     """
     judgement = judged_together([recording for _, recording in logs], gravity=gravity)
     if judgement is not None and judgement.alone:
         return [mend(log, judgement) for log, _ in logs]
-    own = [mend(log, judged_together([each], gravity=gravity)) for log, each in logs]
-    return [None if one is None or not one.another else one for one in own]
+    own: list[Mend | None] = []
+    for log, recording in logs:
+        one = mend(log, judged_together([recording], gravity=gravity))
+        if one is not None and not one.another:
+            one = None
+        own.append(one)
+    return own
 
 
 def advised(log: Log, suspicion: Suspicion) -> Notice:
     """The notice of a suspicion with its remedies: those under which the log shows a real arm."""
-    known = recorded(log)
-    tried = () if known is None else _tried(log, suspicion, known)
-    return replace(suspicion.notice, remedies=tuple(tried))
+    recording = recorded(log)
+    if recording is None:
+        return replace(suspicion.notice, remedies=())
+    return replace(suspicion.notice, remedies=tuple(_tried(log, suspicion, recording)))
 
 
-def _tried(log: Log, suspicion: Suspicion, known: Recorded) -> Iterator[Remedy]:
+def _tried(log: Log, suspicion: Suspicion, recording: Recorded) -> Iterator[Remedy]:
     """The remedies that are physical and explain the torque."""
-    if suspicion.weightless and _is_real(tried_together([known], AS_READ, gravity=False)):
-        yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
-        yield Remedy({"gravity": 0}, "for a horizontal plane")
-    candidates = [tried_together([known], guess) for guess in suspicion.guesses]
-    if suspicion.free_zero and not any(map(_is_real, candidates)):
-        candidates += [zeroed_together([known], guess) for guess in suspicion.guesses]
-    for one in candidates:
-        if one is not None and one.convincing:
-            yield Remedy(_flat(_settings(one.convention, log)))
+    if suspicion.weightless:
+        weightless = tried_together([recording], AS_READ, gravity=False)
+        if weightless is not None and weightless.convincing:
+            yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
+            yield Remedy({"gravity": 0}, "for a horizontal plane")
+    real = _real(tried_together([recording], guess) for guess in suspicion.guesses)
+    if suspicion.free_zero and not real:
+        real = _real(zeroed_together([recording], guess) for guess in suspicion.guesses)
+    for one in real:
+        yield Remedy(_flat(_settings(one.convention, log)))
 
 
-def _is_real(found: Candidate | None) -> bool:
-    return found is not None and found.convincing
+def _real(candidates: Iterable[Candidate | None]) -> list[Candidate]:
+    """Those under which the log shows a real arm."""
+    return [one for one in candidates if one is not None and one.convincing]
 
 
 def _clauses(convention: Convention) -> Iterator[str]:
     """What is wrong with a log that has to be read by `convention`."""
     if convention.swapped and convention.torques_swapped:
         yield "the joints are swapped"
-    elif convention.swapped or convention.torques_swapped:
-        yield f"the {'angles' if convention.swapped else 'torques'} of the joints are swapped"
+    elif convention.swapped:
+        yield "the angles of the joints are swapped"
+    elif convention.torques_swapped:
+        yield "the torques of the joints are swapped"
     for joint in (0, 1):
         angle, torque = convention.signs[joint] < 0, convention.torque_signs[joint] < 0
         if angle and torque:
             yield f"joint {joint + 1} counts the other way round"
-        elif angle or torque:
-            yield f"the sign of {'θ' if angle else 'τ'}{joint + 1} is wrong"
+        elif angle:
+            yield f"the sign of θ{joint + 1} is wrong"
+        elif torque:
+            yield f"the sign of τ{joint + 1} is wrong"
     if convention.absolute:
         yield "θ2 counts from the horizontal or the vertical, not from link 1"
     if convention.base:
         yield "the second motor stands at the base"
     for what, scale in zip(("θ1", "θ2"), convention.scale, strict=True):
-        if _is_unit(scale):
-            yield f"{what} is in {'degrees' if scale > 1 else 'turns'}"
+        if isclose(scale, _DEGREES):
+            yield f"{what} is in degrees"
+        elif isclose(scale, _TURNS):
+            yield f"{what} is in turns"
         elif scale != 1:
             yield f"{what} is the motor's angle, {scale:.4g} times the joint's"
     for what, off in zip(("θ1", "θ2"), convention.zero, strict=True):
-        if what == "θ1" and abs(abs(off) - pi / 2) < _SAME:
-            yield f"θ1 is zero {'hanging straight down' if off < 0 else 'upright'}"
-        elif abs(off) > _TOLD:
+        if what == "θ1" and abs(off + pi / 2) < _SAME:
+            yield "θ1 is zero hanging straight down"
+        elif what == "θ1" and abs(off - pi / 2) < _SAME:
+            yield "θ1 is zero upright"
+        elif abs(off) > _MENTIONED:
             yield f"the zero of {what} is off by {degrees(off):.4g}°"
-
-
-def _is_unit(scale: float) -> bool:
-    return isclose(scale, 180 / pi) or isclose(scale, 1 / (2 * pi))
 
 
 def _settings(convention: Convention, log: Read) -> dict[str, Any]:
     """The settings that read the log by `convention`, over those that it was read by."""
     reading = log.origin.reading
     mending: dict[str, Any] = dict(_sources(convention, log))
-    place = (1, 0) if convention.swapped else (0, 1)
     for joint in (0, 1):
-        theta, tau = (
-            mending.setdefault(f"theta{joint + 1}", {}),
-            mending.setdefault(f"tau{joint + 1}", {}),
-        )
+        theta = mending.setdefault(f"theta{joint + 1}", {})
+        tau = mending.setdefault(f"tau{joint + 1}", {})
         # A channel that is swapped keeps what the profile says of its joint: names and units go
         # with the joint.
         if convention.signs[joint] < 0 and convention.torque_signs[joint] < 0:
@@ -254,15 +269,17 @@ def _settings(convention: Convention, log: Read) -> dict[str, Any]:
         elif convention.torque_signs[joint] < 0:
             tau["sign"] = -_own_sign(reading, f"tau{joint + 1}")
         scale = convention.scale[joint]
-        if _is_unit(scale):
-            theta["unit"] = "deg" if scale > 1 else "rev"
+        if isclose(scale, _DEGREES):
+            theta["unit"] = "deg"
+        elif isclose(scale, _TURNS):
+            theta["unit"] = "rev"
         elif scale != 1:
             theta["gear_ratio"] = float(f"{scale:.6g}")
     if convention.absolute:
         mending["second_angle"] = "absolute"
     if convention.base:
         mending["drive"] = "base"
-    mending |= _zeros(convention, reading, place)
+    mending |= _zeros(convention, reading)
     return {name: value for name, value in mending.items() if value != {}}
 
 
@@ -272,51 +289,64 @@ def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
     if convention.swapped and convention.torques_swapped and joints is not None:
         yield "joints", [joints[1], joints[0]]
         return
-    for name, swapped in (("theta", convention.swapped), ("tau", convention.torques_swapped)):
-        for joint in (1, 2) if swapped else ():
-            source = log.origin.mapping.get(f"{name}{3 - joint}", f"{name}{3 - joint}")
-            yield f"{name}{joint}", {"source": source.partition(": ")[2] or source}
+    swapped = {"theta": convention.swapped, "tau": convention.torques_swapped}
+    for quantity in ("theta", "tau"):
+        if not swapped[quantity]:
+            continue
+        for joint, other in ((1, 2), (2, 1)):
+            name = f"{quantity}{other}"
+            source = log.origin.mapping.get(name, name)
+            yield f"{quantity}{joint}", {"source": source.partition(": ")[2] or source}
 
 
 def _own_sign(reading: Reading, name: str) -> int:
     """The sign that the profile gives a channel, beside that of its joint."""
-    return (
-        reading.channels[name].sign * reading.signs[int(name[-1]) - 1]
-        if name in reading.channels
-        else 1
-    )
+    if name not in reading.channels:
+        return 1
+    return reading.channels[name].sign * reading.signs[int(name[-1]) - 1]
 
 
-def _zeros(convention: Convention, reading: Reading, place: tuple[int, int]) -> dict[str, Any]:
+def _zeros(convention: Convention, reading: Reading) -> dict[str, Any]:
     """The profile's zero and offsets, to add to recorded angles once signs and scales are right."""
-    channels = (reading.channels.get("theta1"), reading.channels.get("theta2"))
-    own = [0.0 if channel is None else channel.offset for channel in channels]
-    read = [
-        own[0] + ZEROS[reading.zero],
-        own[1] - (own[0] if reading.second_angle == "absolute" else 0.0),
-    ]
-    first, second = (
-        convention.signs[joint] / convention.scale[joint] * read[place[joint]] for joint in (0, 1)
-    )
-    first, second = (
-        first + convention.zero[0],
-        second - (first if convention.absolute else 0.0) + convention.zero[1],
-    )
-    if (
-        isclose(first, read[0], abs_tol=_SAME)
-        and isclose(second, read[1], abs_tol=_SAME)
-        and not convention.absolute
-    ):
+    own = np.zeros(2)  # what the channels' offsets added as the log was read
+    for joint, name in enumerate(("theta1", "theta2")):
+        if name in reading.channels:
+            own[joint] = reading.channels[name].offset
+    read = own + [ZEROS[reading.zero], 0.0]
+    if reading.second_angle == "absolute":
+        read[1] -= own[0]
+    moved = read
+    if convention.swapped:
+        moved = read[::-1]
+    moved = np.array(convention.signs) / np.array(convention.scale) * moved
+    if convention.absolute:
+        moved[1] -= moved[0] + convention.zero[0]
+    moved = moved + convention.zero
+    if np.allclose(moved, read, rtol=1e-9, atol=_SAME) and not convention.absolute:
         return {}
-    zeros = {name: first - turned for name, turned in ZEROS.items()}
-    zero = min(
-        zeros, key=lambda name: (abs(remainder(zeros[name], 2 * pi)) > _SAME, name != reading.zero)
-    )
-    offset = remainder(zeros[zero], 2 * pi)
-    both = (offset, second + (offset if convention.absolute else 0.0))
-    added = [
-        remainder(both[joint], 2 * pi) - (own[joint] - reading.offsets[joint]) for joint in (0, 1)
-    ]
-    offsets = [0.0 if abs(angle) < _SAME else float(f"{angle:.6g}") for angle in added]
-    mending: dict[str, Any] = {"zero": zero} if zero != reading.zero else {}
-    return mending | ({"offsets": offsets} if offsets != list(reading.offsets) else {})
+    zero, offset = _nearest_zero(float(moved[0]), reading.zero)
+    second = float(moved[1])
+    if convention.absolute:
+        second += offset
+    added = np.array([offset, remainder(second, 2 * pi)]) - (own - reading.offsets)
+    offsets = [float(f"{angle:.6g}") for angle in np.where(np.abs(added) < _SAME, 0.0, added)]
+    mending: dict[str, Any] = {}
+    if zero != reading.zero:
+        mending["zero"] = zero
+    if offsets != list(reading.offsets):
+        mending["offsets"] = offsets
+    return mending
+
+
+def _nearest_zero(first: float, own: str) -> tuple[str, float]:
+    """The named zero of θ1 at the angle `first` in rad, and what is left of that as an offset.
+
+    That of the profile, `own`, where none is there.
+    """
+    left = {name: remainder(first - turned, 2 * pi) for name, turned in ZEROS.items()}
+    if abs(left[own]) <= _SAME:
+        return own, left[own]
+    for name, offset in left.items():
+        if abs(offset) <= _SAME:
+            return name, offset
+    return own, left[own]

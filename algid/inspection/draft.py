@@ -1,4 +1,4 @@
-"""A profile to edit: every key there is, with what a log tells filled in."""
+"""A profile to edit: every key there is, filled in as far as a log states it."""
 
 from __future__ import annotations
 
@@ -66,69 +66,75 @@ def draft_profile(path: Path) -> str:
         If there is no such log, or its format is unknown.
     """
     log = look(path, lambda: open_log(path).origin)
-    head = "" if log.found else f"# {_safe(log.refused or '')}\n"
-    entries = "".join(
-        f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
-        for one in log.entries[:64]
-    )
-    return (
-        _HEAD + head + _source(log.found, log.format) + entries + _channels(log.found, log.format)
-    )
+    head = _HEAD
+    if log.content is None:
+        head += f"# {_safe(log.refused or '')}\n"
+    entries = ""
+    for one in log.entries[:64]:
+        entries += f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
+    return head + _source(log.content, log.format) + entries + _channels(log.content, log.format)
 
 
 def _source(origin: Origin | None, kind: str) -> str:
     """Lines of topic, joints, clock and time as in the log, behind # where they are not known."""
-    reading = origin.reading if origin else Reading()
-    joints = (
-        f"joints = [{', '.join(map(_quoted, reading.joints))}]"
-        if reading.joints
-        else '# joints = ["shoulder", "elbow"]'
-    )
+    reading = Reading()
+    time = '# time = "t"'
+    if origin is not None:
+        reading = origin.reading
+        if "t" in origin.mapping:
+            time = f"time = {_quoted(origin.mapping['t'])}"
+    joints = '# joints = ["shoulder", "elbow"]'
+    if reading.joints:
+        joints = f"joints = [{', '.join(map(_quoted, reading.joints))}]"
     if kind in _ON_TOPICS:
-        topic = (
-            f"topic = {_quoted(reading.topics[0])}"
-            if reading.topics
-            else '# topic = "/joint_states"'
-        )
-        time = ('# time = "t"  # of tables', '# time_unit = "s"  # of tables: s, ms, us, ns')
+        topic = '# topic = "/joint_states"'
+        if reading.topics:
+            topic = f"topic = {_quoted(reading.topics[0])}"
         clock = "# clock = \"log\"  # the recorder's times, not the messages' own"
+        time = '# time = "t"  # of tables'
+        unit = '# time_unit = "s"  # of tables: s, ms, us, ns'
     else:
-        topic, clock = (
-            '# topic = "/joint_states"  # of bags',
-            '# clock = "log"  # of bags: header or log',
-        )
-        unit = f'time_unit = "{reading.time_unit}"' if reading.time_unit else '# time_unit = "s"'
-        name = f"time = {_quoted(origin.mapping['t'])}" if origin else '# time = "t"'
-        time = (name, f"{unit}  # s, ms, us, ns")
-    return "\n".join([topic, f"{joints}  # first joint first", clock, *time, ""])
+        topic = '# topic = "/joint_states"  # of bags'
+        clock = '# clock = "log"  # of bags: header or log'
+        unit = '# time_unit = "s"  # s, ms, us, ns'
+        if reading.time_unit:
+            unit = f'time_unit = "{reading.time_unit}"  # s, ms, us, ns'
+    return f"{topic}\n{joints}  # first joint first\n{clock}\n{time}\n{unit}\n"
 
 
 def _channels(origin: Origin | None, kind: str) -> str:
+    """A table for each channel, its topic and source as in the log where they are known."""
     text = ""
     for name in CHANNELS:
-        topic, source = "", origin.mapping.get(name, "") if origin else ""
-        if kind in _ON_TOPICS:
-            topic, _, source = source.partition(": ")
-        own = topic and origin is not None and topic != origin.reading.topics[0]
-        lines = [
-            f"topic = {_quoted(topic)}"
-            if own
-            else '# topic = "/joint_states"  # where it is another',
-            f"source = {_quoted(source)}" if source else '# source = "NAME"',
-        ]
-        text += (
-            f"\n[{name}]\n"
-            + "\n".join(lines)
-            + f"\n# sign = -1\n# offset = 0.0\n{_UNITS[name[:-1]]}"
-        )
+        topic_line = '# topic = "/joint_states"  # where it is another'
+        source_line = '# source = "NAME"'
+        if origin is not None and name in origin.mapping:
+            topic, source = "", origin.mapping[name]
+            if kind in _ON_TOPICS:
+                topic, _, source = source.partition(": ")
+            if topic and topic != origin.reading.topics[0]:
+                topic_line = f"topic = {_quoted(topic)}"
+            if source:
+                source_line = f"source = {_quoted(source)}"
+        text += f"\n[{name}]\n{topic_line}\n{source_line}\n# sign = -1\n# offset = 0.0\n"
+        text += _UNITS[name[:-1]]
     return text
 
 
 def _quoted(text: str) -> str:
     """As a TOML basic string: escapes as in JSON, save those of two surrogates."""
-    letters = (f"\\U{ord(one):08x}" if ord(one) > 0xFFFF else json.dumps(one)[1:-1] for one in text)
-    return f'"{"".join(letters)}"'
+    escaped = ""
+    for letter in text:
+        if ord(letter) > 0xFFFF:
+            escaped += f"\\U{ord(letter):08x}"
+        else:
+            escaped += json.dumps(letter)[1:-1]
+    return f'"{escaped}"'
 
 
 def _safe(text: str) -> str:
-    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
+    """The text without what cannot be printed."""
+    for letter in set(text):
+        if not letter.isprintable():
+            text = text.replace(letter, "\ufffd")
+    return text

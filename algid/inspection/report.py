@@ -35,7 +35,7 @@ class Look(Generic[T]):
 
     format: str
     entries: tuple[Entry, ...]
-    found: T | None = None
+    content: T | None = None
     refused: str | None = None
 
 
@@ -47,12 +47,19 @@ def look(log: Any, read: Callable[[], T]) -> Look[T]:
     LogError
         As `contents`; what `read` raises stands in `refused`.
     """
-    with during("opening", NAME if not isinstance(log, str | Path) else log):
+    with during("opening", _called(log)):
         kind, entries = contents(log)
     try:
-        return Look(kind, entries, found=read())
+        return Look(kind, entries, content=read())
     except LogError as error:
         return Look(kind, entries, refused=str(error))
+
+
+def _called(log: Any) -> str:
+    """A log's path, or what stands for one in memory."""
+    if isinstance(log, str | Path):
+        return str(log)
+    return NAME
 
 
 def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
@@ -110,7 +117,7 @@ class Inspection:
         return plain
 
 
-def inspect_log(given: Any, profile: Profile | None = None) -> Inspection:
+def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
     """Look at a log, a path or one in memory, without using it.
 
     A log that cannot be read gives what it holds, and the reason.
@@ -120,30 +127,36 @@ def inspect_log(given: Any, profile: Profile | None = None) -> Inspection:
     LogError
         If there is no such log, or its format is unknown.
     """
-    seen = look(given, lambda: given if isinstance(given, Log) else read_log(given, profile))
-    path = str(given) if isinstance(given, str | Path) else NAME
-    if seen.found is None:
-        return Inspection(path, seen.format, seen.entries, refused=seen.refused)
-    log = seen.found
-    gravity = profile.gravity if profile is not None else 9.81
-    effort = None if profile is None else profile.effort
-    known = saturation(log, gravity=gravity, effort=effort)
-    findings = (
-        *examine(log, gravity=gravity, effort=effort, known=known),
-        *clipped(log, known.limits),
-    )
+
+    def samples() -> Log:
+        if isinstance(log, Log):
+            return log
+        return read_log(log, profile)
+
+    seen = look(log, samples)
+    if seen.content is None:
+        return Inspection(_called(log), seen.format, seen.entries, refused=seen.refused)
+    path = _called(log)
+    if isinstance(log, Log):
+        path = log.origin.path
+    gravity, effort = 9.81, None
+    if profile is not None:
+        gravity, effort = profile.gravity, profile.effort
+    known = saturation(seen.content, gravity=gravity, effort=effort)
+    findings = examine(seen.content, gravity=gravity, effort=effort, known=known)
+    findings += tuple(clipped(seen.content, known.limits))
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     return Inspection(
-        path=log.origin.path if isinstance(given, Log) else path,
+        path=path,
         format=seen.format,
         entries=seen.entries,
         refused="; ".join(reasons) or None,
-        mapping=log.origin.mapping,
-        synthetic=log.origin.truth is not None,
-        clock=clock_figures(log),
-        signals=_signals(log),
-        dynamics=dynamic_figures(log),
-        notices=log.notices,
+        mapping=seen.content.origin.mapping,
+        synthetic=seen.content.origin.truth is not None,
+        clock=clock_figures(seen.content),
+        signals=_signals(seen.content),
+        dynamics=dynamic_figures(seen.content),
+        notices=seen.content.notices,
         findings=findings,
     )
 
@@ -151,7 +164,8 @@ def inspect_log(given: Any, profile: Profile | None = None) -> Inspection:
 def _signals(log: Log) -> dict[str, SignalFigures]:
     signals = {}
     pairs = [("theta", log.theta), ("tau", log.tau)]
-    pairs += [("omega", log.omega)] if log.omega is not None else []
+    if log.omega is not None:
+        pairs.append(("omega", log.omega))
     for name, pair in pairs:
         for joint, values in enumerate(pair, start=1):
             signals[f"{name}{joint}"] = signal_figures(values)
@@ -163,4 +177,6 @@ def _finite(value: Any) -> Any:
         return {key: _finite(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
         return [_finite(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

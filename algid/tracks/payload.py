@@ -114,7 +114,7 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     cells = joined(parts)
     segments = edges(cells)
     for _ in range(ROUNDS):
-        rough = [cells.part(*ends) for ends in pairwise(segments.places)]
+        rough = _cut(cells, segments.places)
         cells = joined(_settled(source, arm, rough, _masses(rough, segments.drift)))
         segments = edges(cells)
     changes = _changes(source, arm, cells, segments)
@@ -126,20 +126,27 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
 
 def _masses(parts: Sequence[Cells], drift: Drift | None) -> list[float]:
     """What each part's payload weighs, friction's drift freed."""
-    return [(part if drift is None else drift.freed(part)).mass for part in parts]
+    if drift is None:
+        return [part.mass for part in parts]
+    return [drift.freed(part).mass for part in parts]
 
 
-def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, found: Edges) -> list[Place]:
+def _cut(cells: Cells, places: Sequence[int]) -> list[Cells]:
+    """The cells between each two neighbouring places."""
+    return [cells.part(first, last) for first, last in pairwise(places)]
+
+
+def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, rough: Edges) -> list[Place]:
     """Changes of the payload: those that cells show, as far as their rows confirm them."""
-    parts = [cells.part(*ends) for ends in pairwise(found.places)]
     places = []
-    for place in found.places[1:-1]:
+    for place in rough.places[1:-1]:
         safe = float(cells.start[place - AHEAD]), float(cells.start[place]) + BEHIND * CELL
         places.append(Place(float(cells.start[place]), safe, safe, np.inf))
-    rough = Changes(tuple(places), tuple(_masses(parts, found.drift)))
+    masses = _masses(_cut(cells, rough.places), rough.drift)
+    changes = Changes(tuple(places), tuple(masses))
     ends = (float(cells.start[0]), float(cells.end[-1]))
     return confirmed(
-        source, arm, found.drift, rough, ends, PENALTY * found.variance, found.variance
+        source, arm, rough.drift, changes, ends, PENALTY * rough.variance, rough.variance
     )
 
 
@@ -152,47 +159,53 @@ def _weigh(
 ) -> Track:
     """The track of a log with payload changes at `changes`, each stretch from its `inner` cells."""
     counts = [len(part) for part in inner]
-    starts = np.cumsum([0, *counts[:-1]])
+    places = np.append(0, np.cumsum(counts))
+    starts = places[:-1]
     whole = joined(inner)
     drift = drift_of(whole, starts, rough_variance(whole))
-    calm = whole if drift is None else drift.freed(whole)
+    calm = whole
+    if drift is not None:
+        calm = drift.freed(whole)
     information = np.maximum(np.add.reduceat(calm.A, starts), 1e-300)
     weights = np.add.reduceat(calm.B, starts) / information
     masses = np.repeat(weights, counts)
     T = calm.sensitivity(arm, masses)
     if drift is not None:
         T = drift.sensitivity(calm, starts, T, calm.friction_sensitivity(arm, masses))
-    parts = list(pairwise([*starts, len(whole)]))
+    parts = list(pairwise(places.tolist()))
     colour = variance(calm, parts, known=(T, covariance), robust=False)
     squares = calm.squares(masses)
     own = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
     noise = np.maximum(own, colour)  # a stretch's own, or the log's where that is larger
     J = np.add.reduceat(T, starts) / information[:, None]
-    by_drift = 0.0 if drift is None else drift.variances(calm, starts)
-    stds = np.sqrt(
-        noise * (1 / information + by_drift) + np.einsum("kx,xy,ky->k", J, covariance, J)
-    )
-    curves = [
-        _band(calm.part(first, first + count), T[first : first + count], covariance, one, drift)
-        for first, count, one in zip(starts, counts, noise, strict=True)
-    ]
+    scatter = 1 / information
+    if drift is not None:
+        scatter = scatter + drift.variances(calm, starts)
+    stds = np.sqrt(noise * scatter + np.einsum("kx,xy,ky->k", J, covariance, J))
+    curves = []
+    for (first, last), one in zip(parts, noise, strict=True):
+        curves.append(_band(calm.part(first, last), T[first:last], covariance, one, drift))
     t, m_p, std = np.concatenate(curves, axis=1)
     signal, left = calm.Q.sum() - calm.rows.sum(), max(squares.sum() - calm.rows.sum(), 0.0)
+    share = 0.0
+    if signal > 0:
+        share = float(1 - left / signal)
     wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
-    bounds = [float(cells.start[0]), *(one.time for one in changes), float(cells.end[-1])]
+    times = [float(cells.start[0])] + [one.time for one in changes] + [float(cells.end[-1])]
+    stretches = []
+    for (start, end), mass, one in zip(pairwise(times), weights, stds, strict=True):
+        stretches.append(Stretch(start, end, float(mass), float(one)))
+    brackets = [(one.time, one.bracket[0], one.bracket[1]) for one in changes]
     return Track(
-        stretches=[
-            Stretch(start, end, float(mass), float(one))
-            for (start, end), mass, one in zip(pairwise(bounds), weights, stds, strict=True)
-        ],
+        stretches=stretches,
         t=t,
         m_p=m_p,
         std=std,
         stretch=np.repeat(np.arange(len(inner)), counts).astype(np.float64),
         left=np.sqrt(np.maximum(squares, 0.0) / calm.rows),
-        changes=np.array([(one.time, *one.bracket) for one in changes]).reshape(-1, 3),
+        changes=np.array(brackets).reshape(-1, 3),
         colour=colour,
-        explained=float(1 - left / signal) if signal > 0 else 0.0,
+        explained=share,
         holes=np.stack([cells.end[wide], cells.start[wide + 1]], axis=1),
         tip_equivalent=arm.tip_equivalent,
     )
@@ -204,7 +217,8 @@ def _settled(
     """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
     settled = list(rough)
     for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
-        if cells := cells_of((segment for _, segment in own), arm, masses[place]):
+        cells = cells_of((segment for _, segment in own), arm, masses[place])
+        if cells:
             settled[place] = joined(cells)
     return settled
 
@@ -224,14 +238,18 @@ def _by_stretch(
 
 def _inner_parts(cells: Cells, changes: Sequence[Place]) -> list[Cells]:
     """Cells of each stretch where its payload surely is constant, or some in its middle."""
-    begins = [-np.inf, *(one.safe[1] for one in changes)]
-    ends = [*(one.safe[0] for one in changes), np.inf]
-    bounds = [-np.inf, *(one.time for one in changes), np.inf]
     parts = []
-    for place, (start, end) in enumerate(pairwise(bounds)):
-        first = int(np.searchsorted(cells.start, begins[place])) + CALM * (place > 0)
-        last = int(np.searchsorted(cells.end, ends[place], side="right"))
-        last -= CALM * (place < len(changes))
+    for place in range(len(changes) + 1):
+        start, first = -np.inf, 0
+        if place > 0:
+            before = changes[place - 1]
+            start = before.time
+            first = int(np.searchsorted(cells.start, before.safe[1])) + CALM
+        end, last = np.inf, len(cells)
+        if place < len(changes):
+            after = changes[place]
+            end = after.time
+            last = int(np.searchsorted(cells.end, after.safe[0], side="right")) - CALM
         if last - first < FEWEST:
             own = np.searchsorted(cells.start, [start, end])
             first = min(max(int(own.sum() - FEWEST) // 2, 0), len(cells) - FEWEST)
@@ -253,7 +271,7 @@ def _band(
     high = np.clip(np.arange(len(cells)) + half + 1, None, len(cells))
 
     def moving(x: FloatArray) -> FloatArray:
-        total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
+        total = np.concatenate([np.zeros_like(x[:1]), np.cumsum(x, axis=0)])
         return np.asarray(total[high] - total[low])
 
     A = np.maximum(moving(cells.A), 1e-300)
