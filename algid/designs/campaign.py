@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,7 +12,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.criteria import UNDETERMINED
 from algid.designs.belief import Asked, Belief
-from algid.designs.information import Experiment, Slopes, informations
+from algid.designs.information import Experiment, Information, Slopes, informations
 from algid.designs.limits import HANGING, Limits, Row, Usage, resting, usage
 from algid.designs.optimise import optimise
 from algid.designs.position import JUDGED_RATE, PositionProblem
@@ -23,9 +24,8 @@ from algid.options import flag
 from algid.progress import Progress
 
 Drive = Literal["position", "torque"]
-MARGIN = (
-    0.05  # of each limit, kept for what a controller overshoots while its model is a fifth wrong
-)
+MARGIN = 0.05
+"""Of each limit, kept for what a controller overshoots while its model is a fifth wrong."""
 ARMS = 20  # of the belief, of which the worst is reported
 SECOND = 1.0  # s: for how long each stretch of the motion is, whose information is shown
 
@@ -59,7 +59,7 @@ class Campaign:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A planned motion and what it will tell.
+    """A planned motion and the error bars that it will give.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Design:
     def open_parameters(self) -> list[str]:
         """Names of those asked for whose error bar is as large as they are."""
         lost = self.campaign.asked.wanted & (self.relative > UNDETERMINED)
-        return [name for name, yes in zip(self.names, lost, strict=True) if yes]
+        return [self.names[place] for place in np.flatnonzero(lost)]
 
     @property
     def binding(self) -> list[tuple[Row, float]]:
@@ -138,17 +138,16 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     KeyboardInterrupt
         If it is interrupted before there is a motion; later, the best so far is the plan.
     """
-    t = (
-        np.arange(round(campaign.duration * campaign.experiment.rate) + 1)
-        / campaign.experiment.rate
-    )
-    planned = _swung if campaign.drive == "torque" else _guided
+    rate = campaign.experiment.rate
+    t = np.arange(round(campaign.duration * rate) + 1) / rate
     try:
-        return planned(campaign, t, progress)
+        if campaign.drive == "torque":
+            return _swung(campaign, t, progress)
+        return _guided(campaign, t, progress)
     except np.linalg.LinAlgError as error:
         # Torque noise below the rounding of the noise of twice differentiated angles.
         raise SettingError(
-            f"{flag('rate')}: at {campaign.experiment.rate:g} Hz the noise of the angles, "
+            f"{flag('rate')}: at {rate:g} Hz the noise of the angles, "
             f"differentiated twice, leaves nothing of the torque ({error}); ask for a lower rate "
             f"or less {flag('position_noise')}"
         ) from error
@@ -175,16 +174,23 @@ def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Des
     optimum = optimise(problem, experiment.rate, campaign.seed, progress)
     motion = problem.family.motion(optimum.x, problem.family.basis(t))
     slopes = Slopes(experiment.shared.model, motion, experiment.rate)
-    kinds = (False, True) if experiment.shared.payload else (False,)
-    torque = {loaded: np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c) for loaded in kinds}
+    kinds = [False]
+    if experiment.shared.payload:
+        kinds.append(True)
+    motions, torque = {}, {}
+    for loaded in kinds:
+        motions[loaded] = motion
+        torque[loaded] = np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c)
     used = usage(campaign.limits, slopes, loads, derivatives=False)
-    return _judged(campaign, t, dict.fromkeys(kinds, motion), torque, used, optimum.interrupted)
+    return _judged(campaign, t, motions, torque, used, optimum.interrupted)
 
 
 def _swung(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
     """The plan of an open loop: one torque, under which every arm and load moves in its own way."""
     limits = campaign.limits.within(campaign.margin)
-    start = limits.middle if campaign.experiment.shared.model.gravity == 0 else np.array(HANGING)
+    start = np.array(HANGING)
+    if campaign.experiment.shared.model.gravity == 0:
+        start = limits.middle
     problem = TorqueProblem(
         campaign.experiment,
         campaign.belief,
@@ -210,18 +216,16 @@ def _judged(
     used: Usage,
     interrupted: bool,
 ) -> Design:
-    """What a plan tells, at the times `t` (N,) of its log."""
+    """A plan with the error bars of its log, at the times `t` (N,)."""
     experiment, belief = campaign.experiment, campaign.belief
     recorded = {loaded: motions[loaded] for loaded in experiment.kinds}
     every = max(1, round(experiment.rate / JUDGED_RATE))
     whole = informations(experiment, recorded, belief.mean, 1, experiment.rate)
-    drawn = [
-        informations(experiment, recorded, arm, every, experiment.rate)
-        for arm in belief.draws(ARMS, campaign.seed)
-    ]
-    C, *others = (
-        campaign.asked.covariance(np.sum([one.S for one in arm], axis=0)) for arm in [whole, *drawn]
-    )
+    C = _covariance(campaign, whole)
+    worst = np.diag(C)
+    for arm in belief.draws(ARMS, campaign.seed):
+        drawn = informations(experiment, recorded, arm, every, experiment.rate)
+        worst = np.maximum(worst, np.diag(_covariance(campaign, drawn)))
     parts = np.sum([one.parts(round(SECOND * experiment.rate)) for one in whole], axis=0)
     return Design(
         campaign=campaign,
@@ -229,8 +233,13 @@ def _judged(
         motions=motions,
         torque=torque,
         std=np.sqrt(np.diag(C)),
-        worst=np.sqrt(np.max([np.diag(one) for one in [C, *others]], axis=0)),
+        worst=np.sqrt(worst),
         shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
         usage=used,
         interrupted=interrupted,
     )
+
+
+def _covariance(campaign: Campaign, runs: Sequence[Information]) -> FloatArray:
+    """Covariance (Q, Q) of the parameters from all runs together."""
+    return campaign.asked.covariance(np.sum([one.S for one in runs], axis=0))

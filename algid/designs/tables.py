@@ -15,10 +15,12 @@ from algid.report.document import Column, Drawn, Table
 from algid.report.drawings import gauges
 from algid.text import ABSENT, percent, resolved, significant, unit_text
 from algid.verdict import Verdict, graded
+from algid.words import counted
 
 # of what the margin leaves: a limit that is used as far is what keeps the error bars from being
 # less
 BINDS = 0.98
+_YES = {True: "yes", False: ""}
 SIGNS = {
     "range": "rad",
     "speed": "rad/s",
@@ -35,8 +37,10 @@ def bound_table(design: Design) -> Table:
     mean = design.campaign.belief.mean
     rows = []
     for place, name in enumerate(design.names):
-        relative = percent(design.std[place], asked.size[place]) if asked.known[place] else ABSENT
-        worst = percent(design.worst[place], asked.size[place]) if asked.known[place] else ABSENT
+        relative = worst = ABSENT
+        if asked.known[place]:
+            relative = percent(design.std[place], asked.size[place])
+            worst = percent(design.worst[place], asked.size[place])
         rows.append(
             (
                 name,
@@ -45,7 +49,7 @@ def bound_table(design: Design) -> Table:
                 unit_text(UNITS[name]),
                 relative,
                 worst,
-                "yes" if asked.wanted[place] else "",
+                _YES[bool(asked.wanted[place])],
             )
         )
     columns = (
@@ -60,18 +64,18 @@ def bound_table(design: Design) -> Table:
     runs = design.campaign.experiment.runs
     note = (
         f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as stated. "
-        "The worst arm is the "
-        "worst of 20 drawn from what is believed."
+        "The worst arm is the worst of 20 drawn from what is believed."
     )
     return Table("What the campaign will tell", columns, tuple(rows), note)
 
 
 def _runs(runs: tuple[int, int]) -> str:
-    words = [
-        f"{count} {kind} run{'s' * (count > 1)}"
-        for count, kind in zip(runs, ("unloaded", "loaded"), strict=True)
-    ]
-    return " and ".join(word for word, count in zip(words, runs, strict=True) if count)
+    """The numbers of runs of each kind, in words."""
+    words = []
+    for count, kind in zip(runs, ("unloaded", "loaded"), strict=True):
+        if count:
+            words.append(counted(count, f"{kind} run"))
+    return " and ".join(words)
 
 
 def limit_table(design: Design) -> Table:
@@ -91,7 +95,7 @@ def limit_table(design: Design) -> Table:
                 significant(limit, 4),
                 SIGNS[row.limit],
                 percent(used, 1.0, 3),
-                "yes" if used >= BINDS * most else "",
+                _YES[used >= BINDS * most],
             )
         )
     columns = (
@@ -105,8 +109,7 @@ def limit_table(design: Design) -> Table:
     )
     note = (
         f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller "
-        "overshoots. Torque is the "
-        "largest that any arm of those believed possible asks for."
+        "overshoots. Torque is the largest that any arm of those believed possible asks for."
     )
     drawn = Drawn("of the limit", gauges({kind: used for kind, (_, used) in tightest.items()}), "%")
     return Table("What limits bind", columns, tuple(rows), note, drawn=(drawn,))
@@ -116,7 +119,7 @@ def kind_name(row: Row) -> str:
     """What a limit is of, in words."""
     if row.limit == "rest":
         return "velocity at the end"
-    load = "" if row.loaded is None else ", loaded" if row.loaded else ", unloaded"
+    load = {None: "", True: ", loaded", False: ", unloaded"}[row.loaded]
     return f"{row.limit.replace('-', ' ')}{load}"
 
 
@@ -124,8 +127,12 @@ def place_name(row: Row) -> str:
     """Where a limit is: a joint, and which way."""
     if row.joint is None:
         return ""
-    side = "" if row.limit == "rest" else ", up" if row.upper else ", down"
-    return f"joint {row.joint + 1}{side}"
+    joint = f"joint {row.joint + 1}"
+    if row.limit == "rest":
+        return joint
+    if row.upper:
+        return f"{joint}, up"
+    return f"{joint}, down"
 
 
 def limit_name(row: Row) -> str:
@@ -133,8 +140,9 @@ def limit_name(row: Row) -> str:
     if row.limit == "rest":
         return f"velocity of joint {(row.joint or 0) + 1} at the end"
     kind, comma, load = kind_name(row).partition(",")
-    where = place_name(row)
-    return f"{kind}{f' of {where}' if where else ''}{comma}{load}"
+    if row.joint is None:
+        return f"{kind}{comma}{load}"
+    return f"{kind} of {place_name(row)}{comma}{load}"
 
 
 def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
@@ -146,26 +154,28 @@ def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
     if row.limit == "rest":
         limit = END * float(np.abs(design.motion.omega[row.joint]).max())
         return limit, used * limit
-    sign = 1.0 if row.upper else -1.0
     if row.limit == "range":
         low, high = float(limits.low[row.joint]), float(limits.high[row.joint])
-        middle = 0.5 * (low + high)
-        return (high if row.upper else low), middle + sign * used * 0.5 * (high - low)
+        middle, half = 0.5 * (low + high), used * 0.5 * (high - low)
+        if row.upper:
+            return high, middle + half
+        return low, middle - half
     limit = float(getattr(limits, row.limit)[row.joint])
-    return sign * limit, sign * used * limit
+    if not row.upper:
+        limit = -limit
+    return limit, used * limit
+
+
+_WIDER = tuple(Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs"))
 
 
 def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
     """The design in one clause, with reasons: `doubts` about its prior, undetermined parameters."""
-    reasons = [*doubts]
+    reasons = []
     if design.open_parameters:
-        wider = tuple(
-            Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs")
-        )
-        reasons.insert(
-            0,
-            Notice("NOT_REACHED", numbers={"names": list(design.open_parameters)}, remedies=wider),
-        )
+        numbers = {"names": list(design.open_parameters)}
+        reasons.append(Notice("NOT_REACHED", numbers=numbers, remedies=_WIDER))
+    reasons += doubts
     if design.interrupted:
         reasons.append(Notice("BROKEN_OFF"))
     return graded(_headline(design), reasons)
@@ -178,6 +188,5 @@ def _headline(design: Design) -> str:
     row, used = design.binding[0]
     return (
         f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is "
-        "the least certain); "
-        f"{limit_name(row)} is used to {percent(used, 1.0, 3)} %"
+        f"the least certain); {limit_name(row)} is used to {percent(used, 1.0, 3)} %"
     )

@@ -1,4 +1,4 @@
-"""A design's folder: the trajectory for controllers, players and people, and what it will tell.
+"""A design's folder: the trajectory for controllers, players and people, and what it predicts.
 
 ``trajectory.csv``, ``.parquet`` and ``.mcap``, ``joint_trajectory.yaml``, ``design.json``,
 ``report.html``.
@@ -17,11 +17,12 @@ import numpy as np
 from algid import __version__
 from algid.arm import FloatArray
 from algid.designs.campaign import Design
+from algid.designs.limits import Row
 from algid.designs.page import page_html
 from algid.designs.tables import amounts, verdict
 from algid.files import whole_file
 from algid.log import Log, Origin
-from algid.model import UNITS, Motion
+from algid.model import UNITS
 from algid.notices import Notice
 
 # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
@@ -72,29 +73,29 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
 
 def trajectory(design: Design) -> dict[str, FloatArray]:
     """The trajectory's columns: time, angles, velocities, accelerations, feed-forward torques."""
-    columns = {"t": design.t, **_signals(design.motion, ("theta", "omega", "alpha"))}
+    motion = design.motion
     first = min(design.torque)
-    columns |= {f"tau{joint + 1}": design.torque[first][joint] for joint in range(2)}
+    columns = {"t": design.t}
+    columns |= _of_joints("theta", motion.theta)
+    columns |= _of_joints("omega", motion.omega)
+    columns |= _of_joints("alpha", motion.alpha)
+    columns |= _of_joints("tau", design.torque[first])
     if True in design.torque and not first:
-        if design.motions[True] is not design.motion:
-            columns |= {
-                f"loaded_{name}": values
-                for name, values in _signals(design.motions[True], ("theta",)).items()
-            }
-        columns |= {f"loaded_tau{joint + 1}": design.torque[True][joint] for joint in range(2)}
+        if design.motions[True] is not motion:
+            columns |= _of_joints("loaded_theta", design.motions[True].theta)
+        columns |= _of_joints("loaded_tau", design.torque[True])
     return columns
 
 
-def _signals(motion: Motion, names: Sequence[str]) -> dict[str, FloatArray]:
-    return {
-        f"{name}{joint + 1}": getattr(motion, name)[joint] for name in names for joint in range(2)
-    }
+def _of_joints(name: str, rows: FloatArray) -> dict[str, FloatArray]:
+    """The rows of a signal (2, N), or its values (2,), by the joints' names."""
+    return {f"{name}1": rows[0], f"{name}2": rows[1]}
 
 
 def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
     """The motion as trajectory_msgs/JointTrajectory in YAML, for a joint_trajectory_controller."""
     every = max(1, round(design.campaign.experiment.rate / POINTS))
-    places = [*range(0, design.t.size - 1, every), design.t.size - 1]
+    places = np.append(np.arange(0, design.t.size - 1, every), design.t.size - 1)
     lines = [
         "# trajectory_msgs/msg/JointTrajectory, planned by algid design.",
         (
@@ -122,7 +123,7 @@ def joint_trajectory(design: Design, joints: tuple[str, str]) -> str:
 
 
 def _numbers(values: FloatArray) -> str:
-    return f"[{', '.join(repr(round(float(value), 9) + 0.0) for value in values)}]"
+    return str([round(float(value), 9) + 0.0 for value in values])
 
 
 def design_json(design: Design, origin: Provenance) -> str:
@@ -134,6 +135,10 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
     """What ``design.json`` holds."""
     campaign = design.campaign
     experiment, limits = campaign.experiment, campaign.limits
+    height = None
+    if np.isfinite(limits.height):
+        height = limits.height
+    noise = _of_joints("theta", experiment.noise.theta) | _of_joints("tau", experiment.noise.tau)
     return {
         "schema_version": SCHEMA_VERSION,
         "version": __version__,
@@ -146,11 +151,7 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
         "runs": {"unloaded": experiment.runs[0], "loaded": experiment.runs[1]},
         "seed": campaign.seed,
         "interrupted": design.interrupted,
-        "noise": {
-            f"{name}{joint + 1}": float(values[joint])
-            for name, values in (("theta", experiment.noise.theta), ("tau", experiment.noise.tau))
-            for joint in range(2)
-        },
+        "noise": {name: float(level) for name, level in noise.items()},
         "gravity": experiment.shared.model.gravity,
         "parameters": {name: _parameter(design, place) for place, name in enumerate(design.names)},
         "largest_relative_bound": design.largest,
@@ -159,34 +160,42 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
             "speed": _finite(limits.speed),
             "acceleration": _finite(limits.acceleration),
             "torque": _finite(limits.torque),
-            "tip_height": limits.height if np.isfinite(limits.height) else None,
+            "tip_height": height,
             "margin": campaign.margin,
         },
-        "used": [
-            {
-                "limit": row.limit,
-                "joint": None if row.joint is None else row.joint + 1,
-                "loaded": row.loaded,
-                "allowed": limit,
-                "most": value,
-                "share": used,
-            }
-            for row, used in design.binding
-            for limit, value in [amounts(design, row, used)]
-        ],
+        "used": [_used(design, row, share) for row, share in design.binding],
         "start": design.motion.theta[:, 0].tolist(),
         "joints": list(origin.joints),
     }
 
 
+def _used(design: Design, row: Row, share: float) -> dict[str, Any]:
+    """A limit and the share of it that the motion uses."""
+    limit, most = amounts(design, row, share)
+    joint = None
+    if row.joint is not None:
+        joint = row.joint + 1
+    return {
+        "limit": row.limit,
+        "joint": joint,
+        "loaded": row.loaded,
+        "allowed": limit,
+        "most": most,
+        "share": share,
+    }
+
+
 def _parameter(design: Design, place: int) -> dict[str, Any]:
+    """What is believed of a parameter, and the error bars that the campaign will give it."""
     asked = design.campaign.asked
-    known = bool(asked.known[place])
+    relative = None
+    if asked.known[place]:
+        relative = float(design.relative[place])
     return {
         "believed": float(design.campaign.belief.mean[place]),
         "believed_std": float(design.campaign.belief.std[place]),
         "std": float(design.std[place]),
-        "relative": float(design.relative[place]) if known else None,
+        "relative": relative,
         "worst_std": float(design.worst[place]),
         "unit": UNITS[design.names[place]],
         "asked": bool(asked.wanted[place]),
@@ -195,4 +204,8 @@ def _parameter(design: Design, place: int) -> dict[str, Any]:
 
 
 def _finite(values: FloatArray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
+    """As JSON has them: null where there is no limit."""
+    limits: list[float | None] = values.tolist()
+    for place in np.flatnonzero(~np.isfinite(values)):
+        limits[place] = None
+    return limits

@@ -3,7 +3,7 @@
 The windows of the weak form are gathered with the columns of all terms, linearised where they are
 not linear, and weighed by each joint's residual, log by log; `algid.estimators.shrinkage` finds
 parameters and spreads. A joint that stands is held by dry friction, which is any torque up to f
-there: its windows say nothing and are left out.
+there: its windows are left out.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.shrinkage import Expected, dispersion, divided, joined, shrink
 from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Normal, Source, WeakSettings
-from algid.model import DELAYS, EVERY_TERM, K3, SINES, TERMS
+from algid.model import EVERY_TERM, K3, SINES, TERMS
 
+_DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _ROUNDS = 3
 _REWEIGHTINGS = 4
 
@@ -58,7 +59,9 @@ def fit(
     """
     settings = settings or WeakSettings()
     logs = _Logs(tuple(unloaded), tuple(loaded))
-    held = () if known is None else known.names
+    held: tuple[str, ...] = ()
+    if known is not None:
+        held = known.names
     first = logs.normals(_with_terms(settings, ()), {})
     terms = offered([normal for _, normal in first], held)
     estimates_delay = settings.estimate_delay or settings.shift.delay == 0
@@ -66,32 +69,32 @@ def fit(
     settings = resting(unloaded, loaded, settings)
     shared = Shared(settings.model, estimates_delay, bool(loaded), dict(lengths or {}))
     moved = np.max([normal.moved for _, normal in first], axis=0)
-    return _found(logs, shared, settings, known, held, moved)
+    return _estimated(logs, shared, settings, known, held, moved)
 
 
 def resting(
     unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> WeakSettings:
     """The settings with the speeds below which a joint of these logs stands."""
-    rest = AT_REST * weak.speeds([*unloaded, *loaded], settings)
+    rest = AT_REST * weak.speeds(list(unloaded) + list(loaded), settings)
     return replace(settings, rest=(float(rest[0]), float(rest[1])))
 
 
 def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:
     """Terms that logs can determine: no gain without a motor; a lag is a delay to first order."""
-    driven = all(normal.gram[:, joint, -1, -1].any() for normal in normals for joint in (0, 1))
-    return tuple(
-        term
-        for term, content in TERMS.items()
-        if (content.spread is not None and (driven or not content.gains))
-        or set(content.names) & set(held)
-    )
+    driven = all(normal.gram[:, :, -1, -1].any(axis=0).all() for normal in normals)
+    terms = []
+    for name, term in TERMS.items():
+        free = term.spread is not None and (driven or not term.gains)
+        if free or not set(term.names).isdisjoint(held):
+            terms.append(name)
+    return tuple(terms)
 
 
 def _with_terms(settings: WeakSettings, terms: Sequence[str]) -> WeakSettings:
-    return replace(
-        settings, model=replace(settings.model, terms=tuple(terms)), estimate_delay=False
-    )
+    """The settings with these terms and no delay to estimate."""
+    model = replace(settings.model, terms=tuple(terms))
+    return replace(settings, model=model, estimate_delay=False)
 
 
 @dataclass(frozen=True)
@@ -108,9 +111,12 @@ class _Logs:
     def groups(self, settings: WeakSettings) -> Groups:
         """Which of the logs that are long enough repeat each other."""
         places = [place for place, _, _ in self._placed(settings, {})]
-        every = grouped(self.unloaded, self.loaded)
-        kept = (tuple(places.index(one) for one in group if one in places) for group in every)
-        return tuple(group for group in kept if group)
+        groups = []
+        for group in grouped(self.unloaded, self.loaded):
+            long_enough = tuple(places.index(one) for one in group if one in places)
+            if long_enough:
+                groups.append(long_enough)
+        return tuple(groups)
 
     def _placed(
         self, settings: WeakSettings, at: Mapping[bool, FloatArray]
@@ -123,7 +129,7 @@ class _Logs:
                 yield place, kind, normal
 
 
-def _found(
+def _estimated(
     logs: _Logs,
     shared: Shared,
     settings: WeakSettings,
@@ -131,28 +137,24 @@ def _found(
     held: Sequence[str],
     moved: FloatArray,
 ) -> Fit:
-    base = settings.shift.delay
-    at: dict[bool, FloatArray] = {}
-    normals = logs.normals(settings, at)
-    bare, burdened = (
-        [normal for kind, normal in normals if kind is loaded] for loaded in (False, True)
-    )
+    base, columns = settings.shift.delay, len(settings.model.names)
+    normals = logs.normals(settings, {})
+    bare = [normal for loaded, normal in normals if not loaded]
+    burdened = [normal for loaded, normal in normals if loaded]
     beta, _ = weak.first_estimate(shared, bare, burdened, known)
     first = bare + burdened
     groups = logs.groups(settings)
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
         if number:
-            at = {
-                kind: shared.coefficients(beta, kind)[: len(settings.model.names)]
-                for kind, _ in normals
-            }
+            at = {kind: shared.coefficients(beta, kind)[:columns] for kind, _ in normals}
             if shared.delay:
-                base = float(beta[len(settings.model.names)])
+                base = float(beta[columns])
                 settings = settings.delayed(base)
             normals = logs.normals(settings, at)
         expected = expectation(shared, first, settings, beta, held)
-        share = share if number else np.ones(len(expected.names))
+        if number == 0:
+            share = np.ones(len(expected.names))
         for _ in range(_REWEIGHTINGS):
             likelihoods = [_weighed(shared, normal, kind, beta, base) for kind, normal in normals]
             likelihoods = shared_out(likelihoods, groups)
@@ -168,7 +170,7 @@ def _weighed(
 ) -> LogInformation:
     """A log's likelihood with the weights of its residual at `beta` (Q,).
 
-    Its columns tell the delay's change.
+    The delay's column is that of a change from `base`, in s.
     """
     c0 = shared.coefficients(beta, loaded)
     c = c0.copy()
@@ -177,7 +179,8 @@ def _weighed(
     weights = row_weights(normal.gram.sum(axis=0), np.append(-c, 1.0), normal.rows)
     # Overlapping rows repeat each other: a window's worth of rows counts as two.
     gram = np.einsum("a,baxy->bxy", weights * (2.0 / OVERLAP), normal.gram)
-    return LogInformation(loaded, c0, gram[:, :-1, :-1], gram[:, :-1, -1] - gram[:, :-1, :-1] @ c)
+    S = gram[:, :-1, :-1]
+    return LogInformation(loaded, c0, S, gram[:, :-1, -1] - S @ c)
 
 
 def expectation(
@@ -188,26 +191,38 @@ def expectation(
     held: Sequence[str] = (),
 ) -> Expected:
     """Prior of the terms of logs whose torque has the size of `normals`, except those `held`."""
-    squares = np.sum([normal.gram[:, :, -1, -1].sum(axis=0) for normal in normals], axis=0)
-    torque = np.sqrt(squares / np.maximum(np.sum([normal.rows for normal in normals], axis=0), 1.0))
-    torque = np.where(
-        torque > 0, torque, torque.max()
-    )  # a joint without a motor carries a load like the other's
-    inertia = float(abs(beta[shared.names.index(K3)]))
-    late = (
-        0.0 if settings.shift.held else 0.5 * normals[0].dt
-    )  # a torque held by a digital controller
-    rows = []
-    for term in (*shared.model.terms, *(DELAYS if shared.delay else ())):
+    squares, rows = np.zeros(2), np.zeros(2)
+    for normal in normals:
+        squares += normal.gram[:, :, -1, -1].sum(axis=0)
+        rows += normal.rows
+    torque = np.sqrt(squares / np.maximum(rows, 1.0))
+    # a joint without a motor carries a load like the other's
+    torque = np.where(torque > 0, torque, torque.max())
+    value = dict(zip(shared.names, np.abs(beta).tolist(), strict=True))
+    names, terms, means, spreads, usual = [], [], [], [], []
+    offered_terms = shared.model.terms
+    if shared.delay:
+        offered_terms += _DELAYS
+    for term in offered_terms:
         spread = EVERY_TERM[term].spread
-        for name in DELAYS if term in DELAYS else TERMS[term].names:
-            if spread is None or name in held or name not in shared.names:
+        if spread is None:
+            continue
+        mean = 0.0
+        if term in _DELAYS and not settings.shift.held:
+            mean = 0.5 * normals[0].dt  # of a torque that a digital controller holds
+        for name in EVERY_TERM[term].names:
+            if name in held or name not in shared.names:
                 continue
-            cosine = abs(float(beta[shared.names.index(SINES[name])])) if name in SINES else 0.0
-            own = float(torque[1 if name.endswith("2") else 0])
-            unit = {"unit": 1.0, "inertia": inertia, "torque": own, "cosine": cosine}[spread.of]
-            rows.append(
-                (name, term, late if term in DELAYS else 0.0, spread.size * unit, spread.usual)
-            )
-    names, terms, means, spreads, usual = zip(*rows, strict=True)
-    return Expected(names, terms, np.array(means), np.array(spreads), np.array(usual))
+            unit = 1.0
+            if spread.of == "inertia":
+                unit = value[K3]
+            elif spread.of == "torque":
+                unit = float(torque[int(name.endswith("2"))])
+            elif spread.of == "cosine":
+                unit = value[SINES[name]]
+            names.append(name)
+            terms.append(term)
+            means.append(mean)
+            spreads.append(spread.size * unit)
+            usual.append(spread.usual)
+    return Expected(tuple(names), tuple(terms), np.array(means), np.array(spreads), np.array(usual))

@@ -1,4 +1,4 @@
-"""Covariance and statuses of parameters found with shrunk terms, and what stays undetermined."""
+"""Covariance and statuses of parameters beside shrunk terms, and what stays undetermined."""
 
 from __future__ import annotations
 
@@ -46,13 +46,17 @@ def concluded(
         Logs that repeat each other, among which each likelihood is shared out already.
     """
     beta, H, _ = combine(shared, logs, beta, prior)
-    given = (*shrinkage.names, *prior.absent)
-    statuses, left_open = _judged(shared.names, beta, H, given, moved)
+    bounded = shrinkage.names + prior.absent
+    statuses, left_open = _judged(shared.names, beta, H, bounded, moved)
     without = _left_out(shared, logs, beta, prior)
     each = merged(logs, groups)
-    alone = without if len(each) == len(logs) else _left_out(shared, each, beta, prior)
+    alone = without
+    if len(each) < len(logs):
+        alone = _left_out(shared, each, beta, prior)
     wide = spread(shared, each, beta, prior, alone)
-    intervals: Intervals = "sandwich" if wide.jackknife is None else "jackknife"
+    intervals: Intervals = "jackknife"
+    if wide.jackknife is None:
+        intervals = "sandwich"
     ways = [way for way in (wide.jackknife, wide.scores, wide.stretches) if way is not None]
     return Fit(
         estimator="weak",
@@ -74,19 +78,23 @@ def concluded(
 
 
 def _judged(
-    names: Sequence[str], beta: FloatArray, H: FloatArray, shrunk: Sequence[str], moved: FloatArray
+    names: Sequence[str],
+    beta: FloatArray,
+    H: FloatArray,
+    bounded: Sequence[str],
+    moved: FloatArray,
 ) -> tuple[tuple[Status, ...], tuple[Notice, ...]]:
     """Each parameter's status, and what is open.
 
     A term is never open, since physics bounds it.
     """
-    free = np.array([name not in shrunk for name in names])
+    free = [place for place, name in enumerate(names) if name not in bounded]
     own = scaled_pinv(scaled_pinv(H)[np.ix_(free, free)])
-    judged = examine([name for name in names if name not in shrunk], beta[free], own, moved)
-    determined = iter(judged.determined)
-    statuses: list[Status] = [
-        "OK" if not yes or next(determined) else "NOT_IDENTIFIABLE" for yes in free
-    ]
+    judged = examine([names[place] for place in free], beta[free], own, moved)
+    statuses: list[Status] = ["OK"] * len(names)
+    for place, determined in zip(free, judged.determined, strict=True):
+        if not determined:
+            statuses[place] = "NOT_IDENTIFIABLE"
     return tuple(statuses), judged.left_open
 
 
@@ -97,9 +105,10 @@ def _left_out(
 
     Without the only one of its kind, those of all.
     """
-    rows = []
+    rows = np.tile(beta, (len(logs), 1))
     for place, log in enumerate(logs):
-        rest = [*logs[:place], *logs[place + 1 :]]
-        alone = not any(other.loaded is log.loaded for other in rest)
-        rows.append(beta if alone else combine(shared, rest, beta, prior)[0])
-    return np.array(rows)
+        rest = list(logs)
+        del rest[place]
+        if any(other.loaded is log.loaded for other in rest):
+            rows[place] = combine(shared, rest, beta, prior)[0]
+    return rows

@@ -320,7 +320,7 @@ def _zeros(convention: Convention, reading: Reading) -> dict[str, Any]:
         moved = read[::-1]
     moved = np.array(convention.signs) / np.array(convention.scale) * moved
     if convention.absolute:
-        moved[1] -= moved[0] + convention.zero[0]
+        moved[1] -= moved[0]
     moved = moved + convention.zero
     if np.allclose(moved, read, rtol=1e-9, atol=_SAME) and not convention.absolute:
         return {}

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +41,7 @@ from algid.tracks.drift import Drift
 
 STEP = 5e-3  # s, between candidates
 REACH = 0.4  # s: how far a change may lie from where the cells have it
-WIDEST = 1.5  # s: of log on both sides of a change that tells when it was
+WIDEST = 1.5  # s: of log on both sides of a change by which it is placed
 CLOSE = 0.8  # s: changes closer than that may be one with its jolt
 MARGIN = 0.04  # s: of log at least before the first and after the last candidate
 LIKELY = 7.352  # −2 ln(1 − √0.95)
@@ -117,7 +116,9 @@ def rows_of(
     torques = stencil.torques(len(piece))
     t = piece.start + piece.dt * np.arange(torques.start, torques.stop) + arm.shift
     which = np.searchsorted(np.asarray(moments), t, side="right")
-    friction = None if drift is None else drift.at(t).T
+    friction = None
+    if drift is not None:
+        friction = drift.at(t).T
     theta = smoothed(piece.theta, piece.dt, min(SMOOTHING, 0.1 / piece.dt))
     for last in (False, True):
         H, error, g = _linearised(piece, arm, stencil, theta, which, masses, friction)
@@ -142,7 +143,8 @@ def _linearised(
     friction: FloatArray | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """H, torque residuals (2, n) and g (2, n) over the torques' noise, each row at its own mass."""
-    motion = Motion(*stencil.differences(theta))
+    angles, velocities, accelerations = stencil.differences(theta)
+    motion = Motion(angles, velocities, accelerations)
     coefficients = [arm.k + mass * arm.unit for mass in masses]
 
     def each(function: Callable[[Model, FloatArray, Motion], FloatArray]) -> FloatArray:
@@ -153,7 +155,9 @@ def _linearised(
 
     J, modelled = each(sensitivity), each(torque)
     if arm.model.lag_name is not None:
-        J, modelled = (low_passed(one, piece.dt, arm.model.lag(arm.k)) for one in (J, modelled))
+        lag = arm.model.lag(arm.k)
+        J = low_passed(J, piece.dt, lag)
+        modelled = low_passed(modelled, piece.dt, lag)
     if friction is not None:
         modelled = modelled + np.einsum("afn,fn->an", J[:, arm.friction], friction)
     G = along_stencil(each(partials), stencil.weights)
@@ -213,7 +217,7 @@ def _worth(rows: Rows, left: FloatArray, a: FloatArray, moment: float) -> float:
 def explained(rows: Rows, moments: FloatArray) -> float:
     """Squares of the rows that masses explain which change at `moments` (S,)."""
     X = np.concatenate([rows.whitened(rows.g[None]), rows.steps(moments)])
-    fitted, *_ = np.linalg.lstsq(X.T, rows.e, rcond=None)
+    fitted = np.linalg.lstsq(X.T, rows.e, rcond=None)[0]
     return float(np.sum((fitted @ X) ** 2))
 
 
@@ -228,7 +232,9 @@ def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment 
     first = round((start - segment.start) / segment.dt) - given.start
     last = round((end - segment.start) / segment.dt) + len(segment) - given.stop
     first, last = max(0, first), min(len(segment), last)
-    return segment.part(first, last) if last - first > 1 else None
+    if last - first <= 1:
+        return None
+    return segment.part(first, last)
 
 
 @dataclass(frozen=True)
@@ -238,11 +244,15 @@ class Changes:
     places: tuple[Place, ...]
     masses: tuple[float, ...]
 
-    def one_for(self, first: int, last: int, place: Place | None) -> Changes:
-        """With `place`, or nothing, in place of the changes from `first` to `last`."""
-        kept = () if place is None else (place,)
-        masses = (*self.masses[: first + 1], *self.masses[last + 1 + (place is None) :])
-        return Changes((*self.places[:first], *kept, *self.places[last + 1 :]), masses)
+    def merged(self, first: int, last: int, place: Place) -> Changes:
+        """With one change at `place` for those from `first` to `last`."""
+        places = self.places[:first] + (place,) + self.places[last + 1 :]
+        return Changes(places, self.masses[: first + 1] + self.masses[last + 1 :])
+
+    def without(self, at: int) -> Changes:
+        """Without one change: what is weighed before it stands behind it too."""
+        places = self.places[:at] + self.places[at + 1 :]
+        return Changes(places, self.masses[: at + 1] + self.masses[at + 2 :])
 
 
 @dataclass(frozen=True)
@@ -258,20 +268,21 @@ class _Log:
         self, changes: Changes, groups: Sequence[tuple[int, int]]
     ) -> Iterator[tuple[tuple[int, int], Rows]]:
         """The rows about each group of changes, from its first to its last, in one pass."""
-        spans = [self._window(changes, *group) for group in groups]
+        spans = [self._window(changes, first, last) for first, last in groups]
         for place, piece in windows(self.source(), spans, self.arm.shift):
             first, last = groups[place]
             moments = [one.time for one in changes.places[first : last + 1]]
-            yield (
-                groups[place],
-                rows_of(piece, self.arm, self.drift, moments, changes.masses[first : last + 2]),
-            )
+            masses = changes.masses[first : last + 2]
+            yield groups[place], rows_of(piece, self.arm, self.drift, moments, masses)
 
     def _window(self, changes: Changes, first: int, last: int) -> tuple[float, float]:
         """From where to where the log holds the masses about a group of changes, and no other."""
         places = changes.places
-        start = places[first - 1].safe[1] if first else self.ends[0]
-        end = places[last + 1].safe[0] if last + 1 < len(places) else self.ends[1]
+        start, end = self.ends
+        if first > 0:
+            start = places[first - 1].safe[1]
+        if last + 1 < len(places):
+            end = places[last + 1].safe[0]
         return max(start, places[first].time - WIDEST), min(end, places[last].time + WIDEST)
 
 
@@ -322,35 +333,31 @@ def _placed(log: _Log, changes: Changes, variance: float) -> Changes:
 
 def _merged(log: _Log, changes: Changes, penalty: float, variance: float) -> Changes:
     """Merge close changes where their rows need only one: a jolt is no change of payload."""
-    close = [
-        (at, at + 1)
-        for at, (one, other) in enumerate(pairwise(changes.places))
-        if other.time - one.time < CLOSE
-    ]
+    times = np.array([one.time for one in changes.places])
+    close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
     places: dict[tuple[int, int], Place] = {}
     for (first, last), rows in log.rows(changes, close):
-        left, right = (changes.places[at].time for at in (first, last))
-        low = max(left - MARGIN, float(rows.t[0]) + MARGIN)
-        high = min(right + MARGIN, float(rows.t[-1]) - MARGIN)
+        low = max(times[first] - MARGIN, float(rows.t[0]) + MARGIN)
+        high = min(times[last] + MARGIN, float(rows.t[-1]) - MARGIN)
         if low < high:
             one = place(rows, low, high, variance)
-            both = explained(rows, np.array([left, right]))
+            both = explained(rows, times[[first, last]])
             if both - explained(rows, np.array([one.time])) < penalty:
                 places[first, last] = one
     following = len(changes.places)
     for (first, last), one in sorted(places.items(), reverse=True):
         if last < following:  # of pairs that share a change, the later one
-            changes, following = changes.one_for(first, last, one), first
+            changes, following = changes.merged(first, last, one), first
     return changes
 
 
 def _needed(changes: Changes, penalty: float) -> Changes:
     """Changes less those that explain too little, of neighbours the least first."""
-    gains = [np.inf, *(one.gain for one in changes.places), np.inf]
+    gains = [np.inf] + [one.gain for one in changes.places] + [np.inf]
     for at in reversed(range(len(changes.places))):
         before, own, after = gains[at : at + 3]
         if own < penalty and own <= min(before, after):
-            changes = changes.one_for(at, at, None)
+            changes = changes.without(at)
     return changes
 
 
@@ -387,6 +394,7 @@ def _cut(
     if held is None:
         return
     for at in which:
-        piece = cut_to(held, *spans[at], shift)
+        start, end = spans[at]
+        piece = cut_to(held, start, end, shift)
         if piece is not None and len(piece) > 2 * POINTS:
             yield at, piece

@@ -38,8 +38,12 @@ def stretch_table(result: TrackResult) -> Table:
     for place, (stretch, status) in enumerate(
         zip(result.track.stretches, result.statuses, strict=True), start=1
     ):
-        low, high = (fixed(end, stretch.std) for end in stretch.ci95)
+        low, high = stretch.ci95
         truth = result.truth(stretch)
+        true = error = ABSENT
+        if truth is not None:
+            true = fixed(truth, stretch.std)
+            error = fixed(stretch.m_p - truth, stretch.std)
         rows.append(
             (
                 str(place),
@@ -49,13 +53,15 @@ def stretch_table(result: TrackResult) -> Table:
                 half_text(stretch),
                 "kg",
                 status.value,
-                f"[{low}, {high}]",
-                ABSENT if truth is None else fixed(truth, stretch.std),
-                ABSENT if truth is None else fixed(stretch.m_p - truth, stretch.std),
+                f"[{fixed(low, stretch.std)}, {fixed(high, stretch.std)}]",
+                true,
+                error,
             )
         )
     table = Table("Payload by stretch", COLUMNS, tuple(rows)).without_empty()
-    return table.doubted() if verdict(result).failed else table
+    if verdict(result).failed:
+        return table.doubted()
+    return table
 
 
 def change_table(result: TrackResult) -> Table:
@@ -73,17 +79,13 @@ def change_table(result: TrackResult) -> Table:
     for place, (moment, low, high) in enumerate(result.track.changes.tolist()):
         before, after = result.track.stretches[place : place + 2]
         step = fixed(after.m_p - before.m_p, max(before.std, after.std))
-        true = min(times, key=lambda time: abs(time - moment), default=None)
-        rows.append(
-            (
-                str(place + 1),
-                f"{moment:.3f}",
-                f"[{low:.3f}, {high:.3f}]",
-                step if step.startswith("-") else f"+{step}",
-                "kg",
-                ABSENT if true is None else f"{true:.3f}",
-            )
-        )
+        if not step.startswith("-"):
+            step = f"+{step}"
+        true = ABSENT
+        if times:
+            true = f"{min(times, key=lambda time: abs(time - moment)):.3f}"
+        between = f"[{low:.3f}, {high:.3f}]"
+        rows.append((str(place + 1), f"{moment:.3f}", between, step, "kg", true))
     note = "Between: the change's 95 % interval."
     return Table("Changes", columns, tuple(rows), note).without_empty()
 
@@ -131,30 +133,33 @@ def mass_text(stretch: Stretch) -> str:
 
     0 where it may be nothing.
     """
-    return "0" if stretch.empty else fixed(stretch.m_p, stretch.std)
+    if stretch.empty:
+        return "0"
+    return fixed(stretch.m_p, stretch.std)
 
 
 def half_text(stretch: Stretch) -> str:
     """Half the 95 % interval in kg, with the mass's digits; one digit beside 0."""
     half = stretch.ci95[1] - stretch.m_p
-    return fixed(half, 10 * float(f"{half:.0e}") if stretch.empty else stretch.std)
+    if stretch.empty:
+        return fixed(half, 10 * float(f"{half:.0e}"))
+    return fixed(half, stretch.std)
 
 
 def fixed(value: float, std: float) -> str:
     """`value` with the decimals that its standard deviation resolves, so that columns line up."""
-    decimals = (
-        3
-        if not (math.isfinite(std) and std > 0)
-        else min(max(1 - math.floor(math.log10(std)), 0), 9)
-    )
+    decimals = 3
+    if math.isfinite(std) and std > 0:
+        decimals = min(max(1 - math.floor(math.log10(std)), 0), 9)
     text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    if float(text) == 0:
+        return text.removeprefix("-")
+    return text
 
 
 COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
-STRANGE = (
-    1e4  # of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more
-)
+STRANGE = 1e4
+"""Of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more."""
 ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
 MOST_NAMED = 4
 
@@ -180,17 +185,13 @@ def _weighed(result: TrackResult) -> str:
             f"{half_text(stretches[0])} kg throughout"
         )
     widest = max(stretches, key=lambda stretch: stretch.std)
-    times = [f"{moment:.2f}" for moment in changes[:, 0]]
-    when = f" at {joined(times)} s" if len(times) <= MOST_NAMED else ""
-    how_often = (
-        "once" if len(times) == 1 else "twice" if len(times) == 2 else counted(len(times), "time")
-    )
-    masses = [mass_text(stretch) for stretch in stretches]
-    what = (
-        f"weighing {joined(masses)} kg"
-        if len(masses) <= MOST_NAMED + 1
-        else f"in {counted(len(masses), 'stretch', 'stretches')}"
-    )
+    count = len(changes)
+    how_often = {1: "once", 2: "twice"}.get(count, counted(count, "time"))
+    if count <= MOST_NAMED:
+        when = f" at {joined([f'{moment:.2f}' for moment in changes[:, 0]])} s"
+        what = f"weighing {joined([mass_text(stretch) for stretch in stretches])} kg"
+    else:
+        when, what = "", f"in {counted(len(stretches), 'stretch', 'stretches')}"
     return (
         f"the payload changes {how_often}{when}, {what}, the least certain to ± "
         f"{half_text(widest)} kg (95 %)"
@@ -213,7 +214,8 @@ def _failure(result: TrackResult) -> str | None:
     negative = sum(status is StretchStatus.NEGATIVE_MASS for status in statuses)
     if 2 * negative >= len(statuses):
         share = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')} weigh"
-        share = "the payload weighs" if len(statuses) == 1 else share
+        if len(statuses) == 1:
+            share = "the payload weighs"
         return f"{share} less than nothing: the arm's constants do not fit this log"
     if all(status is StretchStatus.WEAK_EXCITATION for status in statuses):
         return "the arm moves too little to weigh anything"
@@ -237,4 +239,6 @@ def _reasons(result: TrackResult) -> Iterator[Notice]:
         )
     if result.data_lost and not any(one.lossy for one in result.notices):
         yield Notice("DATA_LOST")
-    yield from (one for one in result.notices if not one.note)
+    for one in result.notices:
+        if not one.note:
+            yield one

@@ -134,8 +134,8 @@ def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: 
         piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
         windows = Windows(dt, 0.32, shift, None)
         cut = instruments._cut(piece, windows)
-        every = np.full(cut[0].shape[1], dt)
-        moved = instruments._simulated(Model(), k, every, *cut)
+        every = np.full(cut.theta.shape[1], dt)
+        moved = instruments._simulated(Model(), k, every, cut)
         simulated, good = moved.end_to_end(slice(None), dt), moved.good
         length, first = 8 * windows.step, windows.margin
         starts = first + 2 * windows.step * np.arange(good.size)
@@ -159,10 +159,10 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     k, log = bench.arm.constants(), bench.log()
     windows = Windows(log.dt, 0.2, 0.0, None)
     cut = instruments._cut(log, windows)
-    every = np.full(cut[0].shape[1], log.dt)
-    assert not instruments._simulated(Model(), -k, every, *cut).moves.any()
+    every = np.full(cut.theta.shape[1], log.dt)
+    assert not instruments._simulated(Model(), -k, every, cut).moves.any()
     wild = k * np.array([1, 1, 1, 1, 1, -500, -500])
-    ran = instruments._simulated(Model(), wild, every, *cut)
+    ran = instruments._simulated(Model(), wild, every, cut)
     assert not ran.good.any()
     assert ran.moves.all()
     assert instruments.moments([lambda: [log]], WeakSettings(), -k) == [None]

@@ -89,9 +89,9 @@ def test_a_window_too_short_for_candidates_leaves_a_change_where_it_was(picking:
 def test_changes_are_replaced_with_the_masses_between_them() -> None:
     changes = Changes(rough(1.0, 2.0, 3.0), (0.0, 1.0, 2.0, 3.0))
     (new,) = rough(1.5)
-    merged = changes.one_for(0, 1, new)
+    merged = changes.merged(0, 1, new)
     assert (merged.places, merged.masses) == ((new, changes.places[2]), (0.0, 2.0, 3.0))
-    less = changes.one_for(1, 1, None)
+    less = changes.without(1)
     assert (less.places, less.masses) == ((changes.places[0], changes.places[2]), (0.0, 1.0, 3.0))
 
 
