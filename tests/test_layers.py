@@ -84,7 +84,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "designs": room(
         "arm compiled criteria errors estimators files identification log model notices "
-        "options progress report results signals significance synth text verdict writers",
+        "options progress report results signals significance synth text verdict words writers",
         "numpy polars pydantic scipy",
     ),
     "exports": room(
