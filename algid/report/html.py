@@ -37,12 +37,13 @@ def banner(judged: Verdict) -> str:
     The rest is folded away.
     """
     first, rest = judged.reasons[:MOST_REASONS], judged.reasons[MOST_REASONS:]
-    shown = f"<ul>{_listed(_sentences(first))}</ul>" if first else ""
+    shown = ""
+    if first:
+        shown = f"<ul>{_listed(_sentences(first))}</ul>"
     if judged.command:
         shown += f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>'
-    shown += _folded(counted(len(rest), "more reason"), rest) + _folded(
-        f"data notes ({len(judged.notes)})", judged.notes
-    )
+    shown += _folded(counted(len(rest), "more reason"), rest)
+    shown += _folded(f"data notes ({len(judged.notes)})", judged.notes)
     return (
         f'<div class="verdict {judged.grade}"><span class="sign" '
         f'aria-hidden="true">{SIGNS[judged.grade]}</span>'
@@ -71,10 +72,9 @@ def _listed(sentences: tuple[str, ...]) -> str:
 
 def contents(document: Document) -> str:
     """The page's contents: numbers first, then sections, and figures without a heading."""
-    links = [
-        ("numbers", "Numbers"),
-        *(link for section in document.sections for link in _links(section)),
-    ]
+    links = [("numbers", "Numbers")]
+    for section in document.sections:
+        links += _links(section)
     listed = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in links)
     return (
         '<nav aria-label="Contents"><details '
@@ -88,11 +88,9 @@ def _links(section: Section) -> Iterator[tuple[str, str]]:
     if section.key and section.content:
         yield section.key, section.title
     elif not section.key:
-        yield from (
-            (one.key, one.title)
-            for one in section.content
-            if isinstance(one, Figure | Missing | ArmDrawing)
-        )
+        for one in section.content:
+            if isinstance(one, Figure | Missing | ArmDrawing):
+                yield one.key, one.title
 
 
 def section_html(section: Section) -> str:
@@ -110,8 +108,11 @@ def section_html(section: Section) -> str:
         )
     if key:
         return f'<section aria-labelledby="{key}"><h2 id="{key}">{title}</h2>\n{inner}\n</section>'
-    beside = "" if section.beside is None else arm_html(section.beside)
-    return f'<div class="first"><div>\n{inner}\n</div>{beside}</div>' if beside else inner
+    if section.beside is not None:
+        beside = arm_html(section.beside)
+        if beside:
+            return f'<div class="first"><div>\n{inner}\n</div>{beside}</div>'
+    return inner
 
 
 def content_html(content: Content) -> str:
@@ -126,11 +127,9 @@ def content_html(content: Content) -> str:
         case ReadingAid(text):
             return f'<p class="reading">{escaped(text)}</p>'
         case Bullets(sentences, otherwise):
-            return (
-                f"<ul>{_listed(sentences)}</ul>"
-                if sentences
-                else f'<p class="note">{escaped(otherwise)}</p>'
-            )
+            if sentences:
+                return f"<ul>{_listed(sentences)}</ul>"
+            return f'<p class="note">{escaped(otherwise)}</p>'
         case References():
             return references_html(content)
 
@@ -139,13 +138,21 @@ def references_html(references: References) -> str:
     """The links of each group, as many as are shown."""
     groups = []
     for name, links in references.groups.items():
-        shown = [
-            f'<a href="{escaped(place)}">{escaped(words)}</a>'
-            for words, place in links[: references.most]
-        ]
-        more = f" and {len(links) - references.most:,} more" if len(links) > references.most else ""
-        groups.append(f"<dt>{escaped(name)}</dt><dd>{', '.join(shown) + more or 'none'}</dd>")
+        shown = []
+        for words, place in links[: references.most]:
+            shown.append(f'<a href="{escaped(place)}">{escaped(words)}</a>')
+        listed = ", ".join(shown)
+        if len(links) > references.most:
+            listed += f" and {len(links) - references.most:,} more"
+        groups.append(f"<dt>{escaped(name)}</dt><dd>{listed or 'none'}</dd>")
     return f"<dl>{''.join(groups)}</dl>"
+
+
+def _note(text: str) -> str:
+    """A note below a table or a figure; nothing where there is none."""
+    if not text:
+        return ""
+    return f'<p class="note">{escaped(text)}</p>'
 
 
 Slot = tuple[int, Column] | Drawn
@@ -156,21 +163,21 @@ def table_html(table: Table) -> str:
     """A table with its drawings that scrolls sideways by itself where the page is narrow."""
     slots: list[Slot] = []
     for place, column in enumerate(table.columns):
-        slots += [(place, column), *(one for one in table.drawn if one.after == column.heading)]
+        slots.append((place, column))
+        slots += [one for one in table.drawn if one.after == column.heading]
     slots += [one for one in table.drawn if one not in slots]
     head = "".join(map(_heading, slots))
-    body = "".join(
-        f"<tr{_doubtful(table, row)}>{''.join(_cell(table, slot, row) for slot in slots)}</tr>\n"
-        for row in table.rows
-    )
-    note = f'<p class="note">{escaped(table.note)}</p>' if table.note else ""
+    body = ""
+    for row in table.rows:
+        cells = "".join(_cell(table, slot, row) for slot in slots)
+        body += f"<tr{_doubtful(table, row)}>{cells}</tr>\n"
     cards = " cards" if len(slots) > CARDED else ""
     return (
         f'<div class="scroll{cards}" role="region" tabindex="0" '
         f'aria-label="{escaped(table.title)}"><table>'
         f"<caption>{escaped(table.title)}</caption>\n<thead><tr>{head}</tr></thead>\n"
         f"<tbody>\n{body}</tbody>"
-        f"</table></div>{note}\n"
+        f"</table></div>{_note(table.note)}\n"
     )
 
 
@@ -183,9 +190,12 @@ def _heading(slot: Slot) -> str:
 
 def _doubtful(table: Table, row: tuple[str, ...]) -> str:
     """The class of a row whose number must not be used as it is."""
-    kinds = {column.kind: text for column, text in zip(table.columns, row, strict=True)}
-    poor = "doubtful status" in kinds or kinds.get("status", Status.OK.value) != Status.OK.value
-    return ' class="doubtful"' if poor else ""
+    for column, text in zip(table.columns, row, strict=True):
+        if column.kind == "doubtful status":
+            return ' class="doubtful"'
+        if column.kind == "status" and text != Status.OK.value:
+            return ' class="doubtful"'
+    return ""
 
 
 def _cell(table: Table, slot: Slot, row: tuple[str, ...]) -> str:
@@ -194,23 +204,44 @@ def _cell(table: Table, slot: Slot, row: tuple[str, ...]) -> str:
         drawing = slot.rows.get(row[0], "")
         return f'<td class="drawn{small}" data-label="{escaped(slot.heading)}">{drawing}</td>'
     column, text = slot[1], row[slot[0]]
+    match column.kind:
+        case "name":
+            named = escaped(text)
+            if table.links and text in table.links:
+                named = f'<a href="{escaped(table.links[text])}">{named}</a>'
+            return f'<th scope="row">{named}</th>'
+        case "status" if text == Status.OK.value:
+            return f'<td class="status ok">{escaped(text)}</td>'
+        case "status" | "doubtful status":
+            return f'<td class="status">{escaped(text)}</td>'
+        case "number":
+            return _number_cell(column, text)
+        case "text":
+            return _text_cell(column, text)
+
+
+def _number_cell(column: Column, text: str) -> str:
+    """A number; a status behind it has a line of its own."""
     shown = escaped(text)
-    if column.kind == "name":
-        place = (table.links or {}).get(text)
-        named = shown if place is None else f'<a href="{escaped(place)}">{shown}</a>'
-        return f'<th scope="row">{named}</th>'
-    if column.kind in ("status", "doubtful status"):
-        fine = column.kind == "status" and text == Status.OK.value
-        return f'<td class="status{" ok" if fine else ""}">{shown}</td>'
-    main = " estimate" if column.heading == "Estimate" else ""
-    long = " long" if column.kind == "text" and len(text) > LONG_CELL else ""
-    bare = column.kind == "number" or text in ANSWERS  # says nothing on a card without its heading
-    heading = escaped(column.heading.removesuffix(" std"))  # beside an estimate ± is enough
-    label = f' data-label="{heading}"' if bare and not main else ""
-    if column.kind == "number" and shown.endswith(")"):  # a status behind it has its own line
-        number, mark, status = shown.rpartition(" (")
-        shown = f'{number} <span class="aside">({status}</span>' if mark else shown
-    return f'<td class="{column.kind}{main}{long}"{label}>{shown}</td>'
+    number, mark, status = shown.rpartition(" (")
+    if mark and shown.endswith(")"):
+        shown = f'{number} <span class="aside">({status}</span>'
+    if column.heading == "Estimate":
+        return f'<td class="number estimate">{shown}</td>'
+    return f'<td class="number"{_label(column)}>{shown}</td>'
+
+
+def _text_cell(column: Column, text: str) -> str:
+    """A text; an answer says nothing on a card without its heading."""
+    kinds = "text long" if len(text) > LONG_CELL else "text"
+    label = _label(column) if text in ANSWERS else ""
+    return f'<td class="{kinds}"{label}>{escaped(text)}</td>'
+
+
+def _label(column: Column) -> str:
+    """The heading of a cell on a card."""
+    heading = column.heading.removesuffix(" std")  # beside an estimate ± is enough
+    return f' data-label="{escaped(heading)}"'
 
 
 def figure_html(figure: Figure | Missing) -> str:
@@ -221,13 +252,12 @@ def figure_html(figure: Figure | Missing) -> str:
     panels = "".join(
         _panel(panel, panel_id(figure, place)) for place, panel in enumerate(figure.panels)
     )
-    note = f'<p class="note">{escaped(figure.note)}</p>' if figure.note else ""
     columns = " two" if figure.columns == 2 else ""
     return (
         f'<figure aria-labelledby="{figure.key}">{head}{_views(figure)}{_legend(figure)}'
         f'<div class="panels{columns}">{panels}</div>\n'
         "<figcaption><p "
-        f'class="reading">{escaped(figure.reading)}</p>{note}</figcaption></figure>\n'
+        f'class="reading">{escaped(figure.reading)}</p>{_note(figure.note)}</figcaption></figure>\n'
     )
 
 
@@ -270,12 +300,15 @@ def _legend(figure: Figure) -> str:
             f'style="--tint:var(--{name});opacity:{opacity or 1}"></span>'
         )
         words = f'{swatch}<span class="words">{escaped(entry.words)}</span>'
-        data = f'data-figure="{figure.key}" data-group="{escaped(entry.group)}"'
-        entries.append(
-            f'<button type="button" aria-pressed="{str(entry.shown).lower()}" '
-            f"{data}>{words}</button>"
-            if entry.group
-            else f'<span class="entry">{words}</span>'
-        )
+        if entry.group:
+            data = f'data-figure="{figure.key}" data-group="{escaped(entry.group)}"'
+            pressed = str(entry.shown).lower()
+            entries.append(
+                f'<button type="button" aria-pressed="{pressed}" {data}>{words}</button>'
+            )
+        else:
+            entries.append(f'<span class="entry">{words}</span>')
+    if not entries:
+        return ""
     listed = "".join(f"<li>{entry}</li>" for entry in entries)
-    return f'<ul class="legend" aria-label="Legend">{listed}</ul>' if listed else ""
+    return f'<ul class="legend" aria-label="Legend">{listed}</ul>'

@@ -10,11 +10,21 @@ from algid.files import whole_file
 from algid.methods import settles
 from algid.progress import Progress
 from algid.report.arm import arm_of
-from algid.report.document import Bullets, Document, Drawn, Fold, ReadingAid, Section, Table
+from algid.report.document import (
+    Bullets,
+    Content,
+    Document,
+    Drawn,
+    Fold,
+    ReadingAid,
+    Section,
+    Table,
+)
 from algid.report.drawings import bars, forest
 from algid.report.frame import LIBRARY, library, page
 from algid.report.gallery import Gallery, gallery
 from algid.report.markdown import markdown
+from algid.report.series import TorqueLog
 from algid.report.tables import (
     estimate_tables,
     fit_tables,
@@ -94,62 +104,70 @@ def page_html(
 
 def result_document(result: Result, shown: Gallery | None = None) -> Document:
     """The report of an identification; `shown` holds its figures, which only a page has."""
-    tables = estimate_tables(result)
-    first = [table for table in tables if table.title in FIRST]
-    paper = [table for table in tables if table.title not in (*FIRST, *SECOND)]
-    terms = list(terms_tables(result))
-    torque = None if shown is None else shown.torque
-    figures, convergence = ([], []) if shown is None else (shown.figures, shown.paper)
-    data = (*quality_tables(torque, result), *log_tables(result.logs))
-    noted = tuple(one.sentence for one in result.verdict.notes)
-    notes = Bullets(
-        noted, "What the readers and the estimator warn of stands at the top of the page."
-    )
+    first: list[Table] = []
+    second: list[Table] = []
+    paper: list[Content] = []
+    for table in estimate_tables(result):
+        if table.title in FIRST:
+            first.append(table)
+        elif table.title in SECOND:
+            second.append(table)
+        else:
+            paper.append(table)
+    terms: list[Content] = list(terms_tables(result))
+    torque, figures = None, []
+    if shown is not None:
+        torque, figures = shown.torque, shown.figures
+        paper = shown.paper + paper
+        first, terms = _with_intervals(first, result), _with_gains(result)
     fold: Fold = "open" if _truth(result) else "closed"  # folded where a real log is
-    of_paper = (*convergence, *paper)
     leads = settles(result.estimator)
-    folded = Section(of_paper, "paper", "The paper's figure and tables", fold=fold)
-    sections = (
-        Section(
-            (
-                *(first if shown is None else _with_intervals(first, result)),
-                *(table for table in tables if table.title in SECOND),
-            ),
-            beside=arm_of(result, torque),
-        ),
-        Section(of_paper if leads else ()),
+    sections = [Section(tuple(first + second), beside=arm_of(result, torque))]
+    if leads:
+        sections.append(Section(tuple(paper)))
+    sections += [
         Section(tuple(figures[:1])),
-        Section(
-            tuple(terms if shown is None else _with_gains(terms, result)),
-            "terms",
-            "What the model lacks",
-        ),
+        Section(tuple(terms), "terms", "What the model lacks"),
         Section(tuple(figures[1:])),
         Section(fit_tables(result), "fit", "What the estimator knows of the logs"),
-        Section((notes, *data), "data", "Data quality"),
+        Section((_notes(result),) + _data_tables(result, torque), "data", "Data quality"),
         Section(
             (used_settings(result), result_provenance(result)),
             "settings",
             "Settings and provenance",
         ),
-        Section() if leads else folded,
-    )
+    ]
+    if not leads:
+        title = "The paper's figure and tables"
+        sections.append(Section(tuple(paper), "paper", title, fold=fold))
     name = file_name(result.log.path)
-    seconds, samples = (
-        sum(log.duration for log in result.logs),
-        sum(log.rows for log in result.logs),
-    )
+    others = f" and {len(result.more_logs)} more" if result.more_logs else ""
+    seconds = sum(log.duration for log in result.logs)
+    samples = sum(log.rows for log in result.logs)
     return Document(
         title=f"Identification of {name}",
         verdict=result.verdict,
-        sections=sections,
+        sections=tuple(sections),
         kicker="identification of a two-link arm",
-        name=f"{name} and {len(result.more_logs)} more" if result.more_logs else name,
+        name=f"{name}{others}",
         facts=f"{result.estimator} estimator · {significant(seconds, 4)} s of log at "
         f"{significant(result.log.rate, 4)} Hz · {counted(samples, 'sample')}",
         made=f"Made by algid {result.version} from result.json.",
         tab=name,
     )
+
+
+def _notes(result: Result) -> Bullets:
+    """How the logs were read and the fit was done."""
+    sentences = tuple(one.sentence for one in result.verdict.notes)
+    return Bullets(
+        sentences, "What the readers and the estimator warn of stands at the top of the page."
+    )
+
+
+def _data_tables(result: Result, torque: TorqueLog | None) -> tuple[Table, ...]:
+    """What the logs are."""
+    return quality_tables(torque, result) + log_tables(result.logs)
 
 
 def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
@@ -158,27 +176,22 @@ def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
     The last one says what is drawn.
     """
     logs, truth = _own(result), _truth(result)
-    drawn = forest({**result.parameters, **result.payload}, truth, logs)
+    drawn = forest(result.parameters | result.payload, truth, logs)
     shown = [table.without(TOLD_ELSEWHERE) for table in tables]
     if not shown or not drawn.rows:
         return shown
     scale = significant(drawn.limit, 1)
     marks = [f"Drawn: the 95 % interval on a scale of ± {scale} % of the estimate, arrows beyond"]
-    marks += (
-        [
-            (
-                "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond "
-                "the scale"
-            )
-        ]
-        if logs
-        else []
-    )
-    marks += ["orange ring: the truth"] if truth else []
+    if logs:
+        marks.append(
+            "grey dots: each unloaded log by itself, hollow at the edge where it lies beyond "
+            "the scale"
+        )
+    if truth:
+        marks.append("orange ring: the truth")
     shown[-1] = replace(shown[-1], note="; ".join(marks) + ".")
-    return [
-        replace(table, drawn=(Drawn(drawn.heading, drawn.rows, after="Unit"),)) for table in shown
-    ]
+    column = Drawn(drawn.heading, drawn.rows, after="Unit")
+    return [replace(table, drawn=(column,)) for table in shown]
 
 
 def _own(result: Result) -> dict[str, list[float]]:
@@ -186,30 +199,37 @@ def _own(result: Result) -> dict[str, list[float]]:
 
     a loaded one's hold its payload's share.
     """
-    estimates = [] if result.fit is None else result.fit.by_log
     # a log too short to be fitted has none, and which it is nobody tells
-    if len(estimates) != len(result.logs):
+    if result.fit is None or len(result.fit.by_log) != len(result.logs):
         return {}
-    own = [one for one, log in zip(estimates, result.logs, strict=True) if log.role == "unloaded"]
-    values = {
-        name: [value for one in own if name in one and (value := one[name].estimate) is not None]
-        for name in result.parameters
-    }
-    return {name: kept for name, kept in values.items() if len(kept) > 1}
+    own: dict[str, list[float]] = {}
+    for log, estimates in zip(result.logs, result.fit.by_log, strict=True):
+        if log.role != "unloaded":
+            continue
+        for name, one in estimates.items():
+            if name in result.parameters and one.estimate is not None:
+                own.setdefault(name, []).append(one.estimate)
+    return {name: values for name, values in own.items() if len(values) > 1}
 
 
 def _truth(result: Result) -> dict[str, float]:
     """What a synthetic log was made with, by parameter."""
-    return {
-        row.parameter: row.truth for row in result.table4 if row.truth is not None
-    } | result.truth
+    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
+    return truth | result.truth
 
 
-def _with_gains(terms: Sequence[Table], result: Result) -> list[Table | ReadingAid]:
+def _with_gains(result: Result) -> list[Content]:
     """The terms that were tried, each with what it gains drawn; nothing where none was."""
-    tried = [] if result.fit is None else result.fit.terms
-    gains = {term.term: -100 * term.gain_heldout for term in tried if term.gain_heldout is not None}
+    tables = terms_tables(result)
+    if result.fit is None:
+        return []
+    gains = {}
+    for term in result.fit.terms:
+        if term.gain_heldout is not None:
+            gains[term.term] = -100 * term.gain_heldout
     if not gains:
-        return list(terms)
+        return list(tables)
     column = Drawn("error held out", bars(gains), after="Held-out error, %")
-    return [*(replace(table, drawn=(column,)) for table in terms), ReadingAid(TERMS_READING)]
+    shown: list[Content] = [replace(table, drawn=(column,)) for table in tables]
+    shown.append(ReadingAid(TERMS_READING))
+    return shown
