@@ -11,7 +11,7 @@ from typing import Any
 from algid.report.document import Column, Table
 from algid.report.tables import flat_settings
 from algid.results import Estimate, Result, Status
-from algid.text import ABSENT, file_name, resolved, significant, unit_text, visible
+from algid.text import ABSENT, file_name, formatted, resolved, significant, unit_text, visible
 from algid.words import counted
 
 
@@ -40,10 +40,14 @@ class Comparison:
     @property
     def largest_sigma(self) -> float | None:
         """The largest distance, None where there is none."""
-        distances = [
-            abs(distance) for row in self.sigma.values() for distance in row if distance is not None
-        ]
-        return max(distances, default=None)
+        return max(map(abs, self.distances()), default=None)
+
+    def distances(self) -> list[float]:
+        """Every distance that is known, in the order of the parameters."""
+        known: list[float] = []
+        for row in self.sigma.values():
+            known += [distance for distance in row if distance is not None]
+        return known
 
 
 def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> Comparison:
@@ -64,11 +68,11 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     if labels is not None and len(labels) != len(results):
         raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
     shown = _distinct(labels or [file_name(result.log.path) for result in results])
-    first, *others = (result.estimates for result in results)
+    every = [result.estimates for result in results]
     sigma: dict[str, tuple[float | None, ...]] = {}
-    for name in _names([result.estimates for result in results]):
-        distances = [distance_sigma(first.get(name), other.get(name)) for other in others]
-        sigma[name] = tuple(distances)
+    for name in _names(every):
+        first = every[0].get(name)
+        sigma[name] = tuple(distance_sigma(first, other.get(name)) for other in every[1:])
     return Comparison(
         tuple(shown),
         sigma,
@@ -102,9 +106,9 @@ def comparison_json(compared: Comparison, results: Sequence[Result]) -> str:
         parameters[name] = {
             "estimate": [one.estimate for one in estimates],
             "std": [one.std for one in estimates],
-            "sigma": [None, *distances],
+            "sigma": (None,) + distances,
         }
-    settings = {name: list(values) for name, *values in compared.settings.rows}
+    settings = {row[0]: row[1:] for row in compared.settings.rows}
     content = {"labels": list(compared.labels), "parameters": parameters, "settings": settings}
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -120,7 +124,9 @@ def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | No
     if first.std is None or other.std is None:
         return None
     combined = math.hypot(first.std, other.std)
-    return (other.estimate - first.estimate) / combined if combined > 0 else None
+    if combined == 0:
+        return None
+    return (other.estimate - first.estimate) / combined
 
 
 def _estimates(
@@ -132,11 +138,11 @@ def _estimates(
         columns += [Column(label, "number"), change, distance]
     rows = []
     for name, distances in sigma.items():
-        first, *others = (result.estimates.get(name) for result in results)
-        unit = next(unit_text(one.unit) for one in (first, *others) if one is not None)
-        cells = [visible(name), unit, with_std(first)]
-        for other, far in zip(others, distances, strict=True):
-            cells += [with_std(other), _change(first, other), _far(far) or ABSENT]
+        every = [result.estimates.get(name) for result in results]
+        unit = next(unit_text(one.unit) for one in every if one is not None)
+        cells = [visible(name), unit, with_std(every[0])]
+        for other, far in zip(every[1:], distances, strict=True):
+            cells += [with_std(other), _change(every[0], other), formatted(far, _SIGMAS)]
         rows.append(tuple(cells))
     note = f"Differences are against {labels[0]}; ± is one standard deviation, σ combines both."
     table = Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
@@ -145,16 +151,13 @@ def _estimates(
 
 def _change(first: Estimate | None, other: Estimate | None) -> str:
     """By how many percent `other` differs from `first`."""
-    before = None if first is None else first.estimate
-    after = None if other is None else other.estimate
-    if not before or after is None:
+    if first is None or not first.estimate or other is None or other.estimate is None:
         return ABSENT
-    return f"{100 * (after - before) / abs(before):+.3g}"
+    return f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
 
 
-def _far(distance: float | None) -> str:
-    """A distance in σ; empty where there is none."""
-    return "" if distance is None else f"{distance:+.1f}"
+_SIGMAS = "+.1f"
+"""How a distance in σ is written."""
 
 
 def _upright(
@@ -175,11 +178,14 @@ def _upright(
     for name, distances in sigma.items():
         for place, (label, result) in enumerate(zip(labels, results, strict=True)):
             estimate = result.estimates.get(name)
-            unit = "" if estimate is None else unit_text(estimate.unit)
+            heading = unit = far = ""
+            if estimate is not None:
+                unit = unit_text(estimate.unit)
             if place == 0:
-                rows.append((visible(name), label, with_std(estimate), unit, ""))
-            else:
-                rows.append(("", label, with_std(estimate), unit, _far(distances[place - 1])))
+                heading = visible(name)
+            elif distances[place - 1] is not None:
+                far = formatted(distances[place - 1], _SIGMAS)
+            rows.append((heading, label, with_std(estimate), unit, far))
     return Table("Estimates side by side", columns, tuple(rows), note)
 
 
@@ -200,16 +206,21 @@ def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     every = [_made_with(result) for result in results]
     rows: list[tuple[str, ...]] = []
     for name in _names(every):
+        values = [settings.get(name, ABSENT) for settings in every]
         if len({settings.get(name) for settings in every}) > 1:
-            values = [visible(settings.get(name, ABSENT)) for settings in every]
-            rows.append((visible(name), *values))
-    columns = (Column("Setting", "name"), *(Column(label, "text") for label in labels))
-    note = "" if rows else "Every setting is the same, and every log was read the same way."
-    table = Table("Settings that differ", columns, tuple(rows), note)
+            rows.append((visible(name),) + tuple(map(visible, values)))
+    columns = [Column("Setting", "name")]
+    columns += [Column(label, "text") for label in labels]
+    note = ""
+    if not rows:
+        note = "Every setting is the same, and every log was read the same way."
+    table = Table("Settings that differ", tuple(columns), tuple(rows), note)
     upright: list[tuple[str, ...]] = []
-    for name, first, *others in rows:
-        upright.append((name, labels[0], first))
-        upright += [("", label, value) for label, value in zip(labels[1:], others, strict=True)]
+    for row in rows:
+        heading = row[0]
+        for label, value in zip(labels, row[1:], strict=True):
+            upright.append((heading, label, value))
+            heading = ""
     headings = (Column("Setting", "name"), Column("Result", "text"), Column("Value", "text"))
     return replace(table, upright=replace(table, columns=headings, rows=tuple(upright)))
 

@@ -11,7 +11,7 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.files import whole_file
 from algid.report.comparison import Comparison
-from algid.report.document import Document, Section
+from algid.report.document import Content, Document, Section
 from algid.report.figures.base import (
     Figure,
     Layout,
@@ -57,15 +57,20 @@ def write_comparison(
 def comparison_document(found: Comparison, results: Sequence[Result]) -> Document:
     """The report of a comparison."""
     names, count = found.labels, counted(len(results), "result")
-    figures = [
-        figure for figure in (_intervals(found, results), _distances(found)) if figure.panels
-    ]
+    content: list[Content] = []
+    for figure in (_intervals(found, results), _distances(found)):
+        if figure.panels:
+            content.append(figure)
+    content += found.tables()
+    name = joined(list(names))
+    if len(names) > 3:
+        name = f"{names[0]} and {len(names) - 1} more"
     return Document(
         title="Comparison",
         verdict=verdict(found),
-        sections=(Section((*figures, found.estimates, found.settings)),),
+        sections=(Section(tuple(content)),),
         kicker="results side by side",
-        name=joined(list(names)) if len(names) < 4 else f"{names[0]} and {len(names) - 1} more",
+        name=name,
         facts=f"{count} · measured against {names[0]}",
         made=f"Made by algid {__version__}.",
     )
@@ -73,12 +78,12 @@ def comparison_document(found: Comparison, results: Sequence[Result]) -> Documen
 
 def verdict(found: Comparison) -> Verdict:
     """Whether the results agree: distances beyond `FAR` are named, the largest first."""
-    distances = [
-        (abs(distance), f"{visible(name)} of {other} ({distance:+.1f} σ)")
-        for name, row in found.sigma.items()
-        for other, distance in zip(found.labels[1:], row, strict=True)
-        if distance is not None
-    ]
+    distances = []
+    for name, row in found.sigma.items():
+        for other, distance in zip(found.labels[1:], row, strict=True):
+            if distance is not None:
+                words = f"{visible(name)} of {other} ({distance:+.1f} σ)"
+                distances.append((abs(distance), words))
     if not distances:
         return Verdict("reservations", "no parameter has error bars in two results")
     far = [words for size, words in sorted(distances, reverse=True) if size > FAR]
@@ -92,11 +97,12 @@ def verdict(found: Comparison) -> Verdict:
     return Verdict("good", f"{within}; the largest is {largest}")
 
 
-def _legend(found: Comparison, first: int = 0) -> tuple[Legend, ...]:
-    return tuple(
-        Legend(f"result{place}", words, COLOURS[place % len(COLOURS)])
-        for place, words in enumerate(found.labels[first:], start=first)
-    )
+def _legend(found: Comparison) -> list[Legend]:
+    """An entry a result, in its colour."""
+    entries = []
+    for place, words in enumerate(found.labels):
+        entries.append(Legend(f"result{place}", words, COLOURS[place % len(COLOURS)]))
+    return entries
 
 
 def _dots(
@@ -121,7 +127,9 @@ def _in_sigmas(found: Estimate | None, first: Estimate, sigma: float) -> tuple[f
     if found is None or found.estimate is None or found.std is None or first.estimate is None:
         return None
     low, high = found.ci95 or (None, None)
-    half = NORMAL * found.std if low is None or high is None else (high - low) / 2
+    half = NORMAL * found.std
+    if low is not None and high is not None:
+        half = (high - low) / 2
     return (found.estimate - first.estimate) / sigma, half / sigma
 
 
@@ -130,10 +138,14 @@ def _sigmas(results: Sequence[Result], names: Sequence[str]) -> dict[str, float]
     by_parameter = {}
     for name in names:
         first = results[0].estimates.get(name)
-        every = [result.estimates.get(name) for result in results]
-        stds = [one.std for one in every if one is not None and one.std]
-        if first is not None and first.estimate is not None and stds:
-            by_parameter[name] = max(stds)
+        if first is None or first.estimate is None:
+            continue
+        largest = 0.0
+        for result in results:
+            if name in result.estimates:
+                largest = max(largest, result.estimates[name].std or 0.0)
+        if largest > 0:
+            by_parameter[name] = largest
     return by_parameter
 
 
@@ -145,14 +157,14 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
     traces: list[Trace] = []
     widest = [0.0]
     for place, result in enumerate(results):
-        rows = [
-            (at, _in_sigmas(result.estimates.get(name), first[name], sigma))
-            for at, (name, sigma) in enumerate(known.items())
-        ]
-        shown = [(at, *share) for at, share in rows if share is not None]
-        x, half = (np.array([row[column] for row in shown]) for column in (1, 2))
-        y = np.array([row[0] for row in shown]) + (place - (len(results) - 1) / 2) * apart
-        widest += [float(value) for value in np.abs(x) + half]
+        shown = []
+        for row, (name, sigma) in enumerate(known.items()):
+            share = _in_sigmas(result.estimates.get(name), first[name], sigma)
+            if share is not None:
+                shown.append((row,) + share)
+        at, x, half = np.array(shown, dtype=np.float64).reshape(-1, 3).T
+        y = at + (place - (len(results) - 1) / 2) * apart
+        widest += (np.abs(x) + half).tolist()
         dots = _dots(found, place, x, y, 7, "+.2f} σ")
         bar = {
             "type": "data",
@@ -161,7 +173,7 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
             "thickness": 2,
             "width": 0,
         }
-        traces.append({**dots, "error_x": bar})
+        traces.append(dots | {"error_x": bar})
     reach = 1.1 * min(max(widest), FARTHEST)
     layout = {
         "xaxis": axis(
@@ -173,66 +185,73 @@ def _intervals(found: Comparison, results: Sequence[Result]) -> Figure:
     says = (
         f"95 % intervals of {counted(len(known), 'parameter')}, {counted(len(results), 'result')}"
     )
-    panels = (
-        (Panel(traces, layout, says, height=FRAME + (ROW + 8 * (len(results) - 2)) * len(known)),)
-        if known
-        else ()
-    )
+    row_height = ROW + 8 * (len(results) - 2)
     reading = (
         "Read: intervals of one row that overlap agree; one that stands apart has changed "
         "or was made otherwise."
     )
     return Figure(
-        "intervals", "Estimates with their 95 % intervals", panels, reading, _legend(found)
+        "intervals",
+        "Estimates with their 95 % intervals",
+        _panels(traces, layout, says, row_height, len(known)),
+        reading,
+        tuple(_legend(found)),
     )
+
+
+def _panels(
+    traces: list[Trace], layout: Layout, says: str, row_height: int, rows: int
+) -> tuple[Panel, ...]:
+    """A panel of so many rows; none without a row."""
+    if rows == 0:
+        return ()
+    return (Panel(traces, layout, says, height=FRAME + row_height * rows),)
 
 
 def _distances(found: Comparison) -> Figure:
     """How far each result is from the first, in combined standard deviations."""
-    names = [
-        name for name, row in found.sigma.items() if any(distance is not None for distance in row)
-    ]
+    rows = {name: row for name, row in found.sigma.items() if set(row) != {None}}
+    names = list(rows)
     traces: list[Trace] = []
     for place in range(1, len(found.labels)):
-        pairs = [(found.sigma[name][place - 1], at) for at, name in enumerate(names)]
-        shown = np.array(
-            [(distance, at) for distance, at in pairs if distance is not None]
-        ).reshape(-1, 2)
-        traces.append(_dots(found, place, shown[:, 0], shown[:, 1], 8, "+.2f} σ"))
-    sizes = [
-        abs(distance) for row in found.sigma.values() for distance in row if distance is not None
-    ]
-    reach = max(1.1 * max(sizes, default=0.0), 4.0)
-    inside = sum(size <= NORMAL for size in sizes)
+        shown = []
+        for at, row in enumerate(rows.values()):
+            if row[place - 1] is not None:
+                shown.append((row[place - 1], at))
+        x, y = np.array(shown, dtype=np.float64).reshape(-1, 2).T
+        traces.append(_dots(found, place, x, y, 8, "+.2f} σ"))
+    sizes = np.abs(found.distances())
+    widest = found.largest_sigma or 0.0
+    reach = max(1.1 * widest, 4.0)
+    inside = np.count_nonzero(sizes <= NORMAL)
     layout = {
         "xaxis": axis("distance, σ", range=[-reach, reach]),
         "yaxis": _names(names),
         "shapes": [stretch(-NORMAL, NORMAL, "@blue/0.25")],
         "hovermode": "closest",
     }
-    largest = significant(max(sizes, default=0.0), 2)
     note = (
         f"{inside} of {counted(len(sizes), 'difference')} within ± {NORMAL:.2f} σ, the largest "
-        f"at {largest} σ."
+        f"at {significant(widest, 2)} σ."
     )
-    panels = (
-        (Panel(traces, layout, f"Distances in σ. {note}", height=FRAME + ROW * len(names)),)
-        if names
-        else ()
-    )
-    legend = (
-        *_legend(found, 1),
-        Legend("", f"± {NORMAL:.2f} σ, 95 % by chance", "@blue/0.25", "area"),
-    )
+    legend = _legend(found)[1:]
+    legend.append(Legend("", f"± {NORMAL:.2f} σ, 95 % by chance", "@blue/0.25", "area"))
     return Figure(
-        "distances", f"Distances from {found.labels[0]}", panels, f"Read: {READING}.", legend, note
+        "distances",
+        f"Distances from {found.labels[0]}",
+        _panels(traces, layout, f"Distances in σ. {note}", ROW, len(names)),
+        f"Read: {READING}.",
+        tuple(legend),
+        note,
     )
 
 
 def _names(names: Sequence[str]) -> Layout:
     """An axis of names from the top down."""
-    ticks: Layout = {
-        "tickvals": list(range(len(names))),
-        "ticktext": [label(name) for name in names],
-    }
-    return axis(range=[len(names) - 0.4, -0.6], zeroline=False, fixedrange=True, **ticks)
+    return axis(
+        range=[len(names) - 0.4, -0.6],
+        zeroline=False,
+        fixedrange=True,
+        tickvals=list(range(len(names))),
+        ticktext=[label(name) for name in names],
+    )

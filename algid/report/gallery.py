@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from algid.errors import ResultError
 from algid.methods import settles
@@ -45,7 +45,7 @@ class Gallery:
     @property
     def every(self) -> list[Figure | Missing]:
         """All figures, those of the paper last."""
-        return [*self.figures, *self.paper]
+        return self.figures + self.paper
 
 
 def gallery(folder: Path, result: Result, progress: Progress | None = None) -> Gallery:
@@ -89,8 +89,12 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
             _try("loaded", LOADED, loaded, lambda: convergence(loaded, result, loaded=True))
         )
     if settles(result.estimator):  # which has no residual, no intervals and nothing of them
-        figures = [one for one in figures if not (isinstance(one, Missing) and one.absent)]
+        figures = [one for one in figures if not _is_absent(one)]
     return Gallery(read, figures, paper)
+
+
+def _is_absent(figure: Figure | Missing) -> bool:
+    return isinstance(figure, Missing) and figure.absent
 
 
 def _scored(path: Path, result: Result, logs: Collection[int]) -> Scored | None:
@@ -103,38 +107,41 @@ def _scored(path: Path, result: Result, logs: Collection[int]) -> Scored | None:
     ResultError
         If `path` cannot be read, or holds others than these logs.
     """
-    score = None if result.fit is None else result.fit.residual
-    if score is None or not path.is_file():
+    if result.fit is None or result.fit.residual is None or not path.is_file():
         return None
     series = read_scored(path)
     if others := sorted(series.keys() - logs):
         raise ResultError(
             f"{path}: expected the logs of torque.parquet, found log {others[0]}; identify again"
         )
-    return Scored(series, score)
+    return Scored(series, result.fit.residual)
 
 
 def drawable(result: Result) -> Result:
     """`result` without the numbers beyond `LARGEST`, which the tables show but no figure can."""
+    changed: dict[str, Any] = {}
+    for group in ("parameters", "loaded", "payload", "paper_payload"):
+        estimates = getattr(result, group)
+        changed[group] = {name: _drawable(one) for name, one in estimates.items()}
+    if result.fit is not None:
+        covariance = []
+        for row in result.fit.covariance:
+            covariance.append([value if _fits(value) else None for value in row])
+        changed["fit"] = result.fit.model_copy(update={"covariance": covariance})
+    return result.model_copy(update=changed)
 
-    def kept(found: Estimate) -> Estimate:
-        numbers = (found.estimate, found.std, *(found.ci95 or ()))
-        if all(number is None or abs(number) <= LARGEST for number in numbers):
-            return found
-        return found.model_copy(update={"estimate": None, "std": None, "ci95": None})
 
-    groups = ("parameters", "loaded", "payload", "paper_payload")
-    changed = {
-        group: {name: kept(e) for name, e in getattr(result, group).items()} for group in groups
-    }
-    if result.fit is None:
-        return result.model_copy(update=changed)
-    covariance = [
-        [None if v is None or abs(v) > LARGEST else v for v in row] for row in result.fit.covariance
-    ]
-    return result.model_copy(
-        update={**changed, "fit": result.fit.model_copy(update={"covariance": covariance})}
-    )
+def _drawable(found: Estimate) -> Estimate:
+    """The estimate, without numbers where one of them cannot be drawn."""
+    low, high = found.ci95 or (None, None)
+    if all(map(_fits, (found.estimate, found.std, low, high))):
+        return found
+    return found.model_copy(update={"estimate": None, "std": None, "ci95": None})
+
+
+def _fits(value: float | None) -> bool:
+    """Whether a number, where there is one, can be drawn."""
+    return value is None or abs(value) <= LARGEST
 
 
 def _try(key: str, title: str, file: Path, make: Callable[[], T]) -> T | Missing:
