@@ -103,11 +103,11 @@ _STEPS = 60
 
 @cache
 def student_quantile(freedom: float, probability: float = 0.975) -> float:
-    """Quantile of Student's t for `freedom` of 1 or more and `probability` from 0.5 to 0.9999.
+    """Quantile of Student's t for `freedom` of 2 or more and `probability` from 0.5 to 0.9999.
 
     Newton's method on P = 1/2 + ∫ density, from the normal quantile. With t = √ν tan φ the
     integrand is cos^(ν−1) φ, which Gauss and Legendre's rule integrates to rounding; P is concave,
-    so that the steps ascend.
+    so that the steps ascend. A power of the rounded cosine would be wrong by ν roundings.
     """
     if math.isinf(freedom):
         return NormalDist().inv_cdf(probability)
@@ -116,7 +116,8 @@ def student_quantile(freedom: float, probability: float = 0.975) -> float:
     for _ in range(_STEPS):
         angle = math.atan(t / root)
         nodes: FloatArray = 0.5 * angle * (_NODES + 1)
-        area = 0.5 * angle * float(_WEIGHTS @ np.cos(nodes) ** (freedom - 1)) * size
+        powers = np.exp(0.5 * (freedom - 1) * np.log1p(-(np.sin(nodes) ** 2)))
+        area = 0.5 * angle * float(_WEIGHTS @ powers) * size
         density = size / root * math.exp(-(freedom + 1) / 2 * math.log1p(t * t / freedom))
         step = (probability - 0.5 - area) / density
         t += step

@@ -8,10 +8,15 @@ import sys
 import time
 from collections.abc import Sequence
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from algid.exits import Exit
 
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
 PATIENCE = 5.0  # s to clear up in after a signal, before a second one is heard
+AGAIN = 0.02  # s after which a signal comes again that a destructor or a callback swallowed
 
 
 def main() -> None:
@@ -25,6 +30,7 @@ def main() -> None:
     stopping = _Stopping()
     for number in ending_signals():
         signal.signal(number, stopping)
+    sys.unraisablehook = stopping.swallowed
     harden_streams()
     bound_by_environment()  # before anything loads numpy
     code = run(sys.argv[1:])
@@ -90,8 +96,27 @@ class _Stopping:
         if now < self._patient_until:
             return
         self._patient_until = now + PATIENCE
-        raise _StoppedError(128 + number)
+        raise _StoppedError(number)
+
+    def swallowed(self, what: UnraisableHookArgs) -> None:
+        """Hear a signal again that came where no exception leaves.
+
+        That is in a destructor, or in a function that a library written in C calls.
+        """
+        if not isinstance(what.exc_value, _StoppedError):
+            sys.__unraisablehook__(what)
+            return
+        from threading import Timer
+
+        self._patient_until = 0.0
+        again = Timer(AGAIN, os.kill, (os.getpid(), what.exc_value.number))
+        again.daemon = True
+        again.start()
 
 
 class _StoppedError(SystemExit):
     """A signal ends algid. typer passes it on, but turns `KeyboardInterrupt` into a silent exit."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(128 + number)
+        self.number = number

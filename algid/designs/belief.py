@@ -119,10 +119,13 @@ class Asked:
     def covariance(self, S: FloatArray) -> FloatArray:
         """Covariance (Q, Q) of the estimates.
 
-        a direction that S leaves open is held at `UNKNOWN` sizes.
+        A direction that S leaves open is held at `UNKNOWN` sizes.  S has no negative eigenvalue
+        but by rounding.
         """
-        scaled = S * np.outer(self.size, self.size) + np.eye(self.size.size) / UNKNOWN**2
-        return np.linalg.inv(0.5 * (scaled + scaled.T)) * np.outer(self.size, self.size)
+        scaled = S * np.outer(self.size, self.size)
+        values, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
+        held = np.maximum(values, 0.0) + 1 / UNKNOWN**2
+        return (axes / held) @ axes.T * np.outer(self.size, self.size)
 
     def relative(self, S: FloatArray) -> FloatArray:
         """Relative bounds (Q,)."""

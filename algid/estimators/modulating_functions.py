@@ -325,6 +325,8 @@ def _kernels(length: int, dt: float, offset: float) -> FloatArray:
     return kernels
 
 
+EPS = float(np.finfo(np.float64).eps)
+ROUNDINGS = 4.0  # of the largest product: more make the sums of products uncertain
 MOTORLESS = 0.1
 """Least residual of a joint without a motor (bearing, cables), as a share of the driven one's."""
 
@@ -343,13 +345,16 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
 
     Notes
     -----
-    A residual below rounding, 1e-12 of the torque, counts as that. The joint with the larger
-    torque sets the measure: a joint without a motor has none, and its load is of the size of the
+    What products of columns leave of a residual's squares cannot be below the rounding of the
+    products, and counts as that; and never below 1e-12 of the torque. The joint with the larger
+    torque sets that measure: a joint without a motor has none, and its load is of the size of the
     other's. Constants that are nothing solve the equation of a joint without a motor exactly, and
     the better it is solved the more it would weigh: its residual counts as `MOTORLESS` of the
     other's at least.
     """
-    squares = np.einsum("x,axy,y->a", v, gram, v)
+    size = np.abs(v)
+    rounding = ROUNDINGS * EPS * np.einsum("x,axy,y->a", size, np.abs(gram), size)
+    squares = np.maximum(np.einsum("x,axy,y->a", v, gram, v), rounding)
     driven = gram[:, -1, -1] > 0
     if driven.sum() == 1:
         each = squares / np.maximum(rows, 1)

@@ -123,12 +123,11 @@ class _Clock:
             return None
         known = [] if self._before is None else [self._before]
         around = stack([*known, table])
-        place = set_back(around)
-        if place is None:
-            place = _far_back(around.stamp_ns)
-        if place is None:
+        places = (set_back(around), _far_back(around.stamp_ns))
+        first = min((place for place in places if place is not None), default=None)
+        if first is None:
             return None
-        return max(0, place + 1 - sum(map(len, known)))
+        return max(0, first + 1 - sum(map(len, known)))
 
     def _settled(self, stamps: IntArray) -> int:
         """How many rows are of this run for certain: all but a few late ones at the end."""

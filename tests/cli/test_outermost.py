@@ -121,7 +121,7 @@ def test_a_fault_of_algid_is_called_one(
     assert told.endswith(line)
 
 
-@pytest.mark.parametrize(("raised", "code"), [(_StoppedError(143), 143), (SystemExit(3), 3)])
+@pytest.mark.parametrize(("raised", "code"), [(_StoppedError(15), 143), (SystemExit(3), 3)])
 def test_an_end_that_is_meant_keeps_its_meaning(
     raised: BaseException, code: int, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

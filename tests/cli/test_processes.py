@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,14 +13,14 @@ import pytest
 from tests.processes import FRESH, Outcome
 
 
+@pytest.mark.skipif(FRESH in os.environ, reason=f"{FRESH}: a fork of loaded packages is unsafe")
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [(["--version"], 0), (["inspect", "nowhere.csv"], 2), (["inspect", "--no-such-flag"], 2)],
 )
 def test_a_fork_prints_and_returns_what_a_fresh_process_does(
-    arguments: list[str], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    arguments: list[str], code: int, tmp_path: Path
 ) -> None:
-    monkeypatch.delenv(FRESH, raising=False)  # it is the fork that is tried
     env = {**os.environ, "COLUMNS": "90"}
     program = Path(sys.executable).with_name("algid")
     fresh = subprocess.run(
@@ -59,3 +60,29 @@ def test_too_few_open_files_are_told_and_more_are_taken_where_they_may_be() -> N
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
         assert done.returncode == 2
         assert done.stderr.startswith(told)
+
+
+@pytest.mark.parametrize(
+    "swallowing",
+    [
+        "ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGTERM))()",
+        "type('Gone', (), {'__del__': lambda self: signal.raise_signal(signal.SIGTERM)})()",
+    ],
+)
+def test_a_signal_that_comes_where_no_exception_leaves_stops_all_the_same(swallowing: str) -> None:
+    code = f"""
+import ctypes, signal, time
+import algid.cli, algid.cli.app
+
+def command(arguments):
+    {swallowing}
+    time.sleep(20)
+
+algid.cli.app.called = lambda arguments: command
+algid.cli.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stdout) == (128 + signal.SIGTERM, "")
+    assert done.stderr == "algid: stopped; nothing half-written is left\n"

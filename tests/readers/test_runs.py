@@ -63,6 +63,16 @@ def test_runs_are_found_wherever_tables_are_cut(data: st.DataObject) -> None:
         assert np.array_equal(np.diff(alone.stamp_ns), np.diff(stamps[own]))
 
 
+def test_a_run_that_goes_far_back_is_found_before_one_behind_it() -> None:
+    """The rows of the second run that lie before all that is known of the first are no overlap."""
+    steps = ((1642, MS), (1100, MS), (1100, 3 * MS), (1100, MS))
+    runs = [np.arange(size) * step for size, step in steps]
+    behind = np.concatenate(runs[1:])
+    parts = [table(runs[0], runs[0] * 1.0), table(behind, behind * 2.0)]
+    for number, run in enumerate(runs, start=1):
+        assert len(read(parts, number)) == run.size
+
+
 def test_late_blocks_start_no_run() -> None:
     order = np.concatenate([np.arange(2000), np.arange(2400, 2800), np.arange(2000, 2400)])
     order = np.concatenate([order, np.arange(2800, 6000)])
