@@ -67,13 +67,23 @@ def unit_text(unit: str) -> str:
 
 
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|(?:kg|N|rad|ms|m|s|Hz)\b))|(?<=±) (?=\d)")
+_FLAG = re.compile(r"(--[a-z][\w-]*) (?=[^\s-])")
 
 
 def lines_of(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    """A text in lines of `width` at most that begin as given; no number parts from its unit."""
-    glued = _UNIT.sub("\u00a0", text)
+    """A text in lines of `width` at most that begin as given.
+
+    No number parts from its unit, no flag from its value; what is longer than a line, like a path,
+    stays whole.
+    """
+    glued = _FLAG.sub("\\1\u00a0", _UNIT.sub("\u00a0", text))
     wrapped = textwrap.wrap(
-        glued, width, initial_indent=first, subsequent_indent=rest, break_on_hyphens=False
+        glued,
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_on_hyphens=False,
+        break_long_words=False,
     )
     return [line.replace("\u00a0", " ") for line in wrapped]
 

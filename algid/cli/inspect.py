@@ -11,6 +11,7 @@ from algid.cli.common import OUTPUT, Quiet
 from algid.cli.output import console, say
 from algid.cli.settings import Choice, takes_profile
 from algid.exits import Exit, exit_of
+from algid.text import lines_of
 
 
 @takes_profile
@@ -50,7 +51,8 @@ def inspect(
                 print_table(part, terminal)
                 terminal.print()
             else:
-                say(part)
+                for line in lines_of(part, terminal.width, rest="    "):
+                    say(line)
     raise typer.Exit(
         Exit.USAGE if found.refused else exit_of(failed=found.contradicted, lost=found.lossy)
     )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
 
 from algid.cli.common import Force, Quiet, out
-from algid.cli.output import say
+from algid.cli.output import remark, say
 
 NAME = "algid.toml"
 
@@ -28,4 +29,5 @@ def new(
     file = out / NAME if out.is_dir() else out
     profile_for(log, file, force)
     if not quiet:
-        say(f"{file}: written; edit it, then try: algid inspect {log} --profile {file}")
+        remark(f"wrote {file}; edit it, then try:")
+        say(f"algid inspect {quote(str(log))} --profile {quote(str(file))}")

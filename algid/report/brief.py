@@ -19,6 +19,8 @@ from algid.words import counted
 WIDTH, HEIGHT = 80, 25
 LEAST_ERROR = 0.01
 """Percent of the truth: a smaller error is said to be smaller."""
+MOST_TERMS = 2
+"""Lines of the terms kept."""
 MOST_COMMAND = 6
 """Lines of what to run first."""
 
@@ -170,11 +172,21 @@ def _terms(result: Result) -> list[str]:
     if not terms and not others:
         return ["Terms kept: none"]
     terms += [name for name in DELAYS if name in others and name not in terms]
-    text = f"Terms kept: {', '.join(terms)}"
-    if others:
-        numbers = [f"{name} {_with_half(estimate)}" for name, estimate in others.items()]
-        text += f" ({', '.join(numbers)})"
-    return _at_most(2, text)
+    numbers = [f"{name} {_with_half(estimate)}" for name, estimate in others.items()]
+    for most in range(len(numbers), -1, -1):
+        lines = _wrapped(f"Terms kept: {', '.join(terms)}{_beside(numbers, most)}")
+        if len(lines) <= MOST_TERMS:
+            return lines
+    return _at_most(MOST_TERMS, f"Terms kept: {', '.join(terms)}")
+
+
+def _beside(numbers: list[str], shown: int) -> str:
+    """The first of the terms' numbers in brackets, each whole, and how many more there are."""
+    if not numbers:
+        return ""
+    left = len(numbers) - shown
+    more = f"{left} {'more' if shown else 'numbers'} with -v" if left else ""
+    return f" ({', '.join([*numbers[:shown], *([more] if more else [])])})"
 
 
 def _beside_constants(result: Result) -> dict[str, Estimate]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from algid.report.document import Column, Table
 from algid.report.tables import flat_settings
-from algid.results import Estimate, Result, Status
+from algid.results import Estimate, LogSummary, Result, Status
 from algid.text import ABSENT, file_name, formatted, resolved, significant, unit_text, visible
 from algid.words import counted
 
@@ -171,21 +171,18 @@ def _upright(
         Column("Parameter", "name"),
         Column("Result", "text"),
         Column("Estimate", "number"),
-        Column("Unit", "text", rank=1),
         Column("Δ/σ", "number"),
     )
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, distances in sigma.items():
-        for place, (label, result) in enumerate(zip(labels, results, strict=True)):
-            estimate = result.estimates.get(name)
-            heading = unit = far = ""
-            if estimate is not None:
-                unit = unit_text(estimate.unit)
-            if place == 0:
-                heading = visible(name)
-            elif distances[place - 1] is not None:
+        estimates = [result.estimates.get(name) for result in results]
+        unit = next(unit_text(one.unit) for one in estimates if one is not None)
+        headings = [visible(name), unit] + [""] * (len(results) - 2)  # the unit under its name
+        for place, (label, estimate) in enumerate(zip(labels, estimates, strict=True)):
+            far = ""
+            if place > 0 and distances[place - 1] is not None:
                 far = formatted(distances[place - 1], _SIGMAS)
-            rows.append((heading, label, with_std(estimate), unit, far))
+            rows.append((headings[place], label, with_std(estimate), far))
     return Table("Estimates side by side", columns, tuple(rows), note)
 
 
@@ -203,11 +200,12 @@ def with_std(estimate: Estimate | None) -> str:
 
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     """What was set otherwise, and how the first log of each kind was read otherwise."""
-    every = [_made_with(result) for result in results]
+    roles = set.intersection(*({log.role for log in result.logs} for result in results))
+    every = [_made_with(result, roles) for result in results]
     rows: list[tuple[str, ...]] = []
     for name in _names(every):
         values = [settings.get(name, ABSENT) for settings in every]
-        if len({settings.get(name) for settings in every}) > 1:
+        if len(set(values)) > 1:
             rows.append((visible(name),) + tuple(map(visible, values)))
     columns = [Column("Setting", "name")]
     columns += [Column(label, "text") for label in labels]
@@ -225,13 +223,31 @@ def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     return replace(table, upright=replace(table, columns=headings, rows=tuple(upright)))
 
 
-def _made_with(result: Result) -> dict[str, str]:
-    """The settings of a result, and how the first log of each kind was read."""
+def _made_with(result: Result, roles: Collection[str]) -> dict[str, str]:
+    """The settings of a result, and how the first log of each of the roles was read."""
     settings = flat_settings(result.settings)
+    settings.pop("command", None)  # it names the logs, and says again what is set
     settings |= {"estimator": result.estimator, "algid": result.version}
     firsts = {log.role: log for log in reversed(result.logs)}
-    for role, log in firsts.items():
-        if log.reading is not None:
-            reading = flat_settings(asdict(log.reading))
-            settings |= {f"{role} log: {name}": value for name, value in reading.items()}
+    for role, log in sorted(firsts.items(), reverse=True):  # the unloaded one first
+        if role not in roles:
+            settings[f"{role} log"] = file_name(log.path)
+        else:
+            settings |= {f"{role} log: {name}": text for name, text in _read(log).items()}
     return settings
+
+
+def _read(log: LogSummary) -> dict[str, str]:
+    """How a log was read, a channel in one cell; who said so is no difference."""
+    if log.reading is None:
+        return {}
+    plain = asdict(log.reading)
+    read: dict[str, str] = {}
+    for name, one in plain.pop("channels").items():
+        # of a velocity the unit is stated as its angle's
+        unit = f"{one['unit']}/s" if name.startswith("omega") else one["unit"]
+        factor = "" if one["factor"] == 1 else f", times {one['factor']:.6g}"
+        offset = "" if one["offset"] == 0 else f", {one['offset']:+.6g}"
+        read[name] = f"{one['source']}, {unit}{factor}{offset}"
+    del plain["joints_told"]
+    return read | {name: text or ABSENT for name, text in flat_settings(plain).items()}

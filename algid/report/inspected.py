@@ -64,10 +64,10 @@ def _figures(found: Inspection) -> Iterator[Table | str]:
     """Of clock, signals and dynamics."""
     if found.clock is not None:
         clock = found.clock
+        longest = f", the longest {clock.longest_gap:.3g} s" if clock.gaps else ""
         yield (
             f"{counted(clock.rows, 'sample')}, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
-            f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}, "
-            f"the longest {clock.longest_gap:.3g} s"
+            f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}{longest}"
         )
     if found.signals:
         headings = ("Low", "High", "Noise", "Step", "Saturated, %")

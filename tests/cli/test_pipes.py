@@ -131,8 +131,11 @@ def refused(arguments: list[str]) -> None:
         done = CliRunner().invoke(app, arguments)
     text = str(done.exception) if isinstance(done.exception, AlgidError) else done.stderr.strip()
     assert done.exit_code != 0
-    if arguments[0] in ("inspect", "batch") and "--torque-file" in arguments:
-        text = done.stdout.strip().splitlines()[-2 if arguments[0] == "batch" else -1]
+    if arguments[0] == "batch" and "--torque-file" in arguments:
+        text = done.stdout.strip().splitlines()[-2]
+    if arguments[0] == "inspect" and "--torque-file" in arguments:
+        # its last words, in as many lines as the terminal needs
+        text = " ".join(done.stdout[done.stdout.rindex("refused: ") :].split())
     assert len(text.splitlines()) == 1, (done.output, done.exception)
     assert "no regular file" in text or (arguments[0] == "batch" and "found none" in text), text
 

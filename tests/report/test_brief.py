@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from algid.notices import Notice, Remedy
 from algid.profile import Profile
 from algid.report.brief import HEIGHT, WIDTH, brief
 from algid.results import Result
+from algid.results.model import TorqueModel
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
 
@@ -81,3 +83,30 @@ def test_a_real_arm_fits_too(shared_data: Path) -> None:
         logs[0], settings=Settings(estimator="weak"), profile=Profile(zero="hanging")
     )
     assert "gravity moment of link 2" in held(found)
+
+
+def test_of_many_coefficients_as_many_are_shown_as_fit_and_the_rest_is_counted(
+    result: Result,
+) -> None:
+    """No number is cut."""
+    assert result.fit is not None
+    terms = ["coulomb", "offset", "stribeck", "load"]
+    model = TorqueModel(terms=terms, coulomb_speed=0.1, stribeck_speed=0.1, chosen_by="logs")
+    one = result.parameters["k1"].model_copy(update={"unit": "N m"})
+    others = {f"{name}{joint}": one for name in ("f", "o", "s", "e") for joint in (1, 2)}
+    many = result.model_copy(
+        update={
+            "parameters": result.parameters | others,
+            "fit": result.fit.model_copy(update={"model": model}),
+        }
+    )
+    lines = brief(many)
+    first = next(place for place, line in enumerate(lines) if line.startswith("Terms kept: "))
+    kept = re.fullmatch(
+        r"Terms kept: coulomb, offset, stribeck, load \((.*), (\d) more with -v\)",
+        " ".join(lines[first : first + 2]),
+    )
+    assert kept is not None
+    shown = kept[1].split(", ")
+    assert len(shown) + int(kept[2]) == len(others)
+    assert all(re.fullmatch(r"\w\d \S+ ± \S+", number) for number in shown)

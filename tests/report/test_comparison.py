@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from algid.log import ChannelReading, Reading
 from algid.report.comparison import compare
 from algid.results import Estimate, Result
 from tests.report.folders import estimate
@@ -33,6 +36,47 @@ def test_only_settings_that_differ_are_shown(result: Result) -> None:
         compare([result, result], ["a", "b"]).settings.note
         == "Every setting is the same, and every log was read the same way."
     )
+
+
+READ = Reading(
+    channels={"theta1": ChannelReading("q1", "deg"), "omega1": ChannelReading("v", "rad")}
+)
+
+
+def test_logs_that_are_read_alike_and_commands_are_no_difference(result: Result) -> None:
+    """A channel is one cell, and a log that only one result has is one row."""
+
+    def made(reading: Reading, role: str, command: str) -> Result:
+        log = result.log.model_copy(update={"reading": reading, "role": "unloaded"})
+        other = log.model_copy(update={"role": role, "path": f"{role}.csv"})
+        settings = {**result.settings, "command": command}
+        return result.model_copy(update={"log": log, "more_logs": [other], "settings": settings})
+
+    turned = replace(
+        READ,
+        zero="hanging",
+        channels={**READ.channels, "theta1": ChannelReading("q1", "deg", "flag", -1.0, 0.5)},
+    )
+    rows = compare(
+        [made(READ, "loaded", "one"), made(turned, "unloaded", "another")], ["a", "b"]
+    ).settings.rows
+    assert rows == (
+        ("unloaded log: theta1", "q1, deg", "q1, deg, times -1, +0.5"),
+        ("unloaded log: zero", "horizontal", "hanging"),
+        ("loaded log", "loaded.csv", "–"),
+    )
+    apart = compare(
+        [made(READ, "unloaded", ""), made(replace(READ, channels={}), "unloaded", "")], ["a", "b"]
+    ).settings.rows
+    assert ("unloaded log: omega1", "v, rad/s", "–") in apart
+
+
+def test_the_unit_of_results_one_below_the_other_stands_under_the_name(result: Result) -> None:
+    upright = compare([result] * 3, ["a", "b", "c"]).estimates.upright
+    assert upright is not None
+    assert [row[0] for row in upright.rows[:6]] == ["k1", "kg m²", "", "k2", "N m", ""]
+    printed_rows = printed(upright, 80)
+    assert "N m s/rad" in printed_rows
 
 
 def test_a_parameter_that_only_one_has_is_shown_without_a_difference(result: Result) -> None:

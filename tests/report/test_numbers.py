@@ -79,6 +79,15 @@ def test_words_are_joined_as_in_a_sentence() -> None:
     assert [joined([]), joined(["a"]), joined(["a", "b", "c"])] == ["", "a", "a, b and c"]
 
 
+def test_no_flag_parts_from_its_value_and_no_path_breaks() -> None:
+    path = "/".join(["folder"] * 9)
+    text = f"one may run it with --zero hanging or --joints a,b on {path} and --force --quiet"
+    lines = lines_of(text, 30)
+    assert " ".join(lines) == text
+    assert path in lines
+    assert all(not line.endswith(("--zero", "--joints")) for line in lines)
+
+
 @pytest.mark.parametrize("width", range(20, 60))
 def test_no_number_parts_from_its_unit(width: int) -> None:
     text = "the least certain, k2, to ± 0.58 % (95 %); weighing 0, 0.05 and 0 kg at 2 and 4 s"
