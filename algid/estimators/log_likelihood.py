@@ -108,7 +108,7 @@ class LogEvidence:
     known : NoiseLevels or None
         Noise levels that are not to be estimated.
 
-    `kept` is empty where the log has no piece long enough.
+    `kept` is empty where the log has no piece long enough; `sure` says that its noise levels stay.
     """
 
     def __init__(
@@ -120,6 +120,7 @@ class LogEvidence:
         known: NoiseLevels | None,
     ) -> None:
         self.loaded = loaded
+        self.sure = False
         self._source = source
         self._shared = shared
         self._stencil = stencil
@@ -169,18 +170,23 @@ class LogEvidence:
 
     def restore(self, state: tuple[NoiseLevels, list[FloatArray]]) -> None:
         """Forget what was trained since the log had this `state`."""
-        self.noise, self._trajectories = state[0], list(state[1])
+        self.noise, self._trajectories, self.sure = state[0], list(state[1]), False
 
     def train(self, c: FloatArray) -> Outcome:
-        """Linearise the training set at the coefficients `c`; keeps the trajectories found."""
+        """Linearise the training set at the coefficients `c`; keeps the trajectories found.
+
+        Noise levels that are known, or sure, are not scored.
+        """
         gathered, scores = _Gathered(), []
+        scored = self._known is None and not self.sure
         for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
             linear = self._linearise(c, theta, piece)
             gathered.take(linear, piece.dt, self.noise)
-            multiplier = linear.solve_transposed(linear.columns[-1:])[0]
-            self._trajectories[seed] = trajectory(piece, linear, multiplier, self.noise)
-            if self._known is None:
-                scores.append(variance_score(linear, len(piece), seed))
+            asked = linear.columns if scored else linear.columns[-1:]
+            multipliers = linear.solve_transposed(asked)
+            self._trajectories[seed] = trajectory(piece, linear, multipliers[-1], self.noise)
+            if scored:
+                scores.append(variance_score(linear, multipliers, len(piece), seed))
         return gathered.outcome(self.loaded, c, reduce(add, scores) if scores else None)
 
     def shaped(self, shared: Shared, c: FloatArray) -> Outcome:
@@ -193,7 +199,7 @@ class LogEvidence:
     def reshape(self, shared: Shared) -> None:
         """From here on friction has the shape of `shared`; noise levels start where they did."""
         self._shared = shared
-        self.noise = self._known or self._guess
+        self.noise, self.sure = self._known or self._guess, False
 
     def run(self, c: FloatArray) -> Outcome:
         """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""

@@ -169,12 +169,16 @@ def _step(values: FloatArray) -> float:
     return step if off_grid.max() < 0.02 else 0.0
 
 
-def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
+def variance_score(
+    linear: Linearised, multipliers: FloatArray, length: int, seed: int
+) -> VarianceScore:
     """Contribution of one linearised piece.
 
     Parameters
     ----------
     linear : Linearised
+    multipliers : (q + 1, 2 n)
+        L⁻ᵀ of its columns.
     length : int
         Samples of the piece's angles.
     seed : int
@@ -182,7 +186,6 @@ def variance_score(linear: Linearised, length: int, seed: int) -> VarianceScore:
     """
     H, first = linear.H, linear.first
     rows = linear.columns.shape[1]
-    multipliers = linear.solve_transposed(linear.columns)
     residual = _by_joint(multipliers[-1])
     back = adjoint(H, residual, first, length)
     smeared = linear.smeared(residual)

@@ -38,6 +38,8 @@ from algid.signals.differences import Stencil
 _STEPS = 20
 _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
+_NOISE_SURE = 0.1  # the same of one of many logs, after which its noise levels stay
+_MOST_SCORED = 32  # logs; of more, those whose noise levels have settled are not scored again
 _CLOSE = 0.1  # standard deviations of the last step: friction's step at noisy speeds may keep it up
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
@@ -211,6 +213,7 @@ def _train(
     """Parameters, the last pass over each log, steps taken, and how the alternation ended."""
     total = sum(log.trained for log in logs)
     known = any(log.noise_known for log in logs)
+    many = len(logs) > _MOST_SCORED
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
@@ -221,11 +224,15 @@ def _train(
                 progress(f"fitting, step {iteration}", done, total)
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
         free = not known and iteration <= _NOISE_STEPS
-        improved = max(map(LogEvidence.improve_noise, logs, outcomes)) if free else 0.0
+        changes = list(map(LogEvidence.improve_noise, logs, outcomes)) if free else [0.0]
+        improved = max(changes)
         moved = _distance(better - beta, S)
         beta = better
         if not known and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
+        if many and free and iteration > 1:
+            for log, change in zip(logs, changes, strict=True):
+                log.sure = change < _NOISE_SURE
         if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     return beta, outcomes, _STEPS, "settled" if moved < _CLOSE else "unsettled"

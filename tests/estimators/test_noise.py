@@ -11,6 +11,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.noise import (
+    VarianceScore,
     first_guess,
     floored,
     largest_change,
@@ -108,13 +109,17 @@ def linear(request: pytest.FixtureRequest, bench: Bench) -> Linearised:
     )
 
 
+def _scored(linear: Linearised, seed: int = 0) -> VarianceScore:
+    return variance_score(linear, linear.solve_transposed(linear.columns), ANGLES, seed)
+
+
 def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
     parts, columns = _parts(linear)
     V = sum(parts[1:], parts[0])
     inverse = np.linalg.inv(V)
     Y, e = columns[:, :-1], columns[:, -1]
     lam = inverse @ e
-    found = variance_score(linear, ANGLES, 0)
+    found = _scored(linear)
     rounding = np.linalg.cond(V) * np.finfo(float).eps
     np.testing.assert_allclose(
         found.power, [lam @ part @ lam for part in parts], rtol=1e3 * rounding
@@ -125,7 +130,7 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
         expected = Y.T @ inverse @ part @ inverse @ Y
         scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
         np.testing.assert_allclose(one / scale, expected / scale, atol=1e3 * rounding)
-    traces = np.array([variance_score(linear, ANGLES, seed).trace for seed in range(30)])
+    traces = np.array([_scored(linear, seed).trace for seed in range(30)])
     expected = np.array([np.trace(inverse @ part) for part in parts])
     assert np.all(
         np.abs(traces.mean(axis=0) - expected)
@@ -163,7 +168,7 @@ def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(
         linear,
         columns=np.vstack([linear.columns[:-1], linear.columns[-1] - best @ linear.columns[:-1]]),
     )
-    score = variance_score(settled, ANGLES, 0)
+    score = _scored(settled)
     V = sum(parts[1:], parts[0])
     score = replace(score, trace=np.array([np.trace(np.linalg.solve(V, part)) for part in parts]))
     before = NoiseLevels(np.ones(2), np.ones(2))
@@ -178,7 +183,7 @@ def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(
 def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(
     linear: Linearised,
 ) -> None:
-    score = replace(variance_score(linear, ANGLES, 0), average=np.diag([4.0, 9.0, 16.0, 25.0]))
+    score = replace(_scored(linear), average=np.diag([4.0, 9.0, 16.0, 25.0]))
     before = NoiseLevels(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     for place, deviations in enumerate((2.0, 3.0, 4.0, 5.0)):
         level = np.array([1.0, 2.0, 3.0, 4.0])
