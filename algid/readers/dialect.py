@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,7 +18,8 @@ from algid.units import is_foreign, unit_of
 from algid.words import counted
 
 COMMENTS = ("#", "%", "//")
-_SEPARATORS = (";", "\t", ",", "|")
+_SEPARATORS = (";", "\t", ",", "|", "")
+"""In the order in which they are tried; the last stands for runs of blanks."""
 _NUMBER = re.compile(
     r"^[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf|infinity)$", re.IGNORECASE
 )
@@ -80,17 +81,10 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
         is not UTF-8.
     """
     lines = _lines(path, head)
-    comment = next(
-        (sign for sign in COMMENTS if any(line.startswith(sign) for line in lines)), None
-    )
-    data = [
-        (number, line)
-        for number, line in enumerate(lines)
-        if line.strip() and not _comment(line, comment)
-    ]
+    comment = _comment_sign(lines)
+    data = _below_titles(list(_numbered(lines, comment)))
     if not data:
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
-    data = _below_titles(data)
     number, header = data[0]
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
     separator = _separator(path, header, [line for _, line in data[1:20]])
@@ -98,17 +92,17 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     if all(_is_number(cell) for cell in split(header, separator) if cell):
         cells, first_row = split(header, separator), 0
         if names is None:
-            header = _commented_header(path, lines[:number], comment, cells, separator)
+            header = _commented_header(path, above, cells, separator)
     columns = _named(path, split(header, separator), names)
-    units = _units(columns, split(data[first_row][1], separator)) if len(data) > first_row else {}
-    first_row += bool(units)
+    units: dict[str, str] = {}
+    if len(data) > first_row:
+        units = _units(columns, split(data[first_row][1], separator))
+    if units:
+        first_row += 1
     if len(data) <= first_row:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
-    number, row = data[first_row]
-    dialect = _checked(
-        path, columns, separator, number, comment, [line for _, line in data[first_row:]], row
-    )
-    return replace(dialect, units={**in_text(above, columns), **units})
+    dialect = _checked(path, columns, separator, comment, data[first_row:])
+    return replace(dialect, units=in_text(above, columns) | units)
 
 
 def described(path: Path, head: bytes) -> Dialect:
@@ -125,24 +119,28 @@ def described(path: Path, head: bytes) -> Dialect:
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
     """Numbered lines from the header on, which has as many cells as the numbers below it."""
     for first in range(min(len(data), LIMITS.title_lines)):
-        for separator in (*_SEPARATORS, ""):
-            table = [split(line, separator) for _, line in data[first : first + 5]]
-            rows = table[2:] if len(table) > 2 and _units(table[0], table[1]) else table[1:]
-            # the last line may break off
-            same = len(table[0]) > 1 and all(
-                len(row) == len(table[0]) for row in table[: max(2, len(table) - 1)]
-            )
-            if same and rows and _numeric(rows[0]) and not _numeric(table[0]):
-                return data[first:]
+        lines = [line for _, line in data[first : first + 5]]
+        if any(_begins_table(lines, separator) for separator in _SEPARATORS):
+            return data[first:]
     return data
+
+
+def _begins_table(lines: Sequence[str], separator: str) -> bool:
+    """Whether the first line is a header, for it has as many cells as the numbers below it."""
+    header, *rows = (split(line, separator) for line in lines)
+    whole = rows if len(rows) < 2 else rows[:-1]  # the last line may break off
+    if len(header) < 2 or any(len(row) != len(header) for row in whole):
+        return False
+    if len(rows) > 1 and _units(header, rows[0]):
+        rows = rows[1:]
+    return bool(rows) and _numeric(rows[0]) and not _numeric(header)
 
 
 def _numeric(cells: Sequence[str]) -> bool:
     """Whether half of the cells hold numbers, dates or nothing, and one a number."""
     numbers = sum(map(_is_number, cells))
-    return numbers > 0 and 2 * (
-        numbers + sum(not cell or bool(_DATE.match(cell)) for cell in cells)
-    ) >= len(cells)
+    others = sum(not cell or bool(_DATE.match(cell)) for cell in cells)
+    return numbers > 0 and 2 * (numbers + others) >= len(cells)
 
 
 def _is_number(cell: str) -> bool:
@@ -165,29 +163,39 @@ def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
     """By column "Int64", "Float64" or "String", as far as the first lines tell."""
     lines = _lines(path, head)[found.skip :]
     lines = lines[:-1] or lines  # the last may break off in the middle of a number
-    rows = [
-        split(line, found.separator)
-        for line in lines
-        if line.strip() and not _comment(line, found.comment)
-    ]
-    table = zip(*(cells for cells in rows if len(cells) == len(found.columns)), strict=True)
-    numbers = [all(not cell or _is_number(cell) for cell in cells) for cells in table]
-    return {
-        column: "Int64" if column in found.whole else "Float64" if number else "String"
-        for column, number in zip(found.columns, numbers, strict=True)
-    }
+    rows = [line for _, line in _numbered(lines, found.comment)]
+    kinds = {}
+    for column, cells in _cells_by_column(found.columns, rows, found.separator).items():
+        kinds[column] = "String"
+        if column in found.whole:
+            kinds[column] = "Int64"
+        elif all(not cell or _is_number(cell) for cell in cells):
+            kinds[column] = "Float64"
+    return kinds
 
 
 def split(line: str, separator: str) -> list[str]:
     """Cells of a line, blanks and quotes stripped."""
-    if '"' not in line:
-        return [cell.strip() for cell in line.split(separator)] if separator else line.split()
-    cells = (
-        next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
-        if separator
-        else line.split()
-    )
+    if not separator:
+        cells = line.split()
+    elif '"' in line:
+        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
+    else:
+        return [cell.strip() for cell in line.split(separator)]
     return [cell.strip().strip('"').strip() for cell in cells]
+
+
+def _cells_by_column(
+    columns: Sequence[str], lines: Iterable[str], separator: str
+) -> dict[str, list[str]]:
+    """The cells under each column, of the lines that have one for each."""
+    by_column: dict[str, list[str]] = {column: [] for column in columns}
+    for line in lines:
+        cells = split(line, separator)
+        if len(cells) == len(columns):
+            for column, cell in zip(columns, cells, strict=True):
+                by_column[column].append(cell)
+    return by_column
 
 
 def _lines(path: Path, head: bytes) -> list[str]:
@@ -201,27 +209,38 @@ def _lines(path: Path, head: bytes) -> list[str]:
         raise LogError(
             f"{path}: a line of more than 65,000 characters; expected a table of a few columns"
         )
-    lone = next(
-        (number for number, line in enumerate(lines, start=1) if "\r" in line.rstrip("\r")), None
-    )
-    if lone is not None:
-        raise LogError(
-            f"{path}: line {lone} holds carriage returns alone, without line feeds; save it with "
-            "line feeds"
-        )
-    return lines if len(head) < LIMITS.line_bytes else lines[:-1]
+    for number, line in enumerate(lines, start=1):
+        if "\r" in line.rstrip("\r"):
+            raise LogError(
+                f"{path}: line {number} holds carriage returns alone, without line feeds; save it "
+                "with line feeds"
+            )
+    if len(head) >= LIMITS.line_bytes:  # the last line may break off
+        return lines[:-1]
+    return lines
 
 
-def _comment(line: str, comment: str | None) -> bool:
-    return comment is not None and line.startswith(comment)
+def _comment_sign(lines: Sequence[str]) -> str | None:
+    """What the lines of comments begin with; None where there is none."""
+    for sign in COMMENTS:
+        if any(line.startswith(sign) for line in lines):
+            return sign
+    return None
+
+
+def _numbered(lines: Sequence[str], comment: str | None) -> Iterator[tuple[int, str]]:
+    """The lines that hold something and are no comments, with their numbers from 0."""
+    for number, line in enumerate(lines):
+        if line.strip() and (comment is None or not line.startswith(comment)):
+            yield number, line
 
 
 def _separator(path: Path, header: str, rows: list[str]) -> str:
-    for separator in (*_SEPARATORS, ""):
+    for separator in _SEPARATORS:
         wanted = len(split(header, separator))
         if wanted > 1 and all(len(split(row, separator)) == wanted for row in rows[:-1]):
             return separator
-    for separator in (*_SEPARATORS, ""):
+    for separator in _SEPARATORS:
         if len(split(header, separator)) > 4:
             return separator
     raise LogError(
@@ -241,11 +260,9 @@ def _named(path: Path, cells: list[str], names: Sequence[str] | None) -> tuple[s
     return tuple(names)
 
 
-def _commented_header(
-    path: Path, before: list[str], comment: str | None, cells: list[str], separator: str
-) -> str:
-    for line in reversed(before):
-        text = line.removeprefix(comment or "").strip()
+def _commented_header(path: Path, above: list[str], cells: list[str], separator: str) -> str:
+    """The header among the comments `above` the table."""
+    for text in reversed(above):
         names = split(text, separator)
         if len(names) == len(cells) and not any(map(_is_number, names)):
             return text
@@ -261,11 +278,12 @@ def _checked(
     path: Path,
     columns: tuple[str, ...],
     separator: str,
-    skip: int,
     comment: str | None,
-    rows: list[str],
-    first: str,
+    data: Sequence[tuple[int, str]],
 ) -> Dialect:
+    """The dialect of a table with such columns and numbered rows."""
+    skip, first = data[0]
+    rows = [line for _, line in data]
     if len(columns) > LIMITS.columns:
         raise LogError(
             f"{path}: {counted(len(columns), 'column')}; expected {LIMITS.columns} at most"
@@ -279,23 +297,29 @@ def _checked(
     repeated = sorted(name for name, count in Counter(columns).items() if name and count > 1)
     if repeated:
         raise LogError(f"{path}: the column {repeated[0]!r} stands in the header twice; rename one")
-    comma = separator != "," and any(
-        "," in cell and _is_number(cell) for row in rows for cell in split(row, separator)
+    comma = padded = False
+    if separator != ",":
+        comma = any(_has_decimal_comma(row, separator) for row in rows)
+    if separator:
+        behind = re.compile(rf"[ \t]{re.escape(separator)}|[ ]$")
+        padded = any(behind.search(row.rstrip("\r")) for row in rows)
+    whole, dates = set(), set()
+    for column, cells in _cells_by_column(columns, rows, separator).items():
+        if all(map(_WHOLE.match, cells)):
+            whole.add(column)
+        if all(map(_DATE.match, cells)):
+            dates.add(column)
+    return Dialect(
+        columns,
+        separator,
+        comma,
+        skip,
+        comment,
+        frozenset(whole),
+        padded,
+        dates=frozenset(dates),
     )
-    padded = bool(separator) and any(
-        re.search(rf"[ \t]{re.escape(separator)}|[ ]$", row.rstrip("\r")) for row in rows
-    )
-    table = [
-        cells for cells in (split(row, separator) for row in rows) if len(cells) == len(columns)
-    ]
-    whole = frozenset(
-        column
-        for column, *cells in zip(columns, *table, strict=True)
-        if all(map(_WHOLE.match, cells))
-    )
-    dates = frozenset(
-        column
-        for column, *cells in zip(columns, *table, strict=True)
-        if all(map(_DATE.match, cells))
-    )
-    return Dialect(columns, separator, comma, skip, comment, whole, padded, dates=dates)
+
+
+def _has_decimal_comma(row: str, separator: str) -> bool:
+    return any("," in cell and _is_number(cell) for cell in split(row, separator))

@@ -25,8 +25,9 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
         rows = tuple((name, visible(source)) for name, source in sorted(found.mapping.items()))
         yield Table("Taken as", (Column("algid", "name"), Column("log", "text")), rows)
     yield from _figures(found)
-    for one in (*found.notices, *found.findings):
-        yield f"{one.code}: {visible(one.clause, 2000)}"
+    for notices in (found.notices, found.findings):
+        for one in notices:
+            yield f"{one.code}: {visible(one.clause, 2000)}"
     if found.refused:
         yield f"refused: {visible(found.refused, 2000)}"
 
@@ -40,24 +41,27 @@ def _held(found: Inspection) -> Iterator[Table | str]:
         Column("Samples", "number"),
         Column("Hz", "number"),
     )
-    rows = [
-        (visible(one.name, NAME), visible(one.type, TYPE), *_numbers(one.count, one.rate))
-        for one in shown
-    ]
+    rows = []
+    for one in shown:
+        count = rate = ""
+        if one.count is not None:
+            count = str(one.count)
+        if one.rate is not None:
+            rate = f"{one.rate:.4g}"
+        rows.append((visible(one.name, NAME), visible(one.type, TYPE), count, rate))
     left = len(found.entries) - len(shown)
     note = f"and {left} more" if left else ""
     if rows:
         yield Table("Channels", columns, tuple(rows), note).without_empty()
     for one in shown:
         if one.joints or one.fields:
-            joints = f"joints {', '.join(one.joints)}; " if one.joints else ""
-            more = " …" if len(one.fields) > MOST_FIELDS else ""
-            fields = ", ".join(one.fields[:MOST_FIELDS]) or "without a number"
-            yield visible(f"{one.name}: {joints}fields {fields}{more}", 2000)
-
-
-def _numbers(count: int | None, rate: float | None) -> tuple[str, str]:
-    return "" if count is None else str(count), "" if rate is None else f"{rate:.4g}"
+            held = "fields "
+            if one.joints:
+                held = f"joints {', '.join(one.joints)}; fields "
+            held += ", ".join(one.fields[:MOST_FIELDS]) or "without a number"
+            if len(one.fields) > MOST_FIELDS:
+                held += " …"
+            yield visible(f"{one.name}: {held}", 2000)
 
 
 def _figures(found: Inspection) -> Iterator[Table | str]:
@@ -70,12 +74,18 @@ def _figures(found: Inspection) -> Iterator[Table | str]:
             f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}{longest}"
         )
     if found.signals:
-        headings = ("Low", "High", "Noise", "Step", "Saturated, %")
-        columns = (Column("Channel", "name"), *(Column(one, "number") for one in headings))
+        columns = (
+            Column("Channel", "name"),
+            Column("Low", "number"),
+            Column("High", "number"),
+            Column("Noise", "number"),
+            Column("Step", "number"),
+            Column("Saturated, %", "number"),
+        )
         rows = []
         for name, one in found.signals.items():
             values = (one.low, one.high, one.noise, one.step, 100 * one.saturated)
-            rows.append((name, *(f"{value:.4g}" for value in values)))
+            rows.append((name,) + tuple(f"{value:.4g}" for value in values))
         yield Table("Signals", columns, tuple(rows))
     if found.dynamics is not None:
         rough = found.dynamics

@@ -54,7 +54,9 @@ def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Mi
     panels = [_panel(read, name, target, key) for name, target in targets.items()]
     if read.condition is not None:
         panels.append(_condition(read, read.condition, key))
-    windows = f" in each window of {read.window:g} s" if len(read.windows) > 1 else ""
+    windows = ""
+    if len(read.windows) > 1:
+        windows = f" in each window of {read.window:g} s"
     reading = (
         f"Read: from ε = {EPSILON:g} s on{windows}, blue should settle on green; "
         "double-click shows the spikes that the frame cuts off."
@@ -63,13 +65,16 @@ def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Mi
 
 
 def _target(name: str, result: Result, loaded: bool) -> Target:
-    groups = (
-        [result.loaded, result.paper_payload, result.payload] if loaded else [result.parameters]
-    )
-    estimate = next((group[name] for group in groups if name in group), None)
-    row = next((row for row in result.table4 if row.parameter == name), None)
-    unit = estimate.unit if estimate is not None else row.unit if row is not None else ""
-    truth = result.truth.get(name) if row is None else row.truth
+    estimates = result.parameters
+    if loaded:
+        estimates = result.payload | result.paper_payload | result.loaded
+    estimate = estimates.get(name)
+    unit, truth = "", result.truth.get(name)
+    for row in result.table4:
+        if row.parameter == name:
+            unit, truth = row.unit, row.truth
+    if estimate is not None:
+        unit = estimate.unit
     return Target(estimate, truth, unit_text(unit))
 
 
@@ -79,18 +84,15 @@ def _panel(read: SeriesLog, name: str, target: Target, sync: str) -> Panel:
         "xaxis": axis("time, s", range=[read.start, read.end]),
         "yaxis": axis(label(unit), range=_view(read.samples[name], target)),
         "yaxis2": {"overlaying": "y", "range": [0, 1], "visible": False, "fixedrange": True},
-        "shapes": [*_marks(target), *_epsilons(read)],
+        "shapes": _marks(target) + _epsilons(read),
         "hovermode": "closest",
     }
-    final = (
-        ""
-        if estimate is None
-        else f"; final estimate {resolved(estimate.estimate, estimate.std)} {unit}"
-    )
-    truth = "" if target.truth is None else f"; truth {significant(target.truth)} {unit}"
-    return Panel(
-        _traces(read, name, unit), layout, f"{name} over time{final}{truth}", name, HEIGHT, sync
-    )
+    says = f"{name} over time"
+    if estimate is not None:
+        says += f"; final estimate {resolved(estimate.estimate, estimate.std)} {unit}"
+    if target.truth is not None:
+        says += f"; truth {significant(target.truth)} {unit}"
+    return Panel(_traces(read, name, unit), layout, says, name, HEIGHT, sync)
 
 
 def _traces(read: SeriesLog, name: str, unit: str) -> list[Trace]:
@@ -98,12 +100,6 @@ def _traces(read: SeriesLog, name: str, unit: str) -> list[Trace]:
     where, share = read.singular[name]
     traces: list[Trace] = []
     if share.any():
-        area = {
-            "fill": "tozeroy",
-            "fillcolor": "@amber/0.35",
-            "line": {"width": 0, "shape": "hv"},
-            "hoverinfo": "skip",
-        }
         traces.append(
             {
                 "type": "scatter",
@@ -111,17 +107,21 @@ def _traces(read: SeriesLog, name: str, unit: str) -> list[Trace]:
                 "x": times(where),
                 "y": packed(share),
                 "yaxis": "y2",
-                **area,
+                "fill": "tozeroy",
+                "fillcolor": "@amber/0.35",
+                "line": {"width": 0, "shape": "hv"},
+                "hoverinfo": "skip",
+                "legendgroup": "singular",
+                "name": "singular",
             }
         )
-        traces[-1] |= {"legendgroup": "singular", "name": "singular"}
     hover = f"{label(name)} %{{y:.5g}} {label(unit)}<br>at %{{x:.4g}} s<extra></extra>"
     colour = "@blue/0.3" if read.coarse else "@blue"
-    traces.append(line(*read.lines[name], colour, label(name), "series", width=1.2, hover=hover))
+    t, values = read.lines[name]
+    traces.append(line(t, values, colour, label(name), "series", width=1.2, hover=hover))
     if read.coarse:
-        traces.append(
-            line(*read.middles[name], "@blue", label(name), "middle", width=1.6, hover=hover)
-        )
+        t, values = read.middles[name]
+        traces.append(line(t, values, "@blue", label(name), "middle", width=1.6, hover=hover))
     return traces
 
 
@@ -130,10 +130,11 @@ def _condition(read: SeriesLog, condition: Series, sync: str) -> Panel:
     layout = {
         "xaxis": axis("time, s", range=[read.start, read.end]),
         "yaxis": axis(type="log", dtick=3, tickfont={"size": 10}),
-        "shapes": [level(LARGEST_CONDITION, "@amber"), *_epsilons(read)],
+        "shapes": [level(LARGEST_CONDITION, "@amber")] + _epsilons(read),
         "hovermode": "closest",
     }
-    trace = line(*condition, "@muted", "condition number", "", width=1.2, hover=hover)
+    t, values = condition
+    trace = line(t, values, "@muted", "condition number", "", width=1.2, hover=hover)
     return Panel(
         [trace],
         layout,
@@ -151,15 +152,12 @@ def _view(samples: FloatArray, target: Target) -> list[float] | None:
     if not settled.size:
         return None
     estimate = target.found
-    known = (
-        [target.truth]
-        if estimate is None
-        else [target.truth, estimate.estimate, *(estimate.ci95 or ())]
-    )
-    ends = [
-        *np.percentile(settled, [4, 96]).tolist(),
-        *(value for value in known if value is not None),
-    ]
+    known = [target.truth]
+    if estimate is not None:
+        known.append(estimate.estimate)
+        known += estimate.ci95 or ()
+    ends = np.percentile(settled, [4, 96]).tolist()
+    ends += [value for value in known if value is not None]
     low, high = min(ends), max(ends)
     space = 0.25 * (high - low) or 0.05 * abs(high) or 1.0
     return [low - space, high + space]
@@ -169,11 +167,12 @@ def _marks(target: Target) -> list[Layout]:
     """The interval, the estimate and the truth, as far as they are known."""
     marks: list[Layout] = []
     estimate = target.found
-    low, high = (estimate.ci95 if estimate is not None else None) or (None, None)
-    if low is not None and high is not None:
-        marks.append(band(low, high, "@green/0.28"))
-    if estimate is not None and estimate.estimate is not None:
-        marks.append(level(estimate.estimate, "@green", "solid"))
+    if estimate is not None:
+        low, high = estimate.ci95 or (None, None)
+        if low is not None and high is not None:
+            marks.append(band(low, high, "@green/0.28"))
+        if estimate.estimate is not None:
+            marks.append(level(estimate.estimate, "@green", "solid"))
     if target.truth is not None:
         marks.append(level(target.truth, "@ink", "dash", 1.2))
     return marks
@@ -181,7 +180,9 @@ def _marks(target: Target) -> list[Layout]:
 
 def _epsilons(read: SeriesLog) -> list[Layout]:
     ends = [begin + EPSILON for begin in read.windows if begin + EPSILON < read.end]
-    return [upright(end, "@muted") for end in ends] if len(ends) <= MOST_WINDOWS else []
+    if len(ends) > MOST_WINDOWS:
+        return []
+    return [upright(end, "@muted") for end in ends]
 
 
 def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...]:
@@ -193,8 +194,10 @@ def _legend(read: SeriesLog, targets: Mapping[str, Target]) -> tuple[Legend, ...
         ]
     results = [target.found for target in targets.values() if target.found is not None]
     if results:
-        spread = " and its 95 % interval" if any(estimate.ci95 for estimate in results) else ""
-        entries.append(Legend("", f"result{spread}", "@green"))
+        words = "result"
+        if any(estimate.ci95 for estimate in results):
+            words += " and its 95 % interval"
+        entries.append(Legend("", words, "@green"))
     if any(target.truth is not None for target in targets.values()):
         entries.append(Legend("", "truth", "@ink", "dash"))
     if _epsilons(read):
