@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -82,28 +82,28 @@ def assign(
             f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
             "changed or damaged; write it again, or remove its truth if it was changed on purpose"
         )
-    named = {name: column for name in profile.channels if (column := profile.channel(name).column)}
+    named = {}
+    for name in profile.channels:
+        column = profile.channel(name).column
+        if column:
+            named[name] = column
     if profile.time:
         named["t"] = profile.time
     sources, choice = _sources(path, available, named, profile)
-    plain = {name for name, column in choice.columns.items() if sources.get(name) == column}
     beside = {name: stated[column] for name, column in sources.items() if column in stated}
     torques = [sources[name] for name in ("tau1", "tau2") if name in sources]
-    currents = [
-        name
-        for name in ("tau1", "tau2")
-        if name in sources and take_apart(sources[name]).stem in CURRENTS
-    ]
-    units = {name: known for name, unit in beside.items() if (known := unit_of(unit))}
-    units |= {name: unit for name, unit in choice.units.items() if name in plain}
-    units |= {name: "A" for name in currents if units.get(name) not in CURRENT}
-    foreign = {name: unit for name, unit in choice.foreign.items() if name in plain}
-    foreign |= {name: unit for name, unit in beside.items() if unit_of(unit) is None}
+    units, foreign = _units(sources, choice, beside)
+    currents = []
+    for name in ("tau1", "tau2"):
+        if name in sources and take_apart(sources[name]).stem in CURRENTS:
+            currents.append(name)
+            if units.get(name) not in CURRENT:
+                units[name] = "A"
     all_named = set(profile.needed) <= named.keys()
+    reading = Reading(joints_told="profile" if all_named else "names")
+    order: tuple[Notice, ...] = ()
     if profile.joints or (choice.joints and not all_named):
         reading, order = reading_of(choice.joints or (), profile)
-    else:
-        reading, order = Reading(joints_told="profile" if all_named else "names"), ()
     said = []
     if torques and take_apart(torques[0]).stem in COMMANDED and profile.effort != "command":
         said.append(Notice("COMMANDED_TORQUE", numbers={"columns": ", ".join(torques)}))
@@ -112,7 +112,7 @@ def assign(
     said += _of_motors(path, sources, currents, profile)
     said += _of_other_units(sources, units, beside, profile)
     of_time = profile.time_unit or units.get("t")
-    if all(sources[name] == name for name in ("t", *profile.needed)):
+    if sources["t"] == "t" and all(sources[name] == name for name in profile.needed):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
     others = other_joints(available, angles)
@@ -123,6 +123,31 @@ def assign(
     return Columns(
         sources, units, of_time or units.get("t"), tuple(said), of_time is not None, reading, others
     )
+
+
+def _units(
+    sources: Mapping[str, str], choice: ChannelChoice, beside: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Units by channel, those that algid knows and others.
+
+    A column's name says them, or else what the file states `beside`.
+    """
+    units: dict[str, str] = {}
+    of_names: dict[str, str] = {}
+    foreign: dict[str, str] = {}
+    for name, column in choice.columns.items():
+        if sources.get(name) == column:
+            if name in choice.units:
+                of_names[name] = choice.units[name]
+            if name in choice.foreign:
+                foreign[name] = choice.foreign[name]
+    for name, unit in beside.items():
+        known = unit_of(unit)
+        if known is None:
+            foreign[name] = unit
+        else:
+            units[name] = known
+    return units | of_names, foreign
 
 
 def _sources(
@@ -142,22 +167,24 @@ def _sources(
         raise LogError(
             f"{path}: {error}; {two}; or name each column: {_naming(['theta1'])} …"
         ) from error
-    read = ("t", *profile.channels)
-    sources = {name: one for name, one in {**choice.columns, **named}.items() if name in read}
+    read = {"t"} | set(profile.channels)
+    every = choice.columns | dict(named)
+    sources = {name: column for name, column in every.items() if name in read}
     if profile.passive and f"tau{3 - profile.passive}" in sources:
         # a joint without a motor needs no torque of its own: what stands in its place is not
         # looked at
         sources.setdefault(f"tau{profile.passive}", sources[f"tau{3 - profile.passive}"])
     for name, law in (("q_des1", profile.tau1.q_des), ("q_des2", profile.tau2.q_des)):
-        if law and {name, "tau1"} <= set(read):  # what the controller follows makes the torque
+        if law and {name, "tau1"} <= read:  # what the controller follows makes the torque
             sources.setdefault(name, law)
     if not sources.keys() >= set(REFERENCES):
-        sources = {name: column for name, column in sources.items() if name not in REFERENCES}
+        _leave_out(sources, REFERENCES)
     if not (profile.velocity and sources.keys() >= set(VELOCITIES)):
-        sources = {name: column for name, column in sources.items() if name not in VELOCITIES}
+        _leave_out(sources, VELOCITIES)
     if profile.rate is not None:
         sources["t"] = ""
-    missing = [name for name in ("t", *profile.needed) if name not in sources]
+    missing = [] if "t" in sources else ["t"]
+    missing += [name for name in profile.needed if name not in sources]
     if missing:
         text = f"{path}: no column for {', '.join(missing)}; found {_listed(available)}"
         raise LogError(
@@ -166,10 +193,16 @@ def _sources(
     return sources, choice
 
 
+def _leave_out(sources: dict[str, str], channels: Iterable[str]) -> None:
+    for name in channels:
+        sources.pop(name, None)
+
+
 def _or_a_rate(missing: Sequence[str]) -> str:
     """What else to say of a log without a time."""
-    rate = Remedy({"rate": None}, "; or give the samples a second of a log without a time")
-    return str(rate) if "t" in missing else ""
+    if "t" not in missing:
+        return ""
+    return str(Remedy({"rate": None}, "; or give the samples a second of a log without a time"))
 
 
 def _or_a_law(missing: Sequence[str]) -> str:
@@ -187,8 +220,10 @@ def _naming(channels: Sequence[str]) -> Remedy:
 
 
 def _listed(available: Sequence[str]) -> str:
-    names = [repr(name[:40]) for name in available[:16]]
-    return ", ".join(names) + (f" and {len(available) - 16} more" if len(available) > 16 else "")
+    names = ", ".join(repr(name[:40]) for name in available[:16])
+    if len(available) > 16:
+        names += f" and {len(available) - 16} more"
+    return names
 
 
 def _of_foreign_units(
@@ -204,7 +239,9 @@ def _of_foreign_units(
         Where the user names no unit of a joint for them.
     """
     # a reference may be in any unit: it is an instrument, of which the scale says nothing
-    for name in [name for name in foreign if name in CHANNELS and name not in REFERENCES]:
+    for name in foreign:
+        if name not in CHANNELS or name in REFERENCES:
+            continue
         given = profile.channel(name).unit
         if given is None:
             usual = "N m" if name.startswith("tau") else "rad"

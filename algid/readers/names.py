@@ -141,7 +141,9 @@ def take_apart(column: str) -> Name:
     A name longer than any of a joint's is its own stem: the patterns' time grows with its square.
     """
     text = column.strip().strip('"').strip().lower()
-    return Name(text, None, None) if len(text) > LIMITS.name_letters else _taken_apart(text)
+    if len(text) > LIMITS.name_letters:
+        return Name(text, None, None)
+    return _taken_apart(text)
 
 
 @lru_cache(maxsize=1 << 13)
@@ -149,8 +151,10 @@ def _taken_apart(text: str) -> Name:
     unit = foreign = None
     for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
         match = pattern.match(text)
-        if match and ((known := unit_of(match[2])) or is_foreign(match[2])):
-            text, unit, foreign = match[1].strip(), known, None if known else match[2]
+        if match and (unit_of(match[2]) or is_foreign(match[2])):
+            text, unit = match[1].strip(), unit_of(match[2])
+            if unit is None:
+                foreign = match[2]
             break
     if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
         unit = known
@@ -202,58 +206,58 @@ def choose(
     parts = {column: take_apart(column) for column in columns}
     chosen = _pairs(parts, joints)
     if not set(needed) <= chosen.keys():
-        states = {**parts, **_of_states(parts)}
+        states = parts | _of_states(parts)
         pairs = _pairs(states, joints)
         if set(needed) <= pairs.keys():
             chosen, parts = pairs, states
     if not set(needed) <= chosen.keys():
-        worded = _worded(parts)
-        pairs = _pairs({**parts, **worded}, joints)
-        own = _named_joints(pairs, {**parts, **worded})
+        worded = parts | _worded(parts)
+        pairs = _pairs(worded, joints)
+        own = _named_joints(pairs, worded)
         if joints or (own and along_the_arm(own)[1] == "names"):
-            chosen, parts = pairs, {**parts, **worded}
-        if joints and needed[0] not in {*chosen, *named}:
-            names = [
-                name.own
-                for name in {**parts, **worded}.values()
-                if name.joint and name.stem in _STEMS
-            ]
-            there = ", ".join(list(dict.fromkeys(names))[:16]) or "none that their names show"
+            chosen, parts = pairs, worded
+        if joints and needed[0] not in chosen and needed[0] not in named:
+            there = ", ".join(_joints_of(worded)[:16]) or "none that their names show"
             raise LookupError(
                 f"no columns of the joints {', '.join(joints)}; joints there are: {there}"
             )
-    if (
-        passive
-        and "tau1" not in chosen
-        and (torque := _only_torque(parts, chosen.get(f"theta{3 - passive}")))
-    ):
-        chosen[f"tau{3 - passive}"] = torque
-    if time := _time(parts):
+    if passive and "tau1" not in chosen:
+        torque = _only_torque(parts, chosen.get(f"theta{3 - passive}"))
+        if torque is not None:
+            chosen[f"tau{3 - passive}"] = torque
+    time = _time(parts)
+    if time is not None:
         chosen["t"] = time
     chosen = _of_one_pair(chosen, parts)
+    units, foreign = {}, {}
     for channel, column in chosen.items():
-        stem, joint = parts[column].stem, parts[column].joint
-        if channel in named or joint is None:
-            continue
-        twin = next(
-            (
-                one
-                for one, other in parts.items()
-                if one != column and (other.stem, other.joint) == (stem, joint)
-            ),
-            None,
-        )
-        # another column of the same name but for its writing or its unit
-        if twin is not None and channel not in (
-            "q_des1",
-            "q_des2",
-        ):
-            raise LookupError(f"{column!r} and {twin!r} are both {stem} of joint {joint}")
-    units = {channel: unit for channel, column in chosen.items() if (unit := parts[column].unit)}
-    foreign = {
-        channel: unit for channel, column in chosen.items() if (unit := parts[column].foreign)
-    }
+        if channel not in named and channel not in ("q_des1", "q_des2"):
+            _refuse_twin(column, parts)
+        unit, other = parts[column].unit, parts[column].foreign
+        if unit is not None:
+            units[channel] = unit
+        if other is not None:
+            foreign[channel] = other
     return ChannelChoice(chosen, units, _named_joints(chosen, parts), foreign)
+
+
+def _joints_of(parts: dict[str, Name]) -> list[str]:
+    """The joints that columns of a known quantity name, each once."""
+    joints: list[str] = []
+    for name in parts.values():
+        if name.joint and name.stem in _STEMS and name.own not in joints:
+            joints.append(name.own)
+    return joints
+
+
+def _refuse_twin(column: str, parts: dict[str, Name]) -> None:
+    """Raises `LookupError` for another column of the same name but for its writing or its unit."""
+    name = parts[column]
+    if name.joint is None:
+        return
+    for twin, other in parts.items():
+        if twin != column and (other.stem, other.joint) == (name.stem, name.joint):
+            raise LookupError(f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}")
 
 
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
@@ -261,19 +265,18 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
     chosen: dict[str, str] = {}
     for quantity in STEMS:
         for stem in STEMS[quantity]:
-            of_stem = {
-                name.joint: column
-                for column, name in parts.items()
-                if name.stem == stem and name.joint
-            }
-            pair = _two(of_stem, joints)
-            if len(of_stem) > 2 and not joints and quantity == "q_des":
-                continue  # the log is read without it
+            of_stem = {}
+            for column, name in parts.items():
+                if name.stem == stem and name.joint:
+                    of_stem[name.joint] = column
             if len(of_stem) > 2 and not joints:
+                if quantity == "q_des":
+                    continue  # the log is read without it
                 there = ", ".join(list(of_stem)[:8])
                 raise LookupError(
                     f"{stem!r} stands there for {counted(len(of_stem), 'joint')}: {there}"
                 )
+            pair = _two(of_stem, joints)
             if pair:
                 chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
                 break
@@ -283,28 +286,36 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
 def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
     """Columns of the two given joints, else of the only two, ordered by name from the base."""
     if joints:
-        keys_of = [
-            [key for key in by_joint if _called(joint) & {key, key.rpartition("/")[2]}]
-            for joint in joints
-        ]
-        return (
-            (by_joint[keys_of[0][0]], by_joint[keys_of[1][0]])
-            if all(len(keys) == 1 for keys in keys_of)
-            else None
-        )
+        first, second = (_of_joint(by_joint, joint) for joint in joints)
+        if len(first) != 1 or len(second) != 1:
+            return None
+        return first[0], second[0]
     if len(by_joint) != 2:
         return None
     short = {key.rpartition("/")[2]: column for key, column in by_joint.items()}
     named = short if len(short) == 2 else by_joint
-    (first, second), _ = along_the_arm(list(named))
-    return named[first], named[second]
+    (base, tip), _ = along_the_arm(list(named))
+    return named[base], named[tip]
+
+
+def _of_joint(by_joint: dict[str, str], joint: str) -> list[str]:
+    """The columns of a joint as a user names it."""
+    names = _called(joint)
+    columns = []
+    for key, column in by_joint.items():
+        if key in names or key.rpartition("/")[2] in names:
+            columns.append(column)
+    return columns
 
 
 def _called(joint: str) -> set[str]:
     """Column names for a joint that a user names: ``Joint_2`` is joint 2 of ``Joint_2_pos``."""
     name = joint.strip().lower()
+    names = {name}
     numbered = _NUMBERED.match(name)
-    return {name, numbered[1].lstrip("0") or "0"} if numbered else {name}
+    if numbered:
+        names.add(numbered[1].lstrip("0") or "0")
+    return names
 
 
 _NO_NAMES = frozenset(
@@ -320,11 +331,11 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
     read = [parts[column] for column in angles]
     kinds = {(name.stem, name.topic) for name in read if name.stem not in _NO_NAMES}
     joints = {name.joint for name in read}
-    return {
-        name.own: column
-        for column, name in parts.items()
-        if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds
-    }
+    others = {}
+    for column, name in parts.items():
+        if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds:
+            others[name.own] = column
+    return others
 
 
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:
@@ -335,11 +346,9 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
             continue
         text = re.sub(r"\W+", "_", name.stem).strip("_")
         for stem in _STEMS:
-            joint = (
-                text.removesuffix(f"_{stem}")
-                if text.endswith(f"_{stem}")
-                else text.removeprefix(f"{stem}_")
-            )
+            joint = text.removesuffix(f"_{stem}")
+            if joint == text:
+                joint = text.removeprefix(f"{stem}_")
             if joint != text:
                 words = [word for word in joint.split("_") if word not in ("joint", "axis")]
                 if words and _NO_JOINTS.isdisjoint(words):
@@ -372,39 +381,38 @@ def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, 
     own = (f"{quantity}1", f"{quantity}2")
     pair = sorted((chosen[name] for name in own if name in chosen), key=places.index)
     names = [parts[column].own for column in pair]
-    return (
-        (names[0], names[1])
-        if len(names) == 2 and not all(name.isdecimal() for name in names)
-        else None
-    )
+    if len(names) < 2 or all(name.isdecimal() for name in names):
+        return None
+    return names[0], names[1]
 
 
 def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
     """The torque of the joint with the angle, or the only torque; the other joint has none."""
     for stem in STEMS["tau"]:
         torques = [column for column, name in parts.items() if name.stem == stem]
-        own = [
-            column
-            for column in torques
-            if angle in parts and parts[column].joint == parts[angle].joint
-        ]
-        if len(own or torques) == 1:
-            return (own or torques)[0]
+        if angle in parts:
+            joint = parts[angle].joint
+            own = [column for column in torques if parts[column].joint == joint]
+            torques = own or torques
+        if len(torques) == 1:
+            return torques[0]
     return None
 
 
 def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
     """Keep quantities of the angles' joints only: torques of other joints are not theirs."""
-    pair = (
-        [parts[chosen[f"theta{joint}"]].joint for joint in (1, 2)] if "theta1" in chosen else None
-    )
+    if "theta1" not in chosen:
+        return dict(chosen)
     kept = {}
     for channel, column in chosen.items():
         joint = parts[column].joint
-        theirs = pair[int(channel[-1]) - 1] if pair and channel != "t" else joint
+        if channel == "t" or joint is None:
+            kept[channel] = column
+            continue
+        theirs = parts[chosen[f"theta{channel[-1]}"]].joint
         # drivers mix counting from zero and from one between quantities: the order is what counts
         # then
-        if joint in (None, theirs) or {joint, theirs} <= {"0", "1", "2"}:
+        if joint == theirs or {joint, theirs} <= {"0", "1", "2"}:
             kept[channel] = column
     return kept
 
@@ -415,11 +423,14 @@ def has_a_time(columns: Iterable[str]) -> bool:
 
 
 def _time(parts: dict[str, Name]) -> str | None:
-    plain = {column.strip().strip('"').strip().lower(): column for column in reversed(list(parts))}
-    for name in TIMES:
-        if name in plain:
-            return plain[name]
-    bare = {
-        part.stem: column for column, part in reversed(list(parts.items())) if part.joint is None
-    }
-    return next((bare[name] for name in TIMES if name in bare), None)
+    plain: dict[str, str] = {}
+    bare: dict[str, str] = {}
+    for column, part in parts.items():  # of two alike the first one counts
+        plain.setdefault(column.strip().strip('"').strip().lower(), column)
+        if part.joint is None:
+            bare.setdefault(part.stem, column)
+    for known in (plain, bare):
+        for name in TIMES:
+            if name in known:
+                return known[name]
+    return None
