@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
 from algid.limits import LIMITS
@@ -82,49 +82,75 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         If no topic holds the joints, several do, or a message cannot be read.
     """
     read, needed = _channels(profile)
-    places = {name: profile.place(name) for name in read} if profile else {}
-    named = {name: (topic, source) for name, (topic, source) in places.items() if source}
-    usual = _usual_topic(source, profile) if not set(needed) <= named.keys() else None
+    named: dict[str, tuple[str | None, str]] = {}
+    if profile is not None:
+        for channel in read:
+            topic, path = profile.place(channel)
+            if path:
+                named[channel] = (topic, path)
+    usual = None
+    if not set(needed) <= named.keys():
+        usual = _usual_topic(source, profile)
     sources: dict[str, tuple[str, str]] = {}
+    units: dict[str, str] = {}
     reading = Reading(joints_told="profile")
     notices: tuple[Notice, ...] = ()
+    home = None if profile is None else profile.topic
     if usual is not None:
-        sources = {
-            channel: (usual.topic, path) for channel, path in usual.paths.items() if channel in read
-        }
-        if profile is not None and profile.joints is not None:
-            reading = Reading(joints=profile.joints, joints_told=profile.told_by("joints"))
-        else:
-            joints, by = along_the_arm(usual.joints)
-            reading = Reading(joints=joints, joints_told=by)
-            notices = order_notice(usual.joints, joints, by) if usual.named else ()
+        home = usual.topic
+        for channel, path in usual.paths.items():
+            if channel in read:
+                sources[channel] = (usual.topic, path)
+        reading, notices = _reading(usual, profile)
         notices += _choice_notice(usual)
-    if usual is not None and not set(REFERENCES) & named.keys():
-        sources |= _reference(source, reading.joints) if usual.named and reading.joints else {}
-    for channel, (topic, path) in named.items():
-        home = topic or (usual.topic if usual else None) or (profile.topic if profile else None)
-        if home is None:
+        if usual.named and reading.joints and named.keys().isdisjoint(REFERENCES):
+            sources |= _reference(source, reading.joints)
+        units = {name: unit for name, unit in usual.units.items() if name not in named}
+    for channel, (own, path) in named.items():
+        place = own or home
+        if place is None:
             raise LogError(
                 f"{source.path}: {channel} is taken from {path!r} without a topic: {_TOPIC}"
             )
-        sources[channel] = (home, path)
-    if (profile and not profile.velocity) or not all(name in sources for name in VELOCITIES):
-        sources = {name: source for name, source in sources.items() if name not in VELOCITIES}
-    if not all(name in sources for name in REFERENCES):
-        sources = {name: source for name, source in sources.items() if name not in REFERENCES}
+        sources[channel] = (place, path)
+    _leave_out_halves(sources)
+    if profile is not None and not profile.velocity:
+        for name in VELOCITIES:
+            sources.pop(name, None)
     mapping = {channel: f"{topic}: {path}" for channel, (topic, path) in sources.items()}
-    homes = list(dict.fromkeys(sources[name][0] for name in sources))
-    topics = tuple(_topic(source, home, sources, profile) for home in homes)
-    clock = topics[0].fields.stamp if topics[0].clock != "log" else None
-    mapping["t"] = f"{homes[0]}: {clock[0].rpartition('.')[0]}" if clock else "log time"
-    reading = replace(reading, topics=tuple(homes), clock="header" if clock else "log")
-    units = (
-        {}
-        if usual is None
-        else {name: one for name, one in usual.units.items() if name not in named}
-    )
-    others = usual.others if usual is not None and usual.topic == topics[0].name else {}
+    homes = list(dict.fromkeys(topic for topic, _ in sources.values()))
+    topics = tuple(_topic(source, one, sources, profile) for one in homes)
+    main = topics[0]
+    if main.clock == "log" or main.fields.stamp is None:
+        mapping["t"] = "log time"
+        reading = replace(reading, topics=tuple(homes), clock="log")
+    else:
+        seconds, _ = main.fields.stamp
+        mapping["t"] = f"{main.name}: {seconds.rpartition('.')[0]}"
+        reading = replace(reading, topics=tuple(homes), clock="header")
+    others: dict[str, str] = {}
+    if usual is not None and usual.topic == main.name:
+        others = usual.others
     return Plan(topics, mapping, reading, notices, units, others)
+
+
+def _reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
+    """Which joints of the topic are read, by the user or along the arm, and what to say of it."""
+    if profile is not None and profile.joints is not None:
+        return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
+    joints, by = along_the_arm(usual.joints)
+    reading = Reading(joints=joints, joints_told=by)
+    if not usual.named:
+        return reading, ()
+    return reading, order_notice(usual.joints, joints, by)
+
+
+def _leave_out_halves(by_channel: dict[str, Any]) -> None:
+    """Leave out velocities, and references, of which one joint's is missing."""
+    for both in (VELOCITIES, REFERENCES):
+        if not by_channel.keys() >= set(both):
+            for name in both:
+                by_channel.pop(name, None)
 
 
 def _channels(profile: Profile | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -144,10 +170,13 @@ def _reference(source: Source, joints: tuple[str, str]) -> dict[str, tuple[str, 
             shape = next(_shapes(source, topic, kind), None)
         except LogError:  # the log is read without it
             continue
-        paths = {} if shape is None else reference_fields(shape, joints)
-        if paths:
-            by_topic[topic] = {name: (topic, path) for name, path in paths.items()}
-    return next(iter(by_topic.values())) if len(by_topic) == 1 else {}
+        if shape is not None:
+            paths = reference_fields(shape, joints)
+            if paths:
+                by_topic[topic] = {name: (topic, path) for name, path in paths.items()}
+    if len(by_topic) != 1:
+        return {}
+    return by_topic.popitem()[1]
 
 
 def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
@@ -166,11 +195,13 @@ def _topic(
     paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
     for topic, kind in kinds(source):
+        if topic != name:
+            continue
         missing, known, stamp, messages = list(paths), list[str](), None, 0
-        for shape in _shapes(source, topic, kind) if topic == name else ():
+        for shape in _shapes(source, topic, kind):
             messages += 1
             missing = [channel for channel in missing if not shape.find(paths[channel])]
-            known = known or [*shape.numbers][:12]
+            known = known or list(shape.numbers)[:12]
             stamp = stamp or stamp_paths(shape)
         if messages and (best is None or len(missing) < len(best[1])):
             best = (kind, missing, known, stamp)
@@ -181,12 +212,13 @@ def _topic(
         one = Remedy({"tau1.topic": None}, "for one channel")
         raise NothingFoundError(f"{source.path}: {text}; {one}", f"{text}; {one}")
     kind, missing, known, stamp = best
-    for channel in missing:
+    if missing:
+        channel = missing[0]
         raise LogError(
             f"{source.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
             f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
         )
-    clock = profile.clock if profile else None
+    clock = None if profile is None else profile.clock
     if clock == "header" and stamp is None:
         log_clock = Remedy({"clock": "log"})
         raise LogError(f"{source.path}: messages on {name!r} carry no stamp: {log_clock}")
@@ -230,38 +262,42 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
                 if len(joints) > 2 or (joints and profile and profile.joints):
                     many.setdefault(name, {}).update(dict.fromkeys(joints))
                 elif len(joints) < 2 and names:
-                    last = len(names) - 1
-                    short = [
-                        what for what in _words(needed) if shape.find(f"{what}[{last}]") is None
-                    ]
-                    stays = f", whose {' and '.join(short)} stay empty" if short else ""
-                    lacking.append(f"{name!r} with the joints {', '.join(names[:8])}{stays}")
+                    lacking.append(f"{name!r} {_lacking(shape, names, needed)}")
         except LogError as error:  # another topic may still hold the joints
             refused.append(error)
     if _USUAL in fitting:
-        return replace(fitting[_USUAL], beside=tuple(name for name in fitting if name != _USUAL))
+        usual = fitting.pop(_USUAL)
+        return replace(usual, beside=tuple(fitting))
     if len(fitting) == 1:
-        return next(iter(fitting.values()))
+        return fitting.popitem()[1]
     if fitting:
         raise LogError(f"{source.path}: joint states on {', '.join(fitting)}; choose: {_TOPIC}")
     if many:
         name, own = next(iter(many.items()))
-        text = f"{name!r} has {counted(len(own), 'joint')} ({', '.join([*own][:12])})"
+        text = f"{name!r} has {counted(len(own), 'joint')} ({', '.join(list(own)[:12])})"
         raise LogError(f"{source.path}: {text}; choose: {_JOINTS}")
     if refused:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in needed):
         return None
-    wanted = (
-        f"the joints {profile.joints}"
-        if profile and profile.joints
-        else f"{' and '.join(f'{what}s' for what in _words(needed))} of two joints"
-    )
+    wanted = f"{' and '.join(f'{what}s' for what in _words(needed))} of two joints"
+    if profile is not None and profile.joints:
+        wanted = f"the joints {profile.joints}"
     both = Remedy({"topic": None, "joints": None})
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
-    there = "; ".join([*dict.fromkeys(lacking)][:4]) or listed(source)
+    there = "; ".join(list(dict.fromkeys(lacking))[:4]) or listed(source)
     why = f"no topic holds {wanted}; found {there}; name topics and fields: {both}; {each}"
     raise NothingFoundError(f"{source.path}: {why}", why)
+
+
+def _lacking(shape: Shape, names: Sequence[str], needed: Sequence[str]) -> str:
+    """Which joints a message names, and which of their quantities it leaves empty."""
+    last = len(names) - 1
+    text = f"with the joints {', '.join(names[:8])}"
+    empty = [what for what in _words(needed) if shape.find(f"{what}[{last}]") is None]
+    if empty:
+        text += f", whose {' and '.join(empty)} stay empty"
+    return text
 
 
 def _words(channels: Sequence[str]) -> list[str]:
@@ -275,10 +311,13 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
 
     None where it has not both, or of more nobody chose two.
     """
-    if profile is not None and profile.joints is not None:
-        chosen = profile.joints if set(profile.joints) <= set(joints) else None
-    else:
-        chosen = along_the_arm(joints)[0] if len(joints) == 2 else None
+    wanted = None if profile is None else profile.joints
+    chosen = None
+    if wanted is not None:
+        if set(wanted) <= set(joints):
+            chosen = wanted
+    elif len(joints) == 2:
+        chosen, _ = along_the_arm(joints)
     if chosen:
         there = (joints[0], joints[1]) if len(joints) == 2 else chosen
         named = bool(names_in(shape))
@@ -289,25 +328,24 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
         return None
     _, needed = _channels(profile)
     # plain numbers by their names: {"q1": …, "tau1": …} or {"q": […], "tau": […]}
-    paths = [path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, ())]
     try:
-        choice = choose(paths, profile.joints if profile else None, needed=needed)
+        choice = choose(_paths(shape, ()), wanted, needed=needed)
     except LookupError:
         return None
-    path_of = {name: path for name, path in choice.columns.items() if name != "t"}
-    for both in (VELOCITIES, REFERENCES):
-        if not all(name in path_of and shape.find(path_of[name]) for name in both):
-            path_of = {name: path for name, path in path_of.items() if name not in both}
-    if not set(needed) <= path_of.keys() or not all(shape.find(path) for path in path_of.values()):
+    path_of = {}
+    for name, path in choice.columns.items():
+        if name != "t" and shape.find(path):
+            path_of[name] = path
+        elif name in needed:
+            return None
+    _leave_out_halves(path_of)
+    if not set(needed) <= path_of.keys():
         return None
-    currents = {name: "A" for name, path in path_of.items() if take_apart(path).stem in CURRENTS}
-    return _Usual(
-        topic,
-        choice.joints or ("1", "2"),
-        choice.joints is not None,
-        path_of,
-        {**choice.units, **currents},
-    )
+    units = dict(choice.units)
+    for name, path in path_of.items():
+        if take_apart(path).stem in CURRENTS:
+            units[name] = "A"
+    return _Usual(topic, choice.joints or ("1", "2"), choice.joints is not None, path_of, units)
 
 
 def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]]:
@@ -347,19 +385,23 @@ def fields_shown(source: Source, number: int) -> tuple[tuple[str, ...], tuple[st
     if shape is None:
         return (), ()
     joints = names_in(shape)
-    return joints, tuple(
-        path for name, one in shape.numbers.items() for path in _paths_of(name, one.count, joints)
-    )
+    return joints, tuple(_paths(shape, joints))
 
 
-def _paths_of(name: str, count: int, joints: tuple[str, ...]) -> list[str]:
-    """The paths of a field's numbers: one, none, or one a place."""
-    if count < 2:
-        return [name if count else f"{name} (empty)"]
-    return [
-        f"{name}[{place}]"
-        for place in (joints if len(joints) == count else range(min(count, LIMITS.joint_cells)))
-    ]
+def _paths(shape: Shape, joints: tuple[str, ...]) -> Iterator[str]:
+    """The paths of a message's numbers: of a field one, none, or one a place."""
+    for name, field_shape in shape.numbers.items():
+        count = field_shape.count
+        if count == 0:
+            yield f"{name} (empty)"
+        elif count == 1:
+            yield name
+        elif count == len(joints):
+            for joint in joints:
+                yield f"{name}[{joint}]"
+        else:
+            for place in range(min(count, LIMITS.joint_cells)):
+                yield f"{name}[{place}]"
 
 
 def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
@@ -385,10 +427,9 @@ def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
         fitting, misfit = 0, None
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
             _work(source, topic, size // _BYTES_A_STEP)
+            end = start + min(size, LIMITS.message_bytes)
             try:
-                shape = walk(
-                    messages.content[start : start + min(size, LIMITS.message_bytes)].tobytes()
-                )
+                shape = walk(messages.content[start:end].tobytes())
             except MisfitError as error:
                 misfit = error
                 continue

@@ -67,22 +67,30 @@ def joint_names(shape: Shape, channels: Collection[str]) -> list[str]:
 
 def other_positions(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
     """By joint the path of its position, of those that a message names beside `joints`."""
-    names = [name for name in names_in(shape) if name not in joints][: LIMITS.other_joints]
-    return {name: path for name in names if (path := _path(shape, name, "theta")) is not None}
+    names = [name for name in names_in(shape) if name not in joints]
+    paths = {}
+    for name in names[: LIMITS.other_joints]:
+        path = _path(shape, name, "theta")
+        if path is not None:
+            paths[name] = path
+    return paths
 
 
 def repeated_name(shape: Shape) -> str | None:
     """A joint that a message of this shape names twice, if any."""
     names = names_in(shape)
-    return next((name for name in names if names.count(name) > 1), None)
+    for name in names:
+        if names.count(name) > 1:
+            return name
+    return None
 
 
 def names_in(shape: Shape) -> tuple[str, ...]:
     """The joints that a message of this shape names."""
-    lists = [
-        texts for path, texts in shape.texts.items() if path in ("name", "names", "joint_names")
-    ]
-    return lists[0][: LIMITS.joints] if lists else ()
+    for path, texts in shape.texts.items():
+        if path in ("name", "names", "joint_names"):
+            return texts[: LIMITS.joints]
+    return ()
 
 
 def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
@@ -90,14 +98,15 @@ def joint_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
 
     Without velocities where one lacks them.
     """
-    paths = {
-        f"{quantity}{number}": path
-        for quantity in _QUANTITIES
-        for number, joint in enumerate(joints, start=1)
-        if (path := _path(shape, joint, quantity))
-    }
-    if not all(name in paths for name in VELOCITIES):
-        paths = {name: path for name, path in paths.items() if name not in VELOCITIES}
+    paths = {}
+    for quantity in _QUANTITIES:
+        for number, joint in enumerate(joints, start=1):
+            path = _path(shape, joint, quantity)
+            if path is not None:
+                paths[f"{quantity}{number}"] = path
+    if not paths.keys() >= set(VELOCITIES):
+        for name in VELOCITIES:
+            paths.pop(name, None)
     return paths
 
 
@@ -119,8 +128,10 @@ def reference_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
 def _path(shape: Shape, joint: str, quantity: str) -> str | None:
     """Path of a joint's number in this shape: in a list beside its name, or in its interfaces."""
     field = _QUANTITIES[quantity]
-    paths = (f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]")
-    return next((path for path in paths if shape.find(path) is not None), None)
+    for path in (f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]"):
+        if shape.find(path) is not None:
+            return path
+    return None
 
 
 _STAMP = ("sec", "nanosec")
@@ -191,19 +202,17 @@ class Topic:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
-        promised = (
-            sum(source.counts.get(channel, 0) for channel in channels) if source.counts else None
-        )
-        yield last.noting(
-            *source.notices, *account.notices(promised), *self._left_out(decoder, source, channels)
-        )
+        promised = self.count(source) if source.counts else None
+        notices = list(source.notices)
+        notices += account.notices(promised)
+        notices += self._left_out(decoder, source, channels)
+        yield last.noting(*notices)
 
     def count(self, source: Source) -> int:
         """Messages that the file counts, 0 where it does not."""
-        return sum(
-            (source.counts or {}).get(channel, 0)
-            for channel in channels_of(source, self.name, self.type)
-        )
+        counts = source.counts or {}
+        channels = channels_of(source, self.name, self.type)
+        return sum(counts.get(channel, 0) for channel in channels)
 
     def _clocked(self, path: str, parts: list[SampleTable]) -> SampleTable:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
@@ -212,16 +221,16 @@ class Topic:
         notices: tuple[Notice, ...] = ()
         stamps = table.stamp_ns
         if _STAMP[0] in columns:
-            header = self._nanoseconds(path, *(columns.pop(part) for part in _STAMP))
+            seconds, nanoseconds = (columns.pop(part) for part in _STAMP)
+            header = self._nanoseconds(path, seconds, nanoseconds)
             if self._chosen is None and len(table):
-                still = (
-                    self.clock != "header" and len(table) > 1 and not np.any(header != header[0])
-                )
-                self._chosen = "log" if still else "header"
-                if still:
+                self._chosen = "header"
+                if self.clock != "header" and len(table) > 1 and not np.any(header != header[0]):
+                    self._chosen = "log"
                     numbers = {"topic": self.name, "stamp": int(header[0])}
                     notices = (Notice("LOG_TIME", numbers=numbers),)
-            stamps = header if self._chosen == "header" else stamps
+            if self._chosen == "header":
+                stamps = header
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
             header_clock = Remedy({"clock": "header"}, "take the header's stamps")
             raise LogError(
@@ -245,12 +254,9 @@ class Topic:
                     f"seconds or nanoseconds; expected whole numbers below 2^63 ns; {log_clock}"
                 )
         whole = np.floor(seconds)
-        rest = (
-            nanoseconds + np.rint((seconds - whole) * 1e9)
-            if seconds.dtype.kind == "f"
-            else nanoseconds
-        )
-        return whole.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
+        if seconds.dtype.kind == "f":
+            nanoseconds = nanoseconds + np.rint((seconds - whole) * 1e9)
+        return whole.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
 
     def _left_out(self, decoder: Decoder, source: Source, channels: frozenset[int]) -> list[Notice]:
         """Notices of messages that lack a field, do not fit, or are otherwise typed or encoded."""
@@ -265,13 +271,12 @@ class Topic:
         if decoder.misfits:
             numbers = {"count": decoder.misfits, "topic": self.name, "first": str(decoder.misfit)}
             said.append(Notice("MISFIT_MESSAGES", numbers=numbers, lossy=True))
-        others = {
-            one for one in source.used() - channels if source.channels[one].topic == self.name
-        }
-        if others:
-            types = ", ".join(
-                sorted({source.channels[one].type or "no schema" for one in others})[:4]
-            )
-            numbers = {"topic": self.name, "types": types}
+        types = set()
+        for number in source.used() - channels:
+            channel = source.channels[number]
+            if channel.topic == self.name:
+                types.add(channel.type or "no schema")
+        if types:
+            numbers = {"topic": self.name, "types": ", ".join(sorted(types)[:4])}
             said.append(Notice("OTHER_TYPE", numbers=numbers, lossy=True))
         return said
