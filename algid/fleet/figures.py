@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,19 +39,22 @@ MOST_POINTS = 400  # of a robot: the latest logs
 SIDE_BY_SIDE = 6  # robots that one panel can hold in a colour each
 MOST_ROBOTS = 40  # that it can hold in one
 COLOURS = ("@blue", "@orange", "@green", "@amber", "@red", "@muted")
-READING = (
-    "Read: a dot is a log with its 95 % interval, and leads to its report. A red ring is an "
-    "outlier; grey is the mean "
-    f"of the {SPAN} months before; an orange line is a drift; at a red line the arm changed at "
-    "once."
-)
-LEGEND = (
-    Legend("log", "a log, ± 95 %", "@blue", "point"),
-    Legend("mean", f"mean of {SPAN} months", "@measured"),
-    Legend("drift", "drift", "@orange"),
-    Legend("outlier", "outlier", "@red", "ring"),
-    Legend("", "changed at once", "@red", "dash"),
-)
+LEGEND = {
+    "log": Legend("log", "a log, ± 95 %", "@blue", "point"),
+    "mean": Legend("mean", f"mean of {SPAN} months", "@measured"),
+    "drift": Legend("drift", "drift", "@orange"),
+    "outlier": Legend("outlier", "outlier", "@red", "ring"),
+    "change": Legend("", "changed at once", "@red", "dash"),
+}
+READING = {
+    "log": "a dot is a log with its 95 % interval",
+    "report": "it leads to its report",
+    "mean": f"grey is the mean of the {SPAN} months before",
+    "drift": "an orange line is a drift",
+    "outlier": "a red ring is an outlier",
+    "change": "at a red line the arm changed at once",
+}
+"""What is said of what the panels show."""
 
 
 def courses(history: History, most: int) -> list[Drawn]:
@@ -109,10 +112,7 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
             for place, robot in enumerate(robots)
             if len(robots) <= SIDE_BY_SIDE
         )
-        reading = (
-            "Read: a dot is a log with its 95 % interval, and leads to its report; a red ring is "
-            "an outlier, an orange line a drift."
-        )
+        reading = _reading(shown_in(panels))
         return Figure("logs", "Every log of every robot", panels, reading, legend, columns=2)
     panels = tuple(
         _panel(
@@ -126,7 +126,37 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
     )
     count = history.drifts.height + history.findings.height + _changed(history)
     title = "What was found, log by log" if count else "The clearest trends, which are no drift"
-    return Figure("logs", title, panels, READING, LEGEND, columns=2) if panels else None
+    return _log_by_log("logs", title, panels) if panels else None
+
+
+def _log_by_log(key: str, title: str, panels: tuple[Panel, ...], note: str = "") -> Figure:
+    """A figure of single robots, which explains what its panels show and nothing else."""
+    shown = shown_in(panels)
+    legend = tuple(one for name, one in LEGEND.items() if name in shown)
+    return Figure(key, title, panels, _reading(shown), legend, note, columns=2)
+
+
+def shown_in(panels: Sequence[Panel]) -> set[str]:
+    """Which of logs, their reports, means, drifts, outliers and changes the panels show."""
+    shown = {"log"}
+    for panel in panels:
+        if panel.layout["shapes"]:
+            shown.add("change")
+        for trace in panel.traces:
+            if "customdata" in trace:
+                shown.add("report")
+            if trace["mode"] == "lines":
+                shown.add("drift")
+            elif trace["mode"] == "lines+markers":
+                shown.add("mean")
+            elif trace["marker"].get("symbol") == "circle-open":
+                shown.add("outlier")
+    return shown
+
+
+def _reading(shown: Collection[str]) -> str:
+    """How to read panels that show so much."""
+    return f"Read: {'; '.join(words for name, words in READING.items() if name in shown)}."
 
 
 def robot_figure(
@@ -143,7 +173,7 @@ def robot_figure(
         if jobs.height > MOST_POINTS
         else ""
     )
-    return Figure(key, f"{visible(robot)}, log by log", panels, READING, LEGEND, note, columns=2)
+    return _log_by_log(key, f"{visible(robot)}, log by log", panels, note)
 
 
 def _changed(history: History) -> int:

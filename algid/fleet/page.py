@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 READING = (
     "Read: each parameter has one scale of change for all robots; the band is the 95 % interval "
     "of the mean over "
-    f"{SPAN} months. Level within its band is steady, orange drifts. A robot's name leads to all "
-    "its parameters."
+    f"{SPAN} months. Level within its band is steady{{drifts}}. A robot's name leads to all its "
+    "parameters."
 )
 MOST_ROBOTS = 40  # whose table is printed
 MOST_NAMED = 3  # drifts, and logs that stand out
@@ -93,6 +93,7 @@ def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Sectio
         drawn=tuple(drawn),
         links=places,
     )
+    reading = READING.format(drifts=", orange drifts" if history.drifts.height else "")
     jobs = {visible(job): place for job, place in reports.items()}
     tables = [
         replace(table, links=links)
@@ -106,7 +107,7 @@ def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Sectio
     shown = _only(history, list(keys))
     each = [_robot_section(shown, robot, key, reports) for robot, key in keys.items()]
     return (
-        Section((robots, *([ReadingAid(READING)] if drawn else []), *filled(*tables))),
+        Section((robots, *([ReadingAid(reading)] if drawn else []), *filled(*tables))),
         Section(() if first is None else (first,)),
         Section((ReadingAid(_which(history, len(each))),) if each else (), "each", "Each robot"),
         *each,
@@ -228,7 +229,11 @@ def verdict(history: History) -> Verdict:
 
     drifts, findings = history.drifts.height, history.findings.height
     statement = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}: "
-    statement += f"{counted(drifts, 'drift')} and {counted(findings, 'finding')}"
+    found = [counted(drifts, "drift"), counted(findings, "finding")]
+    if history.changes is not None and history.changes.height:
+        steps = history.changes.n_unique(["robot", "after"])
+        found.insert(1, counted(steps, "change"))
+    statement += joined(found)
     tested = history.windows.filter(pl.col("p").is_not_nan() & (pl.col("mean") != 0.0))
     if tested.height:  # the clearest trend of all that were tested, whether it drifts or not
         row = tested.sort("p", "robot", "parameter").row(0, named=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from algid.notices import Notice
@@ -26,9 +27,19 @@ from algid.words import counted
 # columns; a row of a wider table stands as a card on a phone, so that no column is out of sight
 CARDED = 3
 ANSWERS = ("yes", "no", "none")
+PLAIN = frozenset({"Format", "Log", "Meaning", "Parameter", "Robot", "Unit", "What", "Why"})
+"""Headings of texts that say themselves what they are, but for an answer."""
 LONG_CELL = 40  # beyond, a cell breaks into lines
 KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
 SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
+
+
+_FLAG = re.compile(r"(?<![\w-])--[a-z][\w-]*")
+
+
+def unbroken(text: str) -> str:
+    """`text` for an element; no line of it ends within a flag."""
+    return _FLAG.sub(r'<span class="flag">\g<0></span>', escaped(text))
 
 
 def banner(judged: Verdict) -> str:
@@ -41,7 +52,7 @@ def banner(judged: Verdict) -> str:
     if first:
         shown = f"<ul>{_listed(_sentences(first))}</ul>"
     if judged.command:
-        shown += f'<p class="cause">Run first: <code>{escaped(judged.command)}</code></p>'
+        shown += f'<p class="cause">Run first: <code>{unbroken(judged.command)}</code></p>'
     shown += _folded(counted(len(rest), "more reason"), rest)
     shown += _folded(f"data notes ({len(judged.notes)})", judged.notes)
     return (
@@ -67,7 +78,7 @@ def _folded(title: str, notices: Sequence[Notice]) -> str:
 
 
 def _listed(sentences: tuple[str, ...]) -> str:
-    return "".join(f"<li>{escaped(sentence)}</li>" for sentence in sentences)
+    return "".join(f"<li>{unbroken(sentence)}</li>" for sentence in sentences)
 
 
 def contents(document: Document) -> str:
@@ -152,7 +163,7 @@ def _note(text: str) -> str:
     """A note below a table or a figure; nothing where there is none."""
     if not text:
         return ""
-    return f'<p class="note">{escaped(text)}</p>'
+    return f'<p class="note">{unbroken(text)}</p>'
 
 
 Slot = tuple[int, Column] | Drawn
@@ -232,10 +243,11 @@ def _number_cell(column: Column, text: str) -> str:
 
 
 def _text_cell(column: Column, text: str) -> str:
-    """A text; an answer says nothing on a card without its heading."""
+    """A text; on a card it has its heading, unless it says itself what it is."""
     kinds = "text long" if len(text) > LONG_CELL else "text"
-    label = _label(column) if text in ANSWERS else ""
-    return f'<td class="{kinds}"{label}>{escaped(text)}</td>'
+    labelled = text in ANSWERS or (text and column.heading not in PLAIN)
+    label = _label(column) if labelled else ""
+    return f'<td class="{kinds}"{label}>{unbroken(text)}</td>'
 
 
 def _label(column: Column) -> str:

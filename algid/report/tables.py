@@ -10,6 +10,7 @@ from typing import Any
 
 from algid.methods import settles
 from algid.model import DELAYS, PARAMETERS
+from algid.notices import NAMED
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.phasors import moments
 from algid.report.series import TorqueLog
@@ -29,6 +30,7 @@ from algid.text import (
     file_name,
     formatted,
     interval,
+    joined,
     percent,
     resolved,
     significant,
@@ -175,15 +177,23 @@ def _log_row(log: LogSummary) -> tuple[str, ...]:
 
 
 def _channel_rows(logs: Sequence[LogSummary]) -> Iterator[tuple[str, ...]]:
-    """The channels of the first log, and those of each other one that differ from it."""
-    for place, log in enumerate(logs):
-        name = "all logs"
-        if place > 0:
-            if log.mapping == logs[0].mapping:
-                continue
-            name = file_name(log.path)
+    """Each signal and where it was taken from, once for all logs that have it from there."""
+    taken: dict[str, dict[str, list[str]]] = {}
+    for log in logs:
         for signal, source in log.mapping.items():
-            yield visible(signal), visible(source), name
+            taken.setdefault(signal, {}).setdefault(source, []).append(file_name(log.path))
+    for signal, sources in taken.items():
+        for source, names in sources.items():
+            yield visible(signal), visible(source), _these(names, len(logs))
+
+
+def _these(names: list[str], every: int) -> str:
+    """Logs by their names, of many the first."""
+    if len(names) == every:
+        return "all logs"
+    if len(names) <= NAMED:
+        return joined(names)
+    return f"{names[0]} and {len(names) - 1} more"
 
 
 def settings_table(settings: Mapping[str, Any]) -> Table:

@@ -234,6 +234,7 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
     figure = overview(history, {})
     assert figure is not None
     assert [len(panel.traces) for panel in figure.panels] == [2]  # two robots, nothing marked
+    assert figure.reading == "Read: a dot is a log with its 95 % interval."
 
 
 def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:

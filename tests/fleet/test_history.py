@@ -13,7 +13,7 @@ from scipy.stats import binom, linregress
 from scipy.stats import t as student
 
 from algid.errors import ResultError
-from algid.fleet.figures import courses
+from algid.fleet.figures import courses, robot_figure, shown_in
 from algid.fleet.history import History, history_of, write_history
 from algid.fleet.page import fleet_document, verdict
 from algid.fleet.tables import change_table, parameter_table, robot_table
@@ -317,6 +317,16 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert history.jobs is not None
     table = parameter_table(history, "r1", history.jobs.filter(pl.col("robot") == "r1"))
     assert [row[0] for row in table.rows] == list(NAMES)
+    assert verdict(history).headline.startswith("2 robots, 240 logs: 0 drifts, 1 change and 0 ")
+    figure = robot_figure(history, "r1", history.jobs.filter(pl.col("robot") == "r1"), {}, "r1")
+    assert shown_in(figure.panels) == {"log", "mean", "change"}
+    assert [one.words for one in figure.legend] == [
+        "a log, ± 95 %",
+        "mean of 3 months",
+        "changed at once",
+    ]
+    assert figure.reading.endswith("at a red line the arm changed at once.")
+    assert not any(word in figure.reading for word in ("outlier", "drift", "report"))
     assert table.rows[0][5].startswith("changed by +")
     assert table.rows[1][5] == "–"
 

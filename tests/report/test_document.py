@@ -35,7 +35,7 @@ from algid.report.document import (
 )
 from algid.report.figures.base import Figure, Legend, Missing, Panel, packed
 from algid.report.frame import drawing, page
-from algid.report.html import banner, contents, section_html, table_html
+from algid.report.html import banner, contents, section_html, table_html, unbroken
 from algid.report.markdown import markdown, markdown_table
 from algid.report.terminal import print_document
 from algid.verdict import Verdict, graded
@@ -324,6 +324,20 @@ WIDE = Table(
     ),
     "A note & more.",
 )
+
+
+def test_texts_on_a_card_have_their_heading_but_those_that_need_none() -> None:
+    columns = (Column("Robot", "name"), *(Column(one, "text") for one in ("Changed", "To", "Unit")))
+    text = table_html(Table("Robots", columns, (("r1", "2026-02-08", "", "N m"),)))
+    assert '<td class="text" data-label="Changed">2026-02-08</td>' in text
+    assert '<td class="text"></td>' in text
+    assert '<td class="text">N m</td>' in text
+
+
+def test_no_line_ends_within_a_flag() -> None:
+    assert unbroken("run --zero hanging, a--b <--l1>") == (
+        'run <span class="flag">--zero</span> hanging, a--b &lt;<span class="flag">--l1</span>&gt;'
+    )
 
 
 def test_cells_say_what_they_hold() -> None:

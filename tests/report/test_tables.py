@@ -210,7 +210,14 @@ def test_channels_name_a_log_only_where_they_differ(result: Result) -> None:
     assert {row[2] for row in channels.rows} == {"all logs"}
     other = result.more_logs[0].model_copy(update={"mapping": {"theta1": "q1"}})
     differing = log_tables(result.model_copy(update={"more_logs": [other]}).logs)[1]
-    assert differing.rows[-1] == ("theta1", "q1", "case1-loaded.mcap")
+    theirs = [row for row in differing.rows if row[0] == "theta1"]
+    assert [row[2] for row in theirs] == ["case1-unloaded.mcap", "case1-loaded.mcap"]
+    assert theirs[1][1] == "q1"
+    assert differing.rows[-1][2] == "case1-unloaded.mcap"  # the other log has no such signal
+    many = [result.log] * 5 + [other]
+    rows = log_tables(many)[1].rows
+    assert rows[0][2] == "case1-unloaded.mcap and 4 more"
+    assert len(rows) == len(channels.rows) + 1
 
 
 def test_the_terminal_has_no_colour_without_a_colour_system(
