@@ -49,17 +49,19 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
     jobs: dict[str, Job] = {}
     for source in sources:
         try:
-            manifest = not is_url(source) and is_manifest(Path(source))
-            all_jobs = (
-                read_manifest(Path(source)) if manifest else _paired(_logs(source, out), alone)
-            )
+            if not is_url(source) and is_manifest(Path(source)):
+                all_jobs = read_manifest(Path(source))
+            else:
+                all_jobs = _paired(_logs(source, out), alone)
         except (OSError, ValueError) as error:  # ValueError: a NUL in a path
             raise SettingError(
                 f"{source}: cannot look there ({error}); check its name and rights"
             ) from error
         for job in all_jobs:
             before = jobs.get(job.name, job)
-            jobs[job.name] = job if before == job else _of_one_name(before, job)
+            if before != job:
+                job = _of_one_name(before, job)
+            jobs[job.name] = job
     return [jobs[name] for name in sorted(jobs)]
 
 
@@ -69,39 +71,47 @@ Found = tuple[str, str, str | None]
 
 def _logs(source: str, out: str) -> list[Found]:
     """The logs of a source."""
+    logs: list[Found] = []
     if is_url(source):
         own = _written_by_batch(source, out)
-        logs = [(url, name) for url, name in list_urls(source) if _is_log(name) and not own(name)]
-        return [(url, _stem(name), None) for url, name in logs]
+        for url, name in list_urls(source):
+            if _is_log(name) and not own(name):
+                logs.append((url, _stem(name), None))
+        return logs
     path = Path(source)
     if path.is_dir() and not _is_bag(path):
-        return [
-            _below(path, one)
-            for one in _walk(path, out)
-            if one.trouble or one.bag or _is_log(one.name)
-        ]
-    matches = [_File(source, _is_bag(path))] if path.exists() else list(_matches(source, out))
+        for one in _walk(path, out):
+            if one.trouble or one.bag or _is_log(one.name):
+                logs.append(_below(path, one))
+        return logs
+    if path.exists():
+        matches = [_File(source, _is_bag(path))]
+    else:
+        matches = list(_matches(source, out))
     if not matches:
         raise SettingError(f"{source}: there is no such file, folder or match; check the name")
-    return [
-        (one.path, _stem(one.name), one.trouble)
-        for one in matches
-        if one.bag or not Path(one.path).is_dir()
-    ]
+    for one in matches:
+        if one.bag or not Path(one.path).is_dir():
+            logs.append((one.path, _stem(one.name), one.trouble))
+    return logs
 
 
 def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
     """Whether an object's name below `source` is hidden, part of a result, or in `out`."""
     below, place = f"{shown(source)}/", f"{shown(out)}/"
-    inside = unquote(place.removeprefix(below)) if is_url(out) and place.startswith(below) else None
+    inside = None
+    if is_url(out) and place.startswith(below):
+        inside = unquote(place.removeprefix(below))
 
     def own(name: str) -> bool:
-        *folders, _ = parts = name.split("/")
-        if any(part.startswith(".") for part in parts) or any(
-            part.endswith(".algid") for part in folders
-        ):
+        parts = name.split("/")
+        if any(part.startswith(".") for part in parts):
             return True
-        return inside is not None and (name.startswith(inside) if inside else name == TABLE)
+        if any(part.endswith(".algid") for part in parts[:-1]):
+            return True
+        if inside == "":
+            return name == TABLE
+        return inside is not None and name.startswith(inside)
 
     return own
 
@@ -121,7 +131,9 @@ class _File:
 
 def _below(folder: Path, one: _File) -> Found:
     name = one.path[len(str(folder)) + 1 :]
-    return one.path, name if one.trouble else _stem(name), one.trouble
+    if not one.trouble:
+        name = _stem(name)
+    return one.path, name, one.trouble
 
 
 def _walk(folder: Path, out: str) -> Iterator[_File]:
@@ -137,8 +149,9 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
     """
     results = _mark(out) if Path(out).is_dir() else None
     # a link there leads to all that there is
-    above = {_mark(str(one)) for one in folder.resolve().parents}
-    seen = above | ({results} if results != _mark(str(folder)) else set())
+    seen = {_mark(str(one)) for one in folder.resolve().parents}
+    if results is not None and results != _mark(str(folder)):
+        seen.add(results)
     pending, links = [str(folder)], deque[str]()
     while pending or links:
         place = pending.pop() if pending else links.popleft()
@@ -160,7 +173,9 @@ def _walk(folder: Path, out: str) -> Iterator[_File]:
         if BAG in files and place != str(folder):
             yield _File(place, bag=True)
             continue
-        yield from (_File(f"{place}/{name}") for name in files if mark != results or name != TABLE)
+        for name in files:
+            if mark != results or name != TABLE:
+                yield _File(f"{place}/{name}")
         pending += [f"{place}/{name}" for name in folders if not name.endswith(".algid")]
         links += [f"{place}/{name}" for name in linked if not name.endswith(".algid")]
 
@@ -175,10 +190,14 @@ def _entries(folder: str) -> tuple[list[str], list[str], list[str]]:
     files, folders, links = list[str](), list[str](), list[str]()
     with os.scandir(folder) as entries:
         for entry in entries:
-            if not entry.name.startswith("."):
-                (
-                    files if not _is_folder(entry) else links if entry.is_symlink() else folders
-                ).append(entry.name)
+            if entry.name.startswith("."):
+                continue
+            if not _is_folder(entry):
+                files.append(entry.name)
+            elif entry.is_symlink():
+                links.append(entry.name)
+            else:
+                folders.append(entry.name)
     return sorted(files), sorted(folders), sorted(links)
 
 
@@ -198,27 +217,28 @@ def _matches(pattern: str, out: str) -> Iterator[_File]:
     first = parts.index("**") if "**" in parts else len(parts)
     # a pattern may be absolute
     paths = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207
-    if first == len(parts):
-        yield from (_File(match, _is_bag(Path(match))) for match in paths)
-        return
-    for folder in (Path(match) for match in paths if Path(match).is_dir()):
-        files = (one for one in _walk(folder, out) if not one.trouble)
-        yield from (
-            one for one in files if _fits(Path(one.path).relative_to(folder).parts, parts[first:])
-        )
+    for match in paths:
+        folder = Path(match)
+        if first == len(parts):
+            yield _File(match, _is_bag(folder))
+        elif folder.is_dir():
+            for one in _walk(folder, out):
+                below = Path(one.path).relative_to(folder).parts
+                if not one.trouble and _fits(below, parts[first:]):
+                    yield one
 
 
 def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
     """Whether a path's parts fit a pattern's, of which ``**`` stands for any number of folders."""
     places = {0}  # of the pattern, after the parts so far
     for part in parts:
-        places = _onward(places, pattern)
-        fitting = {
-            n
-            for n in places
-            if n < len(pattern) and (pattern[n] == "**" or fnmatchcase(part, pattern[n]))
-        }
-        places = {n if pattern[n] == "**" else n + 1 for n in fitting}
+        reached = set()
+        for place in _onward(places, pattern) - {len(pattern)}:
+            if pattern[place] == "**":
+                reached.add(place)
+            elif fnmatchcase(part, pattern[place]):
+                reached.add(place + 1)
+        places = reached
     return len(pattern) in _onward(places, pattern)
 
 
@@ -249,27 +269,29 @@ def _paired(logs: Iterable[Found], alone: str) -> list[Job]:
     """A job for each name of logs that differ in their role alone."""
     jobs: dict[str, Job] = {}
     for path, stem, trouble in logs:
+        name, role = stem, alone
         match = _ROLE.fullmatch(stem)
-        name = match["base"] if match else stem
-        loaded = (match["role"] if match else alone) == "loaded"
-        job = _job(name, path, loaded=loaded, trouble=trouble)
-        before = jobs.get(job.name)
-        jobs[job.name] = job if before is None else _together(before, job)
+        if match:
+            name, role = match["base"], match["role"]
+        job = _job(name, path, loaded=role == "loaded", trouble=trouble)
+        if job.name in jobs:
+            job = _together(jobs[job.name], job)
+        jobs[job.name] = job
     return list(jobs.values())
 
 
 def _job(name: str, path: str, *, loaded: bool, trouble: str | None) -> Job:
     """The job of one log, under a name that can stand for its own where that is unfit."""
-    fault = trouble or name_fault(name)
-    if fault is not None:
-        problem = (
-            trouble or f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
-        )
-        return Job(safe_name(name), logs=(path,), trouble=problem)
+    if not trouble:
+        fault = name_fault(name)
+        if fault is not None:
+            trouble = f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
+    if trouble:
+        return Job(safe_name(name), logs=(path,), trouble=trouble)
     robot = name.rpartition("/")[0] or None
-    return (
-        Job(name, loaded=(path,), robot=robot) if loaded else Job(name, logs=(path,), robot=robot)
-    )
+    if loaded:
+        return Job(name, loaded=(path,), robot=robot)
+    return Job(name, logs=(path,), robot=robot)
 
 
 def _together(first: Job, second: Job) -> Job:
@@ -281,11 +303,9 @@ def _together(first: Job, second: Job) -> Job:
 
 def _of_one_name(first: Job, second: Job) -> Job:
     """What stands for two jobs of one name: it cannot be run."""
-    logs, loaded = (
-        tuple(dict.fromkeys(one))
-        for one in (first.logs + second.logs, first.loaded + second.loaded)
-    )
-    paths = ", ".join(map(kept_path, [*logs, *loaded][:MOST_NAMED]))
+    logs = tuple(dict.fromkeys(first.logs + second.logs))
+    loaded = tuple(dict.fromkeys(first.loaded + second.loaded))
+    paths = ", ".join(map(kept_path, (logs + loaded)[:MOST_NAMED]))
     trouble = (
         f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a "
         "manifest"

@@ -76,16 +76,13 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
         return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
     judged = result.verdict
-    lacking = ["samples were lost"] if result.data_lost else []
-    lacking += [
-        f"{name} {one.status.value}" for name, one in result.estimates.items() if not one.usable
-    ]
+    status, reason = _end(result)
     hashes = {log.path: log.sha256 for log in result.logs}
     return _record(
         task,
         inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
-        status=End.FAILED if judged.failed else End.INCOMPLETE if lacking else End.OK,
-        reason=_first_reason(judged) if judged.failed else "; ".join(lacking),
+        status=status,
+        reason=reason,
         seconds=time.perf_counter() - start,
         start_ns=result.log.start_ns,
         log_seconds=sum(log.duration for log in result.logs),
@@ -98,10 +95,27 @@ def run_task(task: Task) -> JobRecord | DiskFull:
     )
 
 
+def _end(result: Result) -> tuple[End, str]:
+    """How a job that gave a result ended, and why, where all is not well."""
+    if result.verdict.failed:
+        return End.FAILED, _first_reason(result.verdict)
+    lacking = []
+    if result.data_lost:
+        lacking.append("samples were lost")
+    for name, one in result.estimates.items():
+        if not one.usable:
+            lacking.append(f"{name} {one.status.value}")
+    if lacking:
+        return End.INCOMPLETE, "; ".join(lacking)
+    return End.OK, ""
+
+
 def _first_reason(judged: Verdict) -> str:
     """Why a result must not be used."""
-    first = judged.reasons[0].text if judged.reasons else ""
-    return judged.sentence if first in judged.sentence else f"{judged.sentence} {first}"
+    reason = judged.sentence
+    if judged.reasons and judged.reasons[0].text not in reason:
+        reason += f" {judged.reasons[0].text}"
+    return reason
 
 
 def is_full(error: BaseException) -> bool:
@@ -113,17 +127,20 @@ def is_full(error: BaseException) -> bool:
 
 def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> JobRecord:
     """The record of a task without result; `known` are other fields of it."""
-    return _record(task, status=status, reason=reason, **{"inputs": inputs_of(task.job), **known})
+    known.setdefault("inputs", inputs_of(task.job))
+    return _record(task, status=status, reason=reason, **known)
 
 
 def kept(job: Job) -> Job:
     """A job as records hold it: its URLs without credentials."""
-    logs, loaded = (tuple(map(kept_path, paths)) for paths in (job.logs, job.loaded))
+    profile = job.profile
+    if profile is not None:
+        profile = kept_path(profile)
     return replace(
         job,
-        logs=logs,
-        loaded=loaded,
-        profile=None if job.profile is None else kept_path(job.profile),
+        logs=tuple(map(kept_path, job.logs)),
+        loaded=tuple(map(kept_path, job.loaded)),
+        profile=profile,
     )
 
 
@@ -139,7 +156,7 @@ def _record(task: Task, **known: Any) -> JobRecord:
 
 def inputs_of(job: Job) -> tuple[Input, ...]:
     """The job's logs as they are now, not hashed."""
-    return tuple(map(_looked_at, (*job.logs, *job.loaded)))
+    return tuple(map(_looked_at, job.logs + job.loaded))
 
 
 def _looked_at(path: str) -> Input:
@@ -155,14 +172,15 @@ def _looked_at(path: str) -> Input:
 
 def _identified(task: Task) -> Result:
     """Identify; what lies in an object store is fetched before and put there after."""
-    paths = (*task.job.logs, *task.job.loaded, task.out)
-    if not is_url(task.out):
+    paths = task.job.logs + task.job.loaded + (task.out,)
+    away = is_url(task.out)
+    if not away:
         refuse_links(Path(task.out), task.job.name)
     with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
-        place = (stage if is_url(task.out) else Path(task.out)) / task.job.name
+        place = (stage if away else Path(task.out)) / task.job.name
         logs = _here(task.job.logs, stage / "logs", task.profile)
         loaded = _here(task.job.loaded, stage / "loaded", task.profile)
-        with naming({log.path: log.url for log in (*logs, *loaded) if isinstance(log, Staged)}):
+        with naming({log.path: log.url for log in logs + loaded if isinstance(log, Staged)}):
             result = identify(
                 logs,
                 loaded,
@@ -173,9 +191,9 @@ def _identified(task: Task) -> Result:
                 name=place.name,
                 force=True,
                 report=task.report,
-                shared_library=not is_url(task.out),
+                shared_library=not away,
             )
-        if is_url(task.out):
+        if away:
             put_folder(
                 open_store(task.out),
                 f"{task.job.name}.algid",
@@ -186,10 +204,13 @@ def _identified(task: Task) -> Result:
 
 def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[str | Staged]:
     """Logs as they can be read on this machine."""
-    return [
-        staged(path, folder / str(n), profile) if is_url(path) else path
-        for n, path in enumerate(paths)
-    ]
+    here: list[str | Staged] = []
+    for number, path in enumerate(paths):
+        if is_url(path):
+            here.append(staged(path, folder / str(number), profile))
+        else:
+            here.append(path)
+    return here
 
 
 def basis_of(
@@ -198,9 +219,16 @@ def basis_of(
     """A hash of everything but the logs that decides a job's outcome."""
     content = {
         "settings": settings,
-        "profile": None if profile is None else profile.model_dump(mode="json"),
-        "parameters": None if parameters is None else parameters.model_dump(mode="json"),
+        "profile": _content(profile),
+        "parameters": _content(parameters),
         "report": report,
         "version": __version__,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _content(one: Profile | Result | None) -> dict[str, Any] | None:
+    """A profile or a result as JSON holds it."""
+    if one is None:
+        return None
+    return one.model_dump(mode="json")

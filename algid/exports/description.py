@@ -71,10 +71,10 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
     spread = dict(zip(model.names, np.sqrt(np.maximum(np.diag(C), 0.0)).tolist(), strict=True))
     wrong = wrong_inertia(value)
     if wrong is not None:
-        raise ResultError(
-            f"{file}: {wrong}, so that masses would come out negative; "
-            + (f"check {flag('l1')}" if conditioned else "identify it from more informative logs")
-        )
+        mend = "identify it from more informative logs"
+        if conditioned:
+            mend = f"check {flag('l1')}"
+        raise ResultError(f"{file}: {wrong}, so that masses would come out negative; {mend}")
     return Coefficients(model, value, {name: spread[name] for name in known}, conditioned)
 
 
@@ -86,12 +86,15 @@ def _conditioned(
         wrong, a = _mismatch(model, c, l1)
         if abs(wrong) <= _ROUNDING * l1 * abs(phasor(model, c, K2)):
             break
-        # without error bars, the moments are taken as equally wrong for their size
-        toward = C @ a if a @ C @ a > 0 else c**2 * a
+        toward = C @ a
+        if not a @ toward > 0:  # no error bars: the moments are equally wrong for their size
+            toward = c**2 * a
         c = c - toward * wrong / (a @ toward)
     _, a = _mismatch(model, c, l1)
     spread = a @ C @ a
-    return c, C - np.outer(C @ a, a @ C) / spread if spread > 0 else C
+    if spread > 0:
+        C = C - np.outer(C @ a, a @ C) / spread
+    return c, C
 
 
 _STEPS, _ROUNDING = 20, 1e-15
@@ -169,37 +172,49 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     """
     lengths = {name: value for name, value in knowns.given.items() if name in ("l1", "l2")}
     given = given_lengths(result) | lengths
-    by_payload = None if not links or "l1" in given else payload_length(result)
-    length = given.get("l1") if by_payload is None else by_payload[0]
+    length = given.get("l1")
+    if links and length is None:
+        by_payload = payload_length(result)
+        if by_payload is not None:
+            length, _ = by_payload
     coefficients = coefficients_of(result, file, length)
     numbers = _identified(coefficients)
     chosen = None
     if links:
-        known = Knowns(**{**knowns.given, **given})
+        known = Knowns(**(knowns.given | given))
         full = replace(known, l2=given.get("l2", _length(result.payload.get("l2"))))
-        l1 = _first_length(coefficients, file) if length is None else length
+        l1 = length
+        if l1 is None:
+            l1 = _first_length(coefficients, file)
         chosen = links_of(coefficients.value, coefficients.model.gravity, l1, full, file)
         numbers += _chosen(chosen, coefficients, known, result)
-    delay = result.delay
+    delay = None
+    if result.delay is not None:
+        delay = result.delay.estimate
     return Description(
-        name=re.sub(
-            r"\W|^(?=\d)",
-            "_",
-            Path(file if Path(file).name != "result.json" else Path(file).parent).stem,
-        ),
+        name=_name(Path(file)),
         source=f"{file}, estimator {result.estimator}",
         coefficients=coefficients,
-        delay=None if delay is None else delay.estimate,
+        delay=delay,
         links=chosen,
         rotor1=knowns.rotor1 or 0.0,
         turn=turn_of(coefficients.value, coefficients.model.gravity),
-        numbers=numbers,
+        numbers=tuple(numbers),
         warnings=contradictions(result, given),
     )
 
 
+def _name(file: Path) -> str:
+    """The arm's name: its result's, as a word of letters, digits and underscores."""
+    if file.name == "result.json":
+        file = file.parent
+    return re.sub(r"\W|^(?=\d)", "_", file.stem)
+
+
 def _length(found: Estimate | None) -> float | None:
-    return None if found is None or not found.usable else found.estimate
+    if found is None or not found.usable:
+        return None
+    return found.estimate
 
 
 def _first_length(coefficients: Coefficients, file: str) -> float:
@@ -225,63 +240,61 @@ def _of_first_length(result: Result) -> str:
     by_payload, by_constants = payload_length(result), first_length(result)
     if by_payload is not None:
         return f"identified with the payload, ± {by_payload[1]:.2g}"
-    spread = "" if by_constants is None else f", ± {by_constants[1]:.2g}"
-    return f"identified, g k1 / k2{spread}"
+    if by_constants is not None:
+        return f"identified, g k1 / k2, ± {by_constants[1]:.2g}"
+    return "identified, g k1 / k2"
 
 
-def _identified(coefficients: Coefficients) -> tuple[Number, ...]:
-    after = ", conditioned on l1" if coefficients.conditioned else ""
+def _identified(coefficients: Coefficients) -> list[Number]:
     numbers = []
     for name in coefficients.model.names:
-        std = "" if name not in coefficients.std else f", ± {coefficients.std[name]:.2g}"
-        numbers.append(
-            Number(name, coefficients.value[name], UNITS[name], f"identified{std}{after}")
-        )
-    return (*numbers, Number("g", coefficients.model.gravity, "m/s^2", "given"))
+        origin = "identified"
+        if name in coefficients.std:
+            origin += f", ± {coefficients.std[name]:.2g}"
+        if coefficients.conditioned:
+            origin += ", conditioned on l1"
+        numbers.append(Number(name, coefficients.value[name], UNITS[name], origin))
+    numbers.append(Number("g", coefficients.model.gravity, "m/s^2", "given"))
+    return numbers
 
 
 def _chosen(
     links: tuple[Link, Link], coefficients: Coefficients, knowns: Knowns, result: Result
-) -> tuple[Number, ...]:
+) -> list[Number]:
+    """The links' numbers: given, identified by what is given, or chosen."""
     first, second = links
-    masses = {name: "given" if getattr(knowns, name) is not None else "" for name in ("m1", "m2")}
-    nearest = "chosen, nearest to a uniform link"
-    horizontal = coefficients.model.gravity == 0
     l1 = "given" if knowns.l1 else _of_first_length(result)
-    l2 = (
-        "given"
-        if knowns.l2
-        else "identified with the payload"
-        if _length(result.payload.get("l2"))
-        else nearest
-    )
-    both = masses["m1"] and masses["m2"]
-    by2 = "identified, given m2" if masses["m2"] else "chosen with m2"
-    by1 = "identified, given m1 and m2" if both and not horizontal else "chosen with the masses"
-    return (
+    l2 = m1 = m2 = "chosen, nearest to a uniform link"
+    by1, by2, rotor1 = "chosen with the masses", "chosen with m2", "chosen: k5 holds it"
+    if knowns.l2:
+        l2 = "given"
+    elif _length(result.payload.get("l2")):
+        l2 = "identified with the payload"
+    if knowns.m1 is not None:
+        m1 = "given"
+    if knowns.m2 is not None:
+        m2, by2 = "given", "identified, given m2"
+    if knowns.rotor1 is not None:
+        rotor1 = "given"
+    if coefficients.model.gravity == 0:  # horizontal
+        lc1, lc2 = by1, f"{by2}: k1 = m2 l1 lc2"
+    else:
+        if m1 == m2 == "given":
+            by1 = "identified, given m1 and m2"
+        lc1, lc2 = f"{by1}: k4 = g (m1 lc1 + m2 l1)", f"{by2}: k2 = g m2 lc2"
+    numbers = [
         Number("l1", first.length, "m", l1),
-        Number("m1", first.mass, "kg", masses["m1"] or nearest),
-        Number(
-            "lc1", first.centre, "m", f"{by1}: k4 = g (m1 lc1 + m2 l1)" if not horizontal else by1
-        ),
+        Number("m1", first.mass, "kg", m1),
+        Number("lc1", first.centre, "m", lc1),
         Number("I1", first.inertia, "kg m^2", f"{by1}: k5 = I1 + rotor1 + m1 lc1^2 + m2 l1^2"),
-        Number(
-            "rotor1",
-            knowns.rotor1 or 0.0,
-            "kg m^2",
-            "chosen: k5 holds it" if knowns.rotor1 is None else "given",
-        ),
+        Number("rotor1", knowns.rotor1 or 0.0, "kg m^2", rotor1),
         Number("l2", second.length, "m", l2),
-        Number("m2", second.mass, "kg", masses["m2"] or nearest),
-        Number(
-            "lc2",
-            second.centre,
-            "m",
-            f"{by2}: k2 = g m2 lc2" if not horizontal else f"{by2}: k1 = m2 l1 lc2",
-        ),
+        Number("m2", second.mass, "kg", m2),
+        Number("lc2", second.centre, "m", lc2),
         Number("I2", second.inertia, "kg m^2", f"{by2}: k3 = I2 + m2 lc2^2"),
-        *_aside(links, coefficients),
-    )
+    ]
+    numbers += _aside(links, coefficients)
+    return numbers
 
 
 def _aside(links: tuple[Link, Link], coefficients: Coefficients) -> Iterator[Number]:
@@ -289,9 +302,10 @@ def _aside(links: tuple[Link, Link], coefficients: Coefficients) -> Iterator[Num
     if not set(SINES) & set(coefficients.model.names):
         return
     for number, link in enumerate(links, start=1):
-        line = f"identified: link {number}'s centre of mass beside its line"
-        by = line if number == 1 else f"{line}, or theta2's zero"
-        yield Number(f"e{number}", link.aside, "m", by)
+        origin = f"identified: link {number}'s centre of mass beside its line"
+        if number == 2:
+            origin += ", or theta2's zero"
+        yield Number(f"e{number}", link.aside, "m", origin)
     turn = turn_of(coefficients.value, coefficients.model.gravity)
     yield Number(
         "turn1", turn, "rad", "identified: added to theta1, which counts from gravity then"
@@ -301,28 +315,29 @@ def _aside(links: tuple[Link, Link], coefficients: Coefficients) -> Iterator[Num
 def lacking(arm: Description, held: frozenset[str]) -> list[str]:
     """Sentences about the torque's terms that a format, which holds those of `held`, lacks."""
     value, sentences = arm.coefficients.value, []
-    for term in arm.coefficients.model.terms:
-        if term not in held:
-            numbers = joined(
-                [f"{name} {value[name]:.6g} {TERMS[term].unit}" for name in TERMS[term].names]
-            )
-            sentences.append(f"lacks {TERMS[term].title}, {TERMS[term].equation}: {numbers}")
+    for name in arm.coefficients.model.terms:
+        if name not in held:
+            term = TERMS[name]
+            numbers = joined([f"{one} {value[one]:.6g} {term.unit}" for one in term.names])
+            sentences.append(f"lacks {term.title}, {term.equation}: {numbers}")
     if arm.delay is not None:
         sentences.append(f"lacks the delay from torque to angle: {arm.delay:.6g} s")
     return sentences
 
 
+_FRAME = "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down;"
+
+
 def header(arm: Description, remarks: list[str]) -> list[str]:
     """Lines of the comment at the top of a file."""
-    return [
+    lines = [
         f"Two-link arm by algid export, from {arm.source}.",
-        (
-            "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down; "
-            "SI units."
-        ),
+        f"{_FRAME} SI units.",
         "",
-        *(str(number).rstrip() for number in arm.numbers),
-        *([""] if remarks or arm.warnings else []),
-        *(f"This file {remark}." for remark in remarks),
-        *(f"Warning: {warning.text}." for warning in arm.warnings),
     ]
+    lines += [str(number).rstrip() for number in arm.numbers]
+    if remarks or arm.warnings:
+        lines.append("")
+    lines += [f"This file {remark}." for remark in remarks]
+    lines += [f"Warning: {warning.text}." for warning in arm.warnings]
+    return lines

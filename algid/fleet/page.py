@@ -26,6 +26,7 @@ from algid.fleet.tables import (
 )
 from algid.notices import Notice
 from algid.report.document import (
+    Content,
     Depth,
     Document,
     ReadingAid,
@@ -63,17 +64,14 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
 
     A long list of robots is left to the page.
     """
-    robots = robot_table(history).at(
-        Depth.TERMINAL if history.robots <= MOST_ROBOTS else Depth.PAGE
-    )
-    tables = filled(change_table(history), drift_table(history), finding_table(history))
-    sections: tuple[Section, ...] = (Section((robots, *tables)),)
-    if reports is not None:
+    if reports is None:
+        sections = [_table_section(history)]
+    else:
         sections = _page_sections(history, reports)
     return Document(
         title="Fleet",
         verdict=verdict(history),
-        sections=sections,
+        sections=tuple(sections),
         kicker="a fleet's history",
         name="Fleet",
         facts=f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}",
@@ -81,54 +79,68 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
     )
 
 
-def _page_sections(history: History, reports: Mapping[str, str]) -> tuple[Section, ...]:
+def _table_section(history: History) -> Section:
+    """The tables alone."""
+    depth = Depth.TERMINAL
+    if history.robots > MOST_ROBOTS:
+        depth = Depth.PAGE
+    content = [robot_table(history).at(depth)]
+    content += filled(change_table(history), drift_table(history), finding_table(history))
+    return Section(tuple(content))
+
+
+def _page_sections(history: History, reports: Mapping[str, str]) -> list[Section]:
     """The tables with their drawings and links, what to look at first, then each robot."""
     keys = {robot: f"robot-{place}" for place, robot in enumerate(_drawn(history), start=1)}
-    ends = history.roster.select("robot", "latest").iter_rows()
-    places = {visible(robot): reports[job] for robot, job in ends if job in reports}
-    places |= {visible(robot): f"#{key}" for robot, key in keys.items()}
-    drawn = courses(history, MOST_ROWS)
-    robots = replace(
-        robot_table(history).at(Depth.PAGE),
-        drawn=tuple(drawn),
-        links=places,
-    )
-    reading = READING.format(drifts=", orange drifts" if history.drifts.height else "")
-    jobs = {visible(job): place for job, place in reports.items()}
-    tables = [
-        replace(table, links=links)
-        for table, links in (
-            (change_table(history), places),
-            (drift_table(history), places),
-            (finding_table(history), jobs),
-        )
-    ]
+    sections = [_linked_tables(history, keys, reports)]
     first = overview(history, reports)
+    if first is not None:
+        sections.append(Section((first,)))
+    if keys:
+        which = ReadingAid(_which(history, len(keys)))
+        sections.append(Section((which,), "each", "Each robot"))
     shown = _only(history, list(keys))
-    each = [_robot_section(shown, robot, key, reports) for robot, key in keys.items()]
-    return (
-        Section((robots, *([ReadingAid(reading)] if drawn else []), *filled(*tables))),
-        Section(() if first is None else (first,)),
-        Section((ReadingAid(_which(history, len(each))),) if each else (), "each", "Each robot"),
-        *each,
-        Section(
-            _other_reports(history, keys, reports),
-            "reports",
-            "Other robots' reports",
-            fold="closed",
-        ),
+    for robot, key in keys.items():
+        sections.append(_robot_section(shown, robot, key, reports))
+    others = _other_reports(history, keys, reports)
+    sections.append(Section(others, "reports", "Other robots' reports", fold="closed"))
+    return sections
+
+
+def _linked_tables(
+    history: History, keys: Mapping[str, str], reports: Mapping[str, str]
+) -> Section:
+    """The tables, whose names lead to a robot's section or report, or to a log's report."""
+    places = {}
+    for robot, job in history.roster.select("robot", "latest").iter_rows():
+        if robot in keys:
+            places[visible(robot)] = f"#{keys[robot]}"
+        elif job in reports:
+            places[visible(robot)] = reports[job]
+    jobs = {visible(job): place for job, place in reports.items()}
+    drawn = tuple(courses(history, MOST_ROWS))
+    robots = replace(robot_table(history).at(Depth.PAGE), drawn=drawn, links=places)
+    content: list[Content] = [robots]
+    if drawn:
+        drifts = ", orange drifts" if history.drifts.height else ""
+        content.append(ReadingAid(READING.format(drifts=drifts)))
+    content += filled(
+        replace(change_table(history), links=places),
+        replace(drift_table(history), links=places),
+        replace(finding_table(history), links=jobs),
     )
+    return Section(tuple(content))
 
 
 def _drawn(history: History) -> list[str]:
     """Robots that are shown log by log, in the roster's order."""
     if history.jobs is None:
         return []
-    frames = [history.drifts, history.findings]
-    frames += [] if history.changes is None else [history.changes]
-    marked = [robot for frame in frames for robot in frame["robot"].to_list()]
     every = history.roster["robot"].to_list()
-    chosen = set(list(dict.fromkeys([*marked, *every]))[:MOST_DRAWN])
+    marked = history.drifts["robot"].to_list() + history.findings["robot"].to_list()
+    if history.changes is not None:
+        marked += history.changes["robot"].to_list()
+    chosen = set(list(dict.fromkeys(marked + every))[:MOST_DRAWN])
     return [robot for robot in every if robot in chosen]
 
 
@@ -137,7 +149,9 @@ def _only(history: History, robots: list[str]) -> History:
     import polars as pl
 
     own = pl.col("robot").is_in(robots)
-    jobs = None if history.jobs is None else history.jobs.filter(own)
+    jobs = history.jobs
+    if jobs is not None:
+        jobs = jobs.filter(own)
     return replace(history, windows=history.windows.filter(own), jobs=jobs)
 
 
@@ -157,29 +171,28 @@ def _robot_section(history: History, robot: str, key: str, reports: Mapping[str,
 
     assert history.jobs is not None
     jobs = history.jobs.filter(pl.col("robot") == robot)
-    links = [(visible(job), reports[job]) for job in jobs["job"].to_list() if job in reports]
+    title = f"{visible(robot)} · {counted(jobs.height, 'log')}"
     days = jobs["time"].drop_nulls()
-    first, last = days.min(), days.max()
-    when = f" · {first.date()} to {last.date()}" if len(days) else ""  # type: ignore[union-attr]
+    if len(days):
+        first, last = days.min(), days.max()
+        title += f" · {first.date()} to {last.date()}"  # type: ignore[union-attr]
     own = pl.col("robot") == robot
     drifting = history.drifts.filter(own)["parameter"].sort().to_list()
-    said = f" · {joined(drifting)} drift{'s' * (len(drifting) == 1)}" if drifting else ""
+    if drifting:
+        title += f" · {joined(drifting)} drift{'s' * (len(drifting) == 1)}"
     if history.changes is not None and history.changes.filter(own).height:
-        said += " · changed at once"
+        title += " · changed at once"
     outlying = history.findings.filter(own)["job"].n_unique()
-    said += f" · {counted(outlying, 'log stands out', 'logs stand out')}" if outlying else ""
-    listed = (References({"Reports, the latest first": links}, MOST_ROWS),) if links else ()
-    return Section(
-        (
-            parameter_table(history, robot, jobs),
-            robot_figure(history, robot, jobs, reports, f"{key}-logs"),
-            *listed,
-        ),
-        key,
-        f"{visible(robot)} · {counted(jobs.height, 'log')}{when}{said}",
-        fold="closed",
-        listed=False,
-    )
+    if outlying:
+        title += f" · {counted(outlying, 'log stands out', 'logs stand out')}"
+    content: list[Content] = [
+        parameter_table(history, robot, jobs),
+        robot_figure(history, robot, jobs, reports, f"{key}-logs"),
+    ]
+    links = [(visible(job), reports[job]) for job in jobs["job"].to_list() if job in reports]
+    if links:
+        content.append(References({"Reports, the latest first": links}, MOST_ROWS))
+    return Section(tuple(content), key, title, fold="closed", listed=False)
 
 
 def _other_reports(
@@ -194,7 +207,9 @@ def _other_reports(
             groups[str(robot)] = [
                 (job, reports[job]) for job in part["job"].to_list() if job in reports
             ]
-    return (References(groups, MOST_ROWS),) if groups else ()
+    if not groups:
+        return ()
+    return (References(groups, MOST_ROWS),)
 
 
 def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
@@ -242,17 +257,20 @@ def verdict(history: History) -> Verdict:
             f"; the clearest trend is {row['parameter']} of {visible(row['robot'])}, "
             f"{slope:+.2g} % a month"
         )
-        statement += f" (p = {p})" + (
-            "" if row["drift"] else f", which does not pass p < {ALPHA:g}"
-        )
-    reasons = [_drifting(history)] if drifts else []
+        statement += f" (p = {p})"
+        if not row["drift"]:
+            statement += f", which does not pass p < {ALPHA:g}"
+    reasons = []
+    if drifts:
+        reasons.append(_drifting(history))
     if history.changes is not None and history.changes.height:
         reasons.append(_changed(history.changes))
     if findings:
         reasons.append(_standing_out(history))
     if history.scattered is not None:
         reasons.append(history.scattered)
-    return graded(statement, [*reasons, *history.untested])
+    reasons += history.untested
+    return graded(statement, reasons)
 
 
 def _drifting(history: History) -> Notice:
@@ -270,12 +288,10 @@ def _standing_out(history: History) -> Notice:
     import polars as pl
 
     worst = history.findings.sort(pl.col("sigmas").abs(), descending=True)
-    rows = worst.head(MOST_NAMED).select("job", "parameter", "sigmas").rows()
-    names = [
-        f"{visible(job)} ({parameter}, {significant(sigmas, 2)} σ)"
-        for job, parameter, sigmas in rows
-    ]
-    rest = worst.height - len(rows)
+    names = []
+    for job, parameter, sigmas in worst.select("job", "parameter", "sigmas").rows()[:MOST_NAMED]:
+        names.append(f"{visible(job)} ({parameter}, {significant(sigmas, 2)} σ)")
+    rest = worst.height - len(names)
     if rest:
         names.append(f"{rest} more")
     return Notice("STAND_OUT", numbers={"count": worst.height, "names": names})
@@ -284,7 +300,12 @@ def _standing_out(history: History) -> Notice:
 def _changed(changes: pl.DataFrame) -> Notice:
     """The first change, and how many there are where it is not alone."""
     row, count = changes.row(0, named=True), changes.n_unique(["robot", "after"])
-    numbers = {name: str(row[name].date()) for name in ("before", "after")}
-    numbers |= {"robot": visible(row["robot"]), "parameter": row["parameter"]}
-    more = {"percent": 100 * row["share"], "count": count if count > 1 else 0}
-    return Notice("CHANGED", numbers={**numbers, **more})
+    numbers = {
+        "before": str(row["before"].date()),
+        "after": str(row["after"].date()),
+        "robot": visible(row["robot"]),
+        "parameter": row["parameter"],
+        "percent": 100 * row["share"],
+        "count": count if count > 1 else 0,
+    }
+    return Notice("CHANGED", numbers=numbers)
