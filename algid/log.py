@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from algid.arm import Arm, FloatArray
 from algid.notices import Notice
+from algid.quantiles import median
 
 IntArray = NDArray[np.int64]
 
@@ -318,14 +319,14 @@ def usual_period(stamp_ns: IntArray) -> float:
     A buffer that is emptied every ten samples leaves nine steps of microseconds for one of ten
     periods: the median step says nothing then. Steps over 64 samples do.
     """
-    median = float(np.median(np.diff(stamp_ns)))
+    step = median(np.diff(stamp_ns))
     far = min(64, (stamp_ns.size - 1) // 4)
     if far > 1:
         paces = (stamp_ns[far:] - stamp_ns[:-far]) / far
-        pace = float(np.median(paces))
-        if median < 0.5 * pace:
+        pace = median(paces)
+        if step < 0.5 * pace:
             return float(np.mean(paces[np.abs(paces - pace) <= 0.2 * pace])) * 1e-9
-    return median * 1e-9
+    return step * 1e-9
 
 
 def join(blocks: Iterable[Log]) -> Log:

@@ -32,12 +32,13 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
     "compiled": room("arm", "numpy scipy"),
+    "quantiles": room("arm", "numpy"),
     "physics": room("arm", "numpy", PURE),
     "model": room("arm physics", "numpy", PURE),
-    "log": room("arm notices", "numpy"),
+    "log": room("arm notices quantiles", "numpy"),
     "signals": room("arm compiled criteria log", "numpy", PURE),
     "estimators": room(
-        "arm compiled criteria model notices physics progress signals significance",
+        "arm compiled criteria model notices physics progress quantiles signals significance",
         "numpy scipy", PURE
     ),
     "methods": room("estimators progress"),
@@ -54,12 +55,12 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
-        "arm criteria errors faults files limits log notices options profile ros2 runtime "
-        "units words",
+        "arm criteria errors faults files limits log notices options profile quantiles ros2 "
+        "runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
-    "inspection": room("arm criteria errors estimators faults log notices profile readers signals "
-                       "units words", "numpy"),
+    "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
+                       "readers signals units words", "numpy"),
     "report": room(
         "arm criteria errors files inspection methods model notices options progress "
         "results ros2 significance text verdict words",

@@ -33,6 +33,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.model import Motion
+from algid.quantiles import medians
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces
@@ -133,7 +134,7 @@ class LogEvidence:
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
         theta, tau = (
-            np.median([getattr(level, name) for level in guesses], axis=0)
+            medians(np.transpose([getattr(level, name) for level in guesses]))
             for name in ("theta", "tau")
         )
         self._guess = guess = floored(NoiseLevels(theta, tau), floor)

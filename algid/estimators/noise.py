@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
+from algid.quantiles import medians
 from algid.signals.differences import POINTS
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
@@ -124,8 +125,7 @@ def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
 def _is_noise(signal: FloatArray) -> bool:
     """Whether each row's next difference grows as white noise's does: no motion is left in it."""
     first, second = (
-        np.median(np.abs(np.diff(signal, order, axis=1)), axis=1)
-        for order in (_DIFFERENCE, _DIFFERENCE + 1)
+        medians(np.abs(np.diff(signal, order, axis=1))) for order in (_DIFFERENCE, _DIFFERENCE + 1)
     )
     growth = np.sqrt(
         comb(2 * _DIFFERENCE + 2, _DIFFERENCE + 1) / comb(2 * _DIFFERENCE, _DIFFERENCE)
@@ -136,7 +136,7 @@ def _is_noise(signal: FloatArray) -> bool:
 def _white_noise(signal: FloatArray, difference: FloatArray | None = None) -> FloatArray:
     difference = np.diff(signal, _DIFFERENCE, axis=1) if difference is None else difference
     # The median of squares, so that steps in the signal do not count as noise.
-    median = np.median(np.abs(difference), axis=1) / 0.6745
+    median = medians(np.abs(difference)) / 0.6745
     mean = np.sqrt(np.mean(difference**2, axis=1))
     spread = np.where(median > 0, median, mean)
     size = np.abs(signal).max(axis=1) + 1e-300

@@ -39,6 +39,7 @@ from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import WeakSettings, grams, overlapping
 from algid.model import Model
+from algid.quantiles import median
 from algid.signals.segments import Segment, append
 
 Cause = Literal["sensor", "drive"]
@@ -447,4 +448,4 @@ def _noise(tau: FloatArray) -> float:
     """
     off = np.abs(np.diff(tau, 3))
     off = off[off > 0]
-    return 1.4826 * float(np.median(off)) / np.sqrt(20.0) if off.size else 0.0
+    return 1.4826 * median(off) / np.sqrt(20.0) if off.size else 0.0

@@ -15,6 +15,7 @@ from algid.inspection.candidates import torques_beside
 from algid.inspection.figures import differences, robust_deviation, saturated_share, thinned
 from algid.log import Log
 from algid.notices import Notice, Remedy
+from algid.quantiles import median, quantile
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
@@ -80,7 +81,7 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
         runs = np.diff(changes)
         longest = int(np.argmax(runs))
         first, length = int(changes[longest]) + 1, int(runs[longest])
-        usual = float(np.quantile(thinned(runs), 0.95))
+        usual = quantile(thinned(runs), 0.95)
         at_limit = tau[first] in (tau.max(), tau.min())
         if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
             seen = {"seconds": length * log.period, "start": first * log.period}
@@ -99,7 +100,7 @@ def held_efforts(log: Log) -> Iterator[Notice]:
         if not _HELD_RUNS <= count < changed.size * _HELD_SHARE:
             continue
         runs = np.diff(np.flatnonzero(changed))
-        usual = float(np.median(thinned(runs)))
+        usual = median(thinned(runs))
         off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
         in_step = float(np.mean(off <= _OFF_STEP * usual))
         moves = np.count_nonzero(theta[1:] != theta[:-1]) > 1.5 * count
@@ -120,7 +121,7 @@ def angles(log: Log) -> Iterator[Notice]:
         near = largest > 0.8 * _TURN  # of most logs no step is, and none has to be looked at
         wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN)) if near else 0
         # at this rate the arm moves by far less than a turn between two samples
-        if wraps and np.median(thinned(sizes)) < 0.5:
+        if wraps and median(thinned(sizes)) < 0.5:
             yield Notice(
                 "WRAPPED_ANGLE",
                 numbers={"channel": what, "count": wraps},
@@ -130,7 +131,7 @@ def angles(log: Log) -> Iterator[Notice]:
         if np.count_nonzero(sizes) == sizes.size:  # it never stands still
             continue
         moving = np.flatnonzero(sizes)
-        runs, usual = np.diff(moving), float(np.quantile(thinned(sizes[moving]), 0.99))
+        runs, usual = np.diff(moving), quantile(thinned(sizes[moving]), 0.99)
         long_enough = max(10, round(0.02 / log.period))
         frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
         if frozen.size:
@@ -218,7 +219,7 @@ def spikes(log: Log) -> Iterator[Notice]:
         off += values[1:-1]
         deviation = robust_deviation(off)
         size = np.abs(off, out=off)
-        limit = _SPIKE * max(deviation, float(np.quantile(thinned(size), 0.9)))
+        limit = _SPIKE * max(deviation, quantile(thinned(size), 0.9))
         if limit == 0:
             continue
         places = np.flatnonzero(size > limit) + 1

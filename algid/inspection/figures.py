@@ -11,6 +11,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.criteria import GAP
 from algid.log import Log
+from algid.quantiles import distinct, median
 from algid.signals.spacing import near_stamps, spaced
 
 ENOUGH = 1 << 18
@@ -73,7 +74,7 @@ def robust_deviation(values: FloatArray) -> float:
     if values.size == 0:
         return 0.0
     values = thinned(values)
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return 1.4826 * median(np.abs(values - median(values)))
 
 
 def grid_step(values: FloatArray) -> float:
@@ -81,7 +82,7 @@ def grid_step(values: FloatArray) -> float:
 
     Else 0.
     """
-    levels = np.unique(values[:20_000])
+    levels = distinct(values[:20_000])
     if levels.size <= 2:
         return 0.0
     steps = np.diff(levels)

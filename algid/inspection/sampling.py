@@ -11,6 +11,7 @@ from algid.arm import FloatArray
 from algid.inspection.figures import ENOUGH, clock_figures, differences, signal_figures
 from algid.log import Log
 from algid.notices import Notice, Remedy
+from algid.quantiles import median, medians, quantile
 from algid.signals.spacing import NEAR, near_stamps
 
 _LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
@@ -57,7 +58,7 @@ def samples_a_period(log: Log) -> float:
     """
     fewest = math.inf
     for theta in log.theta:
-        step, bend = (float(np.median(np.abs(differences(theta, order)))) for order in (1, 2))
+        step, bend = (median(np.abs(differences(theta, order))) for order in (1, 2))
         if step > 0.02 and bend > 0:
             fewest = min(fewest, math.pi / math.asin(min(1.0, bend / (2 * step))))
     return fewest
@@ -81,7 +82,7 @@ def lost_steps(log: Log) -> int:
     power = np.sum(around**2, axis=0)
     share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
     off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
-    clear = (power > np.quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
+    clear = (power > quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
     each = count / max(1, power.size)  # of a long log some steps stand for all
     lost = round(each * np.count_nonzero(clear & (np.abs(share - 2) < _LOST)))
     chance = round(each * np.count_nonzero(clear & (np.abs(share) < _LOST)))
@@ -120,7 +121,7 @@ def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> floa
 
     `room` (2,) is how far noise and encoder let it be from there.
     """
-    places = np.median(theta[:, :few], axis=1, keepdims=True)
+    places = medians(theta[:, :few])[:, None]
     moved = t.size
     for first in range(0, t.size, ENOUGH):  # few arms rest for the whole of a long log
         away = np.any(np.abs(theta[:, first : first + ENOUGH] - places) > room[:, None], axis=0)

@@ -16,6 +16,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import Companion, IntArray, Origin, add, word_sum
 from algid.notices import Notice, Remedy
+from algid.quantiles import median
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.columns import Columns
 from algid.readers.joints import moving_joints
@@ -232,7 +233,7 @@ def _median_step(times: NDArray[Any]) -> float:
     """Median size of the steps between times (N,) that differ; 0 where none do."""
     steps = np.abs(np.diff(times.astype(np.float64)))
     steps = steps[steps > 0]
-    return float(np.median(steps)) if steps.size else 0.0
+    return median(steps) if steps.size else 0.0
 
 
 def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:

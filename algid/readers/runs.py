@@ -14,6 +14,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
+from algid.quantiles import median
 from algid.readers.table import SampleTable, stack
 from algid.readers.timebase import HORIZON, set_back
 from algid.words import counted
@@ -148,7 +149,7 @@ class _Clock:
         self.run += 1
         if self._before is not None:
             steps = np.diff(self._before.stamp_ns)
-            period = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+            period = median(steps[steps > 0]) if np.any(steps > 0) else 0.0
             self._moved_ns = self._latest_ns + max(1, round(_PAUSE * period)) - first_ns
         self._before = None
 

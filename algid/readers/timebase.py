@@ -17,6 +17,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
+from algid.quantiles import median
 from algid.readers.table import SampleTable, stack
 from algid.words import counted
 
@@ -79,7 +80,7 @@ def check_step(path: str, stamps: IntArray) -> None:
     LogError
         If the median step between the stamps (N,) is shorter than `FileLimits.shortest_step_ns`.
     """
-    step = float(np.median(np.diff(stamps))) if stamps.size > 2 else np.inf
+    step = median(np.diff(stamps)) if stamps.size > 2 else np.inf
     if step < LIMITS.shortest_step_ns:
         unit = Remedy({"time_unit": "s"}, "say their unit (s, ms, us or ns)")
         clock = Remedy({"clock": "log"}, "of messages take another clock")
@@ -155,7 +156,7 @@ def set_back(table: SampleTable) -> int | None:
         before = np.arange(max(0, run[0] - HORIZON - run.size), run[0])
         before = before[np.argsort(stamps[before], kind="stable")]
         step = np.diff(stamps[before])
-        period = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+        period = median(step[step > 0]) if np.any(step > 0) else 0.0
         after = np.clip(np.searchsorted(stamps[before], stamps[run]), 0, before.size - 1)
         nearest = before[after]
         left = before[np.maximum(after - 1, 0)]
@@ -180,7 +181,7 @@ class Series:
     @property
     def period(self) -> float:
         """Median time between samples in ns."""
-        return float(np.median(np.diff(self.table.stamp_ns))) if len(self.table) > 1 else 0.0
+        return median(np.diff(self.table.stamp_ns)) if len(self.table) > 1 else 0.0
 
     def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
         """Which of the stamps (N,) are those of samples, or between two samples that are close."""
