@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from algid.api.export import export
     from algid.api.identify import identify
     from algid.api.inspect import inspect
+    from algid.api.read import read_log
     from algid.api.result import Result, read_result
     from algid.api.synthesise import synthesise
     from algid.api.track import track
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from algid.errors import AlgidError
     from algid.log import Log
     from algid.profile import Profile
-    from algid.readers import read_log
     from algid.settings import Settings
     from algid.synth.simulator import simulate
     from algid.writers import write_log
@@ -74,7 +74,7 @@ _HOMES = {
     "export": "algid.api.export",
     "identify": "algid.api.identify",
     "inspect": "algid.api.inspect",
-    "read_log": "algid.readers",
+    "read_log": "algid.api.read",
     "read_result": "algid.api.result",
     "simulate": "algid.synth.simulator",
     "synthesise": "algid.api.synthesise",

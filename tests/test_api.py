@@ -407,6 +407,23 @@ def test_a_dict_that_is_no_log_is_refused(given: dict[str, Any], expected: str) 
         algid.identify(given, settings=WEAK)
 
 
+@pytest.mark.parametrize("given", [42, np.zeros((2, 9)), [np.zeros(9)], [None], b"log.csv"])
+@pytest.mark.parametrize("verb", [algid.identify, algid.inspect])
+def test_what_is_no_log_is_refused(verb: Callable[[Any], object], given: object) -> None:
+    with pytest.raises(
+        LogError, match="expected a path, a Log, a frame or a dict of arrays, found"
+    ):
+        verb(given)
+
+
+def test_a_log_is_read_with_settings_as_keywords(columns: dict[str, Any]) -> None:
+    plain, turned = algid.read_log(columns), algid.read_log(columns, zero="hanging")
+    assert np.allclose(turned.theta[0], plain.theta[0] - np.pi / 2)
+    assert turned.origin.reading == algid.read_log(columns, {"zero": "hanging"}).origin.reading
+    with pytest.raises(SettingError, match="zer"):
+        algid.read_log(columns, zer="hanging")
+
+
 def test_settings_are_keywords_as_they_are_flags(columns: dict[str, Any]) -> None:
     frame = pl.DataFrame(columns)
     asked = algid.Settings(

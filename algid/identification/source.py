@@ -14,7 +14,7 @@ from algid.errors import LogError
 from algid.files import sha256_of
 from algid.log import Log, Origin
 from algid.notices import Notice
-from algid.readers.memory import Columns, is_columns
+from algid.readers.memory import Columns, is_columns, refuse_others
 from algid.readers.timebase import check_step
 from algid.results import LogSummary, Result
 from algid.runtime import ahead
@@ -99,6 +99,8 @@ def open_source(
     """
     from algid.readers import open_log
 
+    if not isinstance(log, Log | Staged):
+        refuse_others(log)
     if is_columns(log):
         log = open_log(log, profile).whole()
     if isinstance(log, Log):
@@ -165,13 +167,11 @@ def open_sources(
     A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
     the other. Only logs that promise as many samples as another are hashed for it.
     """
-    several = (
-        []
-        if logs is None
-        else [logs]
-        if isinstance(logs, str | Path | Log | Staged) or is_columns(logs)
-        else logs
-    )
+    several = [] if logs is None else logs
+    if isinstance(several, str | Path | Log | Staged) or is_columns(several):
+        several = [several]
+    if not isinstance(several, Iterable):
+        refuse_others(several)
     sources = [open_source(log, role, profile, gravity, effort) for log in several]
     lengths = Counter(source.promised for source in sources if source.digest)
     kept: list[LogSource] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard, cast
 
 import numpy as np
@@ -33,6 +34,16 @@ def is_columns(given: object) -> TypeGuard[Columns]:
     )
 
 
+def refuse_others(given: object) -> None:
+    """Raises `LogError` for what is neither a path nor columns, as an array without a name."""
+    if isinstance(given, str | Path) or is_columns(given):
+        return
+    raise LogError(
+        f"{NAME}: expected a path, a Log, a frame or a dict of arrays, found "
+        f"{type(given).__name__}; arrays become a log by algid.Log.from_arrays(t, theta, tau)"
+    )
+
+
 def open_columns(given: Columns, profile: Profile) -> TableReader:
     """Open a log of columns in memory.
 
@@ -59,6 +70,7 @@ def content_of(given: Columns) -> tuple[str, Content]:
 
 def _taken(given: Columns) -> tuple[str, Content, Any, dict[str, str]]:
     """Kind, content, arrays of another length, and the units that are stated."""
+    refuse_others(given)
     if isinstance(given, Mapping):
         columns, others = columns_of(
             NAME, {str(name): _array(name, values) for name, values in given.items()}
