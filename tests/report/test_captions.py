@@ -11,6 +11,7 @@ import polars as pl
 import pytest
 from scipy.stats import binom
 
+from algid.errors import ResultError
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.innovations import CORRELATION, WHITENED, innovations, read_curves
 from algid.report.figures.running import running
@@ -37,6 +38,15 @@ def test_a_good_reports_innovations_lie_in_their_band(case_folder: Path, result:
     low, high = binom.interval(0.999, count, 0.95)
     assert low <= inside <= high
     assert inside > binom.ppf(0.95, count, 0.85)
+
+
+def test_frequencies_that_no_axis_shows_are_refused(folder: Path) -> None:
+    path = folder / "innovations.parquet"
+    changed = pl.when(pl.col("quantity") == WHITENED).then(-1e9).otherwise(pl.col("x")).alias("x")
+    pl.read_parquet(path).with_columns(changed).write_parquet(path)
+    expected = "column 'x' of its whitened spectrum: expected rising numbers above 0"
+    with pytest.raises(ResultError, match=expected):
+        read_curves(path)
 
 
 def test_the_note_counts_what_the_picture_shows(folder: Path, result: Result) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.errors import ResultError
 from algid.report.figures.base import (
     Figure,
     Legend,
@@ -20,7 +21,7 @@ from algid.report.figures.base import (
     level,
     line,
 )
-from algid.report.reduce import table_of
+from algid.report.reduce import LARGEST, table_of
 from algid.results import Result
 
 TITLE = "Innovations: what the estimator left"
@@ -111,7 +112,18 @@ def read_curves(path: Path) -> Curves:
             own = (quantity == kind) & (numbers["joint"] == joint)
             if own.any():
                 found[kind, joint] = Curve(*(numbers[name][own] for name in COLUMNS[2:]))
+    for (kind, _), curve in found.items():
+        _check(path, kind, curve)
     return found
+
+
+def _check(path: Path, kind: str, curve: Curve) -> None:
+    """Refuse a curve that no axis shows."""
+    if not (curve.x[0] > 0 and curve.x[-1] <= LARGEST and np.all(np.diff(curve.x) > 0)):
+        raise ResultError(
+            f"{path}: column 'x' of its {kind}: expected rising numbers above 0; identify again "
+            "with this version"
+        )
 
 
 def _spectrum(curves: Curves, joint: int) -> Panel:
