@@ -37,6 +37,10 @@ class Verdict:
     notes: tuple[Notice, ...] = ()
     command: str | None = None
 
+    def __repr__(self) -> str:
+        codes = ", ".join(dict.fromkeys(one.code for one in self.reasons)) or "none"
+        return f"Verdict({self.grade!r}, {self.headline!r}, reasons: {codes})"
+
     @property
     def word(self) -> str:
         """The word of its grade."""

@@ -71,6 +71,27 @@ def test_a_log_shows_no_arrays() -> None:
     assert repr(log) == "Log('run 1', N = 1,201, 12 s)"
 
 
+def test_what_the_verbs_give_shows_itself_in_a_line() -> None:
+    unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide")
+    result = algid.identify(unloaded, estimator="weak")
+    given = [
+        result.verdict,
+        algid.inspect(unloaded),
+        algid.inspect({"t": unloaded.t, "q": unloaded.theta}),
+        algid.validate(result, unloaded),
+        algid.track(loaded, result, l1=0.1626, l2=0.1232),
+        algid.export(result, "c"),
+        algid.compare([result, result], labels=["a", "b"]),
+    ]
+    shown = list(map(repr, given))
+    assert [text.partition("(")[0] for text in shown] == [type(one).__name__ for one in given]
+    assert all(len(text.splitlines()) == 1 and len(text) < 300 for text in shown), shown
+    assert "N = 2,001" in shown[1]
+    assert "refused: log: no column for tau1, tau2" in shown[2]
+    assert shown[3].startswith("Validated(logs: 1, R² ")
+    assert shown[-1] == "Comparison(a, b: the largest distance 0.0 σ)"
+
+
 def test_a_log_is_written_to_a_path_that_is_text(tmp_path: Path) -> None:
     log, _ = algid.synthesise("case1", duration=0.1)
     algid.write_log(str(tmp_path / "a.mcap"), log)

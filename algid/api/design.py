@@ -42,6 +42,9 @@ class Planned:
     design: Design
     origin: Provenance
 
+    def __repr__(self) -> str:
+        return f"Planned({', '.join(f'{name} ± {std:.2g}' for name, std in self.bounds.items())})"
+
     @property
     def open_parameters(self) -> list[str]:
         """Names of those asked for whose error bar is as large as they are."""

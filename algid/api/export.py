@@ -27,6 +27,11 @@ class Exported:
     warnings: tuple[Notice, ...]
     path: Path | None = None
 
+    def __repr__(self) -> str:
+        codes = ", ".join(one.code for one in self.warnings) or "none"
+        lines = self.text.count("\n")
+        return f"Exported(lines of text: {lines}, warnings: {codes}, path={self.path!r})"
+
 
 def export(
     result: Result | str | Path,

@@ -38,6 +38,10 @@ class Validated:
     warnings: tuple[str, ...] = ()
     max_nrmse: float | None = None
 
+    def __repr__(self) -> str:
+        r2 = "unknown" if self.total is None else ", ".join(f"{one:.4f}" for one in self.total.r2)
+        return f"Validated(logs: {len(self.logs)}, R² {r2})"
+
     @property
     def over(self) -> bool:
         """Whether the normalised RMSE of a joint is past the limit, or missing."""

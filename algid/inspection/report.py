@@ -101,6 +101,13 @@ class Inspection:
     notices: tuple[Notice, ...] = ()
     findings: tuple[Notice, ...] = ()
 
+    def __repr__(self) -> str:
+        if self.refused is not None:
+            return f"Inspection({self.path!r}, refused: {self.refused:.160})"
+        rows = 0 if self.clock is None else self.clock.rows
+        codes = ", ".join(dict.fromkeys(one.code for one in (*self.notices, *self.findings)))
+        return f"Inspection({self.path!r}, N = {rows:,}, found: {codes or 'nothing'})"
+
     @property
     def lossy(self) -> bool:
         """Whether samples are missing."""

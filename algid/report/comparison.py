@@ -29,6 +29,11 @@ class Comparison:
     settings: Table
     results: tuple[Result, ...] = ()
 
+    def __repr__(self) -> str:
+        far = self.largest_sigma
+        largest = "no distance" if far is None else f"the largest distance {far:.1f} σ"
+        return f"Comparison({', '.join(self.labels)}: {largest})"
+
     def tables(self) -> tuple[Table, Table]:
         """The estimates side by side, and what was set otherwise."""
         return self.estimates, self.settings

@@ -6,7 +6,7 @@ import html
 from typing import TYPE_CHECKING
 
 from algid.model import PARAMETERS
-from algid.text import visible
+from algid.text import resolved, significant, unit_text, visible
 from algid.verdict import MOST_REASONS
 
 if TYPE_CHECKING:
@@ -38,9 +38,9 @@ def html_of(result: Result, title: str) -> str:
 
 def _row(name: str, found: Estimate) -> str:
     meaning = PARAMETERS[name].meaning if name in PARAMETERS else ""
-    value = "-" if found.estimate is None else f"{found.estimate:.6g}"
-    std = "-" if found.std is None else f"{found.std:.2g}"
-    before, after = (name, meaning, value, std), (found.unit, found.status.value)
+    value, std = resolved(found.estimate, found.std), significant(found.std, 2)
+    unit = unit_text(found.unit).replace(" ", "\u00a0")  # on one line
+    before, after = (name, meaning, value, std), (unit, found.status.value)
     cells = [*map(_text, before), interval_bar(found), *map(_text, after)]
     return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 

@@ -43,6 +43,10 @@ class TrackResult:
     notices: tuple[Notice, ...] = ()
     data_lost: bool = False
 
+    def __repr__(self) -> str:
+        masses = ", ".join(f"{one.m_p:.4g} ± {one.std:.2g}" for one in self.track.stretches)
+        return f"TrackResult({self.log.path!r}, by stretch {masses} kg)"
+
     @property
     def statuses(self) -> list[StretchStatus]:
         """Of each stretch."""
