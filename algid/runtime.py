@@ -38,8 +38,11 @@ _VARIABLES = (
 
 
 def bound_by_environment() -> None:
-    """One thread for any BLAS loaded from now on, unless the user's environment differs."""
-    for variable in _VARIABLES:
+    """One thread for any BLAS loaded from now on, unless the user's environment differs.
+
+    Nor are all installed packages searched for plugins of pydantic.
+    """
+    for variable in (*_VARIABLES, "PYDANTIC_DISABLE_PLUGINS"):
         os.environ.setdefault(variable, "1")
 
 

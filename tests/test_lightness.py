@@ -30,3 +30,23 @@ def test_a_short_parquet_log_needs_no_heavy_package(tmp_path: Path, report: bool
     loaded = json.loads(done.stdout.splitlines()[-1])
     heavy = HEAVY if report else (*HEAVY, "pyarrow.compute", "numpy.ma")
     assert [name for name in heavy if name in loaded] == []
+
+
+COMMAND = """
+import gc, sys
+from algid.cli import main
+sys.argv = ["algid", "identify", "--help"]
+usual = gc.get_threshold()
+try:
+    main()
+finally:
+    plugins = "pydantic.plugin._loader" in sys.modules
+    found = sys.modules["pydantic.plugin._loader"]._plugins if plugins else None
+    print(gc.get_threshold()[0] > 10 * usual[0], found, file=sys.stderr)
+"""
+
+
+def test_a_command_hardly_searches_for_cycles_and_not_for_plugins() -> None:
+    done = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.splitlines()[-1] == "True None"

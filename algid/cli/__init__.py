@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -15,6 +16,9 @@ from algid.exits import Exit
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
+SELDOM = (20_000, 20, 20)
+"""Thresholds of Python's search for cycles: its own let a short command search for a seventh of its
+time through what it has imported."""
 PATIENCE = 5.0  # s to clear up in after a signal, before a second one is heard
 AGAIN = 0.02  # s after which a signal comes again that a destructor or a callback swallowed
 
@@ -27,6 +31,7 @@ def main() -> None:
     from algid.cli.streams import harden_streams
     from algid.runtime import bound_by_environment, ending_signals
 
+    gc.set_threshold(*SELDOM)
     stopping = _Stopping()
     for number in ending_signals():
         signal.signal(number, stopping)
