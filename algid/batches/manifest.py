@@ -58,9 +58,10 @@ def read_manifest(path: Path) -> list[Job]:
         raise SettingError(
             f"{path}: expected labels of at most {LIMITS.columns} names, found {len(labels)}"
         )
-    return [
-        _job(row, f"{path}: {kind} {number}", path.parent) for number, row in enumerate(rows, 1)
-    ]
+    jobs = []
+    for number, row in enumerate(rows, start=1):
+        jobs.append(_job(row, f"{path}: {kind} {number}", path.parent))
+    return jobs
 
 
 def _tables(path: Path) -> list[dict[str, object]]:
@@ -96,21 +97,36 @@ def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
         columns = ", ".join(row) or "nothing"
         raise SettingError(f"{place}: expected a name and logs, found {visible(columns, 200)}")
     profile = _paths(row, "profile", place, folder)
-    labels = {
-        name: _label(row, name, place) for name in row if name not in ("logs", "loaded", "profile")
-    }
-    name, robot, time = (labels.pop(own, None) for own in ("name", "robot", "time"))
+    labels = {}
+    for name in row:
+        if name not in ("logs", "loaded", "profile"):
+            label = _label(row, name, place)
+            if name not in ("name", "robot", "time"):
+                labels[name] = label
+    own_name = checked_name(_text(row, "name", place), place)
+    time = None
+    if row.get("time") is not None:
+        time = _time(str(row["time"]), place)
+    robot = None
+    if row.get("robot") is not None:
+        robot = _text(row, "robot", place)
     return Job(
-        name=checked_name(str(row["name"] if isinstance(row["name"], str) else name), place),
+        name=own_name,
         logs=logs,
         loaded=loaded,
         profile=profile[0] if profile else None,
-        robot=None
-        if robot is None
-        else str(row["robot"] if isinstance(row["robot"], str) else robot),
-        time=None if time is None else _time(str(row["time"]), place),
-        labels={name: label for name, label in labels.items() if label is not None},
+        robot=robot,
+        time=time,
+        labels=labels,
     )
+
+
+def _text(row: Mapping[str, object], name: str, place: str) -> str:
+    """A cell's text as it stands, or that of what it means."""
+    cell = row[name]
+    if isinstance(cell, str):
+        return cell
+    return str(_label(row, name, place))
 
 
 def _time(text: str, place: str) -> str:
@@ -144,8 +160,10 @@ def label_of(value: object) -> Label:
     """
     if isinstance(value, str):
         return _number_in(value)
-    if isinstance(value, bool | date | clock):
-        return value if isinstance(value, bool) else str(value)
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, date | clock):
+        return str(value)
     if isinstance(value, int) and -(2**63) <= value < 2**63:
         return value
     if isinstance(value, float) and math.isfinite(value):
@@ -158,7 +176,9 @@ def _number_in(text: str) -> str | float:
         number = float(text)
     except ValueError:
         return text
-    return number if math.isfinite(number) else text
+    if not math.isfinite(number):
+        return text
+    return number
 
 
 def _paths(row: Mapping[str, object], name: str, place: str, folder: Path) -> tuple[str, ...]:
@@ -166,8 +186,16 @@ def _paths(row: Mapping[str, object], name: str, place: str, folder: Path) -> tu
     if cell is None:
         return ()
     parts = cell.split(";") if isinstance(cell, str) else cell
-    if not isinstance(parts, list) or not all(
-        isinstance(part, str) and part.strip() and "\0" not in part for part in parts
-    ):
+    if not isinstance(parts, list) or not all(map(_is_path, parts)):
         raise SettingError(f"{place}: {name}: expected paths, found {reprlib.repr(cell):.60}")
-    return tuple(part.strip() if "://" in part else str(folder / part.strip()) for part in parts)
+    paths = []
+    for part in parts:
+        path = part.strip()
+        if "://" not in path:
+            path = str(folder / path)
+        paths.append(path)
+    return tuple(paths)
+
+
+def _is_path(part: object) -> bool:
+    return isinstance(part, str) and bool(part.strip()) and "\0" not in part

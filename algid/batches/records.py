@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
@@ -95,8 +95,10 @@ def stat_of(path: str) -> Input:
     """
     if is_url(path):
         return Input(kept_path(path), *object_stat(path))
+    files = [Path(path)]
     try:
-        files = filter(Path.is_file, Path(path).iterdir()) if Path(path).is_dir() else [Path(path)]
+        if files[0].is_dir():
+            files = [file for file in files[0].iterdir() if file.is_file()]
         stats = [file.stat() for file in files]
     except (FileNotFoundError, NotADirectoryError):
         return Input(kept_path(path), 0, 0)
@@ -104,16 +106,18 @@ def stat_of(path: str) -> Input:
         raise LogError(
             f"{path}: it cannot be looked at ({error.strerror}); check name and rights"
         ) from error
-    mtime, ctime = (
-        max((getattr(s, name) for s in stats), default=0) for name in ("st_mtime_ns", "st_ctime_ns")
-    )
-    return Input(kept_path(path), sum(s.st_size for s in stats), mtime, ctime)
+    size = sum(one.st_size for one in stats)
+    mtime = max((one.st_mtime_ns for one in stats), default=0)
+    ctime = max((one.st_ctime_ns for one in stats), default=0)
+    return Input(kept_path(path), size, mtime, ctime)
 
 
 def hash_of(path: str) -> str | None:
     """The SHA-256 of a log on this machine; None where it cannot be had."""
+    if is_url(path):
+        return None
     try:
-        return None if is_url(path) else sha256_of(Path(path))
+        return sha256_of(Path(path))
     except OSError:
         return None
 
@@ -131,17 +135,20 @@ def unchanged(before: Input, path: str) -> Input | None:
     now = replace(stat_of(path), sha256=before.sha256)
     if now == before:
         return before
-    same = now.size == before.size and before.sha256 is not None and hash_of(path) == before.sha256
-    return now if same else None
+    if now.size != before.size or before.sha256 is None or hash_of(path) != before.sha256:
+        return None
+    return now
 
 
 def same_logs(before: Sequence[Input], now: Sequence[Input]) -> bool:
     """Whether logs are unchanged: by hashes if both are known, else by size and time of change."""
 
     def same(one: Input, other: Input) -> bool:
-        hashed = one.sha256 is not None and other.sha256 is not None
-        marks = [(i.path, i.size, i.sha256 if hashed else i.mtime_ns) for i in (one, other)]
-        return marks[0] == marks[1]
+        if (one.path, one.size) != (other.path, other.size):
+            return False
+        if one.sha256 is None or other.sha256 is None:
+            return one.mtime_ns == other.mtime_ns
+        return one.sha256 == other.sha256
 
     return len(before) == len(now) and all(map(same, before, now))
 
@@ -153,10 +160,13 @@ def estimates_of(result: Result) -> dict[str, tuple[float | None, float | None, 
 
 def record_name(job: str) -> str:
     """Where the record of a job lies in OUT; no folder of one job's is the file of another's."""
-    *folders, last = job.split("/")
-    # x.json is the file of a job x: as a folder it gets a mark, which marks marked ones once more
-    apart = (f"{one}~" if one.rstrip("~").endswith(".json") else one for one in folders)
-    return "/".join((FOLDER, *apart, f"{last}.json"))
+    parts = [FOLDER]
+    parts += job.split("/")
+    for place, folder in enumerate(parts[:-1]):
+        # x.json is the file of a job x: as a folder it is marked, and a marked one once more
+        if folder.rstrip("~").endswith(".json"):
+            parts[place] += "~"
+    return f"{'/'.join(parts)}.json"
 
 
 def prepare(store: Store) -> None:
@@ -242,21 +252,11 @@ def _record_in(content: bytes, place: str) -> JobRecord:
 def _fault(record: JobRecord, place: str) -> str | None:
     """Why a record is invalid: no row of the table could hold it, or it is another job's."""
     job = record.job
-    whole = [record.start_ns or 0, *(number for one in record.inputs for number in (one.size,))]
-    whole += [label for label in job.labels.values() if type(label) is int]
-    real = [
-        record.seconds,
-        record.log_seconds,
-        *(x for one in record.estimates.values() for x in one[:2]),
-    ]
-    real += [label for label in job.labels.values() if isinstance(label, float)]
     if name_fault(job.name) is not None or record_name(job.name) != place:
         return f"job.name: expected the job whose record lies here, found {job.name!r:.60}"
-    if [one.path for one in record.inputs] != [*job.logs, *job.loaded]:
+    if tuple(one.path for one in record.inputs) != job.logs + job.loaded:
         return "inputs: expected the job's own logs"
-    if not all(math.isfinite(x) for x in real if x is not None) or not all(
-        -(2**63) <= n < 2**63 for n in whole
-    ):
+    if not all(map(_fits_column, _numbers(record))):
         return "expected finite numbers, whole ones of 64 bits"
     if not all(map(_is_estimates, record.estimates)):
         return "estimates: expected the names of parameters"
@@ -266,6 +266,29 @@ def _fault(record: JobRecord, place: str) -> str | None:
         except ValueError:
             return f"job.time: expected ISO 8601 from 1970 to 2261, found {job.time!r:.60}"
     return None
+
+
+def _numbers(record: JobRecord) -> Iterator[float]:
+    """The numbers of a record, and its labels that are some."""
+    for number in (record.start_ns, record.seconds, record.log_seconds):
+        if number is not None:
+            yield number
+    for one in record.inputs:
+        yield one.size
+    for estimate, std, _ in record.estimates.values():
+        for number in (estimate, std):
+            if number is not None:
+                yield number
+    for label in record.job.labels.values():
+        if isinstance(label, int | float):
+            yield label
+
+
+def _fits_column(number: float) -> bool:
+    """Whether a column of a table can hold a number."""
+    if isinstance(number, int):
+        return -(2**63) <= number < 2**63
+    return math.isfinite(number)
 
 
 def _is_estimates(name: str) -> bool:

@@ -16,6 +16,7 @@ from string import Template
 
 from algid.exports.description import Description, header, lacking
 from algid.model import TERMS, Model, Weighted, attributes
+from algid.physics.expressions import Atom, Product
 from algid.physics.motion import Widths
 
 HELD = frozenset(name for name, term in TERMS.items() if term.timing is None)
@@ -27,19 +28,20 @@ def c99(arm: Description) -> str:
 
     Without the bodies where ``ARM_DECLARATIONS_ONLY`` is defined.
     """
-    text = "\n".join(f" * {line}".rstrip() for line in header(arm, lacking(arm, HELD))).replace(
-        "*/", "* /"
-    )
-    constants = "".join(
-        f"static const double {name} = {value!r};\n" for name, value in _constants(arm).items()
-    )
-    return _written(arm, _C, _C_BY_TERM, {"TEXT": text, "CONSTANTS": constants})
+    text = "\n".join(f" * {line}".rstrip() for line in header(arm, lacking(arm, HELD)))
+    constants = ""
+    for name, value in _constants(arm).items():
+        constants += f"static const double {name} = {value!r};\n"
+    parts = {"TEXT": text.replace("*/", "* /"), "CONSTANTS": constants}
+    return _written(arm, _C, _C_BY_TERM, parts)
 
 
 def python_module(arm: Description) -> str:
     """The arm's dynamics as functions of pairs of floats."""
     text = "\n".join(header(arm, lacking(arm, HELD))).replace("\\", "/").replace('"""', "'''")
-    constants = "".join(f"{name} = {value!r}\n" for name, value in _constants(arm).items())
+    constants = ""
+    for name, value in _constants(arm).items():
+        constants += f"{name} = {value!r}\n"
     body = _written(arm, _PYTHON, _PYTHON_BY_TERM, {"CONSTANTS": constants})
     used = [name for name in _FUNCTIONS if re.search(rf"\b{name}\(", body)]
     return f'"""{text}\n"""\n\nfrom math import {", ".join(used)}\n\n{body}'
@@ -49,10 +51,13 @@ def _constants(arm: Description) -> dict[str, float]:
     """Constants of the module by their names."""
     model, value = arm.coefficients.model, arm.coefficients.value
     constants = {name.upper(): value[name] for name in model.names if name != model.lag_name}
-    shapes = {shape for term in model.terms for shape in TERMS[term].shapes}
-    return constants | {
-        s.name.upper(): getattr(model, s.name) for s in fields(Widths) if s.name in shapes
-    }
+    shapes: set[str] = set()
+    for term in model.terms:
+        shapes.update(TERMS[term].shapes)
+    for width in fields(Widths):
+        if width.name in shapes:
+            constants[width.name.upper()] = getattr(model, width.name)
+    return constants
 
 
 def _source(model: Model, weighted: Weighted) -> str:
@@ -60,28 +65,36 @@ def _source(model: Model, weighted: Weighted) -> str:
     text = ""
     for product, pairs in weighted.items():
         for place, factor in pairs:
-            size = [] if abs(factor) == 1 else [f"{abs(factor):g}"]
-            part = " * ".join([*size, model.names[place].upper(), *(atom.name for atom in product)])
-            text += (
-                f" {'-' if factor < 0 else '+'} {part}"
-                if text
-                else f"{'-' if factor < 0 else ''}{part}"
-            )
+            sign = "-" if factor < 0 else "+"
+            if text:
+                text += f" {sign} "
+            else:
+                text = sign.removeprefix("+")
+            factors = [model.names[place].upper()]
+            factors += [atom.name for atom in product]
+            if abs(factor) != 1:
+                factors.insert(0, f"{abs(factor):g}")
+            text += " * ".join(factors)
     return text
 
 
 def _definitions(expressions: list[Weighted], form: str) -> str:
     """Lines that define what the expressions hold, each in a language's `form`."""
-    atoms = sorted(
-        {atom for expression in expressions for product in expression for atom in product}
-    )
-    lines = [form.format(f"{atom.name} = {atom.source}") for atom in atoms if atom.source]
-    bare = " ".join([*lines, *(atom.name for atom in atoms)])
-    first = [form.format(f"q{n} = theta[{n - 1}]") for n in (1, 2) if re.search(rf"\bq{n}\b", bare)]
-    first += [
-        form.format(f"w{n} = omega[{n - 1}]") for n in (1, 2) if re.search(rf"\bw{n}\b", bare)
-    ]
-    return "".join([*first, *lines])
+    atoms: set[Atom] = set()
+    for expression in expressions:
+        for product in expression:
+            atoms.update(product)
+    named, defined = "", ""
+    for atom in sorted(atoms):
+        named += f"{atom.name} "
+        if atom.source:
+            defined += form.format(f"{atom.name} = {atom.source}")
+    states = ""
+    for letter, name in (("q", "theta"), ("w", "omega")):
+        for number in (1, 2):
+            if re.search(rf"\b{letter}{number}\b", named + defined):
+                states += form.format(f"{letter}{number} = {name}[{number - 1}]")
+    return states + defined
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +107,15 @@ class _Expressions:
     def others(self) -> list[int]:
         """Places of the columns that are no load."""
         compiled = self.model.compiled
-        return [place for place in range(len(compiled.names)) if place not in compiled.loads]
+        return sorted(set(range(len(compiled.names))) - set(compiled.loads))
 
     def inertia(self, places: list[int]) -> dict[tuple[int, int], Weighted]:
         """What multiplies the accelerations, of the columns at `places`."""
         compiled = self.model.compiled
-        return {
-            entry: compiled.only(weighted, places) for entry, weighted in compiled.inertia.items()
-        }
+        own = {}
+        for entry, weighted in compiled.inertia.items():
+            own[entry] = compiled.only(weighted, places)
+        return own
 
     def rest(self, places: list[int]) -> list[Weighted]:
         """The torque at zero acceleration, of the columns at `places`."""
@@ -109,32 +123,29 @@ class _Expressions:
 
     def gravity(self, places: list[int]) -> list[Weighted]:
         """The load at rest: products without a velocity."""
-        moving = re.compile(r"omega")
-        return [
-            {
-                p: pairs
-                for p, pairs in weighted.items()
-                if not any(moving.search("".join(a.slopes())) for a in p)
-            }
-            for weighted in self.rest(places)
-        ]
+        at_rest: list[Weighted] = []
+        for weighted in self.rest(places):
+            still = {product: pairs for product, pairs in weighted.items() if not _moves(product)}
+            at_rest.append(still)
+        return at_rest
+
+
+def _moves(product: Product) -> bool:
+    """Whether a product has a velocity in it."""
+    slopes = [name for atom in product for name in atom.slopes()]
+    return any("omega" in name for name in slopes)
 
 
 def _written(arm: Description, form: str, by_term: Mapping[str, str], parts: dict[str, str]) -> str:
     """A language's form with the constants, and with what its parts are for the model's terms."""
     model = arm.coefficients.model
     own, loads = _Expressions(model), list(model.compiled.loads)
-    M, X, n, r, g = (
-        own.inertia(loads),
-        own.inertia(own.others),
-        own.rest(loads),
-        own.rest(own.others),
-        own.gravity(loads),
-    )
+    M, X = own.inertia(loads), own.inertia(own.others)
+    n, r, g = own.rest(loads), own.rest(own.others), own.gravity(loads)
     define = by_term["definition"]
     parts = parts | {
         "DEFINE_GRAVITY": _definitions(g, define),
-        "DEFINE_INERTIA": _definitions([*M.values(), *X.values()], define),
+        "DEFINE_INERTIA": _definitions(list(M.values()) + list(X.values()), define),
         "DEFINE_LOAD": _definitions(list(M.values()), define),
         "DEFINE_REST": _definitions(n, define),
         "DEFINE_FRICTION": _definitions(r, define),
@@ -144,30 +155,36 @@ def _written(arm: Description, form: str, by_term: Mapping[str, str], parts: dic
         parts[f"GRAVITY{number}"] = _source(model, g[joint]) or "0.0"
         parts[f"N{number}"] = _source(model, n[joint]) or "0.0"
         parts[f"R{number}"] = _source(model, r[joint]) or "0.0"
-        factors = [
-            f"(1 + {name.upper()})" for name, one in attributes(model, "gains") if one == joint
-        ]
-        parts[f"GAIN{number}"] = "".join(f"{factor} * " for factor in factors)
-        parts[f"UNGAIN{number}"] = "".join(f" / {factor}" for factor in factors)
-        extra = []
+        gain = ungain = extra = ""
+        for name in _of_joint(model, "gains", joint):
+            gain += f"(1 + {name}) * "
+            ungain += f" / (1 + {name})"
         for other in range(2):
             parts[f"M{number}{other + 1}"] = _source(model, M[joint, other]) or "0.0"
+            parts[f"X{number}{other + 1}"] = ""
             text = _source(model, X[joint, other])
-            parts[f"X{number}{other + 1}"] = f" + {text}" if text else ""
-            extra += [f" + ({text}) * alpha[{other}]"] if text else []
-        parts[f"EXTRA{number}"] = "".join(extra)
-        shares = [
-            f"{name.upper()} * {by_term['sign'].format(joint)}"
-            for name, one in attributes(model, "by_load")
-            if one == joint
-        ]
-        parts[f"SHARE{number}"] = " + ".join(shares) or "0.0"
-    loaded = bool(attributes(model, "by_load"))
-    parts["LOAD"] = Template(by_term["load"]).substitute(parts) if loaded else ""
-    parts["SOLVED"] = Template(by_term["solved with load" if loaded else "solved"]).substitute(
-        parts
-    )
+            if text:
+                parts[f"X{number}{other + 1}"] = f" + {text}"
+                extra += f" + ({text}) * alpha[{other}]"
+        sign = by_term["sign"].format(joint)
+        shares = [f"{name} * {sign}" for name in _of_joint(model, "by_load", joint)]
+        parts |= {
+            f"GAIN{number}": gain,
+            f"UNGAIN{number}": ungain,
+            f"EXTRA{number}": extra,
+            f"SHARE{number}": " + ".join(shares) or "0.0",
+        }
+    load, solved = "", by_term["solved"]
+    if attributes(model, "by_load"):
+        load, solved = by_term["load"], by_term["solved with load"]
+    parts["LOAD"] = Template(load).substitute(parts)
+    parts["SOLVED"] = Template(solved).substitute(parts)
     return Template(form).substitute(parts)
+
+
+def _of_joint(model: Model, attribute: str, joint: int) -> list[str]:
+    """Constants of the module that act on a joint in the way of `attribute`."""
+    return [name.upper() for name, one in attributes(model, attribute) if one == joint]
 
 
 _C = """/*
