@@ -70,32 +70,39 @@ def arm_of(result: Result, torque: TorqueLog | None) -> ArmDrawing | None:
 
     None where l1 follows from nothing, or no motion is at hand.
     """
-    l1, l2 = (_length(result, name) for name in ("l1", "l2"))
-    l1 = _coupling_length(result) if l1 is None else l1
-    motion = None if torque is None else _motion(torque)
-    if l1 is None or motion is None:
+    l1, l2 = _length(result, "l1"), _length(result, "l2")
+    if l1 is None:
+        l1 = _coupling_length(result)
+    if l1 is None or torque is None:
         return None
-    mass = result.payload["m_p"].estimate if "m_p" in result.payload else None
-    payload = "" if mass is None else f"payload of {significant(mass, 3)} kg"
-    unknown = (
-        ""
-        if l2 is not None
-        else f" Link 2's length is not known: it is drawn as long as link 1 (give {flag('l2')})."
-    )
-    turn, loads = _phases(result)
-    bent = "" if loads is None else " Dashed: where each joint's load lies, by gravity and inertia."
-    reading = f"{READING} l1 is {significant(l1, 3)} m.{unknown}{bent}"
+    motion = _motion(torque)
+    if motion is None:
+        return None
     t, theta = motion
-    aside = result.payload["y_p"].estimate if "y_p" in result.payload else None
+    reading = f"{READING} l1 is {significant(l1, 3)} m."
+    if l2 is None:
+        reading += (
+            f" Link 2's length is not known: it is drawn as long as link 1 (give {flag('l2')})."
+        )
+    turn, loads = _phases(result)
+    if loads is not None:
+        reading += " Dashed: where each joint's load lies, by gravity and inertia."
+    payload, aside = "", 0.0
+    if "m_p" in result.payload:
+        mass = result.payload["m_p"].estimate
+        if mass is not None:
+            payload = f"payload of {significant(mass, 3)} kg"
+    if "y_p" in result.payload:
+        aside = result.payload["y_p"].estimate or 0.0
     return ArmDrawing(
         l1,
-        l1 if l2 is None else l2,
+        l2 or l1,
         t,
         theta + np.array([[turn], [0.0]]),
         reading,
         payload,
         loads=loads,
-        aside=aside or 0.0,
+        aside=aside,
     )
 
 
@@ -108,16 +115,22 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
     if not set(value) & set(SINES):
         return 0.0, None
     first, second, fourth = moments_of(value)
-    turn = cmath.phase(second / first) if first and second else 0.0
-    load = cmath.phase(fourth * cmath.exp(-1j * turn)) if fourth else 0.0
+    turn = load = 0.0
+    if first and second:
+        turn = cmath.phase(second / first)
+    if fourth:
+        load = cmath.phase(fourth * cmath.exp(-1j * turn))
     return turn, (load, cmath.phase(first))
 
 
 def _length(result: Result, name: str) -> float | None:
     """A link's length in m: estimated with the payload, or given."""
-    estimate = result.payload.get(name)
-    value = estimate.estimate if estimate is not None else result.settings.get(name)
-    return float(value) if isinstance(value, int | float) and value > 0 else None
+    value = result.settings.get(name)
+    if name in result.payload:
+        value = result.payload[name].estimate
+    if not isinstance(value, int | float) or value <= 0:
+        return None
+    return float(value)
 
 
 def _coupling_length(result: Result) -> float | None:
@@ -127,17 +140,26 @@ def _coupling_length(result: Result) -> float | None:
     """
     value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
     gravity = result.settings.get("gravity")
-    l1 = length_by_coupling(value, gravity) if isinstance(gravity, int | float) else None
-    return l1 if l1 is not None and l1 > 0 else None
+    if not isinstance(gravity, int | float):
+        return None
+    l1 = length_by_coupling(value, gravity)
+    if l1 is None or l1 <= 0:
+        return None
+    return l1
 
 
 def _motion(torque: TorqueLog) -> tuple[FloatArray, FloatArray] | None:
     """Times (n,) and angles (2, n) of the first log, out of its reduced series."""
-    series = torque.series[min(torque.series)] if torque.series else {}
-    both = [series[name] for name in ("theta1", "theta2") if name in series]
-    kept = [(x[np.isfinite(y)], y[np.isfinite(y)]) for x, y in both]
-    if len(kept) < 2 or any(x.size < 2 for x, _ in kept):
+    if not torque.series:
         return None
+    series = torque.series[min(torque.series)]
+    kept = []
+    for name in ("theta1", "theta2"):
+        x, y = series.get(name, (np.empty(0), np.empty(0)))
+        finite = np.isfinite(y)
+        if np.count_nonzero(finite) < 2:
+            return None
+        kept.append((x[finite], y[finite]))
     t = np.union1d(kept[0][0], kept[1][0])
     return t, np.stack([np.interp(t, x, y) for x, y in kept])
 
@@ -150,24 +172,26 @@ def arm_html(arm: ArmDrawing) -> str:
     tip = elbow + arm.l2 * np.stack([np.cos(both), np.sin(both)])
     left, top, width, height = _frame(arm, elbow, tip)
     says = f"Arm of {significant(arm.l1, 3)} m and {significant(arm.l2, 3)} m links"
-    frames = dict(
-        zip(("t", "theta1", "theta2"), np.round([t, *theta], DIGITS).tolist(), strict=True)
-    )
-    levels = [
-        ("level", 0.0),
-        *([] if arm.height is None or not np.isfinite(arm.height) else [("limit", -arm.height)]),
-    ]
-    ground = "".join(
-        f'<line class="{kind}" x1="{left:.5g}" y1="{y:.5g}" x2="{left + width:.5g}" y2="{y:.5g}"/>'
-        for kind, y in levels
-    )
+    frames = {
+        "t": np.round(t, DIGITS).tolist(),
+        "theta1": np.round(theta[0], DIGITS).tolist(),
+        "theta2": np.round(theta[1], DIGITS).tolist(),
+    }
+    levels = {"level": 0.0}
+    if arm.height is not None and np.isfinite(arm.height):
+        levels["limit"] = -arm.height
+    ground, right = "", left + width
+    for kind, y in levels.items():
+        ground += (
+            f'<line class="{kind}" x1="{left:.5g}" y1="{y:.5g}" x2="{right:.5g}" y2="{y:.5g}"/>'
+        )
     path = " ".join(f"{x:.4g},{-y:.4g}" for x, y in tip.T)
     return (
         f'<figure class="arm" id="{arm.key}-figure" aria-labelledby="{arm.key}"><h2 '
         f'id="{arm.key}">{arm.title}</h2>\n'
         f'<svg viewBox="{left:.5g} {top:.5g} {width:.5g} {height:.5g}" role="img" '
         f'aria-label="{escaped(says)}">\n{ground}<polyline class="path" points="{path}"/>\n'
-        f"{_links(arm, *(-np.degrees(theta[:, 0])))}</svg>\n"
+        f"{_links(arm, -np.degrees(theta[0, 0]), -np.degrees(theta[1, 0]))}</svg>\n"
         f'<div class="player"><button type="button" aria-pressed="false" data-play>Play</button>'
         f'<input type="range" min="{t[0]:.6g}" max="{t[-1]:.6g}" value="{t[0]:.6g}" step="0.01" '
         f'aria-label="Time, s"><output>{t[0]:.2f} s</output>'
@@ -205,13 +229,13 @@ def _frame(
 def _links(arm: ArmDrawing, first: float, second: float) -> str:
     """Link 2 stands in link 1's frame, both turned by SVG, in degrees, whose y points down."""
     radius = 0.028 * (arm.l1 + arm.l2)
-    payload = (
-        f'<circle class="payload" cx="{arm.l2:.5g}" cy="{-arm.aside:.5g}" '
-        f'r="{1.6 * radius:.4g}"><title>{escaped(arm.payload)}</title>'
-        "</circle>"
-        if arm.payload
-        else ""
-    )
+    payload = ""
+    if arm.payload:
+        payload = (
+            f'<circle class="payload" cx="{arm.l2:.5g}" cy="{-arm.aside:.5g}" '
+            f'r="{1.6 * radius:.4g}"><title>{escaped(arm.payload)}</title>'
+            "</circle>"
+        )
     return (
         f'<g class="link1" transform="rotate({first:.4f})"><line class="link" x1="0" y1="0" '
         f'x2="{arm.l1:.5g}" y2="0"/>{_load(arm, 0)}'

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,16 +61,16 @@ def forest(
     truth : what a synthetic log was made with, by name: drawn as a ring
     logs : each log's own estimates by name: drawn as dots
     """
-    shares = {
-        name: share for name, estimate in group.items() if (share := _share(estimate)) is not None
-    }
+    truth, logs = truth or {}, logs or {}
+    shares = {}
+    for name, estimate in group.items():
+        share = _share(estimate)
+        if share is not None:
+            shares[name] = share
     limit = _limit(list(shares.values()))
-    rows = {
-        name: _row(
-            name, group[name], share, limit, (truth or {}).get(name), (logs or {}).get(name, ())
-        )
-        for name, share in shares.items()
-    }
+    rows = {}
+    for name, share in shares.items():
+        rows[name] = _row(name, group[name], share, limit, truth.get(name), logs.get(name, ()))
     return Forest(rows, limit)
 
 
@@ -79,15 +79,12 @@ def _share(found: Estimate) -> float | None:
 
     Infinite about zero, None where there is none.
     """
-    if (
-        found.estimate is None
-        or found.ci95 is None
-        or found.ci95[0] is None
-        or found.ci95[1] is None
-    ):
+    low, high = found.ci95 or (None, None)
+    if found.estimate is None or low is None or high is None:
         return None
-    half = (found.ci95[1] - found.ci95[0]) / 2
-    return 100 * half / abs(found.estimate) if found.estimate else math.inf
+    if found.estimate == 0:
+        return math.inf
+    return 100 * ((high - low) / 2) / abs(found.estimate)
 
 
 def _limit(shares: Sequence[float]) -> float:
@@ -96,8 +93,10 @@ def _limit(shares: Sequence[float]) -> float:
     Intervals as wide as their estimates do not count: they hold zero, and would flatten the others.
     It is rounded up to the next 1, 2 or 5 times a power of ten.
     """
+    if not shares:
+        return 1.0
     shares = [share for share in shares if share < WIDEST] or shares
-    least = min(max(shares) * ROOM, MOST * statistics.median(shares), WIDEST) if shares else 0.0
+    least = min(max(shares) * ROOM, MOST * statistics.median(shares), WIDEST)
     if least <= 0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(least))
@@ -116,25 +115,25 @@ def _row(
 
     def place(value: float) -> float:
         """Where a value stands, in pixels; beyond the edges where it is beyond the scale."""
-        off = 100 * (value - (found.estimate or 0.0)) / size / limit if size else 0.0
+        if size == 0:
+            return WIDTH / 2
+        off = 100 * (value - (found.estimate or 0.0)) / size / limit
         return WIDTH / 2 * (1 + off * (1 - 2 * EDGE / WIDTH))
 
     reach = min(share / limit, 1.0) * (WIDTH / 2 - EDGE)
     middle, y = WIDTH / 2, HEIGHT / 2
-    ends = (
-        f'<path class="end" d="M{EDGE:g} {y - 4:g} L1 {y:g} L{EDGE:g} {y + 4:g} M{WIDTH - EDGE:g} '
-        f"{y - 4:g} "
-        f'L{WIDTH - 1:g} {y:g} L{WIDTH - EDGE:g} {y + 4:g}"/>'
-        if share > limit
-        else ""
-    )
+    ends = ring = ""
+    if share > limit:
+        ends = (
+            f'<path class="end" d="M{EDGE:g} {y - 4:g} L1 {y:g} L{EDGE:g} {y + 4:g} '
+            f'M{WIDTH - EDGE:g} {y - 4:g} L{WIDTH - 1:g} {y:g} L{WIDTH - EDGE:g} {y + 4:g}"/>'
+        )
+    if truth is not None and 0 <= place(truth) <= WIDTH:
+        ring = f'<circle class="truth" cx="{place(truth):.1f}" cy="{y:g}" r="4"/>'
     dots = "".join(_dot(place(value), y + 6) for value in logs)
-    ring = (
-        f'<circle class="truth" cx="{place(truth):.1f}" cy="{y:g}" r="4"/>'
-        if truth is not None and 0 <= place(truth) <= WIDTH
-        else ""
-    )
-    width = "wider than its value" if share > WIDEST else f"± {significant(share, 2)} %"
+    width = f"± {significant(share, 2)} %"
+    if share > WIDEST:
+        width = "wider than its value"
     drawing = (
         f'<line class="zero" x1="{middle:g}" y1="0" x2="{middle:g}" y2="{HEIGHT:g}"/>'
         f'<line class="reach" x1="{middle - reach:.1f}" y1="{y:g}" x2="{middle + reach:.1f}" '
@@ -157,7 +156,7 @@ LEAST = 1.0  # of the bars' scale: changes all below are shown as small as they 
 
 def bars(values: Mapping[str, float]) -> dict[str, str]:
     """A drawing a row: a bar from zero in the middle, to the left where the value is negative."""
-    scale = max([LEAST, *map(abs, values.values())])
+    scale = max(LEAST, max(map(abs, values.values()), default=LEAST))
     return {name: _bar(name, value, scale) for name, value in values.items()}
 
 
@@ -223,12 +222,13 @@ def sparklines(courses: Mapping[str, Course]) -> dict[str, str]:
         return {}
     first = min(float(course.t[0]) for course in shown.values())
     last = max(float(course.t[-1]) for course in shown.values())
-    marked = [course.reach for course in shown.values() if course.marked]
-    scale = (
-        max([float(np.quantile([course.reach for course in shown.values()], USUAL)), *marked])
-        or 1.0
-    )
-    return {name: _course(name, course, (first, last), scale) for name, course in shown.items()}
+    reaches = [course.reach for course in shown.values()]
+    scale = float(np.quantile(reaches, USUAL))
+    for course in shown.values():
+        if course.marked:
+            scale = max(scale, course.reach)
+    span = (first, last)
+    return {name: _course(name, course, span, scale or 1.0) for name, course in shown.items()}
 
 
 def _course(name: str, course: Course, span: tuple[float, float], scale: float) -> str:
@@ -237,20 +237,19 @@ def _course(name: str, course: Course, span: tuple[float, float], scale: float) 
     changes = course.value - course.middle + np.array([[0.0], [-1.0], [1.0]]) * course.half
     middle = SPARK_HEIGHT / 2
     y, low, high = np.clip(middle - changes / scale * (middle - SPARK_EDGE), 0.0, SPARK_HEIGHT)
-    band = _points([*zip(x, high, strict=True), *zip(x[::-1], low[::-1], strict=True)])
+    ends = x
     if x.size == 1:  # a lone value has its band as a bar
-        band = _points(
-            [(x[0] - 1, high[0]), (x[0] + 1, high[0]), (x[0] + 1, low[0]), (x[0] - 1, low[0])]
-        )
+        ends, high, low = x[0] + np.array([-1.0, 1.0]), high.repeat(2), low.repeat(2)
+    band = _points(np.append(ends, ends[::-1]), np.append(high, low[::-1]))
     drawing = (
         f"<title>{escaped(course.says)}</title>"
         f'<polygon class="band" points="{band}"/>'
-        f'<polyline class="course" points="{_points(zip(x, y, strict=True))}"/>'
+        f'<polyline class="course" points="{_points(x, y)}"/>'
         f'<circle class="last" cx="{x[-1]:.1f}" cy="{y[-1]:.1f}" r="1.8"/>'
     )
     kind = "spark marked" if course.marked else "spark"
     return _svg(kind, SPARK_WIDTH, SPARK_HEIGHT, f"{name}: {course.says}", drawing)
 
 
-def _points(pairs: Iterable[tuple[float, float]]) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in pairs)
+def _points(x: FloatArray, y: FloatArray) -> str:
+    return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x, y, strict=True))

@@ -20,6 +20,7 @@ ROS 2 messages in CDR, little endian: the two that an exported log needs.
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,9 +42,18 @@ if TYPE_CHECKING:
 START_KEY = b"start_ns"
 JOINTS = ("joint1", "joint2")
 SIGNALS = (
-    *("log", "t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2"),
-    *("tau1_predicted", "tau2_predicted"),
+    "log",
+    "t",
+    "theta1",
+    "theta2",
+    "omega1",
+    "omega2",
+    "tau1",
+    "tau2",
+    "tau1_predicted",
+    "tau2_predicted",
 )
+MEASURED, PREDICTED = SIGNALS[2:8], SIGNALS[8:]
 ROWS = 1 << 14
 
 
@@ -84,7 +94,7 @@ def start_stamps(path: Path, logs: int) -> list[int]:
     """
     starts = metadata_of(path, START_KEY)
     try:
-        known = [int(stamp) for stamp in json.loads(starts)] if starts else []
+        known = [int(stamp) for stamp in json.loads(starts or "[]")]
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise ResultError(
             f"{path}: {START_KEY.decode()}: expected stamps in ns, found {starts!r:.60}; identify "
@@ -104,21 +114,17 @@ def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | N
     for log, block in by_log(blocks(path, SIGNALS, ROWS)):
         stamps = _stamps(path, block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
-        names = ("theta{}", "omega{}", "tau{}", "tau{}_predicted")
-        theta, omega, tau, predicted = (
-            (block[name.format(1)], block[name.format(2)]) for name in names
-        )
-        residual = (tau[0] - predicted[0], tau[1] - predicted[1])
+        measured = np.stack([block[name] for name in MEASURED], axis=1)
+        predicted = np.stack([block[name] for name in PREDICTED], axis=1)
         for name, message, signals in (
-            ("measured", whole, (theta, omega, tau)),
-            ("predicted", torque, (predicted,)),
-            ("residual", torque, (residual,)),
+            ("measured", whole, measured),
+            ("predicted", torque, predicted),
+            ("residual", torque, measured[:, -2:] - predicted),
         ):
             topic = f"{place}/{name}"
             if topic not in channels:
                 channels[topic] = writer.register_channel(topic, "cdr", schema)
-            rows = np.stack([row for pair in signals for row in pair], axis=1).tolist()
-            for stamp, values in zip(stamps, rows, strict=True):
+            for stamp, values in zip(stamps, signals.tolist(), strict=True):
                 writer.add_message(channels[topic], stamp, message(stamp, values), stamp)
         done += len(stamps)
         if progress is not None:
@@ -134,11 +140,10 @@ def write_series(writer: Writer, path: Path, topic: str) -> None:
         return
     [start] = start_stamps(path, 1)
     names = [name for name in columns_of(path) if name != "t"]
-    schema = writer.register_schema(
-        ESTIMATES, "ros2msg", estimates_schema(field_names(names)).encode()
-    )
+    definition = estimates_schema(field_names(names))
+    schema = writer.register_schema(ESTIMATES, "ros2msg", definition.encode())
     channel = writer.register_channel(topic, "cdr", schema)
-    for block in blocks(path, ["t", *names], ROWS):
+    for block in blocks(path, ["t"] + names, ROWS):
         rows = np.stack([block[name] for name in names], axis=1).tolist()
         for stamp, row in zip(_stamps(path, block["t"], start), rows, strict=True):
             writer.add_message(channel, stamp, numbers_message(stamp, row), stamp)
@@ -170,9 +175,7 @@ def estimates_schema(names: list[str]) -> str:
 
 def field_names(columns: list[str]) -> list[str]:
     """Columns as ROS field names: ``k5+k3+z1+z2`` is ``k5_k3_z1_z2``."""
-    return [
-        "".join(c if c.isalnum() else "_" for c in column).lower().strip("_") for column in columns
-    ]
+    return [re.sub(r"[^\w]", "_", column).lower().strip("_") for column in columns]
 
 
 class JointStates:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.criteria import CUT
@@ -79,26 +80,30 @@ def read_series(path: Path, settings: Mapping[str, Any]) -> SeriesLog:
     Raises `ResultError`.
     """
     columns = columns_of(path)
-    gathering = _SeriesGathering(
-        [name for name in columns if name not in NOT_SERIES], row_count(path), settings
-    )
-    wanted = [
-        "t",
-        *gathering.names,
-        *(name for name in ("condition", "k7_condition") if name in columns),
-    ]
+    names = [name for name in columns if name not in NOT_SERIES]
+    gathering = _SeriesGathering(names, row_count(path), settings)
+    wanted = ["t"] + names
+    wanted += [name for name in ("condition", "k7_condition") if name in columns]
     for block in blocks(path, wanted):
         gathering.take(block)
     return gathering.result("condition" in columns)
+
+
+def _window(settings: Mapping[str, Any]) -> float:
+    """After how long the integrals restart, s; the paper's where its own settings say nothing."""
+    window = settings.get("window")
+    if not settles(settings.get("estimator")) or isinstance(window, bool):
+        return WINDOW
+    if isinstance(window, int | float) and window > 0:
+        return float(window)
+    return WINDOW
 
 
 class _SeriesGathering:
     def __init__(self, names: list[str], total: int, settings: Mapping[str, Any]) -> None:
         self.names = names
         self._total = total
-        window = settings.get("window") if settles(settings.get("estimator")) else None
-        usable = isinstance(window, int | float) and not isinstance(window, bool) and window > 0
-        self._window = float(window) if usable else WINDOW  # type: ignore[arg-type]
+        self._window = _window(settings)
         self._start: float | None = None
         self._end = 0.0
         self._size = bucket_size(total, SERIES_POINTS)
@@ -110,7 +115,8 @@ class _SeriesGathering:
     def take(self, block: Block) -> None:
         """Add the next block."""
         t = block["t"]
-        self._start = float(t[0]) if self._start is None else self._start
+        if self._start is None:
+            self._start = float(t[0])
         self._end = float(t[-1])
         since = t - self._start
         # stamps are multiples of the period but for rounding, which must not move a window's first
@@ -118,20 +124,12 @@ class _SeriesGathering:
         late = np.mod(since + 1e-9, self._window) >= EPSILON
         for name in self.names:
             self._lines[name].feed(t, block[name])
-            conditions = ["condition", *(["k7_condition"] if name == K7 else [])]
-            known = [
-                ~(block[condition] <= LARGEST_CONDITION)
-                for condition in conditions
-                if condition in block
-            ]
-            # everywhere where the file does not tell
-            ill = np.logical_or.reduce(known) if known else np.ones(t.size, dtype=bool)
-            self._singular[name].feed(t, late & np.isnan(block[name]) & ill)
+            lacking = late & np.isnan(block[name])
+            self._singular[name].feed(t, lacking & _ill_conditioned(name, block))
         if "condition" in block:
-            self._condition.feed(
-                t, np.where(np.isfinite(block["condition"]), block["condition"], np.nan)
-            )
-        self._samples.feed(np.stack([t, *(block[name] for name in self.names)]))
+            condition = block["condition"]
+            self._condition.feed(t, np.where(np.isfinite(condition), condition, np.nan))
+        self._samples.feed(np.stack([t] + [block[name] for name in self.names]))
 
     def result(self, with_condition: bool) -> SeriesLog:
         """What was gathered."""
@@ -150,6 +148,18 @@ class _SeriesGathering:
             singular={name: share.result() for name, share in self._singular.items()},
             condition=self._condition.result() if with_condition else None,
         )
+
+
+def _ill_conditioned(name: str, block: Block) -> NDArray[np.bool_]:
+    """Where the system of a series was singular (n,): everywhere where the file does not tell."""
+    conditions = ["condition"]
+    if name == K7:
+        conditions.append("k7_condition")
+    ill = [~(block[one] <= LARGEST_CONDITION) for one in conditions if one in block]
+    if not ill:
+        return np.ones(block["t"].size, dtype=np.bool_)
+    every: NDArray[np.bool_] = np.logical_or.reduce(ill)
+    return every
 
 
 def _medians(x: FloatArray, y: FloatArray) -> Series:
@@ -175,7 +185,8 @@ COLUMNS = (
     "tau2_predicted",
 )
 MOTION = COLUMNS[2:6]
-SERIES = (*COLUMNS[2:], "residual1", "residual2")
+RESIDUALS = ("residual1", "residual2")
+SERIES = COLUMNS[2:] + RESIDUALS
 SCORED = ("tau1", "tau2", "tau1_predicted", "tau2_predicted")
 SCORED_POINTS = 1_200  # of a curve without anything fast in it
 POINTS = 2_400  # a series; twice what the page is wide
@@ -256,7 +267,7 @@ class _Gathering:
 
     def take(self, log: int, block: Block) -> None:
         """Add the next block of the log of that number."""
-        block |= {f"residual{j}": block[f"tau{j}"] - block[f"tau{j}_predicted"] for j in (1, 2)}
+        _add_residuals(block)
         self._range(log, block["t"])
         reducers = self.reducers.setdefault(log, {name: MinMax(self.size) for name in SERIES})
         for name, reducer in reducers.items():
@@ -291,16 +302,12 @@ class _Gathering:
     def result(self) -> TorqueLog:
         """What was gathered."""
         rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
-        longest = {log: CUT * self.size * span.period for log, span in self.ranges.items()}
+        series = {}
+        for log, reducers in self.reducers.items():
+            series[log] = _broken(reducers, CUT * self.size * self.ranges[log].period)
         return TorqueLog(
             ranges=self.ranges,
-            series={
-                log: {
-                    name: broken_at_gaps(*reducer.result(), longest[log])
-                    for name, reducer in reducers.items()
-                }
-                for log, reducers in self.reducers.items()
-            },
+            series=series,
             motion=self.motion.result(4),
             extremes=self.extremes,
             rms=(float(rms[0]), float(rms[1])),
@@ -311,6 +318,22 @@ class _Gathering:
         )
 
 
+def _add_residuals(block: Block) -> None:
+    """Add measured less predicted torque to a block of both."""
+    for joint in (1, 2):
+        residual = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
+        block[f"residual{joint}"] = residual
+
+
+def _broken(reducers: Mapping[str, MinMax], longest: float) -> dict[str, Series]:
+    """The reduced series by name, broken at gaps longer than `longest`, s."""
+    series = {}
+    for name, reducer in reducers.items():
+        t, values = reducer.result()
+        series[name] = broken_at_gaps(t, values, longest)
+    return series
+
+
 def read_scored(path: Path) -> dict[int, dict[str, Series]]:
     """The scored torque, its prediction and their difference by log and name, as a `TorqueLog`.
 
@@ -319,19 +342,14 @@ def read_scored(path: Path) -> dict[int, dict[str, Series]]:
     size = bucket_size(row_count(path), SCORED_POINTS)
     reducers: dict[int, dict[str, MinMax]] = {}
     steps: dict[int, float] = {}
-    for log, block in by_log(blocks(path, ("log", "t", *SCORED))):
-        block |= {f"residual{j}": block[f"tau{j}"] - block[f"tau{j}_predicted"] for j in (1, 2)}
-        own = reducers.setdefault(
-            log, {name: MinMax(size) for name in (*SCORED, "residual1", "residual2")}
-        )
+    for log, block in by_log(blocks(path, ("log", "t") + SCORED)):
+        _add_residuals(block)
+        own = reducers.setdefault(log, {name: MinMax(size) for name in SCORED + RESIDUALS})
         for name, reducer in own.items():
             reducer.feed(block["t"], block[name])
         if block["t"].size > 1:
             steps.setdefault(log, float(np.median(np.diff(block["t"]))))
-    return {
-        log: {
-            name: broken_at_gaps(*reducer.result(), CUT * size * steps.get(log, np.inf))
-            for name, reducer in own.items()
-        }
-        for log, own in reducers.items()
-    }
+    series = {}
+    for log, own in reducers.items():
+        series[log] = _broken(own, CUT * size * steps.get(log, np.inf))
+    return series

@@ -15,6 +15,7 @@ from algid.report.figures.base import (
     Legend,
     Missing,
     Panel,
+    Trace,
     axis,
     band,
     between,
@@ -76,11 +77,9 @@ def innovations(path: Path, result: Result) -> Figure | Missing:
     if not joints:
         return Missing("innovations", TITLE, "the logs are too short to tell noise from colour")
     whitened = any(quantity == WHITENED for quantity, _ in curves)
-    panels = tuple(
-        panel
-        for joint in joints
-        for panel in (_spectrum(curves, joint), _correlation(curves, joint))
-    )
+    panels = []
+    for joint in joints:
+        panels += [_spectrum(curves, joint), _correlation(curves, joint)]
     faint = any(_is_faint(curves[CORRELATION, joint]) for joint in joints)
     legend, reading = [RESIDUAL, BAND], WHITE_READING
     if not whitened:
@@ -93,7 +92,7 @@ def innovations(path: Path, result: Result) -> Figure | Missing:
     return Figure(
         "innovations",
         TITLE,
-        panels,
+        tuple(panels),
         reading,
         tuple(legend),
         _note(curves, joints, result),
@@ -111,9 +110,9 @@ def read_curves(path: Path) -> Curves:
         for joint in (1, 2):
             own = (quantity == kind) & (numbers["joint"] == joint)
             if own.any():
-                found[kind, joint] = Curve(*(numbers[name][own] for name in COLUMNS[2:]))
-    for (kind, _), curve in found.items():
-        _check(path, kind, curve)
+                x, value, low, high = (numbers[name][own] for name in COLUMNS[2:])
+                found[kind, joint] = Curve(x, value, low, high)
+                _check(path, kind, found[kind, joint])
     return found
 
 
@@ -131,32 +130,29 @@ def _spectrum(curves: Curves, joint: int) -> Panel:
     white = curves.get((WHITENED, joint))
     if white is not None:
         hover = "%{y:.3g} of white noise at %{x:.3g} Hz<extra></extra>"
-        traces = [
-            *between(white.x, white.low, white.high, "@blue/0.25"),
-            line(white.x, white.value, "@orange", "residual", "residual", hover=hover),
-        ]
+        traces = list(between(white.x, white.low, white.high, "@blue/0.25"))
+        traces.append(line(white.x, white.value, "@orange", "residual", "residual", hover=hover))
         y = axis("share of white noise", type="log", **_round_ticks(white))
         return Panel(
             traces, _layout(white.x, y), f"{says}; {_count(white)} inside the band", title, HEIGHT
         )
     hover = "%{y:.3g} (N m)²/Hz at %{x:.3g} Hz<extra></extra>"
     torque, own = curves.get((TORQUE, joint)), curves.get((SPECTRUM, joint))
-    traces = []
+    traces = list[Trace]()
+    x: FloatArray = np.ones(1)
+    density: FloatArray = np.empty(0)
     if torque is not None:
+        density = torque.value
         traces.append(
             line(torque.x, torque.value, "@measured", "torque", "torque", width=2, hover=hover)
         )
     if own is not None:
+        x, density = own.x, np.concatenate([density, own.value])
         traces.append(line(own.x, own.value, "@orange", "residual", "residual", hover=hover))
-    density = np.concatenate(
-        [np.empty(0), *(curve.value for curve in (torque, own) if curve is not None)]
-    )
     positive = density[density > 0]
-    x = own.x if own is not None else np.ones(1)
-    # ticks at every other power of ten where there are many; plotly's own where there are few
-    ticks = (
-        {"dtick": 2} if positive.size and positive.max() > 1e4 * positive.min() else {"nticks": 5}
-    )
+    ticks = {"nticks": 5}  # plotly's own where there are few powers of ten
+    if positive.size and positive.max() > 1e4 * positive.min():
+        ticks = {"dtick": 2}  # every other power of ten
     y = axis("(N m)²/Hz", type="log", tickfont={"size": 10}, **ticks)
     return Panel(traces, _layout(x, y), says, title, HEIGHT)
 
@@ -173,7 +169,8 @@ def _round_ticks(white: Curve) -> dict[str, Any]:
     """Ticks and a range that holds the band and the values, in shares of white noise."""
     positive = white.value[white.value > 0]
     high = max(4.0, float(white.high.max()), float(white.value.max()))
-    low = max(min(0.25, float(white.low.min()), *positive.tolist()), high / _LARGEST_RANGE)
+    low = min(0.25, float(white.low.min()), float(positive.min(initial=0.25)))
+    low = max(low, high / _LARGEST_RANGE)
     decades = np.log10(high / low)
     if decades > _FEW_DECADES:  # ticks of their own would stand on one another
         step = int(np.ceil(decades / _FEW_DECADES))
@@ -202,21 +199,19 @@ def _correlation(curves: Curves, joint: int) -> Panel:
         hover=f"%{{y:.3f}} at %{{x:.4g}} {unit}<extra></extra>",
     )
     half = 0.5 * float(x[0])
-    steps = [
-        band(low, high, "@blue/0.25")
-        | {"xref": "x", "x0": float(at - half), "x1": float(at + half)}
-        for at, low, high in zip(x, curve.low.tolist(), curve.high.tolist(), strict=True)
-    ]
-    shapes = (
-        [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)] if _is_faint(curve) else []
-    )
-    reach = 1.15 * max(
-        float(np.abs(curve.value).max()), 2 * float(curve.high.max()), FAINT if shapes else 0.0
-    )
+    shapes = []
+    for at, low, high in zip(x, curve.low.tolist(), curve.high.tolist(), strict=True):
+        step = {"xref": "x", "x0": float(at - half), "x1": float(at + half)}
+        shapes.append(band(low, high, "@blue/0.25") | step)
+    reach = max(float(np.abs(curve.value).max()), 2 * float(curve.high.max()))
+    if _is_faint(curve):
+        shapes += [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)]
+        reach = max(reach, FAINT)
+    reach *= 1.15
     layout = {
         "xaxis": axis(f"lag, {unit}", range=[0.0, float(x[-1]) + 2 * half]),
         "yaxis": axis("correlation", range=[max(-reach, -1.05), min(reach, 1.05)]),
-        "shapes": [*steps, *shapes],
+        "shapes": shapes,
         "hovermode": "closest",
     }
     says = f"Autocorrelation of joint {joint}'s residual; {_count(curve)} inside the band"
@@ -236,16 +231,16 @@ def _note(curves: Curves, joints: list[int], result: Result) -> str:
     """How many values lie inside the bands, and what the estimator's own test says."""
     listed = " and ".join(_count(curves[CORRELATION, joint]) for joint in joints)
     note = f"Inside the band: {listed} correlations of joints 1 and 2"
-    white = [curves[WHITENED, joint] for joint in joints if (WHITENED, joint) in curves]
-    note += f", {' and '.join(map(_count, white))} frequencies." if white else "."
+    white = [_count(curves[WHITENED, joint]) for joint in joints if (WHITENED, joint) in curves]
+    if white:
+        note += f", {' and '.join(white)} frequencies"
+    note += "."
     fit = result.fit
     if fit is None:
         return note
-    allow = (
-        "the intervals allow for colour"
-        if fit.intervals != "likelihood"
-        else "the intervals do not allow for that"
-    )
+    allow = "the intervals allow for colour"
+    if fit.intervals == "likelihood":
+        allow = "the intervals do not allow for that"
     if not fit.whiteness:
         return f"{note} The {result.estimator} estimator takes no noise to be white: {allow}."
     if all(test.white for test in fit.whiteness.values()):
