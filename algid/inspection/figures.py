@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -11,7 +12,9 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.criteria import GAP
 from algid.log import Log
+from algid.notices import Notice
 from algid.quantiles import distinct, median
+from algid.readers.runs import PAUSE
 from algid.signals.spacing import near_stamps, spaced
 
 ENOUGH = 1 << 18
@@ -110,18 +113,26 @@ def saturated_share(values: FloatArray) -> float:
 def clock_figures(log: Log) -> ClockFigures:
     """Figures of a log's stamps, two at least.
 
-    Gaps and jitter are those left once clusters are in their place.
+    Gaps and jitter are those left once clusters are in their place; a pause that the reader put
+    between two runs is no gap.
     """
     period, stamp_ns = log.period, log.stamp_ns
     if near_stamps(stamp_ns, period):
         stamp_ns = np.concatenate([block.stamp_ns for block in spaced([log], period)])
     steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
-    gaps = steps > GAP * period
+    wide = steps > GAP * period
+    gaps = _without_pauses(steps[wide], PAUSE * period, log.notices)
     return ClockFigures(
         rows=len(log),
         duration=log.duration,
         rate=1 / period,
-        jitter=round(float(np.std(steps[~gaps])), 12),  # stamps count nanoseconds
-        gaps=int(np.count_nonzero(gaps)),
-        longest_gap=float(steps.max()) if gaps.any() else 0.0,
+        jitter=round(float(np.std(steps[~wide])), 12),  # stamps count nanoseconds
+        gaps=gaps.size,
+        longest_gap=float(gaps.max(initial=0.0)),
     )
+
+
+def _without_pauses(gaps: FloatArray, pause: float, notices: Iterable[Notice]) -> FloatArray:
+    """The gaps (N,), in s, less as many of a pause's length as runs were joined."""
+    joined = sum(one.numbers.get("joined", 0) for one in notices if one.code == "RESTARTS")
+    return np.delete(gaps, np.argsort(np.abs(gaps - pause))[:joined])

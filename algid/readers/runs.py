@@ -23,7 +23,7 @@ _SHORTEST = 64
 """Late samples at a table's end that wait for the next table, and least samples of a far run."""
 _MOST = 1000
 """Runs of a log: more are a broken clock's."""
-_PAUSE = 20
+PAUSE = 20
 """Periods between a run and the next one: a gap that no window spans."""
 
 
@@ -71,7 +71,8 @@ def _restarts(runs: int, only: int | None) -> tuple[Notice]:
     mends: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)
     if only is not None:
         said, mends = f"number {only} is read alone", ()
-    numbers = {"count": runs - 1, "runs": runs, "said": said}
+    joined = runs - 1 if only is None else 0
+    numbers = {"count": runs - 1, "runs": runs, "said": said, "joined": joined}
     return (Notice("RESTARTS", numbers=numbers, note=True, remedies=mends),)
 
 
@@ -150,7 +151,7 @@ class _Clock:
         if self._before is not None:
             steps = np.diff(self._before.stamp_ns)
             period = median(steps[steps > 0]) if np.any(steps > 0) else 0.0
-            self._moved_ns = self._latest_ns + max(1, round(_PAUSE * period)) - first_ns
+            self._moved_ns = self._latest_ns + max(1, round(PAUSE * period)) - first_ns
         self._before = None
 
     def _moved(self, part: SampleTable) -> tuple[int, SampleTable]:

@@ -126,3 +126,16 @@ def test_runs_are_cut_by_their_own_time(tmp_path: Path) -> None:
     _, theta1, path = two_runs(tmp_path)
     log = read_log(path, Profile(segment=2, start=1.0))
     assert np.array_equal(log.theta[0], theta1[3000:])
+
+
+@pytest.mark.parametrize("lost", [0, 60])
+def test_the_pause_between_runs_is_no_gap(lost: int, tmp_path: Path) -> None:
+    _, _, path = two_runs(tmp_path)
+    rows = pq.read_table(path)
+    pq.write_table(pa.concat_tables([rows[:900], rows[900 + lost :]]), path)
+    found = inspect(path)
+    assert found.clock is not None
+    assert found.clock.gaps == (1 if lost else 0)
+    assert found.clock.longest_gap == pytest.approx((lost + 1) / 500 if lost else 0.0)
+    assert "RESTARTS" in [one.code for one in found.notices]
+    assert ("GAPS" in [one.code for one in found.findings]) == bool(lost)
