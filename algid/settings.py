@@ -65,7 +65,14 @@ def _poles(text: str) -> tuple[complex, ...]:
         observer_gain(poles)
     except ValueError as error:
         raise SettingError(f"{flag('poles')} {text:.200}: {error}; {like}") from None
-    return tuple(pole.real if pole.imag == 0 else pole for pole in poles)
+    return tuple(_as_real(pole) for pole in poles)
+
+
+def _as_real(pole: complex) -> complex:
+    """A pole as a float if it is real, so that it is written as one."""
+    if pole.imag == 0:
+        return pole.real
+    return pole
 
 
 @cache
@@ -77,15 +84,21 @@ def _kinds() -> dict[str, Any]:
 def _expected(bounds: Range | None, kind: Any, value: object) -> str | None:
     """What a setting has to be, where its value is not that."""
     if bounds is not None:
+        low, high = bounds
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        fits = number and bounds[0] <= value <= bounds[1]  # type: ignore[operator]
-        return None if fits else f"a number from {bounds[0]:g} to {bounds[1]:g}"
-    for part in (kind, *get_args(kind)):
+        if number and low <= value <= high:  # type: ignore[operator]
+            return None
+        return f"a number from {low:g} to {high:g}"
+    for part in (kind,) + get_args(kind):
         if get_origin(part) is Literal:
             words = get_args(part)
-            return None if value in words else f"one of {', '.join(words)}"
-    if kind in (bool, str):
-        return None if isinstance(value, kind) else "true or false" if kind is bool else "text"
+            if value in words:
+                return None
+            return f"one of {', '.join(words)}"
+    if kind is bool and not isinstance(value, bool):
+        return "true or false"
+    if kind is str and not isinstance(value, str):
+        return "text"
     return None
 
 
@@ -122,7 +135,7 @@ class Settings:
         Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
     torque_hold : 'auto', 'foh' or 'zoh'
         Whether the torque moves evenly from sample to sample or is held from each to the next;
-        'auto' lets the logs tell.
+        'auto' lets the logs choose.
     delay : float, s, between torque and angle, where it is known; the term `delay` estimates it
     l1, l2 : float, m, link lengths where known
     payload_mass : float, kg, the payload's where it is known
@@ -211,23 +224,30 @@ class Settings:
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are known, in m."""
-        return {
-            name: value for name, value in (("l1", self.l1), ("l2", self.l2)) if value is not None
-        }
+        lengths = {}
+        if self.l1 is not None:
+            lengths["l1"] = self.l1
+        if self.l2 is not None:
+            lengths["l2"] = self.l2
+        return lengths
 
-    def torque_shift(self, found_delay: float | None = None) -> TorqueShift:
-        """After how long a logged torque acts: its hold, and the delay, found or set."""
-        delay = self.delay if found_delay is None else found_delay
+    def torque_shift(self, delay: float | None = None) -> TorqueShift:
+        """After how long a logged torque acts: its hold, and the `delay` in s, or the one set."""
+        if delay is None:
+            delay = self.delay
         return TorqueShift(self.torque_hold == "zoh", delay)
 
     def as_json(self) -> dict[str, Any]:
         """For `result.json`; complex poles as text, the paper's where none are set."""
         from algid.signals.observers import PAPER_POLES
 
-        poles = map(complex, self.poles or PAPER_POLES)
-        return asdict(self) | {
-            "poles": [pole.real if pole.imag == 0 else str(pole) for pole in poles]
-        }
+        poles: list[float | str] = []
+        for pole in self.poles or PAPER_POLES:
+            if pole.imag == 0:
+                poles.append(float(pole.real))
+            else:
+                poles.append(str(complex(pole)))
+        return asdict(self) | {"poles": poles}
 
     def _check_terms(self) -> None:
         from algid.model import CHOICES, EVERY_TERM
@@ -252,7 +272,7 @@ class Settings:
             )
         if sum(EVERY_TERM[term].timing is not None for term in self.terms) > 1:
             raise SettingError(
-                f"{flag('model')}: no log tells a delay from a lag beside it; leave one of them out"
+                f"{flag('model')}: no log separates a delay from a lag; leave one of them out"
             )
 
     def _refuse_what_it_lacks(self, estimator: Estimator) -> None:
@@ -286,7 +306,10 @@ def _without_short_forms(content: Mapping[str, Any]) -> dict[str, Any]:
     short = [term for (name, value), term in _SHORT_FORMS.items() if content.get(name) == value]
     if not short:
         return dict(content)
-    model = content.get("model", "auto")
-    listed = [] if model in ("auto", "plain") else [name.strip() for name in str(model).split(",")]
-    delay = 0.0 if content.get("delay") == "estimate" else content.get("delay", 0.0)
-    return {**content, "model": ",".join(dict.fromkeys([*listed, *short])), "delay": delay}
+    model, delay = content.get("model", "auto"), content.get("delay", 0.0)
+    terms = []
+    if model not in ("auto", "plain"):
+        terms = [name.strip() for name in str(model).split(",")]
+    if delay == "estimate":
+        delay = 0.0
+    return dict(content) | {"model": ",".join(dict.fromkeys(terms + short)), "delay": delay}

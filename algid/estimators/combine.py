@@ -1,4 +1,4 @@
-"""What logs tell about the shared parameters: quadratic likelihoods that add up.
+"""Information of logs on the shared parameters: quadratic likelihoods that add up.
 
 ======  ===================================================  =========  =================
 symbol  name                                                 shape      unit
@@ -8,7 +8,7 @@ g       score at the coefficients `c0`, by stretch           (B, q)     1 / unit
 ======  ===================================================  =========  =================
 
 Near c0 the log-likelihood is g·(c − c0) − ½ (c − c0)ᵀ S (c − c0). Both are kept by stretch, in
-bounded memory, because what the stretches disagree about tells the error that white noise does not
+bounded memory, because the stretches' disagreement shows the error that white noise does not
 explain. When the stretches become too many, neighbours are added up.
 """
 
@@ -68,22 +68,28 @@ class Prior:
         """The knowledge that an estimate `mean` (p,) with `covariance` (p, p) holds."""
         return cls(names, mean, scaled_pinv(covariance))
 
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Where its parameters stand among `names`."""
+        return [names.index(name) for name in self.names]
 
-_NOTHING = 1e-6  # standard deviation of what is absent, in its unit: far below what any log tells
+
+_NOTHING = 1e-6  # standard deviation of what is absent, in its unit: far below any estimate's
 
 
 def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
     """What is known beforehand where the parameters `absent` are nothing."""
     if not absent:
         return prior
-    names = tuple(name for name in (() if prior is None else prior.names) if name not in absent)
-    precision = np.diag([0.0] * len(names) + [_NOTHING**-2] * len(absent))
-    mean = np.zeros(len(names) + len(absent))
-    if prior is not None and names:
-        kept = [prior.names.index(name) for name in names]
-        mean[: len(names)] = prior.mean[kept]
-        precision[: len(names), : len(names)] = prior.precision[np.ix_(kept, kept)]
-    return Prior((*names, *absent), mean, precision, absent)
+    none = Prior(absent, np.zeros(len(absent)), np.diag([_NOTHING**-2] * len(absent)), absent)
+    if prior is None:
+        return none
+    kept = np.flatnonzero(~np.isin(prior.names, absent))
+    count = kept.size
+    precision = np.zeros((count + len(absent), count + len(absent)))
+    precision[:count, :count] = prior.precision[np.ix_(kept, kept)]
+    precision[count:, count:] = none.precision
+    names = tuple(name for name in prior.names if name not in absent) + absent
+    return Prior(names, np.append(prior.mean[kept], none.mean), precision, absent)
 
 
 def scaled_pinvs(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
@@ -152,7 +158,11 @@ def combine(
                 break
             continue
         gain = float(gradient @ step)
-        beta, damping = beta + step, damping / 10 if damping > 1e-6 else 0.0
+        beta = beta + step
+        if damping > 1e-6:
+            damping /= 10
+        else:
+            damping = 0.0
         value, gradient, S = likelihood(shared, logs, beta, prior)
         if gain < _DONE and damping == 0.0:
             break
@@ -198,7 +208,7 @@ def likelihood(
         gradient += T.T @ (log_g - log_S @ change)
         S += T.T @ log_S @ T
     if prior is not None:
-        places = [shared.names.index(name) for name in prior.names]
+        places = prior.places(shared.names)
         weight = prior.precision
         gradient[places] -= weight @ (beta[places] - prior.mean)
         S[np.ix_(places, places)] += weight
@@ -215,8 +225,7 @@ def _value(
         log_S, log_g = log.total
         value += float(log_g @ change - 0.5 * change @ log_S @ change)
     if prior is not None:
-        places = [shared.names.index(name) for name in prior.names]
-        change = beta[places] - prior.mean
+        change = beta[prior.places(shared.names)] - prior.mean
         value -= 0.5 * float(change @ prior.precision @ change)
     return value
 
@@ -247,7 +256,7 @@ def sandwich(
         meat += T.T @ variance @ T
         stretches += scores.shape[0] // (lags + 1)
     if prior is not None:
-        places = [shared.names.index(name) for name in prior.names]
+        places = prior.places(shared.names)
         meat[np.ix_(places, places)] += prior.precision
     freedom = max(2, stretches - len(shared.names))
     return meat * (max(stretches, freedom + 1) / freedom), freedom
@@ -258,25 +267,23 @@ def left_out(
 ) -> FloatArray:
     """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass."""
     estimates = np.empty((len(logs), len(shared.names)))
-    sums = {kind: _sum_of_rest(logs, kind) for kind in {log.loaded for log in logs}}
-    for kind, (_, without_each) in sums.items():
-        others = [whole for other, (whole, _) in sums.items() if other is not kind]
-        places = [place for place, log in enumerate(logs) if log.loaded is kind]
-        for place, rest in zip(places, without_each, strict=True):
-            left = [*others, rest] if len(places) > 1 else others
-            estimates[place] = combine(shared, left, beta, prior)[0]
+    loaded = np.array([log.loaded for log in logs])
+    for kind in (False, True):
+        others, _ = _by_kind([log for log in logs if log.loaded is not kind])
+        own = [log for log in logs if log.loaded is kind]
+        for place, rest in zip(np.flatnonzero(loaded == kind), _without_each(own), strict=True):
+            estimates[place] = combine(shared, list(others) + rest, beta, prior)[0]
     return estimates
 
 
-def _sum_of_rest(
-    logs: Sequence[LogInformation], loaded: bool
-) -> tuple[LogInformation, list[LogInformation]]:
-    """The likelihood of all logs of a kind in one sum, and without each of them.
+def _without_each(own: Sequence[LogInformation]) -> list[list[LogInformation]]:
+    """The likelihood of all logs of a kind but one, in one sum; none without the only one.
 
-    Without differences of sums: one log may tell 1e16 times as much as the others.
+    Without differences of sums: one log may inform 1e16 times as much as the others.
     """
-    own = [log for log in logs if log.loaded is loaded]
-    c0 = own[0].c0
+    if len(own) < 2:
+        return [[]] * len(own)
+    c0, loaded = own[0].c0, own[0].loaded
     S = np.stack([log.total[0] for log in own])
     g = np.stack([log.total[1] - log.total[0] @ (c0 - log.c0) for log in own])
 
@@ -286,9 +293,8 @@ def _sum_of_rest(
         after = np.cumsum(np.concatenate([nothing, parts[:0:-1]]), axis=0)[::-1]
         return before + after
 
-    every = LogInformation(loaded, c0, S.sum(axis=0)[None], g.sum(axis=0)[None])
     pairs = zip(rest(S), rest(g), strict=True)
-    return every, [LogInformation(loaded, c0, each[None], score[None]) for each, score in pairs]
+    return [[LogInformation(loaded, c0, each[None], score[None])] for each, score in pairs]
 
 
 FEWEST_LOGS = 4
@@ -310,9 +316,9 @@ def jackknife(logs: Sequence[LogInformation], without: FloatArray) -> FloatArray
     """
     if len(logs) < FEWEST_LOGS:
         return None
-    covariance = np.zeros((without.shape[1],) * 2)
-    for loaded in (False, True):
-        kind = without[[log.loaded is loaded for log in logs]]
+    covariance = np.zeros((without.shape[1], without.shape[1]))
+    loaded = np.array([log.loaded for log in logs])
+    for kind in (without[~loaded], without[loaded]):
         if len(kind) > 1:
             moved = kind - kind.mean(axis=0)
             covariance += (1 - 1 / len(kind)) * moved.T @ moved
@@ -344,7 +350,7 @@ class BlockSums:
             self._full, self._count = [], 0
             self._append(_added(sums[: sums.shape[0] - odd], 2))
             if odd:  # waits, as one entry of the old size, for its partner
-                filler = np.zeros((self._factor - 1, *sums.shape[1:]))
+                filler = np.zeros((self._factor - 1,) + sums.shape[1:])
                 self._rest = np.concatenate([sums[-1:], filler, self._rest])
             self._factor *= 2
 
@@ -358,8 +364,10 @@ class BlockSums:
         """
         if self._rest is None:
             raise ValueError("no blocks were added")
-        rest = [self._rest.sum(axis=0, keepdims=True)] if self._rest.shape[0] else []
-        return np.concatenate([*self._full, *rest])
+        parts = list(self._full)
+        if self._rest.shape[0]:
+            parts.append(self._rest.sum(axis=0, keepdims=True))
+        return np.concatenate(parts)
 
     def _append(self, sums: FloatArray) -> None:
         if sums.shape[0]:
@@ -368,7 +376,10 @@ class BlockSums:
 
 
 def _added(blocks: FloatArray, factor: int) -> FloatArray:
-    return blocks if factor == 1 else blocks.reshape(-1, factor, *blocks.shape[1:]).sum(axis=1)
+    """Sums of each `factor` blocks (b, ...) that follow one another."""
+    if factor == 1:
+        return blocks
+    return blocks.reshape((-1, factor) + blocks.shape[1:]).sum(axis=1)
 
 
 def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:
@@ -392,9 +403,8 @@ def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:
     usable = scores[:, power > 0] / np.sqrt(power[power > 0])
     rho = np.clip(np.sum(usable[1:] * usable[:-1], axis=0), -0.97, 0.97)
     # α(1) with unit weights: each score was scaled to unit power above.
-    persistence = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2)) / max(
-        np.sum(1 / (1 - rho) ** 4), 1e-300
-    )
+    numerator = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2))
+    persistence = numerator / max(np.sum(1 / (1 - rho) ** 4), 1e-300)
     lags = int(min(1.1447 * (persistence * count) ** (1 / 3), count / 4))
     total = scores.T @ scores
     for lag in range(1, lags + 1):

@@ -104,21 +104,24 @@ class Fit:
     @property
     def delay(self) -> float | None:
         """The torque's delay in s, where it is estimated."""
-        places = [self.names.index(name) for name in DELAYS if name in self.names]
-        return float(self.values[places[0]]) if places else None
+        for name in DELAYS:
+            if name in self.names:
+                return float(self.values[self.names.index(name)])
+        return None
 
     @property
     def absent(self) -> tuple[str, ...]:
         """Parameters that are nothing, by what the torque is said to hold."""
-        return () if self.prior is None else self.prior.absent
+        if self.prior is None:
+            return ()
+        return self.prior.absent
 
     @cached_property
     def std(self) -> FloatArray:
         """Standard deviations (Q,): infinite where a parameter is not identifiable."""
         std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return read_only(
-            np.where([status == "NOT_IDENTIFIABLE" for status in self.status], np.inf, std)
-        )
+        std[np.array(self.status) == "NOT_IDENTIFIABLE"] = np.inf
+        return read_only(std)
 
     @property
     def ci95(self) -> FloatArray:
@@ -128,11 +131,10 @@ class Fit:
 
     def marked(self, status: Status, names: Collection[str] | None = None) -> Fit:
         """The fit with `status` in the place of OK, for the parameters `names`, by default all."""
-        own = zip(self.names, self.status, strict=True)
-        marked = (
-            status if word == "OK" and (names is None or name in names) else word
-            for name, word in own
-        )
+        marked = list(self.status)
+        for place, name in enumerate(self.names):
+            if marked[place] == "OK" and (names is None or name in names):
+                marked[place] = status
         return replace(self, status=tuple(marked))
 
     @property
@@ -147,7 +149,7 @@ class Fit:
 
     def noted(self, note: Notice) -> Fit:
         """The fit with one more thing to say of it."""
-        return replace(self, notes=(*self.notes, note))
+        return replace(self, notes=self.notes + (note,))
 
     def spread(self, share: FloatArray) -> float:
         """Standard deviation of the sum `share` (Q,) @ values.
@@ -189,15 +191,16 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
         alone = [replace(log, loaded=False)]
         values, S, _ = combine(shared, alone, log.c0, fit.shrinkage)
         known = examine(fit.shared.log_names, values, S, fit.moved)
-        meat, _ = sandwich(shared, alone, values, fit.shrinkage)
-        covariance = (
-            known.covariance @ meat @ known.covariance
-            if fit.intervals != "likelihood"
-            else known.covariance
-        )
+        covariance = known.covariance
+        if fit.intervals != "likelihood":
+            meat, _ = sandwich(shared, alone, values, fit.shrinkage)
+            covariance = covariance @ meat @ covariance
         std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
         estimates.append(OwnEstimate(log.loaded, values, std))
     return tuple(estimates)
+
+
+_STATUS: dict[bool, Status] = {True: "OK", False: "NOT_IDENTIFIABLE"}
 
 
 def conclude(
@@ -239,18 +242,22 @@ def conclude(
     parameters.
     """
     beta, S, _ = combine(shared, logs, beta, prior)
-    known = examined(shared.names, beta, S, moved, () if prior is None else prior.absent)
+    absent: tuple[str, ...] = ()
+    if prior is not None:
+        absent = prior.absent
+    known = examined(shared.names, beta, S, moved, absent)
     covariance, quantile = known.covariance, NORMAL
     intervals: Intervals = "likelihood"
     freedom = samples
     if coloured:
         meat, freedom = sandwich(shared, logs, beta, prior)
-        robust = known.covariance @ meat @ known.covariance
-        # The long-run variance of a short log errs low; white noise alone is the least there can
-        # be.
-        covariance = robust if estimator != "refined" else widened(robust, covariance)
+        covariance = known.covariance @ meat @ known.covariance
+        if estimator == "refined":
+            # The long-run variance of a short log errs low: white noise is the least there is.
+            covariance = widened(covariance, known.covariance)
         squares, intervals = float(freedom), "sandwich"
-        without = left_out(shared, logs, beta, prior) if without is None else without
+        if without is None:
+            without = left_out(shared, logs, beta, prior)
         repeated = jackknife(logs, without)
         if repeated is not None:
             within, covariance, intervals = covariance, widened(covariance, repeated), "jackknife"
@@ -264,7 +271,7 @@ def conclude(
         intervals=intervals,
         quantile=quantile,
         freedom=freedom,
-        status=tuple("OK" if yes else "NOT_IDENTIFIABLE" for yes in known.determined),
+        status=tuple(_STATUS[determined] for determined in known.determined),
         unidentifiable=known.left_open,
         logs=tuple(logs),
         prior=prior,
@@ -287,9 +294,9 @@ def examined(
     of_free = examine([names[place] for place in free], beta[free], S[np.ix_(free, free)], moved)
     covariance = np.zeros_like(S)
     covariance[np.ix_(free, free)] = of_free.covariance
-    determined = dict(zip(free, of_free.determined, strict=True))
-    every = tuple(determined.get(place, True) for place in range(len(names)))
-    return Identifiability(of_free.left_open, every, covariance)
+    determined = np.ones(len(names), dtype=bool)
+    determined[free] = of_free.determined
+    return Identifiability(of_free.left_open, tuple(determined.tolist()), covariance)
 
 
 def _satterthwaite(
@@ -300,18 +307,17 @@ def _satterthwaite(
     The rest has as many as there are logs of each kind, less one.
     """
     known = np.diag(wide) > 0
-    share = (
-        float(np.mean(1 - np.diag(within)[known] / np.diag(wide)[known])) if known.any() else 0.0
-    )
-    repeats = sum(max(0, sum(log.loaded is loaded for log in logs) - 1) for loaded in (False, True))
+    share = 0.0
+    if known.any():
+        share = float(np.mean(1 - np.diag(within)[known] / np.diag(wide)[known]))
+    kinds = {log.loaded for log in logs}
+    repeats = len(logs) - len(kinds)
     return float(1 / (share**2 / max(1, repeats) + (1 - share) ** 2 / max(1, freedom)))
 
 
 def widened(robust: FloatArray, least: FloatArray) -> FloatArray:
     """The covariance `robust` (Q, Q), no standard deviation below that of `least`."""
-    size, floor = (
-        np.sqrt(np.maximum(np.diag(robust), 0.0)),
-        np.sqrt(np.maximum(np.diag(least), 0.0)),
-    )
+    size = np.sqrt(np.maximum(np.diag(robust), 0.0))
+    floor = np.sqrt(np.maximum(np.diag(least), 0.0))
     factor = np.divide(np.maximum(size, floor), size, out=np.ones_like(size), where=size > 0)
     return robust * np.outer(factor, factor)

@@ -9,7 +9,7 @@ it mixes: the information matrix is scaled by the largest parameter of each phys
 The error bars of the likelihood suppose innovations that are white and Gaussian: Ljung & Box's
 test on those of each joint, as they are and summed over 16 and 64 samples, so that slow colour is
 seen as well as fast. The smallest p-value counts three times over (Bonferroni), and a correlation
-too faint to matter counts as none. The excess kurtosis tells heavy tails.
+too faint to matter counts as none. The excess kurtosis shows heavy tails.
 
 ======  ===================================================  ===============  ===============
 symbol  name                                                 shape            unit
@@ -38,10 +38,6 @@ from algid.notices import Notice
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
 from algid.significance import LEVEL
 
-_SCALES = tuple(
-    (scale, tuple(name for name, one in PARAMETERS.items() if one.scale is scale))
-    for scale in dict.fromkeys(one.scale for one in PARAMETERS.values())
-)
 # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be
 # known
 _DAMPING = 0.1
@@ -82,9 +78,8 @@ def examine(
     eigenvalues, vectors, lost = _spectrum(S, size)
     null = vectors[:, lost]
     part = np.sqrt(np.sum(null**2, axis=1))
-    determined = tuple(bool(share < _SHARE) for share in part)
-    # A direction that the logs hardly tell is as wide here as it is: what it mixes with is that
-    # unsure.
+    determined = tuple((part < _SHARE).tolist())
+    # A direction of little information is as wide here as it is: what it mixes with is as unsure.
     inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
     return Identifiability(
         tuple(_left_open(names, null, size, moved)), determined, inverse * np.outer(size, size)
@@ -110,11 +105,8 @@ def _spectrum(S: FloatArray, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     """Eigenvalues and vectors of the information scaled by the sizes, and which count as zero."""
     scaled = S * np.outer(size, size)
     eigenvalues, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    return (
-        eigenvalues,
-        vectors,
-        eigenvalues < max(1 / UNDETERMINED**2, _NOTHING * float(eigenvalues[-1])),
-    )
+    least = max(1 / UNDETERMINED**2, _NOTHING * float(eigenvalues[-1]))
+    return eigenvalues, vectors, eigenvalues < least
 
 
 def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
@@ -122,36 +114,33 @@ def sizes(names: Sequence[str], values: FloatArray) -> FloatArray:
 
     That of viscous friction is a share of critical damping.
     """
-    by_name = dict(zip(names, np.abs(values).tolist(), strict=True))
-
-    def largest_of(members: Sequence[str]) -> float:
-        return max((by_name[name] for name in members if name in by_name), default=0.0)
-
-    sized = {scale: largest_of(members) for scale, members in _SCALES}
-    inertia, moment = (
-        largest_of([n for n in RIGID if PARAMETERS[n].scale is scale])
-        for scale in (INERTIA, MOMENT)
-    )
+    scales = [PARAMETERS[name].scale for name in names]
+    sized = dict.fromkeys(scales + [VISCOUS], 0.0)
+    inertia = moment = 0.0  # the largest of the arm's own
+    for name, scale, value in zip(names, scales, np.abs(values).tolist(), strict=True):
+        sized[scale] = max(sized[scale], value)
+        if name in RIGID and scale is INERTIA:
+            inertia = max(inertia, value)
+        elif name in RIGID and scale is MOMENT:
+            moment = max(moment, value)
     # With both lengths known the torque is linear in the payload, which may be none, and that be
-    # known: its size is
-    # that of a mass which at 1 m loads the arm as much as it loads itself.
-    if any(PARAMETERS[name].scale is MASS for name in names) and not any(
-        PARAMETERS[n].scale is LENGTH for n in names
-    ):
+    # known: its size is that of a mass which at 1 m loads the arm as much as it loads itself.
+    if MASS in scales and LENGTH not in scales:
         sized[MASS] = max(sized[MASS], moment / 9.81, inertia)
     sized[VISCOUS] = max(sized[VISCOUS], _DAMPING * float(np.sqrt(inertia * moment)))
-    return np.array(
-        [max(sized[scale], scale.least) for scale in (PARAMETERS[name].scale for name in names)]
-    )
+    return np.array([max(sized[scale], scale.least) for scale in scales])
 
 
 def _left_open(
     names: Sequence[str], null: FloatArray, size: FloatArray, moved: FloatArray
 ) -> Iterator[Notice]:
     """What the directions `null` leave open; `moved` (2,) in rad is why."""
-    still = [joint + 1 for joint in range(2) if moved[joint] < STILL]
-    why = f": joint {still[0]} never moved" if still else ""
-    why = ": neither joint moved" if len(still) == 2 else why
+    still = moved < STILL
+    why = ""
+    if still.all():
+        why = ": neither joint moved"
+    elif still.any():
+        why = f": joint {int(np.argmax(still)) + 1} never moved"
     for group in _groups(null):
         part = null[group]
         together = [names[row] for row in group]
@@ -168,22 +157,22 @@ def _left_open(
 
 
 def _open(case: str, names: Sequence[str], why: str, **numbers: float) -> Notice:
-    return Notice("OPEN_DIRECTION", numbers={"case": case, "names": names, "why": why, **numbers})
+    numbers_and_names = {"case": case, "names": names, "why": why} | numbers
+    return Notice("OPEN_DIRECTION", numbers=numbers_and_names)
 
 
 def _groups(null: FloatArray) -> list[list[int]]:
     """Rows that share an undetermined direction."""
     projector = null @ null.T
-    rest = [row for row in range(null.shape[0]) if np.sqrt(projector[row, row]) >= _SHARE]
+    rest = np.flatnonzero(np.sqrt(np.diag(projector)) >= _SHARE).tolist()
     groups: list[list[int]] = []
     while rest:
-        group, queue = [], [rest.pop(0)]
-        while queue:
-            row = queue.pop()
-            group.append(row)
+        group = [rest.pop(0)]
+        for row in group:  # which grows as rows that are linked to it are found
             linked = [other for other in rest if abs(projector[row, other]) >= _SHARE**2]
-            rest = [other for other in rest if other not in linked]
-            queue += linked
+            for other in linked:
+                rest.remove(other)
+            group += linked
         groups.append(sorted(group))
     return groups
 
@@ -252,16 +241,17 @@ def correlations(w: FloatArray) -> Correlations:
     counts, products = [], []
     for scale in SCALES:
         whole = w.shape[1] // scale
-        x = (
-            w
-            if scale == 1
-            else w[:, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
-        )
+        x = w
+        if scale > 1:
+            x = w[:, : whole * scale].reshape(2, whole, scale).sum(axis=2) / np.sqrt(scale)
         counts.append(float(whole))
-        products.append(
-            [[row[lag:] @ row[: max(0, whole - lag)] for lag in range(_LAGS + 1)] for row in x]
-        )
+        products.append([_lag_products(x[0]), _lag_products(x[1])])
     return Correlations(np.array(counts), np.array(products), np.sum(w**4, axis=1))
+
+
+def _lag_products(x: FloatArray) -> list[float]:
+    """Sums of the products of x (n,) with itself, 0 to `_LAGS` samples later."""
+    return [float(x[lag:] @ x[: max(0, x.size - lag)]) for lag in range(_LAGS + 1)]
 
 
 def judge(sums: Correlations) -> Whiteness:
@@ -286,9 +276,8 @@ def judge(sums: Correlations) -> Whiteness:
     n = sums.count[:, None, None]
     lags = np.arange(1, _LAGS + 1)
     tested = lags < n / 4
-    statistic = np.sum(
-        np.where(tested, n * (n + 2) * rho**2 / np.maximum(n - lags, 1), 0.0), axis=2
-    )
+    terms = n * (n + 2) * rho**2 / np.maximum(n - lags, 1)
+    statistic = np.sum(np.where(tested, terms, 0.0), axis=2)
     p = chi2_tail(np.maximum(tested.sum(axis=2), 1), statistic)
     # In a long log the least colour is significant; one this faint does not move an error bar.
     faint = np.sqrt(np.mean(rho**2, axis=2)) < _FAINT
@@ -296,5 +285,5 @@ def judge(sums: Correlations) -> Whiteness:
     variance = power[0, :, 0] / sums.count[0]
     kurtosis = sums.fourth / sums.count[0] / variance**2 - 3
     heavy = (kurtosis > _HEAVY) & (kurtosis > _TAILS * np.sqrt(24 / sums.count[0]))
-    white = [bool(p_value[joint] >= LEVEL and not heavy[joint]) for joint in range(2)]
-    return Whiteness(p_value, rho[0, :, 0], kurtosis, (white[0], white[1]))
+    first, second = ((p_value >= LEVEL) & ~heavy).tolist()
+    return Whiteness(p_value, rho[0, :, 0], kurtosis, (first, second))

@@ -75,11 +75,17 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
 def _prediction_columns(
     piece: Segment, omega: FloatArray, predicted: FloatArray
 ) -> dict[str, FloatArray]:
-    columns = {"theta": piece.theta, "omega": omega, "tau": piece.tau}
-    flat = {
-        f"{name}{joint + 1}": value[joint] for name, value in columns.items() for joint in range(2)
+    return {
+        "t": piece.t,
+        "theta1": piece.theta[0],
+        "theta2": piece.theta[1],
+        "omega1": omega[0],
+        "omega2": omega[1],
+        "tau1": piece.tau[0],
+        "tau2": piece.tau[1],
+        "tau1_predicted": predicted[0],
+        "tau2_predicted": predicted[1],
     }
-    return {"t": piece.t, **flat, "tau1_predicted": predicted[0], "tau2_predicted": predicted[1]}
 
 
 def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
@@ -90,12 +96,8 @@ def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
     """
     outstretched = np.abs(np.diag(inertia(model, c, np.zeros((2, 1)))[..., 0]))
     allowed = NOISE_SHARE * np.sqrt(np.mean(piece.tau**2, axis=1))
-    noise = (
-        outstretched
-        * first_guess(piece.theta, piece.tau).theta
-        * np.sqrt(0.4 * piece.dt)
-        * (2 * np.pi) ** 2
-    )
+    sigma = first_guess(piece.theta, piece.tau).theta
+    noise = outstretched * sigma * np.sqrt(0.4 * piece.dt) * (2 * np.pi) ** 2
     sharpest = (allowed / np.maximum(noise, 1e-300)) ** 0.4
     return float(np.clip(sharpest.min(), LOWEST, min(HIGHEST, 0.1 / piece.dt)))
 
@@ -114,10 +116,12 @@ def scored_blocks(
     by = PredictionFilter()
     for number, log in enumerate(survey.logs):
         for piece in scored_torque(model, coefficients[log.role], survey.segments(log), shift, by):
-            dt = float(piece.t[1] - piece.t[0]) if piece.t.size > 1 else 1.0
-            each = slice(None, None, max(1, int(1 / (SCORED_RATE * by.cutoff * dt))))
-            measured, predicted = piece.measured[:, each], piece.predicted[:, each]
-            t = piece.t[each]
+            step = 1
+            if piece.t.size > 1:
+                dt = float(piece.t[1] - piece.t[0])
+                step = max(1, int(1 / (SCORED_RATE * by.cutoff * dt)))
+            measured, predicted = piece.measured[:, ::step], piece.predicted[:, ::step]
+            t = piece.t[::step]
             yield {
                 "log": np.full(t.size, number, dtype=np.int32),
                 "t": t,
@@ -149,8 +153,9 @@ def write_columns(
                 writer = pyarrow.parquet.ParquetWriter(
                     path, schema, compression="zstd", use_dictionary=False
                 )
-            alike = table.schema.equals(writer.schema)  # to cast imports all of pyarrow's functions
-            writer.write_table(table if alike else table.cast(writer.schema))
+            if not table.schema.equals(writer.schema):
+                table = table.cast(writer.schema)  # which imports all of pyarrow's functions
+            writer.write_table(table)
     finally:
         if writer is not None:
             writer.close()
@@ -175,10 +180,8 @@ def series_blocks(
 
 def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
     values = np.concatenate([window.values for window in windows], axis=1)
-    return {
-        "t": np.concatenate([window.t for window in windows]),
-        **dict(zip(names, values, strict=True)),
-    }
+    columns = {"t": np.concatenate([window.t for window in windows])}
+    return columns | dict(zip(names, values, strict=True))
 
 
 def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:
@@ -190,31 +193,25 @@ def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[st
         second = np.floor(t)
         starts = np.flatnonzero(np.diff(second, prepend=-1.0))
         summed = np.add.reduceat(gains, starts, axis=1)
-        yield {
-            "log": np.full(starts.size, number, dtype=np.int32),
-            "t": second[starts],
-            **dict(zip(fit.names, summed, strict=True)),
-        }
+        columns = {"log": np.full(starts.size, number, dtype=np.int32), "t": second[starts]}
+        yield columns | dict(zip(fit.names, summed, strict=True))
 
 
 def running_columns(fit: Fit, durations: Sequence[float]) -> dict[str, FloatArray]:
     """Each shared parameter by time of each log, half its 95 % interval, from all logs so far."""
     course = running(fit, durations)
     lengths = np.array(durations)[course.log]
-    return {
-        "log": course.log,
-        "t": course.share * lengths,
-        **{name: course.beta[:, place] for place, name in enumerate(fit.names)},
-        **{f"{name}_half": course.half[:, place] for place, name in enumerate(fit.names)},
-    }
+    columns = {"log": course.log, "t": course.share * lengths}
+    columns |= dict(zip(fit.names, course.beta.T, strict=True))
+    for name, half in zip(fit.names, course.half.T, strict=True):
+        columns[f"{name}_half"] = half
+    return columns
 
 
-WHITE_SPECTRUM, SPECTRUM, TORQUE_SPECTRUM, AUTOCORRELATION = (
-    "whitened spectrum",
-    "spectrum",
-    "torque spectrum",
-    "autocorrelation",
-)
+WHITE_SPECTRUM = "whitened spectrum"
+SPECTRUM = "spectrum"
+TORQUE_SPECTRUM = "torque spectrum"
+AUTOCORRELATION = "autocorrelation"
 
 
 def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str, object]]:
@@ -227,17 +224,15 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
     kinds: list[tuple[str, FloatArray, FloatArray, FloatArray, FloatArray]] = []
     if whitened:
         spectrum = whiteness_of(sums)
-        low, high = (
-            np.broadcast_to(one, spectrum.density.shape) for one in (spectrum.low, spectrum.high)
-        )
+        low = np.broadcast_to(spectrum.low, spectrum.density.shape)
+        high = np.broadcast_to(spectrum.high, spectrum.density.shape)
         kinds.append((WHITE_SPECTRUM, spectrum.frequency, spectrum.density, low, high))
     else:
         spectrum = spectra(sums)
         nowhere = np.full((2, spectrum.frequency.size), np.nan)
-        kinds += [
-            (kind, spectrum.frequency, spectrum.density[rows], nowhere, nowhere)
-            for kind, rows in ((SPECTRUM, slice(0, 2)), (TORQUE_SPECTRUM, slice(2, 4)))
-        ]
+        residual, of_torque = spectrum.density[:2], spectrum.density[2:]
+        kinds.append((SPECTRUM, spectrum.frequency, residual, nowhere, nowhere))
+        kinds.append((TORQUE_SPECTRUM, spectrum.frequency, of_torque, nowhere, nowhere))
     r = autocorrelation(sums)
     kinds.append((AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half))
     for kind, x, values, low, high in kinds:
@@ -263,9 +258,9 @@ def write_fit_series(
     """
     summaries = [survey.summary(log) for log in survey.logs]
     starts = [summary.start_ns for summary in summaries]
-    coefficients: dict[str, FloatArray] = {
-        role: torque_coefficients(fit, role) for role in {log.role for log in survey.logs}
-    }
+    coefficients: dict[str, FloatArray] = {}
+    for log in survey.logs:
+        coefficients[log.role] = torque_coefficients(fit, log.role)
     model, shift = fit.shared.model, torque_shift(settings, fit)
     torques = torque_blocks(survey, model, coefficients, shift)
     write_columns(folder / "torque.parquet", torques, starts)
@@ -273,7 +268,7 @@ def write_fit_series(
         folder / "scored.parquet", scored_blocks(survey, model, coefficients, shift), starts
     )
     durations = [summary.duration for summary in summaries]
-    # a log too short for a window is in no fit, and nobody tells which it is
+    # a log too short for a window is in no fit, and which it is nobody knows
     every = len(fit.logs) == len(summaries)
     if every:
         write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
+from math import ceil
 from typing import TYPE_CHECKING
 
 from algid.identification.source import LogSource, refuse_shared_torques
@@ -77,7 +78,10 @@ class Survey:
 
     def begin(self, stage: str, logs: Sequence[LogSource] | None = None) -> None:
         """The passes from here on are over `logs`, by default all, and of that stage."""
-        self._stage, self._over, self._words = stage, self.logs if logs is None else tuple(logs), ""
+        self._stage, self._words = stage, ""
+        self._over = self.logs
+        if logs is not None:
+            self._over = tuple(logs)
 
     def segments(self, log: LogSource) -> Iterator[Segment]:
         """A fresh pass over a log: its uniform segments, from its start.
@@ -88,11 +92,11 @@ class Survey:
         """
         rows = 0
         if log in self._kept:
-            self._tell(log, 0)
+            self._report(log, 0)
             for piece in self._kept[log]:
                 yield piece
                 rows += len(piece)
-                self._tell(log, rows)
+                self._report(log, rows)
             return
         held: list[Segment] = []
         for piece in self._sound(log):
@@ -107,7 +111,7 @@ class Survey:
             self._room -= rows
 
     def _sound(self, log: LogSource) -> Iterator[Segment]:
-        """The segments of a pass, without what a limit cuts off: the first block tells it."""
+        """The segments of a pass, without what a limit cuts off, which the first block shows."""
         from algid.estimators.saturation import sound
 
         passing = segments(self._counted(log))
@@ -132,11 +136,12 @@ class Survey:
             self._conventions = {}
             for kind in (self.unloaded, self.loaded):
                 self._conventions |= self._judged(kind)
-        found = self._conventions.get(log)
-        if found is None:
+        convention = self._conventions.get(log)
+        if convention is None:
             return seen
-        of_gravity = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")  # found says it better
-        return (*(one for one in seen if one.code not in of_gravity), found)
+        # what is less precise than the convention
+        of_gravity = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
+        return tuple(one for one in seen if one.code not in of_gravity) + (convention,)
 
     def _judged(self, logs: Sequence[LogSource]) -> dict[LogSource, Notice]:
         """What is wrong with the conventions of each of several logs."""
@@ -148,8 +153,11 @@ class Survey:
         if not known:
             return {}
         gravity = _weight(known[0][0]) > 0
-        found = zip(known, mends(known, gravity=gravity), strict=True)
-        return {log: one.notice for (log, _), one in found if one is not None}
+        wrong = {}
+        for (log, _), mend in zip(known, mends(known, gravity=gravity), strict=True):
+            if mend is not None:
+                wrong[log] = mend.notice
+        return wrong
 
     def _checked(self, log: LogSource, begin: Log, *, whole: bool) -> tuple[Notice, ...]:
         """What the named checks find at the `begin` of a log."""
@@ -163,33 +171,38 @@ class Survey:
         gravity, alone = _weight(log), len(alike) == 1
         known = saturation(begin, gravity=gravity, effort=log.effort)
         self._limits[log] = known.limits
-        found = noticed(
+        notices = noticed(
             begin, gravity=gravity, effort=log.effort, whole=whole, alone=alone, known=known
         )
         if alone:
-            if any(one.code in CONTRADICTIONS for one in found):
+            if any(one.code in CONTRADICTIONS for one in notices):
                 self._limits[log] = ()  # of an arm that is not this one
-            return found
+            return notices
         kept = None
-        if log.effort != "external" and log in alike[:: -(-len(alike) // MOST_LOGS)]:
+        if log.effort != "external" and log in alike[:: ceil(len(alike) / MOST_LOGS)]:
             kept = recorded(begin, seconds_of_each(len(alike)))
         if kept is not None:
             self._recorded[log] = kept
-        return found
+        return notices
 
     def summary(self, log: LogSource) -> LogSummary:
         """The log as a result names it."""
         seen = self.seen(log)
         duration = (seen.last_ns - seen.first_ns) * 1e-9
+        rate, digest = 0.0, None
+        if duration > 0:
+            rate = (seen.rows - 1) / duration
+        if log in self._digests:
+            digest = self._digests[log].result()
         return LogSummary(
             path=log.name,
-            sha256=self._digests[log].result() if log in self._digests else None,
+            sha256=digest,
             role=log.role,
             format=log.origin.format,
             rows=seen.rows,
             start_ns=seen.first_ns,
             duration=duration,
-            rate=(seen.rows - 1) / duration if duration > 0 else 0.0,
+            rate=rate,
             mapping=dict(log.origin.mapping),
             reading=log.origin.reading,
         )
@@ -206,12 +219,14 @@ class Survey:
         rows, first_ns, last_ns = 0, 0, 0
         notices: list[Notice] = list(log.notices)
         counted: Counted | None = None
-        self._tell(log, 0)
+        self._report(log, 0)
         for block, alone in _with_end(log.blocks(), log.promised):
             if len(block) and not rows:
                 first_ns = int(block.stamp_ns[0])
                 if log not in self._findings:
-                    begin = block if alone else block.part(0, EXAMINED)
+                    begin = block
+                    if not alone:
+                        begin = block.part(0, EXAMINED)
                     self._findings[log] = self._checked(log, begin, whole=alone)
                 notices += self._findings[log]
                 counted = Counted(self._limits.get(log, ()))
@@ -222,32 +237,45 @@ class Survey:
             rows += len(block)
             notices += block.notices
             yield block
-            self._tell(log, rows)
+            self._report(log, rows)
         if counted is not None:
             notices += counted.notices(log.origin)
         self._seen.setdefault(log, Seen(rows, first_ns, last_ns, tuple(notices)))
 
-    def _tell(self, log: LogSource, rows: int) -> None:
+    def _report(self, log: LogSource, rows: int) -> None:
         """A pass over `log` has come as far as `rows` samples; 0 starts one.
 
         The first over a log reads it.
         """
         if self.progress is None:
             return
-        words = self._stage if log in self._seen else "reading"
+        words = "reading"
+        if log in self._seen:
+            words = self._stage
         if words != self._words or (rows == 0 and log in self._done):
             self._words, self._done = words, {}
         self._done[log] = rows
-        expected = [
-            self._seen[one].rows if one in self._seen else one.promised for one in self._over
-        ]
-        self.progress(words, sum(self._done.values()), sum(expected) if all(expected) else 0)
+        self.progress(words, sum(self._done.values()), self._expected())
+
+    def _expected(self) -> int:
+        """Samples of the logs that the passes are over; 0 where one does not say how many."""
+        expected = 0
+        for log in self._over:
+            rows = log.promised
+            if log in self._seen:
+                rows = self._seen[log].rows
+            if not rows:
+                return 0
+            expected += rows
+        return expected
 
 
 def _weight(log: LogSource) -> float:
     """Gravity in m/s² in the log's torque; no driver compensates for that of a payload."""
     weightless = log.effort in ("gravity-compensated", "external") and log.role == "unloaded"
-    return 0.0 if weightless else log.gravity
+    if weightless:
+        return 0.0
+    return log.gravity
 
 
 def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]]:
@@ -257,7 +285,11 @@ def _with_end(blocks: Iterator[Log], promised: int) -> Iterator[tuple[Log, bool]
     a reader refuses a log of which it would have to drop half.
     """
     for first in islice(blocks, 1):
-        waited = [] if promised > 2 * len(first) else list(islice(blocks, 1))
-        yield first, not waited and promised <= 2 * len(first)
-        for block in chain(waited, blocks):
+        if promised > 2 * len(first):
+            yield first, False
+        else:
+            waited = list(islice(blocks, 1))
+            yield first, not waited
+            blocks = chain(waited, blocks)
+        for block in blocks:
             yield block, False
