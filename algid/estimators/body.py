@@ -6,7 +6,7 @@ logs say of them follows from the quadratic likelihoods of a fit, without a furt
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from algid.estimators.combine import likelihood
 from algid.estimators.fit import Fit, conclude
+from algid.estimators.parametrisation import BODY_PARAMETERS
 from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
 from algid.physics.parameters import BODY
@@ -24,7 +25,7 @@ FALSE = 0.05
 
 
 def with_body(fit: Fit) -> Fit:
-    """The fit with the payload's offset and inertia, as far as its logs tell them.
+    """The fit with the payload's offset and inertia, as far as its logs determine them.
 
     Parameters
     ----------
@@ -41,15 +42,18 @@ def with_body(fit: Fit) -> Fit:
         return fit
     names, worth = _candidates(fit)
     for count in range(len(names), 0, -1):
-        fits = [with_body_of(fit, chosen) for chosen in combinations(names, count)]
-        worthy = [one for one in fits if _least_worth(one) > worth]
+        worthy = []
+        for chosen in combinations(names, count):
+            candidate = with_body_of(fit, chosen)
+            if min(_worths(candidate)) > worth:
+                worthy.append(candidate)
         if worthy:
             return max(worthy, key=_likelihood)
-    return with_body_of(fit, ()) if fit.shared.body else fit
+    return with_body_of(fit, ())
 
 
 def averaged_over_bodies(fit: Fit) -> Fit:
-    """The fit with what the payload may have beside the chosen, where logs hardly tell that.
+    """The fit averaged over what else the payload may have, where logs hardly determine that.
 
     What is left out biases mass and lengths by up to its own error, which no interval of the
     smaller model holds. The models that have more of the body are therefore averaged with it, each
@@ -66,25 +70,31 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     """
     if not fit.shared.payload or not fit.converged:
         return fit
-    others = [name for name in _candidates(fit)[0] if name not in fit.shared.body]
     values, covariances, weights = [fit.values], [fit.covariance], [1.0]
-    for count in range(1, len(others) + 1):
-        for more in combinations(others, count):
-            body = [one.name for one in BODY if one.name in (*fit.shared.body, *more)]
-            other = with_body_of(fit, body)
-            weight = _weight(other, more)
-            if weight > 0:
-                places = [other.names.index(name) for name in fit.names]
-                values.append(other.values[places])
-                covariances.append(other.covariance[np.ix_(places, places)])
-                weights.append(weight)
+    for body in _larger_bodies(fit):
+        other = with_body_of(fit, body)
+        weight = _weight(other, [name for name in body if name not in fit.shared.body])
+        if weight > 0:
+            places = [other.names.index(name) for name in fit.names]
+            values.append(other.values[places])
+            covariances.append(other.covariance[np.ix_(places, places)])
+            weights.append(weight)
     w = np.array(weights) / sum(weights)
     beta = w @ np.array(values)
     apart = np.array(values) - beta
-    mixed = np.einsum("i,iab->ab", w, np.array(covariances)) + np.einsum(
-        "i,ia,ib->ab", w, apart, apart
-    )
+    mixed = np.einsum("i,iab->ab", w, np.array(covariances))
+    mixed += np.einsum("i,ia,ib->ab", w, apart, apart)
     return replace(fit, values=beta, covariance=mixed)
+
+
+def _larger_bodies(fit: Fit) -> Iterator[list[str]]:
+    """Sets of parameters of the body that hold those of the fit and more, the smallest first."""
+    names, _ = _candidates(fit)
+    others = [name for name in names if name not in fit.shared.body]
+    for count in range(1, len(others) + 1):
+        for more in combinations(others, count):
+            own = fit.shared.body + more
+            yield [name for name in BODY_PARAMETERS if name in own]
 
 
 _MOST = 100.0  # W / 2, beyond which a weight is all there is
@@ -106,9 +116,15 @@ def _candidates(fit: Fit) -> tuple[list[str], float]:
     An offset shows in the sine parts alone. `FALSE` is shared evenly by the tails: an offset has
     two, an inertia, which is positive, has one.
     """
-    across = bool(set(SINES) & set(fit.shared.log_names))
-    names = [one.name for one in BODY if across or one.sign == "+"]
-    tails = sum(1 if one.sign == "+" else 2 for one in BODY if one.name in names)
+    across = not set(SINES).isdisjoint(fit.shared.log_names)
+    names, tails = [], 0
+    for one in BODY:
+        if one.sign == "+":
+            names.append(one.name)
+            tails += 1
+        elif across:
+            names.append(one.name)
+            tails += 2
     return names, sigmas(FALSE, tails, sides=1) ** 2
 
 
@@ -136,14 +152,13 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
             coloured=coloured,
             samples=fit.freedom,
         )
-    before = dict(zip(fit.names, fit.status, strict=True))
-    statuses = zip(changed.names, changed.status, strict=True)
-    status = tuple(
-        own if before.get(name, "OK") == "OK" else before[name] for name, own in statuses
-    )
+    status = list(changed.status)
+    for name, before in zip(fit.names, fit.status, strict=True):
+        if before != "OK" and name in changed.names:
+            status[changed.names.index(name)] = before
     return replace(
         changed,
-        status=status,
+        status=tuple(status),
         noise=fit.noise,
         whiteness=fit.whiteness,
         residual=fit.residual,
@@ -156,7 +171,7 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
 def _worths(fit: Fit) -> list[float]:
     """Wald statistics of the body's parameters.
 
-    Nothing of what no object at the tip has, or the logs leave open.
+    0 of what no object at the tip has, or the logs leave open.
 
     An inertia is positive, and its radius of gyration no longer than joint 2 is away.
     """
@@ -167,13 +182,12 @@ def _worths(fit: Fit) -> list[float]:
     for name in fit.shared.body:
         place = fit.names.index(name)
         value, std = float(fit.values[place]), float(fit.std[place])
-        worths.append((value / std) ** 2 if std > 0 and np.isfinite(std) else 0.0)
+        worth = 0.0
+        if std > 0 and np.isfinite(std):
+            worth = (value / std) ** 2
+        worths.append(worth)
     return worths
 
 
 def _likelihood(fit: Fit) -> float:
     return likelihood(fit.shared, fit.logs, fit.values, fit.prior)[0]
-
-
-def _least_worth(fit: Fit) -> float:
-    return min(_worths(fit))

@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from algid.arm import FloatArray
 from algid.criteria import STILL
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import joints_apart
 from algid.estimators.fit import Fit
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.weak import Normal, Source, WeakSettings
 from algid.model import RIGID, UNITS
 from algid.notices import Notice
 
@@ -38,7 +39,9 @@ def doubted(
     if len(fit.logs) >= FEWEST_LOGS:
         return fit
     doubt = _doubt(fit, unloaded, loaded, settings)
-    return fit if doubt is None else fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
+    if doubt is None:
+        return fit
+    return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
 LEAST_ACTING = 0.02
@@ -68,42 +71,54 @@ def doubted_without_motor(
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
-        every = [weak.normal_equations(source, settings, c) for source in sources]
-        grams = [normal.gram.sum(axis=0) for normal in every if normal is not None]
-        for joint in range(2) if grams else ():
-            gram = np.sum([one[joint] for one in grams], axis=0)
-            acting = float(np.diag(gram)[:-1] @ c**2)
-            power = float(np.sum([one[1 - joint, -1, -1] for one in grams]))
-            if gram[-1, -1] == 0 and acting < LEAST_ACTING**2 * power:
-                said = Notice("MOTORLESS_UNTOLD", numbers={"joint": joint + 1})
-                return fit.marked("WEAK_EXCITATION", RIGID).noted(said)
+        normals = _long_enough(sources, settings, c)
+        if not normals:
+            continue
+        gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
+        power = gram[:, -1, -1]
+        for joint in range(2):
+            acting = float(np.diag(gram[joint])[:-1] @ c**2)
+            if power[joint] == 0 and acting < LEAST_ACTING**2 * float(power[1 - joint]):
+                note = Notice("MOTORLESS_UNTOLD", numbers={"joint": joint + 1})
+                return fit.marked("WEAK_EXCITATION", RIGID).noted(note)
     return fit
+
+
+def _long_enough(
+    sources: Sequence[Source], settings: WeakSettings, c: FloatArray | None = None
+) -> list[Normal]:
+    """Normal equations of the logs that are long enough for a window."""
+    every = [weak.normal_equations(source, settings, c) for source in sources]
+    return [normal for normal in every if normal is not None]
 
 
 def _delayed(fit: Fit, settings: WeakSettings) -> WeakSettings:
     """The settings with the fit's delay, where it has one."""
     known = replace(settings, estimate_delay=False)
-    return known if fit.delay is None else known.delayed(fit.delay)
+    if fit.delay is None:
+        return known
+    return known.delayed(fit.delay)
 
 
 def _doubt(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Notice | None:
+    """Why k1 … k5 are doubtful; None where nothing says so."""
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if still:
         return Notice("JOINT_STILL", numbers={"joints": still})
     settings = _delayed(fit, settings)
     for sources in (unloaded, loaded):
-        every = [weak.normal_equations(source, settings) for source in sources]
-        normals = [normal for normal in every if normal is not None]
-        apart = joints_apart(normals, settings.model) if normals else None
+        normals = _long_enough(sources, settings)
+        if not normals:
+            continue
+        apart = joints_apart(normals, settings.model)
         if apart is not None:
-            unit = UNITS[apart.name]
             numbers = {
                 "name": apart.name,
                 "first": apart.first,
                 "second": apart.second,
-                "unit": unit,
+                "unit": UNITS[apart.name],
             }
             return Notice("JOINTS_CONTRADICT", numbers=numbers)
     return None

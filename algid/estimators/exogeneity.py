@@ -97,7 +97,7 @@ def settled(
         Of the fit: window, bandwidth and hold; model and delay are the fit's.
     """
     settings = resting(unloaded, loaded, settings)
-    following = followed([*unloaded, *loaded], settings)
+    following = followed(list(unloaded) + list(loaded), settings)
     corrected = instrumented(fit, fit.values, unloaded, loaded, settings, following)
     if corrected is None:
         return fit
@@ -110,7 +110,9 @@ def settled(
         return fit
     if following is None and tests.answers:
         return fit.noted(feedback(tests.silent))
-    code = "INSTRUMENTS_STAND" if following is None else "REFERENCE_STANDS"
+    code = "REFERENCE_STANDS"
+    if following is None:
+        code = "INSTRUMENTS_STAND"
     note = Notice(code, numbers={"distance": tests.moved}, note=True)
     return replace(corrected, endogeneity=tests.distance, notes=fit.notes).noted(note)
 
@@ -119,10 +121,12 @@ def watched(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Fit:
     """A fit by instruments, with a warning where it is the torque and answers the motion."""
-    if followed([*unloaded, *loaded], settings) is not None:
+    if followed(list(unloaded) + list(loaded), settings) is not None:
         return fit
     silent = _silent(fit, unloaded, loaded, settings)
-    return fit.noted(feedback(silent)) if silent < LEVEL else fit
+    if silent >= LEVEL:
+        return fit
+    return fit.noted(feedback(silent))
 
 
 def feedback(p_value: float) -> Notice:
@@ -152,8 +156,8 @@ def instrumented(
             continue
         c0 = shared.coefficients(at, kind)
         c = c0.copy()
-        if shared.delay:  # the windows are shifted by it: its column tells a change
-            c[-1] -= base
+        if shared.delay:
+            c[-1] -= base  # the windows are shifted by it: the column is a change's
         for sums in instruments.moments(sources, settings, c, following=following):
             if sums is None or instruments.gone_astray(sums):
                 return None
@@ -175,15 +179,15 @@ def examined(
     settings: WeakSettings,
 ) -> Exogeneity:
     """The tests on estimates by instruments and by least squares."""
-    places = [place for place, name in enumerate(least.names) if name in RIGID]
-    places = [place for place in places if np.isfinite(better.std[place] + least.std[place])]
-    if not places:
+    places = np.flatnonzero(np.isin(least.names, RIGID) & np.isfinite(better.std + least.std))
+    if not places.size:
         return Exogeneity(0.0, 0.0, 1.0, 1.0)
     away = (better.values - least.values)[places]
-    influences = zip(_influences(better), _influences(least), strict=True)
-    V = np.sum([_variance(one, other) for one, other in influences], axis=0)
+    V = np.zeros_like(better.covariance)
+    for one, other in zip(_influences(better), _influences(least), strict=True):
+        V = V + _variance(one, other)
     h = float(away @ scaled_pinv(V[np.ix_(places, places)]) @ away)
-    same = float(chi2_tail(len(places), max(h, 0.0)))
+    same = float(chi2_tail(places.size, max(h, 0.0)))
     distance = float(np.max(np.abs(away) / better.std[places]))
     silent = _silent(better, unloaded, loaded, settings)
     return Exogeneity(distance, _moved(better, least), same, silent)
@@ -191,16 +195,17 @@ def examined(
 
 def _moved(better: Fit, least: Fit) -> float:
     """How far a constant moves at most, in standard deviations of least squares."""
-    known = np.array([name in RIGID for name in least.names]) & np.isfinite(least.std)
-    return float(
-        np.max(np.abs(better.values - least.values)[known] / least.std[known], initial=0.0)
-    )
+    known = np.isin(least.names, RIGID) & np.isfinite(least.std)
+    away = np.abs(better.values - least.values)[known]
+    return float(np.max(away / least.std[known], initial=0.0))
 
 
 def _of(fit: Fit, settings: WeakSettings) -> tuple[WeakSettings, float]:
     """The settings with the fit's model and delay, and that delay in s."""
     shared = fit.shared
-    base = settings.shift.delay if fit.delay is None else fit.delay
+    base = settings.shift.delay
+    if fit.delay is not None:
+        base = fit.delay
     own = replace(settings.delayed(base), model=shared.model, estimate_delay=shared.delay)
     return own, base
 
@@ -222,7 +227,10 @@ def _variance(one: FloatArray, other: FloatArray) -> FloatArray:
 
     Of the first alone where stretches differ.
     """
-    return long_run_variance(one - other if one.shape == other.shape else one)[0]
+    if one.shape == other.shape:
+        one = one - other
+    variance, _ = long_run_variance(one)
+    return variance
 
 
 def _silent(
@@ -252,9 +260,11 @@ def _residual(
     rows = [np.empty((4, 0))]
     for piece, windows, _ in weak.overlapping(source(), settings):
         X = windows.equations(settings.model, piece, False, c)
-        rows.append(np.concatenate([X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1]), X[:, -1]]))
+        residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
+        rows.append(np.concatenate([residual, X[:, -1]]))
     every = np.concatenate(rows, axis=1)
-    every = every - every.mean(axis=1, keepdims=True) if every.shape[1] else every
+    if every.shape[1]:
+        every = every - every.mean(axis=1, keepdims=True)
     return every[:2], every[2:]
 
 
@@ -263,10 +273,12 @@ def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     count = e.shape[1]
     memory = min(_MEMORY, count // 3)
 
-    def autocovariance(x: FloatArray) -> FloatArray:
-        every = [np.sum(x[:, : count - lag] * x[:, lag:], axis=1) for lag in range(memory)]
-        return np.array(every) / count
+    def products(x: FloatArray, later: FloatArray, lags: range) -> FloatArray:
+        """Sums (lags, 2) of products of one signal and another, `lags` windows later."""
+        return np.array([np.sum(x[:, : count - lag] * later[:, lag:], axis=1) for lag in lags])
 
-    both = autocovariance(e) * autocovariance(y)
-    products = [np.sum(e[:, :-lag] * y[:, lag:], axis=1) for lag in range(1, _LAGS + 1)]
-    return np.array(products), count * np.maximum(both[0] + 2 * both[1:].sum(axis=0), both[0])
+    covariance_e = products(e, e, range(memory)) / count
+    covariance_y = products(y, y, range(memory)) / count
+    both = covariance_e * covariance_y
+    variance = count * np.maximum(both[0] + 2 * both[1:].sum(axis=0), both[0])
+    return products(e, y, range(1, _LAGS + 1)), variance

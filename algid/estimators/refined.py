@@ -9,7 +9,7 @@ already within its own error bars.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -100,23 +100,14 @@ def fit(
         )
     start = weak_fit(unloaded, loaded, settings, lengths, prior)
     shared, anchored = start.shared, _anchored(start)
-    logs = [
-        *_opened(unloaded, False, shared, settings, noise),
-        *_opened(loaded, True, shared, settings, noise),
-    ]
-    for loaded_ones, given in ((False, unloaded), (True, loaded)):
-        if given and not any(log.loaded is loaded_ones for log in logs):
-            which = "loaded" if loaded_ones else "unloaded"
-            raise TooShortError(
-                f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} "
-                "samples without a gap"
-            )
+    logs = _opened(unloaded, False, shared, settings, noise)
+    logs += _opened(loaded, True, shared, settings, noise)
     refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
     try:
-        if len(logs) >= _MANY and (
-            steps := _refuted_alone(shared, logs[0], start.values, anchored)
-        ):
-            return replace(refuted, iterations=steps)
+        if len(logs) >= _MANY:
+            steps = _refuted_alone(shared, logs[0], start.values, anchored)
+            if steps:
+                return replace(refuted, iterations=steps)
         beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
         width = None
         if end != "unsettled" and has_width(shared.model):
@@ -152,11 +143,14 @@ def fit(
         imprints = [log.imprint(shared.coefficients(beta, log.loaded)) for log in logs]
         fitted = widened_by_integration(fitted, imprints, prior)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
-    pairs = zip(fitted.status, start.status, strict=True)
+    status = list(fitted.status)
+    for place, before in enumerate(start.status):
+        if before != "OK":
+            status[place] = before
     return with_body(
         replace(
             fitted,
-            status=tuple(own if before == "OK" else before for own, before in pairs),
+            status=tuple(status),
             unidentifiable=tuple(dict.fromkeys(fitted.unidentifiable + start.unidentifiable)),
             noise=tuple(log.noise for log in logs),
             whiteness=whiteness,
@@ -179,7 +173,7 @@ def _anchored(start: Fit) -> Prior | None:
     mean = start.values + size * (null @ (np.clip(along, -1, 1) - along))
     precision = (null @ null.T) / np.outer(size, size) / _ANCHOR**2
     if start.prior is not None:
-        places = [start.names.index(name) for name in start.prior.names]
+        places = start.prior.places(start.names)
         precision[np.ix_(places, places)] += start.prior.precision
         mean[places] = start.prior.mean
     return Prior(start.names, mean, precision)
@@ -191,16 +185,32 @@ def _opened(
     shared: Shared,
     settings: WeakSettings,
     noise: NoiseLevels | None,
-) -> Iterator[LogEvidence]:
+) -> list[LogEvidence]:
+    """The logs of a kind that are long enough.
+
+    Raises
+    ------
+    TooShortError
+        If there are logs and none is.
+    """
+
     def stencil(dt: float, c: FloatArray) -> Stencil:
-        given = settings.shift
-        shift = replace(given, delay=float(c[-1])) if shared.delay else given
+        shift = settings.shift
+        if shared.delay:
+            shift = replace(shift, delay=float(c[-1]))
         return Stencil(dt, shift.at(dt) - shared.model.lag(c), held=shift.held)
 
-    for source in sources:
-        log = LogEvidence(source, loaded, shared, stencil, noise)
-        if log.kept:
-            yield log
+    every = [LogEvidence(source, loaded, shared, stencil, noise) for source in sources]
+    kept = [log for log in every if log.kept]
+    if every and not kept:
+        which = "unloaded"
+        if loaded:
+            which = "loaded"
+        raise TooShortError(
+            f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} "
+            "samples without a gap"
+        )
+    return kept
 
 
 def _train(
@@ -235,7 +245,9 @@ def _train(
                 log.sure = change < _NOISE_SURE
         if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
-    return beta, outcomes, _STEPS, "settled" if moved < _CLOSE else "unsettled"
+    if moved < _CLOSE:
+        return beta, outcomes, _STEPS, "settled"
+    return beta, outcomes, _STEPS, "unsettled"
 
 
 def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Prior | None) -> int:
@@ -287,18 +299,21 @@ def _settled_width(
         now = shared.model.coulomb_speed
         width = likeliest_width(profile, now)
         moved = abs(np.log(width.value / now))
-        if moved < (_WIDTH_SETTLED if end == "settled" else _WIDTH_FAR):
+        if moved < _WIDTH_SETTLED or (end != "settled" and moved < _WIDTH_FAR):
             break
-        before, states = (shared, beta, outcomes, end), [log.state for log in logs]
+        before = shared, beta, outcomes
+        was_settled = end == "settled"
+        states = [log.state for log in logs]
         shared = replace(shared, model=replace(shared.model, coulomb_speed=width.value))
         for log in logs:
             log.reshape(shared)
         beta, outcomes, _, end = _train(shared, logs, beta, prior, progress)
-        if end == "unsettled" and before[-1] == "settled":  # the step is too narrow for the motion
+        if end == "unsettled" and was_settled:  # the step is too narrow for the motion
+            shared, beta, outcomes = before
             for log, state in zip(logs, states, strict=True):
-                log.reshape(before[0])
+                log.reshape(shared)
                 log.restore(state)
-            return *before, width
+            return shared, beta, outcomes, "settled", width
         if end != "settled":
             break
     return shared, beta, outcomes, end, width

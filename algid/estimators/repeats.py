@@ -4,7 +4,7 @@ Two logs repeat each other where their velocities are alike: with v of both join
 
         max_l Σ v(t) w(t + l) / (Σ v(t)² Σ w(t + l)²)^½ > `ALIKE`    for shifts l up to `_SHIFT` s
 
-Names of files tell nothing of it. The likelihoods of n repeats count as one: each is divided by n,
+Names of files do not count. The likelihoods of n repeats count as one: each is divided by n,
 and where errors are judged by how logs and stretches scatter, their mean stands for them.
 """
 
@@ -32,20 +32,23 @@ Groups = tuple[tuple[int, ...], ...]
 
 def grouped(unloaded: Sequence[Source], loaded: Sequence[Source]) -> Groups:
     """Groups of the unloaded and then the loaded logs, by their places in that order."""
-    first = _groups([_velocities(source) for source in unloaded], 0)
-    return first + _groups([_velocities(source) for source in loaded], len(unloaded))
+    return _groups(unloaded, 0) + _groups(loaded, len(unloaded))
 
 
-def _groups(motions: Sequence[FloatArray], start: int) -> Groups:
-    groups: list[list[int]] = []
-    for place, motion in enumerate(motions):
-        same = (group for group in groups if alike(motions[group[0]], motion))
-        group = next(same, None)
-        if group is None:
-            groups.append([place])
+def _groups(sources: Sequence[Source], start: int) -> Groups:
+    """Groups of logs of one kind, whose places begin at `start`."""
+    firsts: list[FloatArray] = []  # the motion of each group's first log
+    groups: list[tuple[int, ...]] = []
+    for place, source in enumerate(sources, start):
+        motion = _velocities(source)
+        for number, first in enumerate(firsts):
+            if alike(first, motion):
+                groups[number] += (place,)
+                break
         else:
-            group.append(place)
-    return tuple(tuple(start + place for place in group) for group in groups)
+            firsts.append(motion)
+            groups.append((place,))
+    return tuple(groups)
 
 
 def alike(one: FloatArray, other: FloatArray) -> bool:
@@ -69,11 +72,13 @@ def _like(one: FloatArray, other: FloatArray, shift: int) -> bool:
 def _velocities(source: Source) -> FloatArray:
     """Velocities (2, N) of the beginning of a log at `_RATE` Hz, gaps closed, in rad a step."""
     means: list[FloatArray] = [np.zeros((2, 0))]
+    gathered = 0
     for segment in source():
         width = max(1, round(1 / (_RATE * segment.dt)))
         count = len(segment) // width
         means.append(segment.theta[:, : count * width].reshape(2, count, width).mean(axis=2))
-        if sum(part.shape[1] for part in means) > _LONGEST * _RATE:
+        gathered += count
+        if gathered > _LONGEST * _RATE:
             break
     theta = np.concatenate(means, axis=1)[:, : round(_LONGEST * _RATE)]
     return np.diff(theta, axis=1)
@@ -81,11 +86,12 @@ def _velocities(source: Source) -> FloatArray:
 
 def shared_out(logs: Sequence[LogInformation], groups: Groups) -> list[LogInformation]:
     """Each log's likelihood, divided by how many repeat its motion."""
-    count = {place: len(group) for group in groups for place in group}
-    return [
-        replace(log, S=log.S / count[place], g=log.g / count[place])
-        for place, log in enumerate(logs)
-    ]
+    shared = list(logs)
+    for group in groups:
+        for place in group:
+            log = logs[place]
+            shared[place] = replace(log, S=log.S / len(group), g=log.g / len(group))
+    return shared
 
 
 def merged(logs: Sequence[LogInformation], groups: Groups) -> list[LogInformation]:
@@ -97,8 +103,8 @@ def _sum(logs: Sequence[LogInformation]) -> LogInformation:
     first = logs[0]
     if len(logs) == 1:
         return first
-    S = np.zeros((max(len(log.S) for log in logs), *first.S.shape[1:]))
-    g = np.zeros((len(S), first.g.shape[1]))
+    q, stretches = first.c0.size, max(len(log.S) for log in logs)
+    S, g = np.zeros((stretches, q, q)), np.zeros((stretches, q))
     for log in logs:
         S[: len(log.S)] += log.S
         g[: len(log.g)] += log.g - log.S @ (first.c0 - log.c0)

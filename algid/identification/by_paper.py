@@ -34,6 +34,7 @@ from algid.settings import Settings
 from algid.table4 import UNITS, finite, unloaded_rows
 
 STAGE1_WINDOW = 2.0  # s
+_STAGE2_UNITS = UNITS | {"l1": "m"}
 STAGE1_FILE = "estimates.parquet"
 STAGE2_FILE = "loaded.parquet"
 
@@ -67,23 +68,25 @@ def run_paper(
             parameters = distrusted(parameters)
         if usable.all():
             rows |= unloaded_rows(k)
-    if loaded is None or k is None or not np.isfinite(k).all():
-        return Identified(
-            parameters, _weak(STAGE2_NAMES, loaded), _weak(("m_p", "l1"), loaded), rows
-        )
+    if loaded is None:
+        return Identified(parameters, {}, {}, rows)
+    payload = ("m_p", "l1")
+    if k is None or not np.isfinite(k).all():
+        return Identified(parameters, _weak(STAGE2_NAMES), _weak(payload), rows)
     values, wander, usable = _estimate(survey, loaded, settings, k, folder)
-    names = (*STAGE2_NAMES, "l1", "m_p")
-    named = _named(names, {**UNITS, "l1": "m"}, values, usable)
-    if np.any((values + FAR_BEYOND * wander)[[names.index("l1"), names.index("m_p")]] < 0):
+    names = STAGE2_NAMES + ("l1", "m_p")
+    named = _named(names, _STAGE2_UNITS, values, usable)
+    of_payload = slice(len(STAGE2_NAMES), len(names))
+    if np.any((values + FAR_BEYOND * wander)[of_payload] < 0):
         named = distrusted(named)
-    rows |= {
-        name: estimate.estimate for name, estimate in named.items() if estimate.estimate is not None
-    }
+    for name, one in named.items():
+        if name in UNITS and one.estimate is not None:
+            rows[name] = one.estimate
     return Identified(
         parameters,
         {name: named[name] for name in STAGE2_NAMES},
-        {name: named[name] for name in ("m_p", "l1")},
-        {name: value for name, value in rows.items() if name in UNITS},
+        {name: named[name] for name in payload},
+        rows,
     )
 
 
@@ -101,14 +104,17 @@ def _estimate(
     """
     # else beside another estimator, whose settings are not its own
     asked = settles(settings.estimator)
-    window = settings.window if asked and settings.window is not None else STAGE1_WINDOW
+    window = STAGE1_WINDOW
+    if asked and settings.window is not None:
+        window = settings.window
     moving = with_velocities(survey, log, settings, luenberger=settings.luenberger or not asked)
-    names: Sequence[str] = STAGE1_SERIES if k is None else STAGE2_SERIES
-    series = (
-        stage1_series(moving, window)
-        if k is None
-        else stage2_series(moving, window, k, settings.gravity)
-    )
+    names: Sequence[str]
+    if k is None:
+        names, file = STAGE1_SERIES, STAGE1_FILE
+        series = stage1_series(moving, window)
+    else:
+        names, file = STAGE2_SERIES, STAGE2_FILE
+        series = stage2_series(moving, window, k, settings.gravity)
     summary = Summary(len(names))
 
     def watched() -> Iterator[PaperSeries]:
@@ -116,20 +122,16 @@ def _estimate(
             summary.add(one)
             yield one
 
+    def columns() -> Iterator[dict[str, FloatArray]]:
+        for block in series_blocks(watched(), names):
+            block.pop("k5+k3", None)  # the sum is Table 4's and follows from the others
+            yield block
+
     if folder is None:
         for _ in watched():
             pass
     else:
-        # the sum k5+k3 is Table 4's and follows from the others
-        columns = (
-            {name: column for name, column in block.items() if name != "k5+k3"}
-            for block in series_blocks(watched(), names)
-        )
-        write_columns(
-            folder / (STAGE1_FILE if k is None else STAGE2_FILE),
-            columns,
-            [survey.seen(log).first_ns],
-        )
+        write_columns(folder / file, columns(), [survey.seen(log).first_ns])
     duration = survey.summary(log).duration
     if duration < SHORTEST - 1e-9:
         raise LogError(
@@ -154,20 +156,20 @@ def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:
 def _named(
     names: Sequence[str], units: dict[str, str], values: FloatArray, usable: NDArray[np.bool_]
 ) -> dict[str, Estimate]:
-    return {
-        name: Estimate(estimate=finite(value), unit=units[name])
-        if good
-        else Estimate(estimate=None, unit=units[name], status=Status.WEAK_EXCITATION)
-        for name, value, good in zip(names, values, usable, strict=False)
-    }
+    """Estimates by name; those that are not usable have none."""
+    named = {}
+    for name, value, good in zip(names, values, usable, strict=False):
+        if good:
+            named[name] = Estimate(estimate=finite(value), unit=units[name])
+        else:
+            named[name] = _none(units[name])
+    return named
 
 
-def _weak(names: Sequence[str], loaded: LogSource | None) -> dict[str, Estimate]:
-    """No estimates where a loaded log was given but stage 1 failed."""
-    if loaded is None:
-        return {}
-    units = {**UNITS, "l1": "m"}
-    return {
-        name: Estimate(estimate=None, unit=units[name], status=Status.WEAK_EXCITATION)
-        for name in names
-    }
+def _weak(names: Sequence[str]) -> dict[str, Estimate]:
+    """No estimates, where stage 1 failed."""
+    return {name: _none(_STAGE2_UNITS[name]) for name in names}
+
+
+def _none(unit: str) -> Estimate:
+    return Estimate(estimate=None, unit=unit, status=Status.WEAK_EXCITATION)

@@ -54,8 +54,10 @@ class Earlier:
     @classmethod
     def of(cls, parameters: Result | str | Path | None) -> Earlier | None:
         """The result itself, or that of a file."""
-        if parameters is None or isinstance(parameters, Result):
-            return None if parameters is None else cls(parameters, parameters.log.path)
+        if parameters is None:
+            return None
+        if isinstance(parameters, Result):
+            return cls(parameters, parameters.log.path)
         return cls(read_result(parameters), str(parameters))
 
 
@@ -123,33 +125,36 @@ def identify(
         If there is neither an unloaded log nor `parameters`.
     """
     refuse_misleading(name)
-    out = None if out is None else Path(out)
     settings = settings or Settings()
     earlier = Earlier.of(parameters)
-    meaning = profile if earlier is None else reused(profile, earlier.result)
+    meaning = profile
+    if earlier is not None:
+        meaning = reused(profile, earlier.result)
     settings = _with_meaning(settings, meaning, earlier)
     sources = with_twins_marked(
         open_sources(unloaded, "unloaded", meaning, settings.gravity, settings.effort),
         open_sources(loaded, "loaded", meaning, settings.gravity, settings.effort),
     )
     survey = Survey(sources, progress)
-    said = {} if meaning is None else meaning.model_dump(mode="json", exclude_unset=True)
+    stated: dict[str, Any] = {}
+    if meaning is not None:
+        stated = meaning.model_dump(mode="json", exclude_unset=True)
     alone = earlier is not None or settings.effort == "external"
     if not survey.unloaded and not (alone and survey.loaded):
         raise ValueError("an unloaded log is needed, or parameters and a loaded log")
-    if settings.cross_validate and (len(survey.unloaded) == 1 or len(survey.loaded) == 1):
-        kind = "unloaded" if len(survey.unloaded) == 1 else "loaded"
-        raise SettingError(
-            f"{flag('cross_validate')}: expected two {kind} logs or more, found one; give more, or "
-            "leave it out"
-        )
+    if settings.cross_validate:
+        for kind, logs in (("unloaded", survey.unloaded), ("loaded", survey.loaded)):
+            if len(logs) == 1:
+                raise SettingError(
+                    f"{flag('cross_validate')}: expected two {kind} logs or more, found one; give "
+                    "more, or leave it out"
+                )
     if out is None:
-        return _identified(survey, settings, earlier, said)
-    folder = result_folder(sources[0].name, out, name)
-    with whole_folder(
-        folder, force, sweep=name is None
-    ) as temporary:  # a batch sweeps its whole output once
-        result = _identified(survey, settings, earlier, said, temporary, series=report)
+        return _identified(survey, settings, earlier, stated)
+    folder = result_folder(sources[0].name, Path(out), name)
+    # a batch sweeps its whole output once
+    with whole_folder(folder, force, sweep=name is None) as temporary:
+        result = _identified(survey, settings, earlier, stated, temporary, series=report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
@@ -164,19 +169,18 @@ def identify(
 
 def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier | None) -> Settings:
     """The settings, completed from the profile or an earlier result where they are not set."""
-    said: dict[str, Any] = (
-        {} if earlier is None else {"effort": earlier.result.settings.get("effort")}
-    )
+    stated: dict[str, Any] = {}
+    if earlier is not None:
+        stated["effort"] = earlier.result.settings.get("effort")
     if meaning is not None:
         own = {name: getattr(meaning, name) for name in OF_BOTH if name in meaning.model_fields_set}
         refuse_contradictions(own)
-        said |= own
-    silent = {
-        name: value
-        for name, value in said.items()
-        if getattr(settings, name) == getattr(Settings, name)
-    }
-    return replace(settings, **silent)
+        stated |= own
+    not_set = {}
+    for name, value in stated.items():
+        if getattr(settings, name) == getattr(Settings, name):
+            not_set[name] = value
+    return replace(settings, **not_set)
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
@@ -191,12 +195,12 @@ def _identified(
     survey: Survey,
     settings: Settings,
     earlier: Earlier | None,
-    said: dict[str, Any],
+    stated: dict[str, Any],
     folder: Path | None = None,
     *,
     series: bool = False,
 ) -> Result:
-    """The result with the user's statements `said`, and warnings of logs read differently now.
+    """The result with what the user `stated`, and warnings of logs read differently now.
 
     Time series go into `folder`: the paper's always, those of a likelihood where `series` asks for
     them.
@@ -204,13 +208,15 @@ def _identified(
     with one_blas_thread():
         if settles(settings.estimator):
             outcome = _by_the_paper(survey, settings, earlier, folder)
+        elif series:
+            outcome, settings = _by_likelihood(survey, settings, earlier, folder)
         else:
-            outcome, settings = _by_likelihood(
-                survey, settings, earlier, folder if series else None
-            )
+            outcome, settings = _by_likelihood(survey, settings, earlier, None)
         result = result_of(outcome, settings, survey)
-    otherwise = [] if earlier is None else read_otherwise(result.logs, earlier.result, earlier.file)
-    return result.model_copy(update={"profile": said, "notices": [*otherwise, *result.notices]})
+    notices = result.notices
+    if earlier is not None:
+        notices = read_otherwise(result.logs, earlier.result, earlier.file) + notices
+    return result.model_copy(update={"profile": stated, "notices": notices})
 
 
 def _by_the_paper(
@@ -224,21 +230,23 @@ def _by_the_paper(
             )
     known = None
     if earlier is not None:
-        constants = [earlier.result.parameters.get(name) for name in CONSTANT_NAMES]
-        values = [None if one is None else one.estimate for one in constants]
-        if None in values:
-            raise ResultError(
-                f"{earlier.file}: the result lacks a constant; identify the arm from a better log "
-                "first"
-            )
-        known = np.array(values, dtype=np.float64)
-    return run_paper(survey, *_firsts(survey), settings, known, folder)
+        known = np.empty(len(CONSTANT_NAMES))
+        for place, name in enumerate(CONSTANT_NAMES):
+            constant = earlier.result.parameters.get(name)
+            if constant is None or constant.estimate is None:
+                raise ResultError(
+                    f"{earlier.file}: the result lacks a constant; identify the arm from a better "
+                    "log first"
+                )
+            known[place] = constant.estimate
+    first, first_loaded = _firsts(survey)
+    return run_paper(survey, first, first_loaded, settings, known, folder)
 
 
 def _by_likelihood(
     survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
 ) -> tuple[Identified, Settings]:
-    """What the logs tell, and the settings with the effort that they tell."""
+    """The outcome of the logs, and the settings with the effort that they show."""
     from algid.identification.by_likelihood import residual_of, with_doubt, with_endogeneity
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
@@ -247,7 +255,7 @@ def _by_likelihood(
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
     settings = with_effort(fit, settings)
-    said = of_effort(fit, settings, asked)
+    of_driver = of_effort(fit, settings, asked)
     if settings != asked:
         fit, predictions, chosen = _fitted(survey, settings, earlier)
     settings = replace(settings, torque_hold=chosen.hold)
@@ -256,7 +264,7 @@ def _by_likelihood(
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     again = partial(_again, earlier=earlier)
     tried = replace(settings, torque_hold=asked.torque_hold)
-    notices = advised([*outcome.notices, *said], survey, tried, again)
+    notices = advised(outcome.notices + of_driver, survey, tried, again)
     outcome = replace(outcome, notices=notices)
     if folder is not None:
         survey.begin("series")
@@ -267,7 +275,7 @@ def _by_likelihood(
 
 
 def _again(survey: Survey, settings: Settings, earlier: Earlier | None) -> Identified | None:
-    """What logs tell by other settings; None where they cannot be used so."""
+    """The outcome by other settings; None where the logs cannot be used so."""
     from algid.identification.outcome import outcome_of
 
     try:
@@ -291,8 +299,11 @@ def _fitted(
     from algid.identification.known import prior_of
 
     survey.begin("choosing terms")
-    chosen = choose_model(survey, settings, None if earlier is None else earlier.result)
-    prior = None if earlier is None else prior_of(earlier.result, chosen.model, earlier.file)
+    if earlier is None:
+        chosen, prior = choose_model(survey, settings, None), None
+    else:
+        chosen = choose_model(survey, settings, earlier.result)
+        prior = prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
     settings = replace(settings, torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
