@@ -86,39 +86,27 @@ class TorqueProblem:
                 f"{flag('range')}: an open loop starts hanging at rest, which the range leaves "
                 "out; widen it"
             )
-        self._experiment, self._belief, self._limits, self._asked = (
-            experiment,
-            belief,
-            limits,
-            asked,
-        )
+        self._experiment, self._belief = experiment, belief
+        self._limits, self._asked = limits, asked
         self._start = start
         self._family = Fourier(duration)
         self._driven = np.flatnonzero(limits.torque > 0)
         self.size = 2 * self._family.harmonics.size * self._driven.size
         self._arms = np.vstack([belief.mean, belief.draws(SEARCHED_ARMS, seed)])
         self._checked = np.vstack([belief.mean, belief.draws(CHECKED_ARMS, seed + 1)])
-        model = experiment.shared.model
-        self._step = step_for(
-            model, self._coefficients(self._checked, list(experiment.kinds)), duration
-        )
+        every = self._coefficients(self._checked, list(experiment.kinds))
+        self._step = step_for(experiment.shared.model, every, duration)
         self._strength = np.minimum(limits.torque, self._need())
 
     def _need(self) -> FloatArray:
         """What arms of the belief ask for at most (2,), about, in motions within the limits."""
         limits, highest = self._limits, self._family.harmonics[-1]
         speed = np.minimum(np.minimum(limits.speed, limits.half * highest), FAST)
-        fastest = Motion(
-            *(
-                np.array([[0.0, 0.0], speed, np.minimum(limits.acceleration, speed * highest)])[
-                    ..., None
-                ]
-            )
-        )
+        acceleration = np.minimum(limits.acceleration, speed * highest)
+        fastest = Motion(np.zeros((2, 1)), speed[:, None], acceleration[:, None])
         Y = regressor(self._experiment.shared.model, fastest)[..., 0]
-        return np.max(
-            np.abs(Y) @ np.abs(self._coefficients(self._arms, list(self._experiment.kinds))), axis=1
-        )
+        c = self._coefficients(self._arms, list(self._experiment.kinds))
+        return np.max(np.abs(Y) @ np.abs(c), axis=1)
 
     def _coefficients(self, arms: FloatArray, kinds: list[bool]) -> FloatArray:
         """C (q, arms × kinds), the kinds of an arm side by side."""
@@ -169,7 +157,9 @@ class TorqueProblem:
             motions = [swings.motion(column) for column in columns]
             most = max(float(row.u.max()) for row in self._used(x, swings.t, motions))
             beyond = max(0.0, most - 1.0)
-            bound = self._bound(dict(zip(kinds, motions, strict=False))) if beyond < _LOST else 1.0
+            bound = 1.0
+            if beyond < _LOST:
+                bound = self._bound(dict(zip(kinds, motions, strict=False)))
             rows.append(np.log(bound) + _PENALTY * min(beyond, 1e3))
         return np.array(rows)
 
@@ -184,7 +174,9 @@ class TorqueProblem:
             bound = self._asked.largest(np.sum([one.S for one in runs], axis=0))
         except np.linalg.LinAlgError:
             return np.inf
-        return bound if np.isfinite(bound) else np.inf
+        if not np.isfinite(bound):
+            return np.inf
+        return bound
 
     def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
         """Constraint use of motions: kinematics, torque, the believed arm's rest at the end."""
@@ -251,10 +243,8 @@ def search(
             if best is None or figures[order[0]] < best[0]:
                 best = float(figures[order[0]]), patterns[order[0]]
             if generation == 0:
-                middle, spread = (
-                    patterns[order[0]],
-                    np.full(problem.size, 0.5 * np.std(patterns[order[0]])),
-                )
+                middle = patterns[order[0]]
+                spread = np.full(problem.size, 0.5 * np.std(middle))
             else:
                 chosen = patterns[order[: POPULATION // 2]]
                 moved = weights @ chosen

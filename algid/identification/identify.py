@@ -176,11 +176,10 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
         own = {name: getattr(meaning, name) for name in OF_BOTH if name in meaning.model_fields_set}
         refuse_contradictions(own)
         stated |= own
-    not_set = {}
-    for name, value in stated.items():
-        if getattr(settings, name) == getattr(Settings, name):
-            not_set[name] = value
-    return replace(settings, **not_set)
+    set_by_user = {name for name in stated if getattr(settings, name) != getattr(Settings, name)}
+    for name in set_by_user:
+        del stated[name]
+    return replace(settings, **stated)
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:

@@ -72,12 +72,14 @@ def edges(cells: Cells) -> Edges:
         # masses are free in short blocks, lest a change that is not found passes for friction
         blocks = np.union1d(np.arange(0, len(cells), BLOCK), np.ravel(calm)[:-1])
         drift = drift_of(cells, blocks, rough_variance(cells))
-        freed = cells if drift is None else drift.freed(cells)
+        freed = cells
+        if drift is not None:
+            freed = drift.freed(cells)
         # a change must stand up to slow errors whatever their reason, wrong constants of the arm
         # included
         spread = variance(freed, calm, spans)
         before = places
-        places = [0, *cuts(freed.A, freed.B, PENALTY * spread, SHORTEST), len(cells)]
+        places = [0] + cuts(freed.A, freed.B, PENALTY * spread, SHORTEST) + [len(cells)]
         if places == before and spans is SPANS:
             break
         spans = SPANS
@@ -86,10 +88,10 @@ def edges(cells: Cells) -> Edges:
 
 def calm_parts(places: Sequence[int]) -> list[tuple[int, int]]:
     """From which cell to which each stretch lies away from the changes at its ends."""
-    first, *inner, last = places
-    begins = [first, *(place + BEHIND for place in inner)]
-    ends = [*(place - AHEAD for place in inner), last]
-    return [(begin, max(begin, end)) for begin, end in zip(begins, ends, strict=True)]
+    begins, ends = np.array(places[:-1]), np.array(places[1:])
+    begins[1:] += BEHIND
+    ends[:-1] -= AHEAD
+    return list(zip(begins.tolist(), np.maximum(begins, ends).tolist(), strict=True))
 
 
 def variance(
@@ -112,10 +114,8 @@ def variance(
 def rough_variance(cells: Cells) -> float:
     """Variance of the rows about masses that hold for a few cells, one at least."""
     groups = len(cells) // SHORTEST
-    A, B, E, rows = (
-        x[: groups * SHORTEST].reshape(groups, -1).sum(axis=1)
-        for x in (cells.A, cells.B, cells.E, cells.rows)
-    )
+    sums = np.stack([cells.A, cells.B, cells.E, cells.rows])[:, : groups * SHORTEST]
+    A, B, E, rows = sums.reshape(4, groups, -1).sum(axis=2)
     # groups that hold a change are few
     return max(1.0, float(np.median((E - B**2 / np.maximum(A, 1e-300)) / rows)))
 
@@ -146,7 +146,6 @@ def excess(
         Whether a median stands for the mean. A few changes that are not known are no errors then,
         nor are those of the few moments at which a joint turns back.
     """
-    typical, spread = (_median, _SPREAD) if robust else (np.mean, _MEAN_SPREAD)
     factor = 1.0
     for span in spans:
         starts = np.concatenate([np.arange(a, b - span + 1, span) for a, b in parts])
@@ -163,7 +162,10 @@ def excess(
             J = np.diff(_blocks(T, starts, span) / information[:, None], axis=0)
             white += np.einsum("cx,xy,cy->c", J, covariance, J)
         squares = np.diff(score / information)[neighbours] ** 2 / white[neighbours]
-        ratio = float(typical(squares))
+        if robust:
+            ratio, spread = _median(squares), _SPREAD
+        else:
+            ratio, spread = float(np.mean(squares)), _MEAN_SPREAD
         if ratio > 1 + _SURE * spread / np.sqrt(squares.size):
             factor = max(factor, ratio)
     return factor
@@ -176,7 +178,7 @@ def _median(squares: FloatArray) -> float:
 
 def _blocks(x: FloatArray, starts: NDArray[np.int64], span: int) -> FloatArray:
     """Sums (N, ...) over `span` cells from each of `starts` (N,)."""
-    total = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
+    total = np.concatenate([np.zeros_like(x[:1]), np.cumsum(x, axis=0)])
     return np.asarray(total[starts + span] - total[starts])
 
 

@@ -43,11 +43,10 @@ def figures(result: TrackResult) -> list[Figure]:
 def _payload(result: TrackResult) -> Figure:
     track = result.track
     hover = "m_p %{y:.5g} kg at %{x:.3f} s<extra></extra>"
-    traces = [
-        *_band(track),
-        line(*_curve(track, track.m_p), "@blue", "m_p(t)", "curve", width=1.2, hover=hover),
-    ]
-    ends = np.array([end for one in track.stretches for end in (one.start, one.end)])
+    t, m_p = _curve(track, track.m_p)
+    traces = [_band(track)]
+    traces.append(line(t, m_p, "@blue", "m_p(t)", "curve", width=1.2, hover=hover))
+    ends = np.ravel([(one.start, one.end) for one in track.stretches])
     masses = np.repeat([one.m_p for one in track.stretches], 2)
     traces.append(_steps(ends, masses, "@green", "stretch", "solid", 2.6))
     legend = [
@@ -56,7 +55,8 @@ def _payload(result: TrackResult) -> Figure:
         Legend("stretch", "mass of each stretch", "@green"),
     ]
     if result.schedule is not None:
-        traces.append(_steps(*_true_steps(result), "@ink", "truth", "dash", 1.3))
+        times_of_truth, true_masses = _true_steps(result)
+        traces.append(_steps(times_of_truth, true_masses, "@ink", "truth", "dash", 1.3))
         legend.append(Legend("truth", "true schedule", "@ink", "dash"))
     if 0 < len(track.changes) <= MOST_MARKS:
         legend.append(Legend("", "95 % interval of a change's time", "@orange/0.2", "area"))
@@ -68,7 +68,7 @@ def _payload(result: TrackResult) -> Figure:
     }
     reading = (
         "Read: blue should run level, green within its band; orange is where it may step. "
-        "A band that opens wide tells that the arm moved too little; double-click shows all of it."
+        "A band that opens wide shows that the arm moved too little; double-click shows all of it."
     )
     words = joined([mass_text(one) for one in track.stretches[:6]])
     panel = Panel(
@@ -80,17 +80,17 @@ def _payload(result: TrackResult) -> Figure:
 def _left(result: TrackResult) -> Figure:
     track = result.track
     hover = "%{y:.3g} times the noise at %{x:.3f} s<extra></extra>"
-    trace = line(*_curve(track, track.left), "@orange", "residual", "left", width=1.0, hover=hover)
+    t, left = _curve(track, track.left)
+    trace = line(t, left, "@orange", "residual", "left", width=1.0, hover=hover)
     layout = {
         "xaxis": axis("time, s", range=_span(track)),
         "yaxis": axis("residual / noise", rangemode="tozero"),
-        "shapes": [*_marks(track), level(1.0, "@ink", "dash", 1.2)],
+        "shapes": _marks(track) + [level(1.0, "@ink", "dash", 1.2)],
         "hovermode": "closest",
     }
     reading = (
         "Read: about 1 all along is the sensors' noise; anything that stands out is torque that "
-        "neither arm nor "
-        "payload explains. Times at which the payload may be changing are left out."
+        "neither arm nor payload explains. Times at which the payload may be changing are left out."
     )
     middle = float(np.median(track.left))
     panel = Panel(
@@ -107,87 +107,89 @@ def _left(result: TrackResult) -> Figure:
     return Figure("left", "What arm and payload leave of the torque", (panel,), reading, legend)
 
 
-def _span(found: Track) -> list[float]:
-    return [found.stretches[0].start, found.stretches[-1].end]
+def _span(track: Track) -> list[float]:
+    return [track.stretches[0].start, track.stretches[-1].end]
 
 
 def _view(result: TrackResult) -> list[float]:
     """Masses, their intervals and the truth; m_p(t) where it is as certain as usual."""
     track = result.track
     certain = track.std <= 3 * np.median(track.std)
-    ends = [end for one in track.stretches for end in one.ci95]
     band = NORMAL * track.std[certain]
     # percentiles: a jolt's spike may leave the frame
-    ends += np.percentile(track.m_p[certain] - band, [1]).tolist()
-    ends += np.percentile(track.m_p[certain] + band, [99]).tolist()
-    ends += [mass for _, mass in result.schedule or ()]
-    low, high = min(ends), max(ends)
+    low = float(np.percentile(track.m_p[certain] - band, 1))
+    high = float(np.percentile(track.m_p[certain] + band, 99))
+    for one in track.stretches:
+        low, high = min(low, one.ci95[0]), max(high, one.ci95[1])
+    for _, mass in result.schedule or ():
+        low, high = min(low, mass), max(high, mass)
     space = SPACE * (high - low) or 0.05
     return [low - space, high + space]
 
 
-def _marks(found: Track) -> list[Layout]:
+def _marks(track: Track) -> list[Layout]:
     """Each change, over the whole panel, as wide as it is uncertain."""
-    if len(found.changes) > MOST_MARKS:
+    if len(track.changes) > MOST_MARKS:
         return []
-    return [stretch(low, high, "@orange/0.2") for _, low, high in found.changes.tolist()]
+    return [stretch(low, high, "@orange/0.2") for _, low, high in track.changes.tolist()]
 
 
-def _curve(found: Track, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _curve(track: Track, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A series, short enough to draw, broken where the log has no samples and between stretches."""
-    size = bucket_size(found.t.size, POINTS)
-    parts = []
-    for place in range(len(found.stretches)):
-        own = found.stretch == place
-        reducer = MinMax(size)
-        reducer.feed(found.t[own], values[own])
-        x, y = broken_at_gaps(*reducer.result(), HOLE + size * CELL)
-        parts += [(x, y), (x[-1:], np.full(x[-1:].size, np.nan))]
-    return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
-
-
-def _band(found: Track) -> list[Trace]:
-    """The band as one closed area a stretch, between holes."""
-    size = bucket_size(found.t.size, POINTS)
+    size = bucket_size(track.t.size, POINTS)
     xs, ys = [], []
-    apart = (np.diff(found.stretch) != 0) | (np.diff(found.t) > HOLE + CELL)
-    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), found.t.size]
+    for place in range(len(track.stretches)):
+        own = track.stretch == place
+        reducer = MinMax(size)
+        reducer.feed(track.t[own], values[own])
+        x, y = reducer.result()
+        x, y = broken_at_gaps(x, y, HOLE + size * CELL)
+        xs += [x, x[-1:]]
+        ys += [y, np.full(x[-1:].size, np.nan)]
+    return np.concatenate(xs), np.concatenate(ys)
+
+
+def _band(track: Track) -> Trace:
+    """The band as one closed area a stretch, between holes."""
+    size = bucket_size(track.t.size, POINTS)
+    xs, ys = [], []
+    apart = (np.diff(track.stretch) != 0) | (np.diff(track.t) > HOLE + CELL)
+    edges = [0] + (np.flatnonzero(apart) + 1).tolist() + [track.t.size]
     for first, last in pairwise(edges):
         starts = np.arange(first, last, size)
-        low = np.minimum.reduceat(found.m_p[:last] - NORMAL * found.std[:last], starts)
-        high = np.maximum.reduceat(found.m_p[:last] + NORMAL * found.std[:last], starts)
-        x = found.t[starts]
+        low = np.minimum.reduceat(track.m_p[:last] - NORMAL * track.std[:last], starts)
+        high = np.maximum.reduceat(track.m_p[:last] + NORMAL * track.std[:last], starts)
+        x = track.t[starts]
         xs += [x, x[::-1], x[:1], x[:1]]
         ys += [high, low[::-1], high[:1], np.full(1, np.nan)]
-    area = {
+    return {
+        "type": "scatter",
         "mode": "lines",
         "fill": "toself",
         "fillcolor": "@blue/0.25",
         "line": {"width": 0, "color": "@blue/0.25"},
+        "x": times(np.concatenate(xs)),
+        "y": packed(np.concatenate(ys)),
+        "name": "band",
+        "legendgroup": "band",
+        "hoverinfo": "skip",
     }
-    drawn = {"x": times(np.concatenate(xs)), "y": packed(np.concatenate(ys))}
-    return [
-        {
-            "type": "scatter",
-            **area,
-            **drawn,
-            "name": "band",
-            "legendgroup": "band",
-            "hoverinfo": "skip",
-        }
-    ]
 
 
 def _true_steps(result: TrackResult) -> tuple[FloatArray, FloatArray]:
+    """Corners of the true schedule: times in s and masses in kg, nothing before the first."""
     first, last = _span(result.track)
-    changes = [(0.0, 0.0), *(change for change in result.schedule or () if change[0] < last)]
-    inner = [max(time, first) for time, _ in changes[1:] for _ in range(2)]
-    return np.array([first, *inner, last]), np.repeat([mass for _, mass in changes], 2)
+    starts, masses = [], [0.0]
+    for time, mass in result.schedule or ():
+        if time < last:
+            starts.append(max(time, first))
+            masses.append(mass)
+    corners = [first] + np.repeat(starts, 2).tolist() + [last]
+    return np.array(corners), np.repeat(masses, 2)
 
 
 def _steps(x: FloatArray, y: FloatArray, colour: str, name: str, dash: str, width: float) -> Trace:
-    trace = line(
-        x, y, colour, name, name, width=width, hover=f"{name} %{{y:.6g}} kg<extra></extra>"
-    )
+    hover = f"{name} %{{y:.6g}} kg<extra></extra>"
+    trace = line(x, y, colour, name, name, width=width, hover=hover)
     trace["line"] |= {"dash": dash}
     return trace

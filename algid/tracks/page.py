@@ -34,17 +34,16 @@ def track_document(result: TrackResult) -> Document:
     """The report of a track."""
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
-    warnings = Bullets(
-        tuple(one.sentence for one in result.notices), "The readers gave no warning."
-    )
+    sentences = tuple(one.sentence for one in result.notices)
+    warnings = Bullets(sentences, "The readers gave no warning.")
+    changes = tuple(filled(change_table(result)))
+    masses = (stretch_table(result),) + tuple(figures(result)) + changes
+    quality = (warnings,) + quality_tables(result)
+    origin = (settings_table(result.settings), track_provenance(result))
     sections = (
-        Section((stretch_table(result), *figures(result), *filled(change_table(result)))),
-        Section((warnings, *quality_tables(result)), "data", "Data quality"),
-        Section(
-            (settings_table(result.settings), track_provenance(result)),
-            "settings",
-            "Settings and provenance",
-        ),
+        Section(masses),
+        Section(quality, "data", "Data quality"),
+        Section(origin, "settings", "Settings and provenance"),
     )
     return Document(
         title=f"Payload in time of {name}",
@@ -81,11 +80,14 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
     """
     document = track_document(result)
     pages = {"report.html": page(document), "report.md": markdown(document)}
+    written = []
     for name, text in pages.items():
         _write_text(folder / name, text)
+        written.append(folder / name)
     if mcap:
         _write_mcap(result, folder)
-    return [folder / name for name in (*pages, *(["track.mcap"] if mcap else []))]
+        written.append(folder / "track.mcap")
+    return written
 
 
 def _write_text(path: Path, text: str) -> None:
@@ -100,7 +102,8 @@ def _write_curve(result: TrackResult, path: Path) -> None:
 
     track = result.track
     number = track.stretch.astype(np.int64)
-    masses = np.array([(s.m_p, *s.ci95) for s in track.stretches])[number].T
+    mass = np.array([one.m_p for one in track.stretches])
+    interval = np.array([one.ci95 for one in track.stretches])
     curve = pl.DataFrame(
         {
             "t": track.t,
@@ -109,7 +112,9 @@ def _write_curve(result: TrackResult, path: Path) -> None:
             "high": track.m_p + NORMAL * track.std,
             "left": track.left,
             "stretch": number,
-            **dict(zip(("stretch_m_p", "stretch_low", "stretch_high"), masses, strict=True)),
+            "stretch_m_p": mass[number],
+            "stretch_low": interval[number, 0],
+            "stretch_high": interval[number, 1],
         }
     )
     with whole_file(path) as temporary:
@@ -122,11 +127,10 @@ def _write_curve(result: TrackResult, path: Path) -> None:
 def _write_stretches(result: TrackResult, path: Path) -> None:
     import polars as pl
 
-    stretches = result.track.stretches
-    rows = [
-        (s.start, s.end, s.m_p, s.std, *s.ci95, status.value)
-        for s, status in zip(stretches, result.statuses, strict=True)
-    ]
+    rows = []
+    for one, status in zip(result.track.stretches, result.statuses, strict=True):
+        low, high = one.ci95
+        rows.append((one.start, one.end, one.m_p, one.std, low, high, status.value))
     frame = pl.DataFrame(
         rows, schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"], orient="row"
     )

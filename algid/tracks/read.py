@@ -112,36 +112,41 @@ class _File(BaseModel):
     notices: list[Notice] | None = None
 
 
-def _result(found: _File, curve: Block) -> TrackResult:
-    changes = [(one.t, one.before, one.to) for one in found.changes]
+def _result(file: _File, curve: Block) -> TrackResult:
+    changes = [(one.t, one.before, one.to) for one in file.changes]
+    schedule = None
+    if file.schedule is not None:
+        schedule = tuple(file.schedule)
     return TrackResult(
         track=Track(
-            stretches=[Stretch(one.start, one.end, one.m_p, one.std) for one in found.stretches],
+            stretches=[Stretch(one.start, one.end, one.m_p, one.std) for one in file.stretches],
             t=curve["t"],
             m_p=curve["m_p"],
             std=(curve["high"] - curve["m_p"]) / NORMAL,
             stretch=curve["stretch"],
             left=curve["left"],
             changes=np.array(changes, dtype=np.float64).reshape(-1, 3),
-            colour=found.excess,
-            explained=found.explained,
-            holes=np.array(found.holes, dtype=np.float64).reshape(-1, 2),
-            tip_equivalent=found.bare,
+            colour=file.excess,
+            explained=file.explained,
+            holes=np.array(file.holes, dtype=np.float64).reshape(-1, 2),
+            tip_equivalent=file.bare,
         ),
-        log=found.log,
-        arm=found.arm.path,
-        arm_sha256=found.arm.sha256,
-        settings=found.settings,
-        version=found.version,
-        schedule=None if found.schedule is None else tuple(found.schedule),
-        notices=_notices(found),
-        data_lost=found.data_lost,
+        log=file.log,
+        arm=file.arm.path,
+        arm_sha256=file.arm.sha256,
+        settings=file.settings,
+        version=file.version,
+        schedule=schedule,
+        notices=_notices(file),
+        data_lost=file.data_lost,
     )
 
 
-def _notices(found: _File) -> tuple[Notice, ...]:
+def _notices(file: _File) -> tuple[Notice, ...]:
     """What was noticed; of a track of schema version 1 its sentences."""
-    if found.notices is not None:
-        return tuple(found.notices)
-    arm = [] if found.arm.sentence is None else [f"the arm's own result: {found.arm.sentence}"]
-    return tuple(Notice("EARLIER", text) for text in [*arm, *found.warnings])
+    if file.notices is not None:
+        return tuple(file.notices)
+    sentences = list(file.warnings)
+    if file.arm.sentence is not None:
+        sentences.insert(0, f"the arm's own result: {file.arm.sentence}")
+    return tuple(Notice("EARLIER", text) for text in sentences)

@@ -48,7 +48,7 @@ def track_log(
         What the log's names, units and signs mean; where it is silent, what was said of the
         result's logs.
     settings : mapping
-        What else the result should tell of the call.
+        What else the result should hold of the call.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def track_log(
     ResultError
         If the result cannot be read, or leaves a constant or a link length open.
     """
-    result, content = _arm(parameters)
+    result, content, called = _arm(parameters)
     source = open_source(
         log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
     )
@@ -71,33 +71,37 @@ def track_log(
             weighed = track(partial(survey.segments, source), arm, covariance)
     except TooShortError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
-    otherwise = read_otherwise([survey.summary(source)], result, _called(parameters))
-    truth, notices = source.origin.truth, survey.seen(source).notices
+    truth, of_log = source.origin.truth, survey.seen(source).notices
     judged = result.verdict
-    doubt = Notice(
-        "ARM_DOUBTFUL", numbers={"grade": judged.word.lower(), "headline": judged.headline}
-    )
+    notices = []
+    if judged.grade != "good":
+        numbers = {"grade": judged.word.lower(), "headline": judged.headline}
+        notices.append(Notice("ARM_DOUBTFUL", numbers=numbers))
+    notices += read_otherwise([survey.summary(source)], result, called)
+    notices += merged(of_log)
+    schedule = None
+    if truth is not None:
+        schedule = truth.schedule or ((0.0, truth.payload),)
+    own_settings = {"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity}
     return TrackResult(
         track=weighed,
         log=survey.summary(source),
-        arm=_called(parameters),
+        arm=called,
         arm_sha256=hashlib.sha256(content).hexdigest(),
-        settings={"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity, **(settings or {})},
+        settings=own_settings | dict(settings or {}),
         version=__version__,
-        schedule=None if truth is None else truth.schedule or ((0.0, truth.payload),),
-        notices=(*(() if judged.grade == "good" else (doubt,)), *otherwise, *merged(notices)),
-        data_lost=any(notice.lossy for notice in notices),
+        schedule=schedule,
+        notices=tuple(notices),
+        data_lost=any(notice.lossy for notice in of_log),
     )
 
 
-def _arm(parameters: Result | str | Path) -> tuple[Result, bytes]:
-    """The arm's result, and its file's content."""
+def _arm(parameters: Result | str | Path) -> tuple[Result, bytes, str]:
+    """The arm's result, its file's content, and what it is called."""
     if isinstance(parameters, Result):
-        return parameters, result_json(parameters).encode()
-    path = Path(parameters)
-    result = read_result(path)
-    return result, read_whole(path / "result.json" if path.is_dir() else path)
-
-
-def _called(parameters: Result | str | Path) -> str:
-    return parameters.log.path if isinstance(parameters, Result) else str(parameters)
+        return parameters, result_json(parameters).encode(), parameters.log.path
+    file = Path(parameters)
+    result = read_result(file)
+    if file.is_dir():
+        file = file / "result.json"
+    return result, read_whole(file), str(parameters)
