@@ -69,8 +69,8 @@ Teller = Literal["flag", "profile", "names", "order"]
 class ChannelReading:
     """How one channel was read: algid's value is `factor` times the recorded one, plus `offset`.
 
-    `unit` is that of the recorded values; `told` by a flag or a profile, by the channel's own
-    name, or not at all ("assumed"). `offset` is in rad, N m or rad/s.
+    `unit` is that of the recorded values, and `told` its source: a flag or a profile, the channel's
+    own name, or none ("assumed"). `offset` is in rad, N m or rad/s.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -84,7 +84,9 @@ class ChannelReading:
     @property
     def sign(self) -> int:
         """Whether the recorded values count the other way round (-1)."""
-        return -1 if self.factor < 0 else 1
+        if self.factor < 0:
+            return -1
+        return 1
 
 
 @dataclass(frozen=True)
@@ -141,9 +143,11 @@ class Reading:
         """What decides the estimates and is read otherwise here than in `other`, in clauses."""
         for name in ("zero", "second_angle", "drive", "joints"):
             mine, others = getattr(self, name), getattr(other, name)
-            if mine != others and mine is not None and others is not None:
-                words = (one if isinstance(one, str) else ",".join(one) for one in (mine, others))
-                yield f"{name} {' instead of '.join(words)}"
+            if mine == others or mine is None or others is None:
+                continue
+            if name == "joints":
+                mine, others = ",".join(mine), ",".join(others)
+            yield f"{name} {mine} instead of {others}"
         for name in self.channels.keys() & other.channels.keys():
             mine, others = self.channels[name], other.channels[name]
             if mine.unit != others.unit:
@@ -209,7 +213,9 @@ class Log:
 
     def __repr__(self) -> str:
         """Where it came from, how many samples it has, and how long it is, without its numbers."""
-        seconds = self.duration if len(self) else 0.0
+        seconds = 0.0
+        if len(self):
+            seconds = self.duration
         return f"Log({self.origin.path!r}, N = {len(self):,}, {seconds:g} s)"
 
     @classmethod
@@ -255,21 +261,17 @@ class Log:
             raise ValueError(f"t must have shape (N,) with two samples or more, got {times.shape}")
         if not np.all(np.diff(times) > 0):
             raise ValueError("t must be finite and strictly increasing")
-        signals = {"theta": theta, "tau": tau, "omega": omega, "reference": reference}
-        rows = {
-            key: _two_rows(key, value, times.size)
-            for key, value in signals.items()
-            if value is not None
-        }
-        stamps = np.round(times * 1e9).astype(np.int64)
-        return cls(
-            stamps,
-            rows["theta"],
-            rows["tau"],
-            Origin(name, "arrays", {}),
-            rows.get("omega"),
-            reference=rows.get("reference"),
+        log = cls(
+            stamp_ns=np.round(times * 1e9).astype(np.int64),
+            theta=_two_rows("theta", theta, times.size),
+            tau=_two_rows("tau", tau, times.size),
+            origin=Origin(name, "arrays", {}),
         )
+        if omega is not None:
+            log = replace(log, omega=_two_rows("omega", omega, times.size))
+        if reference is not None:
+            log = replace(log, reference=_two_rows("reference", reference, times.size))
+        return log
 
     def __len__(self) -> int:
         return self.stamp_ns.size
@@ -291,13 +293,18 @@ class Log:
 
     def part(self, first: int, last: int) -> Log:
         """Samples `first` to `last` - 1 of this log, as views."""
+        omega, reference = self.omega, self.reference
+        if omega is not None:
+            omega = omega[:, first:last]
+        if reference is not None:
+            reference = reference[:, first:last]
         return replace(
             self,
             stamp_ns=self.stamp_ns[first:last],
             theta=self.theta[:, first:last],
             tau=self.tau[:, first:last],
-            omega=None if self.omega is None else self.omega[:, first:last],
-            reference=None if self.reference is None else self.reference[:, first:last],
+            omega=omega,
+            reference=reference,
         )
 
 
@@ -342,6 +349,9 @@ def join(blocks: Iterable[Log]) -> Log:
         raise ValueError("a log needs at least one block, got none")
     if len(parts) == 1:
         return parts[0]
+    notices: list[Notice] = []
+    for part in parts:
+        notices += part.notices
     return replace(
         parts[0],
         stamp_ns=np.concatenate([part.stamp_ns for part in parts]),
@@ -349,14 +359,16 @@ def join(blocks: Iterable[Log]) -> Log:
         tau=np.concatenate([part.tau for part in parts], axis=1),
         omega=joined([part.omega for part in parts]),
         reference=joined([part.reference for part in parts]),
-        notices=tuple(notice for part in parts for notice in part.notices),
+        notices=tuple(notices),
     )
 
 
 def joined(parts: Sequence[FloatArray | None]) -> FloatArray | None:
     """A signal that not every log has, (2, N), out of its parts; None where one lacks it."""
     known = [part for part in parts if part is not None]
-    return np.concatenate(known, axis=1) if known and len(known) == len(parts) else None
+    if not known or len(known) < len(parts):
+        return None
+    return np.concatenate(known, axis=1)
 
 
 KEY = "algid"
@@ -380,7 +392,7 @@ class Companion:
             }
             if self.truth.schedule:
                 content["schedule"] = [list(change) for change in self.truth.schedule]
-        return json.dumps({**content, "crc32": _checksum(content)})
+        return json.dumps(content | {"crc32": _checksum(content)})
 
 
 def loads(text: str | bytes) -> Companion:
@@ -399,11 +411,11 @@ def loads(text: str | bytes) -> Companion:
         if "arm" not in content:
             return Companion(None, sums)
         arm = Arm(**{name: _finite(value) for name, value in content["arm"].items()})
-        case = None if content["case"] is None else str(content["case"])
-        schedule = tuple(
-            (_finite(time), _finite(mass)) for time, mass in content.get("schedule", ())
-        )
-        return Companion(Truth(arm, _finite(content["payload"]), case, schedule), sums)
+        case = content["case"]
+        if case is not None:
+            case = str(case)
+        schedule = [(_finite(time), _finite(mass)) for time, mass in content.get("schedule", ())]
+        return Companion(Truth(arm, _finite(content["payload"]), case, tuple(schedule)), sums)
     except (KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise ValueError(f"not the truth of a synthetic log: {error!r}") from error
 

@@ -32,9 +32,8 @@ _BINS = 112
 _EDGES = np.geomspace(2.0**-14, 0.5, _BINS + 1)  # cycles a row
 _FIRST = 2  # lines of a periodogram below that the mean leaks into
 _NEIGHBOURS = (4 / 9, 1 / 36)  # squared correlation of Hann's lines one and two apart (Harris 1978)
-_FREEDOM = (
-    12.0  # of a point of the spectrum at least: its band then is a factor of two or so either way
-)
+_FREEDOM = 12.0
+"""Of a point of the spectrum at least: its band then is a factor of two or so either way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +85,14 @@ def residual_sums(w: FloatArray, dt: float, stride: int = 1, lags: int = LAGS) -
     place = np.clip(np.searchsorted(_EDGES, frequency, side="right") - 1, 0, _BINS - 1)
     lines = np.bincount(place, minlength=_BINS).astype(np.float64)
     power = np.stack([np.bincount(place, row, minlength=_BINS) for row in periodogram])
-    near, far = (
-        share * np.maximum(lines - apart, 0.0) for apart, share in enumerate(_NEIGHBOURS, start=1)
-    )
+    near = _NEIGHBOURS[0] * np.maximum(lines - 1, 0.0)
+    far = _NEIGHBOURS[1] * np.maximum(lines - 2, 0.0)
     scatter = lines + 2 * (near + far)
-    products = np.array(
-        [[row[lag:] @ row[: max(n - lag, 0)] for lag in range(lags + 1)] for row in w[:2]]
-    )
+    products = np.empty((2, lags + 1))
+    for lag in range(lags + 1):
+        overlap = max(n - lag, 0)
+        products[0, lag] = w[0, lag:] @ w[0, :overlap]
+        products[1, lag] = w[1, lag:] @ w[1, :overlap]
     pairs = np.maximum(n - np.arange(lags + 1, dtype=np.float64), 0.0)
     return ResidualSums(dt, stride, power.astype(np.float64), lines, scatter, products, pairs)
 
@@ -102,8 +102,13 @@ def pooled(sums: Sequence[ResidualSums]) -> ResidualSums | None:
 
     Those whose rows are spaced unlike the first one's are left out.
     """
-    alike = [one for one in sums if abs(one.dt - sums[0].dt) <= ALIKE * sums[0].dt]
-    return sum(alike[1:], alike[0]) if alike else None
+    if not sums:
+        return None
+    total = sums[0]
+    for one in sums[1:]:
+        if abs(one.dt - total.dt) <= ALIKE * total.dt:
+            total = total + one
+    return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +129,8 @@ def spectra(sums: ResidualSums) -> Spectra:
     starts, count, spread = [], 0.0, 0.0
     begin = last = 0
     for place in range(_BINS):
-        begin = begin if count or sums.lines[place] else place
+        if not count and not sums.lines[place]:
+            begin = place
         count, spread = count + sums.lines[place], spread + sums.scatter[place]
         if count and 2 * count**2 / spread >= _FREEDOM:
             starts.append(begin)
@@ -132,11 +138,13 @@ def spectra(sums: ResidualSums) -> Spectra:
             count, spread = 0.0, 0.0
     if not starts:
         return Spectra(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
-    ends = np.array([*starts[1:], last]) - 1
-    lines, scatter = (np.add.reduceat(one[:last], starts) for one in (sums.lines, sums.scatter))
+    ends = np.append(starts[1:], last) - 1
+    lines = np.add.reduceat(sums.lines[:last], starts)
+    scatter = np.add.reduceat(sums.scatter[:last], starts)
     density = np.add.reduceat(sums.power[:, :last], starts, axis=1) / lines
     freedom = 2 * lines**2 / scatter
-    low, high = (chi2_exceeded(freedom, tail) / freedom for tail in (0.975, 0.025))
+    low = chi2_exceeded(freedom, 0.975) / freedom
+    high = chi2_exceeded(freedom, 0.025) / freedom
     middle = np.sqrt(_EDGES[starts] * _EDGES[ends + 1])
     return Spectra(middle / sums.dt, 2 * sums.dt * density, low, high)
 

@@ -33,9 +33,8 @@ from algid.quantiles import medians
 from algid.signals.differences import POINTS
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
-_FED_BACK = (
-    0.9  # of the torque's white level: a controller makes more than that of its encoders' noise
-)
+_FED_BACK = 0.9
+"""Of the torque's white level: a controller makes more than that of its encoders' noise."""
 _LAGS = 32  # samples that a controller's torque rests on
 _MOST_SAMPLES = 8192
 _FEWEST_SAMPLES = 10 * 2 * _LAGS
@@ -110,7 +109,8 @@ def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
     few, or not all noise. A controller turns the noise of its encoders into torque, which moves the
     arm and is no noise of the torque.
     """
-    angles, torques = (np.diff(x[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1) for x in (theta, tau))
+    angles = np.diff(theta[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1)
+    torques = np.diff(tau[:, :_MOST_SAMPLES], _DIFFERENCE, axis=1)
     n = angles.shape[1] - _LAGS
     if n < _FEWEST_SAMPLES or not _is_noise(theta[:, :_MOST_SAMPLES]):
         return np.diff(tau, _DIFFERENCE, axis=1)
@@ -124,17 +124,18 @@ def _not_fed_back(theta: FloatArray, tau: FloatArray) -> FloatArray:
 
 def _is_noise(signal: FloatArray) -> bool:
     """Whether each row's next difference grows as white noise's does: no motion is left in it."""
-    first, second = (
-        medians(np.abs(np.diff(signal, order, axis=1))) for order in (_DIFFERENCE, _DIFFERENCE + 1)
-    )
-    growth = np.sqrt(
-        comb(2 * _DIFFERENCE + 2, _DIFFERENCE + 1) / comb(2 * _DIFFERENCE, _DIFFERENCE)
-    )
+    difference = np.diff(signal, _DIFFERENCE, axis=1)
+    first = medians(np.abs(difference))
+    second = medians(np.abs(np.diff(difference, axis=1)))
+    order = _DIFFERENCE
+    growth = np.sqrt(comb(2 * order + 2, order + 1) / comb(2 * order, order))
     return bool(np.all(np.abs(second - growth * first) < 0.1 * growth * first))
 
 
 def _white_noise(signal: FloatArray, difference: FloatArray | None = None) -> FloatArray:
-    difference = np.diff(signal, _DIFFERENCE, axis=1) if difference is None else difference
+    """White noise (2,) behind a signal (2, N), by its sixth differences or those given."""
+    if difference is None:
+        difference = np.diff(signal, _DIFFERENCE, axis=1)
     # The median of squares, so that steps in the signal do not count as noise.
     median = medians(np.abs(difference)) / 0.6745
     mean = np.sqrt(np.mean(difference**2, axis=1))
@@ -166,7 +167,9 @@ def _step(values: FloatArray) -> float:
         return 0.0
     step = float(np.sum(near) / np.sum(np.round(near / smallest)))
     off_grid = np.abs(near / step - np.round(near / step))
-    return step if off_grid.max() < 0.02 else 0.0
+    if off_grid.max() >= 0.02:
+        return 0.0
+    return step
 
 
 def variance_score(
@@ -203,11 +206,13 @@ def variance_score(
     joints = np.stack([_by_joint(row) for row in multipliers[:-1]])
     backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
     smears = linear.smeared(joints)
+    absorbed = [backs[:, 0] @ backs[:, 0].T, backs[:, 1] @ backs[:, 1].T]
+    absorbed += [smears[:, 0] @ smears[:, 0].T, smears[:, 1] @ smears[:, 1].T]
     return VarianceScore(
         power,
         _traces(linear, length, rows, seed),
         0.5 * whitened @ whitened.T,
-        np.stack([part @ part.T for part in (*backs.swapaxes(0, 1), *smears.swapaxes(0, 1))]),
+        np.stack(absorbed),
     )
 
 

@@ -15,7 +15,7 @@ y       angles at the horizons; NaN past a stretch's end   (H, 2, S)        rad
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,9 +66,8 @@ class RolloutScore:
         return self._root_mean(self.moved)
 
     def _root_mean(self, squares: FloatArray) -> FloatArray:
-        return np.sqrt(
-            np.where(self.count[:, None] > 0, squares / np.maximum(self.count, 1)[:, None], np.nan)
-        )
+        mean = squares / np.maximum(self.count, 1)[:, None]
+        return np.sqrt(np.where(self.count[:, None] > 0, mean, np.nan))
 
 
 def rollouts(
@@ -82,19 +81,18 @@ def rollouts(
 
     `shift` is the time in s after which a logged torque acts, as for `PredictionSums`.
     """
-    step, total, cutter = time_step(model, c), RolloutScore(), None
-    starts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    step = time_step(model, c)
+    states, torques, later = [], [], []
     spacing = max(_CLOSEST, duration / _STARTS)
-    for segment in segments:
-        cutter = cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
-        starts += [_starts(model, c, piece, spacing, step, shift) for piece in cutter.push(segment)]
-    starts += [
-        _starts(model, c, piece, spacing, step, shift)
-        for piece in (cutter.finish() if cutter else ())
-    ]
-    if not sum(x.shape[1] for x, _, _ in starts):
-        return total
-    x, u, y = (np.concatenate(parts, axis=-1) for parts in zip(*starts, strict=True))
+    for piece in _pieces(segments):
+        x, u, y = _starts(model, c, piece, spacing, step, shift)
+        if x.shape[1]:
+            states.append(x)
+            torques.append(u)
+            later.append(y)
+    if not states:
+        return RolloutScore()
+    x, u, y = (np.concatenate(parts, axis=-1) for parts in (states, torques, later))
     angles = np.stack(_angles_at_horizons(model, c, x, u, step))
     judged = np.isfinite(y[:, 0])
     with np.errstate(over="ignore", invalid="ignore"):
@@ -104,6 +102,17 @@ def rollouts(
     return RolloutScore(
         judged.sum(axis=1).astype(np.float64), squares.sum(axis=2), (moved**2).sum(axis=2)
     )
+
+
+def _pieces(segments: Iterable[Segment]) -> Iterator[Segment]:
+    """Pieces of some `_PIECE_SECONDS`."""
+    cutter: Cutter | None = None
+    for segment in segments:
+        if cutter is None:
+            cutter = Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
+        yield from cutter.push(segment)
+    if cutter is not None:
+        yield from cutter.finish()
 
 
 def time_step(model: Model, c: FloatArray) -> float:
@@ -141,11 +150,14 @@ def _starts(
     t = np.arange(n) * dt
     width = max(1, round(step / dt))
     ends, box = (width // 2, (width - 1) // 2), np.full(width, 1 / width)
-    tau = [np.convolve(np.pad(row, ends, "edge"), box, "valid") for row in piece.tau]
     offset = 0.5 * dt * (1 - width % 2)  # of the mean over an even number of samples
-    u = np.stack([np.interp(when + offset, t, row) for row in tau], axis=1)
-    ahead = at + np.array([[horizon / dt] for horizon in HORIZONS])
-    y = np.stack([np.interp(ahead, np.arange(n), row) for row in motion.theta], axis=1)
+    u = np.empty((halves, 2, at.size))
+    ahead = at + np.array(HORIZONS)[:, None] / dt
+    y = np.empty((len(HORIZONS), 2, at.size))
+    for joint in range(2):
+        tau = np.convolve(np.pad(piece.tau[joint], ends, "edge"), box, "valid")
+        u[:, joint] = np.interp(when + offset, t, tau)
+        y[:, joint] = np.interp(ahead, np.arange(n), motion.theta[joint])
     y[np.broadcast_to((ahead > n - 1 - edge)[:, None], y.shape)] = np.nan
     return np.concatenate([motion.theta[:, at], motion.omega[:, at]]), u, y
 

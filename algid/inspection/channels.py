@@ -21,13 +21,10 @@ _DENORMAL = 1e-6
 _SPIKE = 30.0
 _TURN_BACK, _STANDS, _CLEAR = 3, 0.4, 6.0
 """Turning points: samples before and after, share of their speed, their speed over the noise."""
-# s, and in usual runs: a torque that keeps one value so long is not measured
-_DEAD, _DEAD_RUNS = (
-    0.1,
-    20,
-)
+_DEAD, _DEAD_RUNS = 0.1, 20
+"""A torque that keeps one value for so many s and usual runs is not measured."""
 _HELD_RUNS, _HELD_SHARE = 50, 0.6
-"""Changes of a torque that tell its clock, and of how many of the samples at most they are."""
+"""Changes of a torque that show its clock, and of how many of the samples at most they are."""
 _OFF_STEP, _IN_STEP = 0.15, 0.9
 """Largest distance of a held torque's runs from whole steps, and least share of such runs."""
 _TURN = 2 * math.pi
@@ -36,8 +33,8 @@ _TURN = 2 * math.pi
 def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
     """Torques that are zero, constant or at a limit.
 
-    That of a joint without a motor may be anything. A limit that motion tells to be true is no
-    reason to doubt; one that cuts the torque off is told by `algid.inspection.clipping`.
+    That of a joint without a motor may be anything. A limit that motion shows to be true is no
+    reason to doubt; of one that cuts the torque off `algid.inspection.clipping` warns.
     """
     cut_off = {limit.joint + 1 for limit in known.limits}
     for joint, tau in enumerate(log.tau, start=1):
@@ -47,23 +44,22 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
         other = Remedy({f"{name}.source": None}, "name the measured torque")
         largest, what = float(np.abs(tau).max()), _source(log, name)
         if largest == 0:
-            motorless = Remedy({"passive": joint}, "for a joint without a motor")
-            yield Notice(
-                "EFFORT_ZERO",
-                numbers={"channel": what},
-                refuse=True,
-                remedies=(other, *torques_beside(log, name), motorless),
-            )
+            remedies = (other,) + tuple(torques_beside(log, name))
+            remedies += (Remedy({"passive": joint}, "for a joint without a motor"),)
+            yield Notice("EFFORT_ZERO", numbers={"channel": what}, refuse=True, remedies=remedies)
         elif largest < _DENORMAL:
             seen = {"channel": what, "largest": largest}
             yield Notice("EFFORT_DENORMAL", numbers=seen, refuse=True, remedies=(other,))
         elif tau.min() == tau.max():
             seen = {"channel": what, "value": float(tau[0])}
             yield Notice("EFFORT_CONSTANT", numbers=seen, refuse=True, remedies=(other,))
-        elif (share := saturated_share(tau)) > 0.01 and joint not in cut_off:
-            sound = joint - 1 in known.sound
-            seen = {"channel": what, "percent": 100 * share, "case": "true" if sound else "open"}
-            yield Notice("SATURATED_EFFORT", numbers=seen, note=sound)
+        elif joint not in cut_off:
+            share = saturated_share(tau)
+            if share > 0.01:
+                sound = joint - 1 in known.sound
+                case = {True: "true", False: "open"}[sound]
+                seen = {"channel": what, "percent": 100 * share, "case": case}
+                yield Notice("SATURATED_EFFORT", numbers=seen, note=sound)
 
 
 def dead_efforts(log: Log) -> Iterator[Notice]:
@@ -84,8 +80,12 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
         usual = quantile(thinned(runs), 0.95)
         at_limit = tau[first] in (tau.max(), tau.min())
         if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
-            seen = {"seconds": length * log.period, "start": first * log.period}
-            yield Notice("DEAD_EFFORT", numbers={"channel": _source(log, name), **seen})
+            numbers = {
+                "channel": _source(log, name),
+                "seconds": length * log.period,
+                "start": first * log.period,
+            }
+            yield Notice("DEAD_EFFORT", numbers=numbers)
 
 
 def held_efforts(log: Log) -> Iterator[Notice]:
@@ -105,8 +105,12 @@ def held_efforts(log: Log) -> Iterator[Notice]:
         in_step = float(np.mean(off <= _OFF_STEP * usual))
         moves = np.count_nonzero(theta[1:] != theta[:-1]) > 1.5 * count
         if usual >= 2 and in_step >= _IN_STEP and moves:
-            seen = {"held": 1e3 * usual * log.period, "late": 5e2 * (usual - 1) * log.period}
-            yield Notice("HELD_EFFORT", numbers={"channel": _source(log, f"tau{joint}"), **seen})
+            numbers = {
+                "channel": _source(log, f"tau{joint}"),
+                "held": 1e3 * usual * log.period,
+                "late": 5e2 * (usual - 1) * log.period,
+            }
+            yield Notice("HELD_EFFORT", numbers=numbers)
 
 
 def angles(log: Log) -> Iterator[Notice]:
@@ -118,8 +122,9 @@ def angles(log: Log) -> Iterator[Notice]:
         if not largest:
             yield Notice("ANGLE_CONSTANT", numbers={"channel": what, "value": float(theta[0])})
             continue
-        near = largest > 0.8 * _TURN  # of most logs no step is, and none has to be looked at
-        wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN)) if near else 0
+        wraps = 0
+        if largest > 0.8 * _TURN:  # of most logs no step is, and none has to be looked at
+            wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and median(thinned(sizes)) < 0.5:
             yield Notice(
@@ -135,27 +140,21 @@ def angles(log: Log) -> Iterator[Notice]:
         long_enough = max(10, round(0.02 / log.period))
         frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
         if frozen.size:
-            start, length = (
-                (int(moving[frozen[0]]) + 1) * log.period,
-                int(runs[frozen[0]]) * log.period,
-            )
-            yield Notice(
-                "STUCK_SENSOR",
-                numbers={"channel": what, "seconds": length, "start": start},
-            )
+            start = (int(moving[frozen[0]]) + 1) * log.period
+            length = int(runs[frozen[0]]) * log.period
+            numbers = {"channel": what, "seconds": length, "start": start}
+            yield Notice("STUCK_SENSOR", numbers=numbers)
 
 
 def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
     """Angles or velocities in degrees, by each other or by how far the angles turn.
 
-    A joint may turn as often as it will: `is_right` tells whether physics holds for the log as it
+    A joint may turn as often as it will: `is_right` says whether physics holds for the log as it
     was read.
     """
-    ratios = (
-        (0.0, 0.0)
-        if log.omega is None
-        else tuple(_travelled_over_summed(log, row) for row in (0, 1))
-    )
+    ratios = (0.0, 0.0)
+    if log.omega is not None:
+        ratios = (_travelled_over_summed(log, 0), _travelled_over_summed(log, 1))
     pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
     for joint, ratio in enumerate(ratios, start=1):
         for what, quantity, factor in pairs:
@@ -174,33 +173,28 @@ def _travelled_over_summed(log: Log, row: int) -> float:
     assert log.omega is not None
     width = max(1, len(log) // 200)
     travelled = np.abs(np.diff(log.theta[row, ::width]))
-    summed = np.add.reduceat(np.abs(log.omega[row]), np.arange(0, len(log), width))[
-        : travelled.size
-    ]
-    summed = summed / width * np.diff(log.t[::width])
+    summed = np.add.reduceat(np.abs(log.omega[row]), np.arange(0, len(log), width))
+    summed = summed[: travelled.size] / width * np.diff(log.t[::width])
     moving = travelled > 0.2 * travelled.max()
     total = float(np.sum(summed[moving]))
-    return float(np.sum(travelled[moving])) / total if total > 0 else 0.0
+    if total <= 0:
+        return 0.0
+    return float(np.sum(travelled[moving])) / total
 
 
 def _in_degrees(log: Log, name: str, seen: Mapping[str, Any]) -> Notice:
     """Refused, unless the user has said the unit of the channel `name`."""
     if log.origin.reading.told(name):
         unit = log.origin.reading.channels[name].unit
-        return Notice("DEGREES", numbers={**seen, "unit": unit})
-    remedies = [
-        Remedy(
-            {"angle_unit": "deg"} if name.startswith("theta") else {f"{name}.unit": "deg"},
-            "where they are in degrees",
-        )
-    ]
+        return Notice("DEGREES", numbers=dict(seen) | {"unit": unit})
+    in_degrees = "where they are in degrees"
+    right = Remedy({f"{name}.unit": "rad"}, "where it is right")
+    remedies: tuple[Remedy, ...] = (Remedy({f"{name}.unit": "deg"}, in_degrees), right)
     if name.startswith("theta"):
-        remedies.append(
-            Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear")
-        )
-    remedies.append(Remedy({f"{name}.unit": "rad"}, "where it is right"))
-    numbers = {**seen, "unit": None}
-    return Notice("DEGREES", numbers=numbers, refuse=True, remedies=tuple(remedies))
+        gear = Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear")
+        remedies = (Remedy({"angle_unit": "deg"}, in_degrees), gear, right)
+    numbers = dict(seen) | {"unit": None}
+    return Notice("DEGREES", numbers=numbers, refuse=True, remedies=remedies)
 
 
 def spikes(log: Log) -> Iterator[Notice]:
@@ -212,8 +206,13 @@ def spikes(log: Log) -> Iterator[Notice]:
     """
     if len(log) < 20:
         return
-    channels = zip(("theta1", "theta2", "tau1", "tau2"), (*log.theta, *log.tau), strict=True)
-    for name, values in channels:
+    channels = {
+        "theta1": log.theta[0],
+        "theta2": log.theta[1],
+        "tau1": log.tau[0],
+        "tau2": log.tau[1],
+    }
+    for name, values in channels.items():
         off = values[:-2] + values[2:]  # in place: a long log's arrays cost more than the sums
         off *= -0.5
         off += values[1:-1]
@@ -237,22 +236,26 @@ def _alone(values: FloatArray, places: NDArray[np.int64], size: FloatArray) -> N
     before, after = values[places - 1], values[places + 1]
     from_before = 2 * before - values[np.maximum(places - 2, 0)]
     from_after = 2 * after - values[np.minimum(places + 2, values.size - 1)]
-    misfit = [np.abs(values[places] - line) for line in (from_before, from_after)]
-    return (np.abs(after - before) < 0.2 * size) & (np.minimum(*misfit) > 0.5 * size)
+    here = values[places]
+    misfit = np.minimum(np.abs(here - from_before), np.abs(here - from_after))
+    return (np.abs(after - before) < 0.2 * size) & (misfit > 0.5 * size)
 
 
 def _turns_back(theta: FloatArray, places: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether a joint stands still at `places` for a sample, and moves before it and behind."""
     noise = robust_deviation(differences(theta, 3)) / math.sqrt(20)
     inside = np.clip(places, _TURN_BACK + 1, theta.size - _TURN_BACK - 2)
-    now, before, after = (
-        np.abs(theta[inside + apart + 1] - theta[inside + apart - 1])
-        for apart in (0, -_TURN_BACK, _TURN_BACK)
-    )
-    slower = np.minimum(before, after)
-    return (now < _STANDS * slower) & (slower > _CLEAR * noise)
+
+    def travel(places: NDArray[np.int64]) -> FloatArray:
+        return np.abs(theta[places + 1] - theta[places - 1])
+
+    slower = np.minimum(travel(inside - _TURN_BACK), travel(inside + _TURN_BACK))
+    return (travel(inside) < _STANDS * slower) & (slower > _CLEAR * noise)
 
 
 def _source(log: Log, name: str) -> str:
+    """A channel and what it is called in the log."""
     source = log.origin.mapping.get(name, name)
-    return name if source == name else f"{name} ({source})"
+    if source == name:
+        return name
+    return f"{name} ({source})"

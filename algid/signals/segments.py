@@ -63,13 +63,18 @@ class Segment:
 
     def part(self, first: int, last: int) -> Segment:
         """Samples `first` to `last` - 1 as views; it continues the part before it."""
+        omega, reference = self.omega, self.reference
+        if omega is not None:
+            omega = omega[:, first:last]
+        if reference is not None:
+            reference = reference[:, first:last]
         return replace(
             self,
             start=self.start + first * self.dt,
             theta=self.theta[:, first:last],
             tau=self.tau[:, first:last],
-            omega=None if self.omega is None else self.omega[:, first:last],
-            reference=None if self.reference is None else self.reference[:, first:last],
+            omega=omega,
+            reference=reference,
             continues=self.continues or first > 0,
         )
 
@@ -129,7 +134,7 @@ class _Sampler:
 
     def _settle(self, held: Log) -> Iterator[Segment]:
         gaps = np.flatnonzero(np.diff(held.stamp_ns) * 1e-9 > CUT * self._dt) + 1
-        edges = [0, *gaps.tolist(), len(held)]
+        edges = [0] + gaps.tolist() + [len(held)]
         for first, last in pairwise(edges[:-1]):
             yield from self._stretch(held.part(first, last), ends=True)
             self._anchor, self._emitted = float(self._time(held.stamp_ns[last])), 0
@@ -147,7 +152,10 @@ class _Sampler:
     def _stretch(self, log: Log, *, ends: bool) -> Iterator[Segment]:
         """Grid points that `log` determines: up to its last sample but one, or all if `ends`."""
         t = self._time(log.stamp_ns)
-        reach = t[-1] + EVEN * self._dt if ends else t[max(0, t.size - 2)] - EVEN * self._dt
+        if ends:
+            reach = t[-1] + EVEN * self._dt
+        else:
+            reach = t[max(0, t.size - 2)] - EVEN * self._dt
         count = int(np.floor((reach - self._anchor) / self._dt)) + 1 - self._emitted
         if count <= 0 or t.size < 4:
             return
@@ -155,23 +163,30 @@ class _Sampler:
         first = int(np.searchsorted(t, grid[0] - 0.5 * self._dt))
         own = slice(first, first + count)
         even = t[own].size == count and bool(np.all(np.abs(t[own] - grid) <= EVEN * self._dt))
-        weights = None if even else _cubic(t, grid)
+        weights: list[tuple[IntArray, FloatArray]] = []
+        if not even:
+            weights = _cubic(t, grid)
 
         def take(signal: FloatArray) -> FloatArray:
-            if weights is None:
+            if even:
                 return signal[:, own]
             values = np.zeros((2, count))
             for place, weight in weights:
                 values += weight * signal[:, place]
             return values
 
+        omega = reference = None
+        if log.omega is not None:
+            omega = take(log.omega)
+        if log.reference is not None:
+            reference = take(log.reference)
         yield Segment(
             start=float(grid[0]),
             dt=self._dt,
             theta=take(log.theta),
             tau=take(log.tau),
-            omega=None if log.omega is None else take(log.omega),
-            reference=None if log.reference is None else take(log.reference),
+            omega=omega,
+            reference=reference,
             continues=self._emitted > 0,
         )
         self._emitted += count
@@ -181,15 +196,14 @@ def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]
     """Lagrange's cubic around each instant of `grid`: its four samples and their weights."""
     corner = np.clip(np.searchsorted(t, grid, side="right") - 2, 0, t.size - 4)
     nodes = t[corner[:, None] + np.arange(4)]
-    found = []
+    weights: list[tuple[IntArray, FloatArray]] = []
     for node in range(4):
-        others = [other for other in range(4) if other != node]
-        weight = np.prod(
-            [(grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other]) for other in others],
-            axis=0,
-        )
-        found.append((corner + node, weight))
-    return found
+        weight: FloatArray = np.ones(grid.size)
+        for other in range(4):
+            if other != node:
+                weight *= (grid - nodes[:, other]) / (nodes[:, node] - nodes[:, other])
+        weights.append((corner + node, weight))
+    return weights
 
 
 def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
@@ -223,28 +237,29 @@ def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[lis
     for index, piece in enumerate(usable):
         if index % stride:
             continue
-        omega = None if piece.omega is None else piece.omega.copy()
-        reference = None if piece.reference is None else piece.reference.copy()
-        continues = piece.continues and stride == 1
-        kept.append(
-            replace(
-                piece,
-                theta=piece.theta.copy(),
-                tau=piece.tau.copy(),
-                omega=omega,
-                reference=reference,
-                continues=continues,
-            )
-        )
+        copy = _copied(piece)
+        kept.append(replace(copy, continues=piece.continues and stride == 1))
         if len(kept) > 2 * count and sum(map(len, kept)) > 2 * count * rows:
             kept, stride = [replace(other, continues=False) for other in kept[::2]], 2 * stride
     return kept, stride == 1
 
 
+def _copied(piece: Segment) -> Segment:
+    """A piece with arrays of its own."""
+    omega, reference = piece.omega, piece.reference
+    if omega is not None:
+        omega = omega.copy()
+    if reference is not None:
+        reference = reference.copy()
+    return replace(
+        piece, theta=piece.theta.copy(), tau=piece.tau.copy(), omega=omega, reference=reference
+    )
+
+
 class Cutter:
     """Cuts each stretch into pieces of `rows` samples.
 
-    a rest shorter than half a piece joins the last one.
+    A rest shorter than half a piece joins the last one.
 
     The pieces do not depend on how the stretches came in. Their length is below 1.5 `rows`; a
     stretch shorter than half a piece is a piece of its own. Pieces are views wherever they lie
@@ -259,16 +274,26 @@ class Cutter:
         """Take in a segment; give out the pieces that are settled."""
         if self._held is not None and not segment.continues:
             yield from self.finish()
-        held, rest = (segment, None) if self._held is None else (self._held, segment)
-        while len(held) + (0 if rest is None else len(rest)) >= 2 * self._rows:
-            if rest is not None and len(held) < self._rows:
+        if self._held is None:
+            yield from self._pieces_of(segment)
+            return
+        held = self._held
+        while len(held) + len(segment) >= 2 * self._rows:
+            if len(held) < self._rows:
                 missing = self._rows - len(held)
-                yield append(held, rest.part(0, missing))
-                held, rest = rest.part(missing, len(rest)), None
-            else:
-                yield held.part(0, self._rows)
-                held = held.part(self._rows, len(held))
-        self._held = held if rest is None else append(held, rest)
+                yield append(held, segment.part(0, missing))
+                yield from self._pieces_of(segment.part(missing, len(segment)))
+                return
+            yield held.part(0, self._rows)
+            held = held.part(self._rows, len(held))
+        self._held = append(held, segment)
+
+    def _pieces_of(self, segment: Segment) -> Iterator[Segment]:
+        """Whole pieces of a segment that follows no other; holds what is left."""
+        while len(segment) >= 2 * self._rows:
+            yield segment.part(0, self._rows)
+            segment = segment.part(self._rows, len(segment))
+        self._held = segment
 
     def finish(self) -> Iterator[Segment]:
         """Give out what is left of a stretch at its end."""

@@ -55,9 +55,13 @@ class Case:
 
     def constants(self, payload: float) -> FloatArray:
         """Constants (10,) with `payload` kg; another mass has the shape of the case's payload."""
-        share = payload / self.payload if self.payload else 1.0
         x, y = self.place
-        return self.arm.phasors(payload, x, y, share * self.inertia if payload else 0.0)
+        inertia = self.inertia
+        if self.payload:
+            inertia *= payload / self.payload
+        elif not payload:
+            inertia = 0.0
+        return self.arm.phasors(payload, x, y, inertia)
 
 
 class _Table(BaseModel):
@@ -87,7 +91,7 @@ class _ArmTable(_Table):
             "I1": self.m1 * self.l1**2 / 12,
             "I2": self.m2 * self.l2**2 / 12,
         }
-        return Arm(**{**uniform, **self.model_dump(exclude_none=True)})
+        return Arm(**(uniform | self.model_dump(exclude_none=True)))
 
 
 class _PayloadTable(_Table):
@@ -115,11 +119,11 @@ class _TorqueTable(_Table):
 
     def multi_sine(self) -> MultiSine:
         """The torque of both joints."""
-        joints = (self.joint1, self.joint2)
+        one, two = self.joint1, self.joint2
         return MultiSine(
-            amplitude=tuple(tuple(joint.amplitude) for joint in joints),
-            frequency=tuple(tuple(joint.frequency) for joint in joints),
-            phase=tuple(tuple(joint.phase) for joint in joints),
+            amplitude=(tuple(one.amplitude), tuple(two.amplitude)),
+            frequency=(tuple(one.frequency), tuple(two.frequency)),
+            phase=(tuple(one.phase), tuple(two.phase)),
         )
 
 
@@ -132,11 +136,8 @@ class _CaseFile(_Table):
 
 def case_names() -> list[str]:
     """Names of the cases that ship with algid."""
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in _folder().iterdir()
-        if entry.name.endswith(".toml")
-    )
+    files = [Path(entry.name) for entry in _folder().iterdir()]
+    return sorted(file.stem for file in files if file.suffix == ".toml")
 
 
 def load_case(name: str) -> Case:
@@ -164,12 +165,15 @@ def _folder() -> Any:
 
 def _read_case(path: Path) -> Case:
     content = read_toml(path, _CaseFile)
+    torque = None
+    if content.torque is not None:
+        torque = content.torque.multi_sine()
     return Case(
         name=path.stem,
         arm=content.arm.arm(),
         payload=content.payload.m_p,
         place=(content.payload.x, content.payload.y),
         inertia=content.payload.J,
-        torque=None if content.torque is None else content.torque.multi_sine(),
+        torque=torque,
         paper_error_percent=dict(content.paper_error_percent),
     )

@@ -59,7 +59,9 @@ def read_plan(path: Path) -> Reference:
     SettingError
         If there is none, or it lacks a column.
     """
-    file = path / "trajectory.csv" if path.is_dir() else path
+    file = path
+    if path.is_dir():
+        file = path / "trajectory.csv"
     try:
         rows = csv.reader(read_text(file).splitlines())
         names = next(rows, [])
@@ -68,27 +70,31 @@ def read_plan(path: Path) -> Reference:
         raise SettingError(
             f"{file}: not the trajectory of a design ({error}); expected what algid design wrote"
         ) from error
-    missing = next((name for name in COLUMNS if name not in names), None)
-    if missing is not None or values.ndim != 2 or values.shape[1] < 2:
-        problem = f"no column {missing}" if missing is not None else "no motion"
+    problem = None
+    if values.ndim != 2 or values.shape[1] < 2:
+        problem = "no motion"
+    for name in reversed(COLUMNS):
+        if name not in names:
+            problem = f"no column {name}"
+    if problem is not None:
         raise SettingError(
             f"{file}: expected {', '.join(COLUMNS)}, found {problem}; give what algid design wrote"
         )
     column = dict(zip(names, values, strict=True))
-    pairs = {
-        name: np.stack([column[f"{name}1"], column[f"{name}2"]])
-        for name in ("theta", "omega", "tau")
-    }
-    loaded = [column.get(name) for name in LOADED_COLUMNS]
-    with_load = (
-        pairs["tau"] if loaded[0] is None or loaded[1] is None else np.stack([loaded[0], loaded[1]])
-    )
+    tau = np.stack([column["tau1"], column["tau2"]])
+    loaded_tau = tau
+    if column.keys() >= set(LOADED_COLUMNS):
+        loaded_tau = np.stack([column[name] for name in LOADED_COLUMNS])
     if not np.all(np.isfinite(values)) or np.any(np.diff(column["t"]) <= 0):
         raise SettingError(
             f"{file}: expected finite numbers at increasing times; write the design anew"
         )
     return Reference(
-        column["t"] - column["t"][0], pairs["theta"], pairs["omega"], pairs["tau"], with_load
+        t=column["t"] - column["t"][0],
+        theta=np.stack([column["theta1"], column["theta2"]]),
+        omega=np.stack([column["omega1"], column["omega2"]]),
+        tau=tau,
+        loaded_tau=loaded_tau,
     )
 
 
@@ -114,9 +120,10 @@ def follow(
 
     every = max(1, round(plan.t.size / max(plan.duration * _KNOTS, 1)))
     kept = np.unique(np.append(np.arange(0, plan.t.size, every), plan.t.size - 1))
-    wanted = np.concatenate([plan.theta, plan.omega, plan.loaded_tau if loaded else plan.tau])[
-        :, kept
-    ]
+    tau = plan.tau
+    if loaded:
+        tau = plan.loaded_tau
+    wanted = np.concatenate([plan.theta, plan.omega, tau])[:, kept]
     spline = make_interp_spline(plan.t[kept], wanted.T, k=min(5, kept.size - 1))
     end = plan.duration
 

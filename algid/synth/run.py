@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -25,7 +24,7 @@ class Recording:
 
     rate: float = 1000.0
     duration: float = 1.0
-    initial: tuple[float, float, float, float] = (*HANGING.tolist(), 0.0, 0.0)
+    initial: tuple[float, float, float, float] = (float(HANGING[0]), float(HANGING[1]), 0.0, 0.0)
     sensors: Sensors = field(default_factory=Sensors)
 
 
@@ -64,7 +63,7 @@ def synthesise(
     initial = np.array(recording.initial)
     logs: list[Log] = []
     for payload in (0.0, case.payload):
-        role = "loaded" if payload else "unloaded"
+        role = _role(payload)
         sensors = replace(recording.sensors, seed=recording.sensors.seed + len(logs))
         k = case.constants(payload)
         t = sample_times(recording.rate, recording.duration, sensors)
@@ -84,7 +83,7 @@ def rehearse(
     logs: list[Log] = []
     unloaded = case.constants(0.0)
     for payload in dict.fromkeys((0.0, case.payload)):
-        role = "loaded" if payload else "unloaded"
+        role = _role(payload)
         k = case.constants(payload)
         sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
         t = sample_times(recording.rate, recording.duration, sensors)
@@ -93,6 +92,13 @@ def rehearse(
             record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
         )
     return logs
+
+
+def _role(payload: float) -> str:
+    """What a log of the arm with `payload` kg is called."""
+    if payload:
+        return "loaded"
+    return "unloaded"
 
 
 def with_schedule(
@@ -112,19 +118,18 @@ def with_schedule(
     ValueError
         If the times do not increase or a payload is negative.
     """
-    times = [time for time, _ in schedule]
-    ordered = all(a < b for a, b in pairwise(times))
-    if not (ordered and all(0 <= mass < np.inf and np.isfinite(time) for time, mass in schedule)):
+    table = np.array(schedule, dtype=np.float64).reshape(-1, 2)
+    times, masses = table.T
+    if not np.all(np.isfinite(table)) or np.any(np.diff(times) <= 0) or np.any(masses < 0):
         raise ValueError(
             f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}"
         )
     t = sample_times(recording.rate, recording.duration, recording.sensors)
     state = np.array(recording.initial)
     parts = []
-    starts = [0.0, *times]
-    for start, end, mass in zip(
-        starts, [*times, np.inf], [0.0, *(mass for _, mass in schedule)], strict=True
-    ):
+    starts, ends = np.append(0.0, times), np.append(times, np.inf)
+    stretches = np.column_stack([starts, ends, np.append(0.0, masses)])
+    for start, end, mass in stretches.tolist():
         own = t[(t >= start) & (t < end)]
         close = min(end, t[-1])
         if not own.size or close <= start:
@@ -140,21 +145,20 @@ def with_schedule(
             SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept])
         )
     whole = SimulatedMotion(
-        *(
-            np.concatenate([getattr(p, n) for p in parts], axis=-1)
-            for n in ("t", "theta", "omega", "tau")
-        )
+        np.concatenate([part.t for part in parts]),
+        np.concatenate([part.theta for part in parts], axis=1),
+        np.concatenate([part.omega for part in parts], axis=1),
+        np.concatenate([part.tau for part in parts], axis=1),
     )
-    truth = Truth(
-        case.arm, 0.0, case.name, tuple((float(time), float(mass)) for time, mass in schedule)
-    )
+    changes = tuple((time, mass) for time, mass in table.tolist())
+    truth = Truth(case.arm, 0.0, case.name, changes)
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 
 
 def _counted(
     progress: Progress | None, stage: str, recording: Recording
 ) -> Callable[[float], None] | None:
-    """Tells a time that the simulation has come to in samples."""
+    """Reports in samples the time to which the simulation has come."""
     if progress is None:
         return None
     total = round(recording.rate * recording.duration) + 1
