@@ -13,6 +13,7 @@ from algid.errors import ResultError, SettingError
 from algid.files import read_toml
 from algid.options import flag
 from algid.results import Result
+from algid.results.model import Table4Row
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,12 @@ class Judged:
     @property
     def text(self) -> str:
         """One line for the terminal."""
-        size = "no estimate" if self.error is None else f"{self.error:.4g} %"
-        return (
-            f"{'ok  ' if self.passed else 'OVER'}  {self.parameter:12}  {size:>12}  limit "
-            f"{self.limit:.4g} %"
-        )
+        word, size = "OVER", "no estimate"
+        if self.passed:
+            word = "ok  "
+        if self.error is not None:
+            size = f"{self.error:.4g} %"
+        return f"{word}  {self.parameter:12}  {size:>12}  limit {self.limit:.4g} %"
 
 
 class _Tolerances(BaseModel):
@@ -59,17 +61,18 @@ def judge(
     ResultError
         If the result holds no truth to compare with, or no case of the paper.
     """
-    if not any(row.truth is not None for row in result.table4):
+    known = [row for row in result.table4 if row.truth is not None]
+    if not known:
         raise ResultError(
             f"{result.log.path}: the log holds no true parameters; only synthetic logs can be "
             "checked"
         )
-    limits = _limits(result, against == "paper", max_error, tolerance_file)
-    return [
-        Judged(row.parameter, row.error_percent, limits[row.parameter])
-        for row in result.table4
-        if row.parameter in limits
-    ]
+    limits = _limits(result.log.path, known, against == "paper", max_error, tolerance_file)
+    judged = []
+    for row in result.table4:
+        if row.parameter in limits:
+            judged.append(Judged(row.parameter, row.error_percent, limits[row.parameter]))
+    return judged
 
 
 def failed(rows: Sequence[Judged]) -> bool:
@@ -78,9 +81,13 @@ def failed(rows: Sequence[Judged]) -> bool:
 
 
 def _limits(
-    result: Result, of_paper: bool, max_error: float | None, tolerance_file: Path | None
+    log: str,
+    known: Sequence[Table4Row],
+    of_paper: bool,
+    max_error: float | None,
+    tolerance_file: Path | None,
 ) -> Mapping[str, float]:
-    known = [row for row in result.table4 if row.truth is not None]
+    """The largest error in percent of the rows whose truth is known, by parameter."""
     if tolerance_file is not None:
         if max_error is not None:
             raise SettingError(
@@ -96,19 +103,16 @@ def _limits(
                 )
         return limits
     if of_paper:
-        limits = {
-            row.parameter: row.paper_error_percent
-            for row in known
-            if row.paper_error_percent is not None
-        }
+        limits = {}
+        for row in known:
+            if row.paper_error_percent is not None:
+                limits[row.parameter] = row.paper_error_percent
         if not limits:
-            raise ResultError(
-                f"{result.log.path}: not a case of the paper; check {flag('against')} truth"
-            )
+            raise ResultError(f"{log}: not a case of the paper; check {flag('against')} truth")
         return limits
     if max_error is None:
         raise SettingError(
             f"{flag('against')} truth: give the largest error with {flag('max_error')} or "
             f"{flag('tolerance_file')}"
         )
-    return {row.parameter: max_error for row in known}
+    return dict.fromkeys((row.parameter for row in known), max_error)

@@ -60,12 +60,10 @@ class Limits:
     @property
     def middle(self) -> FloatArray:
         """Middle (2,) of the range; hanging where there is none."""
+        middle = np.array(HANGING)
         bounded = np.isfinite(self.half)
-        return np.where(
-            bounded,
-            0.5 * (np.where(bounded, self.low, 0.0) + np.where(bounded, self.high, 0.0)),
-            HANGING,
-        )
+        middle[bounded] = 0.5 * (self.low[bounded] + self.high[bounded])
+        return middle
 
     @property
     def half(self) -> FloatArray:
@@ -75,15 +73,18 @@ class Limits:
     def within(self, margin: float) -> Limits:
         """These limits less a share `margin` of each."""
         taken = np.where(np.isfinite(self.half), margin * self.half, 0.0)
-        kept = {
-            name: (1 - margin) * getattr(self, name) for name in ("speed", "acceleration", "torque")
-        }
-        height = (
-            self.height + margin * (self.lengths.sum() - self.height)
-            if np.isfinite(self.height)
-            else self.height
+        height = self.height
+        if np.isfinite(height):
+            height += margin * (self.lengths.sum() - height)
+        return replace(
+            self,
+            low=self.low + taken,
+            high=self.high - taken,
+            speed=(1 - margin) * self.speed,
+            acceleration=(1 - margin) * self.acceleration,
+            torque=(1 - margin) * self.torque,
+            height=height,
         )
-        return replace(self, low=self.low + taken, high=self.high - taken, height=height, **kept)
 
     def height_of(self, theta: FloatArray) -> FloatArray:
         """Height of the tip (...) in m at angles (2, ...)."""
@@ -114,7 +115,8 @@ class Usage:
         return self.u.max(axis=1)
 
 
-_Found = tuple[Row, FloatArray, FloatArray]
+_Use = tuple[Row, FloatArray, FloatArray]
+"""A limit, its use (N,), and the derivatives (6, N) of that by the motion."""
 
 
 def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bool = True) -> Usage:
@@ -135,10 +137,12 @@ def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bo
         uses += _torque(limits.torque, slopes, load, derivatives)
     rows = tuple(row for row, _, _ in uses)
     u = np.array([values for _, values, _ in uses])
-    return Usage(rows, u, np.array([slope for _, _, slope in uses]) if derivatives else None)
+    if not derivatives:
+        return Usage(rows, u)
+    return Usage(rows, u, np.array([slope for _, _, slope in uses]))
 
 
-def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Found]:
+def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
     kinds = (
         ("range", motion.theta - limits.middle[:, None], limits.half),
         ("speed", motion.omega, limits.speed),
@@ -157,14 +161,11 @@ def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Found]:
         slope = np.zeros((COMPONENTS, both.size))
         slope[0] = -(l1 * np.cos(motion.theta[0]) + l2 * np.cos(both)) / room
         slope[1] = -l2 * np.cos(both) / room
-        yield (
-            Row("tip-height", None, upper=False),
-            (l1 + l2 - limits.height_of(motion.theta)) / room,
-            slope,
-        )
+        used = (l1 + l2 - limits.height_of(motion.theta)) / room
+        yield Row("tip-height", None, upper=False), used, slope
 
 
-def _torque(limit: FloatArray, slopes: Slopes, load: Load, derivatives: bool) -> Iterator[_Found]:
+def _torque(limit: FloatArray, slopes: Slopes, load: Load, derivatives: bool) -> Iterator[_Use]:
     torque, more, by_Y = load.largest(slopes.Y)
     for joint in np.flatnonzero(np.isfinite(limit)).tolist():
         for sign in (1.0, -1.0):
@@ -187,10 +188,8 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
     middle = limits.middle
     low = np.where(np.isfinite(limits.low), limits.low, middle - _WIDE)
     high = np.where(np.isfinite(limits.high), limits.high, middle + _WIDE)
-    grid = np.meshgrid(
-        *(np.linspace(low[joint], high[joint], _STEPS) for joint in range(2)), indexing="ij"
-    )
-    theta = np.stack([axis.ravel() for axis in grid])
+    first, second = np.linspace(low, high, _STEPS, axis=1)
+    theta = np.stack([np.repeat(first, _STEPS), np.tile(second, _STEPS)])
     still = Motion(theta, np.zeros_like(theta), np.zeros_like(theta))
     used = usage(limits, Slopes(model, still, 1.0), loads, derivatives=False)
     most = used.u.max(axis=0)
@@ -217,9 +216,11 @@ def _missed(row: Row, limits: Limits, most: float) -> str:
         )
     assert row.joint is not None
     limit = limits.torque[row.joint]
-    with_load = "loaded " if row.loaded else ""
+    arm = "arm"
+    if row.loaded:
+        arm = "loaded arm"
     return (
-        f"{flag('torque')}: the {with_load}arm asks for {most * limit:.3g} N m at joint "
+        f"{flag('torque')}: the {arm} asks for {most * limit:.3g} N m at joint "
         f"{row.joint + 1} even at rest, the limit is {limit:.3g} N m (margin included); raise it, "
         f"or move {flag('range')} to where gravity pulls less"
     )

@@ -28,7 +28,7 @@ from algid.estimators.standing import Standing, standing
 from algid.estimators.weak import Source
 from algid.model import Model, Motion, regressor, torque
 from algid.signals.filters import butterworth, correlate, smoother
-from algid.signals.segments import Cutter, Segment
+from algid.signals.segments import Cutter, Segment, pieces_of
 from algid.signals.shift import AT_ONCE, TorqueShift
 
 _PIECE_SECONDS = 60.0
@@ -158,7 +158,9 @@ class PredictionSums:
 
     def finish(self) -> None:
         """Take in what is left at the end of the log."""
-        for piece in self._cutter.finish() if self._cutter else ():
+        if self._cutter is None:
+            return
+        for piece in self._cutter.finish():
             self._add(piece)
 
     def score(self, c: FloatArray) -> PredictionScore:
@@ -188,7 +190,9 @@ class PredictionSums:
     def _rows(self, motion: Motion) -> FloatArray:
         """The regressor (2, q, n), and the velocities if one set of coefficients is scored."""
         Y = regressor(self._model, motion, self._at)
-        return Y if self._at is None else np.concatenate([Y, motion.omega[:, None]], axis=1)
+        if self._at is None:
+            return Y
+        return np.concatenate([Y, motion.omega[:, None]], axis=1)
 
 
 def _filtered(
@@ -247,20 +251,15 @@ def scored_torque(
     A piece that is too short to be scored is left out.
     """
     by = by or PredictionFilter()
-    cutter: Cutter | None = None
 
-    def scored(piece: Segment) -> Iterator[ScoredTorque]:
+    def rows(motion: Motion) -> FloatArray:
+        return torque(model, c, motion)[:, None]
+
+    for piece in pieces_of(segments, _PIECE_SECONDS):
         lag = shift.at(piece.dt) - model.lag(c)
-        t, X = _filtered(lambda motion: torque(model, c, motion)[:, None], piece, lag, by)
+        t, X = _filtered(rows, piece, lag, by)
         if X.size:
             yield ScoredTorque(t, X[:, 1], X[:, 0])
-
-    for segment in segments:
-        cutter = cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
-        for piece in cutter.push(segment):
-            yield from scored(piece)
-    for piece in cutter.finish() if cutter else ():
-        yield from scored(piece)
 
 
 def motion_of(theta: FloatArray, dt: float) -> Motion:
@@ -269,12 +268,12 @@ def motion_of(theta: FloatArray, dt: float) -> Motion:
     The two samples at each end repeat their neighbour's.
     """
     inner, n = theta.shape[1] - 4, theta.shape[1]
-    omega, alpha = (
-        sum(weight * theta[:, place : place + inner] for place, weight in enumerate(weights))
-        for weights in (_SLOPE / dt, _BEND / dt**2)
-    )
-    place = np.clip(np.arange(n) - 2, 0, inner - 1)
-    return Motion(theta, np.asarray(omega)[:, place], np.asarray(alpha)[:, place])
+    omega, alpha = np.zeros((2, inner)), np.zeros((2, inner))
+    for place, (first, second) in enumerate(zip(_SLOPE / dt, _BEND / dt**2, strict=True)):
+        omega += first * theta[:, place : place + inner]
+        alpha += second * theta[:, place : place + inner]
+    places = np.clip(np.arange(n) - 2, 0, inner - 1)
+    return Motion(theta, omega[:, places], alpha[:, places])
 
 
 def score(
@@ -302,25 +301,18 @@ def cross_validate(
 
     The other logs' parameters follow from their quadratic likelihoods, without a further pass;
     only the prediction reads the logs again. `shift` is what is known of the time after which a
-    torque acts: a delay that the fit estimates comes on top, each time as the other logs tell it.
+    torque acts: a delay that the fit estimates comes on top, each time as the other logs have it.
     """
-    sources = [*unloaded, *loaded]
+    sources = list(unloaded) + list(loaded)
     if len(sources) != len(fit.logs) or len(unloaded) == 1 or len(loaded) == 1:
         return None
     total = PredictionScore()
     columns = len(fit.shared.model.names)
-    without = (
-        left_out(fit.shared, fit.logs, fit.values, fit.prior)
-        if fit.without is None
-        else fit.without
-    )
+    without = fit.without
+    if without is None:
+        without = left_out(fit.shared, fit.logs, fit.values, fit.prior)
     for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
         c = fit.shared.coefficients(without[place], log.loaded)
         delay = float(c[columns:].sum())
-        total += score(
-            fit.shared.model,
-            c[:columns],
-            source(),
-            shift.later(delay),
-        )
+        total += score(fit.shared.model, c[:columns], source(), shift.later(delay))
     return total

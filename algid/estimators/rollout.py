@@ -15,7 +15,7 @@ y       angles at the horizons; NaN past a stretch's end   (H, 2, S)        rad
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,7 +24,7 @@ from algid.arm import FloatArray
 from algid.estimators.prediction import PredictionFilter, motion_of
 from algid.model import Model, acceleration, damping, inertia
 from algid.signals.filters import butterworth
-from algid.signals.segments import Cutter, Segment
+from algid.signals.segments import Segment, pieces_of
 from algid.signals.shift import AT_ONCE, TorqueShift
 
 HORIZONS = (0.1, 0.5, 2.0)
@@ -84,7 +84,7 @@ def rollouts(
     step = time_step(model, c)
     states, torques, later = [], [], []
     spacing = max(_CLOSEST, duration / _STARTS)
-    for piece in _pieces(segments):
+    for piece in pieces_of(segments, _PIECE_SECONDS):
         x, u, y = _starts(model, c, piece, spacing, step, shift)
         if x.shape[1]:
             states.append(x)
@@ -102,17 +102,6 @@ def rollouts(
     return RolloutScore(
         judged.sum(axis=1).astype(np.float64), squares.sum(axis=2), (moved**2).sum(axis=2)
     )
-
-
-def _pieces(segments: Iterable[Segment]) -> Iterator[Segment]:
-    """Pieces of some `_PIECE_SECONDS`."""
-    cutter: Cutter | None = None
-    for segment in segments:
-        if cutter is None:
-            cutter = Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
-        yield from cutter.push(segment)
-    if cutter is not None:
-        yield from cutter.finish()
 
 
 def time_step(model: Model, c: FloatArray) -> float:

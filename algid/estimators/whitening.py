@@ -145,7 +145,8 @@ def linearise(
     """
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
-    motion = Motion(*stencil.differences(theta0))
+    theta, omega, alpha = stencil.differences(theta0)
+    motion = Motion(theta, omega, alpha)
     if model.linear:
         J = regressor(model, motion)
         modelled = np.einsum("aqn,q->an", J, c)
@@ -153,17 +154,22 @@ def linearise(
         J = sensitivity(model, c, motion)
         modelled = torque(model, c, motion)
     if model.lag_name is not None:
-        J, modelled = (low_passed(signal, stencil.dt, model.lag(c)) for signal in (J, modelled))
+        lag = model.lag(c)
+        J, modelled = low_passed(J, stencil.dt, lag), low_passed(modelled, stencil.dt, lag)
         J[:, model.names.index(model.lag_name)] = -np.gradient(modelled, stencil.dt, axis=1)
     G = along_stencil(partials(model, c, motion), stencil.weights)
-    measured = held_torque(piece.tau) if stencil.held else piece.tau
+    measured = piece.tau
+    if stencil.held:
+        measured = held_torque(measured)
     error = measured[:, torques] - modelled - forward(G, piece.theta - theta0, first)
     H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
     factor = covariance_factor(H, held=stencil.held)
-    parts = [error[None]]
+    parts = []
     if not residual_only:
-        extra = [np.gradient(modelled, stencil.dt, axis=1)[None]] if delay else []
-        parts = [J.swapaxes(0, 1), *extra, *parts]
+        parts.append(J.swapaxes(0, 1))
+        if delay:
+            parts.append(np.gradient(modelled, stencil.dt, axis=1)[None])
+    parts.append(error[None])
     rows = np.concatenate(parts)
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N", in_place=True)
@@ -205,9 +211,8 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
     passed = np.empty_like(extended)
     for place in np.ndindex(extended.shape[:-1]):
         origin = extended[place][0]
-        passed[place] = (
-            recursion(numerator, denominator, extended[place] - origin, np.zeros(1))[0] + origin
-        )
+        response, _ = recursion(numerator, denominator, extended[place] - origin, np.zeros(1))
+        passed[place] = response + origin
     whole = int(lag / dt)
     rest = lag / dt - whole
     start = reach + whole
@@ -218,12 +223,10 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
         -(rest + 1) * rest * (rest - 2) / 2,
         (rest + 1) * rest * (rest - 1) / 6,
     )
-    return np.asarray(
-        sum(
-            weight * passed[..., start + point : start + point + n]
-            for point, weight in enumerate(weights, -1)
-        )
-    )
+    later = np.zeros_like(signal)
+    for point, weight in enumerate(weights, start - 1):
+        later += weight * passed[..., point : point + n]
+    return later
 
 
 def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:
@@ -297,7 +300,9 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
                 below = 2 * lag + other - a
                 if below >= 0:
                     band[: n - lag, a, below] = block[a, other].T
-    correlation = np.convolve(HELD, HELD)[2:] if held else np.ones(1)
+    correlation = np.ones(1)
+    if held:
+        correlation = np.convolve(HELD, HELD)[2:]
     for lag, value in enumerate(correlation):
         band[:, :, 2 * lag] += value
     diagonal = band[:, :, 0].ravel().copy()
@@ -306,7 +311,8 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
         # Whether a pivot of nothing but rounding comes out below zero depends on the processor's
         # kernels.
         lost = np.flatnonzero(factor[0] ** 2 < _ROUNDING * diagonal)
-        info = lost[0] + 1 if lost.size else 0
+        if lost.size:
+            info = lost[0] + 1
     if info != 0:
         raise np.linalg.LinAlgError(
             f"the covariance of the torque residual is not positive definite (row {info})"

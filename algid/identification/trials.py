@@ -19,8 +19,8 @@ from algid.settings import Settings
 from algid.units import TORQUE
 
 TRIED = {"HEAVY_ARM": ("HEAVY_ARM", "LOGS_APART"), "EXTERNAL_EFFORT": ("EXTERNAL_EFFORT",)}
-"""Notices whose remedies are assertions and not the result's own settings; with what each is told
-wrong by, beside the causes of error.
+"""Notices whose remedies are assertions and not the result's own settings; with the notices that
+refute each, beside the causes of error.
 """
 AIR = 1.2  # kg/m³
 
@@ -40,39 +40,37 @@ def advised(
     settings : that they were identified by
     again : identifies logs by other settings
     """
-    return [
-        replace(one, remedies=tuple(_standing(one, survey, settings, again)))
-        if one.code in TRIED
-        else one
-        for one in notices
-    ]
+    tried = []
+    for one in notices:
+        if one.code in TRIED:
+            one = replace(one, remedies=tuple(_standing(one, survey, settings, again)))
+        tried.append(one)
+    return tried
 
 
 def _standing(notice: Notice, survey: Survey, settings: Settings, again: Again) -> Iterator[Remedy]:
+    """The remedies of a notice by which its logs give a result that stands."""
     for remedy in notice.remedies:
-        said: dict[str, Any] = dict(remedy.settings)
-        unit = said.pop("torque_unit", None)
-        logs = [replace(log, effort=said.get("effort", log.effort)) for log in survey.logs]
+        changed: dict[str, Any] = dict(remedy.settings)
+        unit = changed.pop("torque_unit", None)
+        logs = [replace(log, effort=changed.get("effort", log.effort)) for log in survey.logs]
         if unit is not None:
             ratio = _ratio(survey.logs, unit)
             if ratio is None or _is_air(notice, ratio):
                 continue
             logs = [_in_unit(log, ratio) for log in logs]
-        found = again(Survey(logs), replace(settings, **said))
-        if found is not None and _stands(found, TRIED[notice.code]):
+        outcome = again(Survey(logs), replace(settings, **changed))
+        if outcome is not None and _stands(outcome, TRIED[notice.code]):
             yield remedy
 
 
-def _stands(found: Identified, contradictions: tuple[str, ...]) -> bool:
+def _stands(outcome: Identified, contradictions: tuple[str, ...]) -> bool:
     """Whether a result is physical, explains the torque, and names no cause of error."""
-    codes = {notice.code for notice in found.notices if not notice.note}
-    summary = found.fit
-    return (
-        summary is not None
-        and summary.converged
-        and not is_implausible(summary)
-        and not codes & {*CAUSES, *contradictions}
-    )
+    summary = outcome.fit
+    if summary is None or not summary.converged or is_implausible(summary):
+        return False
+    wrong = CAUSES + contradictions
+    return not any(one.code in wrong for one in outcome.notices if not one.note)
 
 
 def _ratio(logs: Sequence[LogSource], unit: str) -> float | None:
@@ -87,11 +85,18 @@ def _ratio(logs: Sequence[LogSource], unit: str) -> float | None:
             channel = reading.channels.get(f"tau{joint}")
             if joint == reading.passive:
                 continue
-            if channel is not None and channel.offset:
+            if channel is None:
+                units.add("N m")
+            elif channel.offset:
                 return None
-            units.add("N m" if channel is None else channel.unit)
-    own = TORQUE.get(units.pop()) if len(units) == 1 else None
-    return None if own is None else TORQUE[unit] / own
+            else:
+                units.add(channel.unit)
+    if len(units) != 1:
+        return None
+    own = TORQUE.get(units.pop())
+    if own is None:
+        return None
+    return TORQUE[unit] / own
 
 
 def _is_air(notice: Notice, ratio: float) -> bool:

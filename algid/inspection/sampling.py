@@ -41,8 +41,9 @@ def sampling(log: Log) -> Iterator[Notice]:
     if clock.gaps:
         yield Notice("GAPS", numbers={"count": clock.gaps, "seconds": clock.longest_gap})
     if clock.jitter * clock.rate > 0.01:
-        bend = max(float(np.sqrt(np.mean(np.diff(row, 2) ** 2))) for row in log.theta) / 8
-        seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": bend}
+        bend = np.sqrt(np.mean(np.diff(log.theta, 2, axis=1) ** 2, axis=1))
+        error = float(bend.max()) / 8
+        seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": error}
         yield Notice("JITTER", numbers=seen)
 
 
@@ -58,7 +59,8 @@ def samples_a_period(log: Log) -> float:
     """
     fewest = math.inf
     for theta in log.theta:
-        step, bend = (median(np.abs(differences(theta, order))) for order in (1, 2))
+        step = median(np.abs(differences(theta, 1)))
+        bend = median(np.abs(differences(theta, 2)))
         if step > 0.02 and bend > 0:
             fewest = min(fewest, math.pi / math.asin(min(1.0, bend / (2 * step))))
     return fewest
@@ -67,18 +69,19 @@ def samples_a_period(log: Log) -> float:
 def lost_steps(log: Log) -> int:
     """How many steps both joints make in the time of one.
 
-    0 where noise or a slow motion does not tell.
+    0 where noise or a slow motion leaves it open.
 
     A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that
     is zero as often.
     """
     count = len(log) - 3
-    before, own, after = (
-        differences(log.theta[:, place : count + place + 1], 1)
-        / (differences(log.stamp_ns[place : count + place + 1], 1) * 1e-9)
-        for place in range(3)
-    )
-    around = 0.5 * (before + after)
+
+    def velocities(first: int) -> FloatArray:
+        part = slice(first, first + count + 1)
+        return differences(log.theta[:, part], 1) / (differences(log.stamp_ns[part], 1) * 1e-9)
+
+    own = velocities(1)
+    around = 0.5 * (velocities(0) + velocities(2))
     power = np.sum(around**2, axis=0)
     share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
     off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
@@ -86,34 +89,39 @@ def lost_steps(log: Log) -> int:
     each = count / max(1, power.size)  # of a long log some steps stand for all
     lost = round(each * np.count_nonzero(clear & (np.abs(share - 2) < _LOST)))
     chance = round(each * np.count_nonzero(clear & (np.abs(share) < _LOST)))
-    return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
+    if lost <= max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance):
+        return 0
+    return lost
 
 
 def rests(log: Log, whole: bool) -> Iterator[Notice]:
     """Rest before the motion and, where the log is `whole`, after it.
 
     A joint that stiction holds has a torque that the motion does not determine: gravity's
-    constants take it. A posture that a motor holds freely tells more of gravity than any motion.
-    The log cannot tell which it is: the rest is named, with the flags that leave it out, and
+    constants take it. A posture that a motor holds freely informs more on gravity than any motion.
+    The log does not say which it is: the rest is named, with the flags that leave it out, and
     stays.
     """
-    figures = [signal_figures(theta) for theta in log.theta]
-    room = np.array(
-        [max(8 * one.noise, 2 * one.step, _STILL * (one.high - one.low)) for one in figures]
-    )
+    room = np.empty(2)
+    for joint, theta in enumerate(log.theta):
+        one = signal_figures(theta)
+        room[joint] = max(8 * one.noise, 2 * one.step, _STILL * (one.high - one.low))
     few = max(4, round(0.02 / log.period))
     before = _still(log.t, log.theta, room, few)
-    after = _still(log.duration - log.t[::-1], log.theta[:, ::-1], room, few) if whole else 0.0
     if before == log.duration:
         return
-    end = log.duration - after
-    parts = [(before, f"for its first {before:.3g} s", "start", float(f"{before:.4g}"))]
-    parts += [(after, f"for its last {after:.3g} s", "end", float(f"{end:.4g}"))]
-    long = [part for part in parts if part[0] >= _REST]
-    if long:
-        rests = [words for _, words, _, _ in long]
-        cut = Remedy({setting: value for _, _, setting, value in long})
-        yield Notice("RESTS", numbers={"rests": rests}, remedies=(cut,), note=True)
+    after = 0.0
+    if whole:
+        after = _still(log.duration - log.t[::-1], log.theta[:, ::-1], room, few)
+    words, cut = [], {}
+    if before >= _REST:
+        words.append(f"for its first {before:.3g} s")
+        cut["start"] = float(f"{before:.4g}")
+    if after >= _REST:
+        words.append(f"for its last {after:.3g} s")
+        cut["end"] = float(f"{log.duration - after:.4g}")
+    if words:
+        yield Notice("RESTS", numbers={"rests": words}, remedies=(Remedy(cut),), note=True)
 
 
 def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> float:
@@ -128,4 +136,6 @@ def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> floa
         if away.any():
             moved = first + int(np.argmax(away))
             break
-    return float(t[moved - 1]) if moved else 0.0
+    if moved == 0:
+        return 0.0
+    return float(t[moved - 1])

@@ -214,6 +214,17 @@ def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
     yield from cutter.finish()
 
 
+def pieces_of(source: Iterable[Segment], seconds: float) -> Iterator[Segment]:
+    """Cut each stretch of a log into pieces of `seconds`: see `Cutter`."""
+    cutter: Cutter | None = None
+    for segment in source:
+        if cutter is None:
+            cutter = Cutter(max(1, round(seconds / segment.dt)))
+        yield from cutter.push(segment)
+    if cutter is not None:
+        yield from cutter.finish()
+
+
 def spread_pieces(usable: Iterable[Segment], count: int, rows: int) -> tuple[list[Segment], bool]:
     """Copies of evenly spread pieces of a log, from one pass over it.
 
