@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -58,7 +57,9 @@ class Request:
     def get(self, name: str, default: Any) -> Any:
         """What is asked of `name`."""
         value = self.content.get(name)
-        return default if value is None else value
+        if value is None:
+            return default
+        return value
 
 
 def request(file: Path | None, flags: Mapping[str, str | float | None]) -> Request:
@@ -69,14 +70,20 @@ def request(file: Path | None, flags: Mapping[str, str | float | None]) -> Reque
     SettingError
         If either is wrong; the flag is named, and the file's line beside it.
     """
-    content = {} if file is None else read_toml(file, LimitsFile).model_dump(exclude_none=True)
+    content: dict[str, Any] = {}
+    source = "the flags"
+    if file is not None:
+        content = read_toml(file, LimitsFile).model_dump(exclude_none=True)
+        source = str(file)
     for name, value in flags.items():
         if value is None:
             continue
-        content[name] = _parsed(name, value) if isinstance(value, str) else value
+        content[name] = value
+        if isinstance(value, str):
+            content[name] = _parsed(name, value)
         if content[name] is None:
             raise SettingError(f"{flag(name)}: expected {_LIKE[name]}, found {value!r}")
-    return Request(content, "the flags" if file is None else str(file))
+    return Request(content, source)
 
 
 def limits_of(asked: Request, lengths: FloatArray) -> Limits:
@@ -108,21 +115,32 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
             f"{flag('tip_height')}: expected less than the arm's reach, {reach:.4g} m, found "
             f"{height:g} m"
         )
-    others = {name: _both(asked.get(name, np.inf)) for name in ("speed", "acceleration", "torque")}
-    if not others["torque"].any():
+    limits = Limits(
+        low=low,
+        high=high,
+        speed=_both(asked.get("speed", np.inf)),
+        acceleration=_both(asked.get("acceleration", np.inf)),
+        torque=_both(asked.get("torque", np.inf)),
+        height=height,
+        lengths=lengths,
+    )
+    if not limits.torque.any():
         raise SettingError(
             f"{flag('torque')}: expected a drive at one joint at least, found 0 for both"
         )
-    if not np.any(np.isfinite([high - low, *others.values()])):
+    every = np.stack([limits.half, limits.speed, limits.acceleration, limits.torque])
+    if not np.any(np.isfinite(every)):
         raise SettingError(
             f"{flag('range')}: without any limit no motion is the best, found inf for all; give one"
         )
-    return Limits(low=low, high=high, height=height, lengths=lengths, **others)
+    return limits
 
 
 def _check(name: str, value: Any) -> None:
     """Raises `SettingError` where a limit is neither inf nor such as an arm may have."""
-    numbers = np.abs(np.array(0.0 if value is None else value, dtype=np.float64)).ravel()
+    if value is None:
+        return
+    numbers = np.abs(np.array(value, dtype=np.float64)).ravel()
     wrong = ~(np.isinf(numbers) | (numbers == 0) | ((numbers >= SMALLEST) & (numbers <= LARGEST)))
     if np.any(wrong):
         raise SettingError(
@@ -132,13 +150,18 @@ def _check(name: str, value: Any) -> None:
 
 
 def _both(value: Any) -> FloatArray:
-    return np.array(value if isinstance(value, tuple | list) else (value, value), dtype=np.float64)
+    """A number for both joints, or one of each."""
+    if not isinstance(value, tuple | list):
+        value = (value, value)
+    return np.array(value, dtype=np.float64)
 
 
 def _range(value: Any) -> tuple[FloatArray, FloatArray]:
     ends = _both(value)
-    # one number a joint is to both sides of hanging
-    low, high = ends.T if ends.ndim == 2 else (np.array(HANGING) - ends, np.array(HANGING) + ends)
+    if ends.ndim == 2:
+        low, high = ends.T
+    else:  # one number a joint is to both sides of hanging
+        low, high = np.array(HANGING) - ends, np.array(HANGING) + ends
     for joint in range(2):
         if not low[joint] < high[joint]:
             raise SettingError(
@@ -165,24 +188,31 @@ _LIKE = {
 def _parsed(name: str, text: str) -> Any:
     """A number, a pair of them, or a pair of spans; None where the flag cannot mean that."""
     try:
-        parts = [tuple(float(number) for number in part.split(":")) for part in text.split(",")]
-    except ValueError:
+        parts = [tuple(map(float, part.split(":"))) for part in text.split(",")]
+        table = np.array(parts)
+    except ValueError:  # no numbers, or not as many in each part
         return None
-    numbers = [part[0] for part in parts]
-    if [len(part) for part in parts] == [2, 2]:
-        spans = name == "range" and not any(math.isnan(number) for part in parts for number in part)
-        return tuple(parts) if spans else None
-    if (
-        len(parts) > 2
-        or any(len(part) != 1 for part in parts)
-        or any(math.isnan(number) for number in numbers)
-    ):
+    if np.any(np.isnan(table)):
         return None
+    if table.shape == (2, 2) and name == "range":
+        return tuple(parts)
+    if table.shape not in ((1, 1), (2, 1)):
+        return None
+    numbers = tuple(table[:, 0].tolist())
     if name == "runs":
-        whole = len(numbers) == 2 and all(
-            0 <= number <= MOST_RUNS and number.is_integer() for number in numbers
-        )
-        return (int(numbers[0]), int(numbers[1])) if whole and any(numbers) else None
-    if not all(number > 0 or (number == 0 and name == "torque") for number in numbers):
+        return _runs(numbers)
+    if min(numbers) < 0 or (min(numbers) == 0 and name != "torque"):
         return None
-    return numbers[0] if len(numbers) == 1 else tuple(numbers)
+    if len(numbers) == 1:
+        return numbers[0]
+    return numbers
+
+
+def _runs(numbers: Sequence[float]) -> tuple[int, int] | None:
+    """Numbers of runs without and with the payload; None where these are none."""
+    if len(numbers) != 2 or not any(numbers):
+        return None
+    for number in numbers:
+        if not number.is_integer() or not 0 <= number <= MOST_RUNS:
+            return None
+    return int(numbers[0]), int(numbers[1])

@@ -138,7 +138,7 @@ def spectra(sums: ResidualSums) -> Spectra:
             count, spread = 0.0, 0.0
     if not starts:
         return Spectra(np.empty(0), np.empty((sums.power.shape[0], 0)), np.empty(0), np.empty(0))
-    ends = np.append(starts[1:], last) - 1
+    ends = np.array(starts[1:] + [last]) - 1
     lines = np.add.reduceat(sums.lines[:last], starts)
     scatter = np.add.reduceat(sums.scatter[:last], starts)
     density = np.add.reduceat(sums.power[:, :last], starts, axis=1) / lines

@@ -69,6 +69,10 @@ class LogSource:
     digest: Callable[[], str] | None
     notices: tuple[Notice, ...] = ()
 
+    def noted(self, notice: Notice) -> LogSource:
+        """The same with one more notice."""
+        return replace(self, notices=self.notices + (notice,))
+
 
 def open_source(
     log: LogLike,
@@ -104,33 +108,15 @@ def open_source(
     if is_columns(log):
         log = open_log(log, profile).whole()
     if isinstance(log, Log):
-        log = _in_radians(log)
-        check_step(log.origin.path, log.stamp_ns)
-        source = LogSource(
-            log.origin.path,
-            role,
-            log.origin,
-            lambda: iter([log]),
-            len(log),
-            gravity,
-            effort,
-            partial(_hash_of_arrays, log),
-        )
+        source = _in_memory(log, role, gravity, effort)
+    elif isinstance(log, Staged):
+        source = _of_file(log.path, role, profile, gravity, effort)
+        source = replace(source, name=log.url)
+        if not log.whole:
+            source = replace(source, digest=None)
     else:
-        path = log.path if isinstance(log, Staged) else Path(log)
-        reader = open_log(path, profile)
-        name, whole = (log.url, log.whole) if isinstance(log, Staged) else (str(log), True)
-        digest = cache(partial(sha256_of, path)) if whole else None
-        source = LogSource(
-            name,
-            role,
-            reader.origin,
-            lambda: ahead(_of_an_arm(reader.blocks())),
-            reader.rows,
-            gravity,
-            effort,
-            digest,
-        )
+        source = _of_file(Path(log), role, profile, gravity, effort)
+        source = replace(source, name=str(log))
     truth = source.origin.truth
     if truth is None or changing:
         return source
@@ -139,12 +125,49 @@ def open_source(
             f"{source.name}: its metadata say that the payload changes; weigh it with algid track"
         )
     if (truth.payload > 0) != (role == "loaded"):
-        payload = f"a payload of {truth.payload:g} kg" if truth.payload > 0 else "no payload"
+        payload = "no payload"
+        if truth.payload > 0:
+            payload = f"a payload of {truth.payload:g} kg"
         raise LogError(
             f"{source.name}: expected a log of the {role} arm, its metadata say {payload}; "
             "swap the logs"
         )
     return source
+
+
+def _in_memory(log: Log, role: Role, gravity: float, effort: str | None) -> LogSource:
+    """The source of a log from arrays."""
+    log = _in_radians(log)
+    check_step(log.origin.path, log.stamp_ns)
+    return LogSource(
+        name=log.origin.path,
+        role=role,
+        origin=log.origin,
+        blocks=lambda: iter([log]),
+        promised=len(log),
+        gravity=gravity,
+        effort=effort,
+        digest=partial(_hash_of_arrays, log),
+    )
+
+
+def _of_file(
+    path: Path, role: Role, profile: Profile | None, gravity: float, effort: str | None
+) -> LogSource:
+    """The source of a log in a file, read ahead of whoever goes over it."""
+    from algid.readers import open_log
+
+    reader = open_log(path, profile)
+    return LogSource(
+        name=str(path),
+        role=role,
+        origin=reader.origin,
+        blocks=lambda: ahead(_of_an_arm(reader.blocks())),
+        promised=reader.rows,
+        gravity=gravity,
+        effort=effort,
+        digest=cache(partial(sha256_of, path)),
+    )
 
 
 def _of_an_arm(blocks: Iterator[Log]) -> Iterator[Log]:
@@ -167,25 +190,23 @@ def open_sources(
     A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
     the other. Only logs that promise as many samples as another are hashed for it.
     """
-    several = [] if logs is None else logs
-    if isinstance(several, str | Path | Log | Staged) or is_columns(several):
-        several = [several]
-    if not isinstance(several, Iterable):
-        refuse_others(several)
-    sources = [open_source(log, role, profile, gravity, effort) for log in several]
+    if logs is None:
+        return []
+    if isinstance(logs, str | Path | Log | Staged) or is_columns(logs):
+        logs = [logs]
+    if not isinstance(logs, Iterable):
+        refuse_others(logs)
+    sources = [open_source(log, role, profile, gravity, effort) for log in logs]
     lengths = Counter(source.promised for source in sources if source.digest)
     kept: list[LogSource] = []
     places: dict[str, int] = {}
     for source in sources:
-        hashed = source.digest is not None and lengths[source.promised] > 1
-        content = source.digest() if source.digest and hashed else None
-        if content in places:
-            twin = places[content]
-            said = Notice("SAME_LOG", numbers={"name": source.name})
-            kept[twin] = replace(kept[twin], notices=(*kept[twin].notices, said))
-            continue
-        if content is not None:
-            places[content] = len(kept)
+        if source.digest is not None and lengths[source.promised] > 1:
+            place = places.setdefault(source.digest(), len(kept))
+            if place < len(kept):
+                twin = Notice("SAME_LOG", numbers={"name": source.name})
+                kept[place] = kept[place].noted(twin)
+                continue
         kept.append(source)
     return kept
 
@@ -193,19 +214,19 @@ def open_sources(
 def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
     """All logs, unloaded ones first.
 
-    a loaded one that is also given as unloaded says so: its payload is zero.
+    A loaded one that is also given as unloaded has a notice of it: its payload is zero.
     """
     lengths = {source.promised for source in unloaded if source.digest}
     if not any(source.digest and source.promised in lengths for source in loaded):
-        return [*unloaded, *loaded]
+        return unloaded + loaded
     names = {source.digest(): source.name for source in unloaded if source.digest}
-    marked = []
+    sources = list(unloaded)
     for source in loaded:
-        twin = names.get(source.digest()) if source.digest else None
-        numbers = {"name": source.name, "twin": twin}
-        said = () if twin is None else (Notice("SAME_LOG_LOADED", numbers=numbers),)
-        marked.append(replace(source, notices=(*source.notices, *said)))
-    return [*unloaded, *marked]
+        if source.digest is not None and source.digest() in names:
+            numbers = {"name": source.name, "twin": names[source.digest()]}
+            source = source.noted(Notice("SAME_LOG_LOADED", numbers=numbers))
+        sources.append(source)
+    return sources
 
 
 def refuse_shared_torques(sources: Sequence[LogSource]) -> None:
@@ -234,13 +255,13 @@ def _in_radians(log: Log) -> Log:
     reading = log.origin.reading
     if "theta1" in reading.channels or "DEGREES" in reading.accepted:
         return log
-    accepted = replace(reading, accepted=(*reading.accepted, "DEGREES"))
+    accepted = replace(reading, accepted=reading.accepted + ("DEGREES",))
     return replace(log, origin=replace(log.origin, reading=accepted))
 
 
 def _hash_of_arrays(log: Log) -> str:
     digest = hashlib.sha256()
-    for array in (log.stamp_ns, *log.theta, *log.tau):
+    for array in (log.stamp_ns, log.theta, log.tau):
         digest.update(array.tobytes())
     return digest.hexdigest()
 
@@ -250,12 +271,13 @@ def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> li
     before = earlier.log.reading
     if before is None:
         return []
-    return [
-        Notice(
-            "READ_OTHERWISE",
-            numbers={"file": file, "differences": ", ".join(differences)},
-            logs=(PurePath(log.path).name,),
-        )
-        for log in logs
-        if log.reading and (differences := sorted(log.reading.differences(before)))
-    ]
+    notices = []
+    for log in logs:
+        if log.reading is None:
+            continue
+        differences = sorted(log.reading.differences(before))
+        if differences:
+            numbers = {"file": file, "differences": ", ".join(differences)}
+            name = PurePath(log.path).name
+            notices.append(Notice("READ_OTHERWISE", numbers=numbers, logs=(name,)))
+    return notices

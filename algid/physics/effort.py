@@ -1,8 +1,8 @@
 """What a driver calls effort, and what of the arm's torque that does not hold.
 
 Whatever a driver takes off before it logs a torque is a change of the same regression: columns that
-are nothing. An arm's own columns are, not its payload's: a driver knows no payload unless it is
-told one.
+are nothing. An arm's own columns are, not its payload's: a driver knows no payload unless a user
+has entered one.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Effort = Literal[
 the arm; as commanded; as a motor's current."""
 
 FRICTION = (VISCOUS.name, "coulomb", "stribeck", "asymmetry", "load")
-_OF_DRIVES = (*FRICTION, "rotor", "gain")
-_EVERY = (*ALWAYS, *OPTIONAL)
+_OF_DRIVES = FRICTION + ("rotor", "gain")
+_EVERY = ALWAYS + OPTIONAL
 
 
 def without_terms(effort: Effort | None, terms: Iterable[str]) -> tuple[str, ...]:
@@ -32,13 +32,13 @@ def without_terms(effort: Effort | None, terms: Iterable[str]) -> tuple[str, ...
 
 def absent(effort: Effort | None, names: Iterable[str]) -> tuple[str, ...]:
     """Those of the parameters `names` that the arm's own torque does not hold, so logged."""
-    if effort == "gravity-compensated":
-        gone = {one.name for term in _EVERY for one in term.parameters if one.weighs}
-    elif effort == "friction-compensated":
-        gone = {name for term in _EVERY if term.name in FRICTION for name in term.names}
-    elif effort == "external":
-        arm = [term for term in _EVERY if term.inertial or term.name in _OF_DRIVES]
-        gone = {name for term in arm for name in term.names}
-    else:
-        gone = set()
+    gone: set[str] = set()
+    for term in _EVERY:
+        of_drive = term.name in _OF_DRIVES
+        if effort == "gravity-compensated":
+            gone |= {parameter.name for parameter in term.parameters if parameter.weighs}
+        if effort == "friction-compensated" and term.name in FRICTION:
+            gone |= set(term.names)
+        if effort == "external" and (term.inertial or of_drive):
+            gone |= set(term.names)
     return tuple(name for name in names if name in gone)

@@ -81,7 +81,7 @@ class Expression:
         total = Expression({})
         for first, factor in self.products.items():
             for second, by in as_expression(other).products.items():
-                total = total + Expression({tuple(sorted((*first, *second))): factor * by})
+                total = total + Expression({tuple(sorted(first + second)): factor * by})
         return total
 
     def __sub__(self, other: Expression | Number) -> Expression:
@@ -106,7 +106,7 @@ class Expression:
             for place, atom in enumerate(product):
                 slope = atom.slopes().get(signal)
                 if slope is not None:
-                    rest = (*product[:place], *product[place + 1 :])
+                    rest = product[:place] + product[place + 1 :]
                     total = total + slope * Expression({rest: factor})
         return total
 
@@ -118,7 +118,7 @@ class Expression:
     @property
     def atoms(self) -> set[Atom]:
         """The atoms in it."""
-        return {atom for product in self.products for atom in product}
+        return set().union(*self.products)
 
     def source(self) -> str:
         """Its text, which C and Python read alike; "" for a sum of nothing."""
@@ -127,10 +127,16 @@ class Expression:
             size = abs(factor)
             parts = [atom.name for atom in product]
             if size != 1 or not parts:
-                parts = [f"{size:g}", *parts]
-            sign = "-" if factor < 0 else "+"
+                parts.insert(0, f"{size:g}")
             joined = " * ".join(parts)
-            text += f" {sign} {joined}" if text else f"{'-' if factor < 0 else ''}{joined}"
+            if text and factor < 0:
+                text += f" - {joined}"
+            elif text:
+                text += f" + {joined}"
+            elif factor < 0:
+                text = f"-{joined}"
+            else:
+                text = joined
         return text
 
 
@@ -142,7 +148,9 @@ def as_expression(value: Expression | Number) -> Expression:
     """A number as an expression."""
     if isinstance(value, Expression):
         return value
-    return Expression({(): float(value)} if value else {})
+    if not value:
+        return NOTHING
+    return Expression({(): float(value)})
 
 
 class Values:
@@ -161,12 +169,14 @@ class Values:
     def of(self, product: Product) -> FloatArray | float:
         """The value of a product (N,); a float where no motion changes it."""
         if product not in self._known:
-            *others, last = product
+            last = product[-1]
             if last.constant is not None:
                 value: FloatArray | float = last.constant(self._shape)
             else:
                 value = last.value(self._motion, self._shape)
-            self._known[product] = self.of(tuple(others)) * value if others else value
+            if len(product) > 1:
+                value = self.of(product[:-1]) * value
+            self._known[product] = value
         return self._known[product]
 
     def sum(self, expression: Expression) -> FloatArray | float:
@@ -174,7 +184,9 @@ class Values:
         total: FloatArray | float = 0.0
         for product, factor in expression.products.items():
             value = self.of(product)
-            total = total + (value if factor == 1 else factor * value)
+            if factor != 1:
+                value = factor * value
+            total = total + value
         return total
 
     def into(self, place: FloatArray, expression: Expression) -> None:

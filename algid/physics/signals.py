@@ -44,8 +44,7 @@ def _trigonometric(name: str, place: int, source: str, turned: str, sign: float)
 
     def slopes() -> Mapping[str, Expression]:
         slope = expression(_TRIGONOMETRIC[turned]) * sign
-        joints = ("1", "2") if name[1:] == "12" else (name[1:],)
-        return {f"theta{joint}": slope for joint in joints}
+        return {f"theta{joint}": slope for joint in name[1:]}
 
     return Atom(name, lambda motion, _shape: motion.trigonometry[place], source, slopes)
 

@@ -280,7 +280,7 @@ def add_toys(package: Path) -> None:
     inserted(formats, "from pathlib import Path\n", "from importlib import import_module\n")
     (package / "inspection" / "toy.py").write_text(CHECK)
     checks = package / "inspection" / "checks.py"
-    inserted(checks, "        *rests(log, whole),\n", "        *toys(log),\n")
+    inserted(checks, "    every += rests(log, whole)\n", "    every += toys(log)\n")
     inserted(checks, "from algid.log import", "from algid.inspection.toy import toys\n")
     inserted(
         package / "notices.py", "    # of tracks\n", '    "TOY_SEEN": "{count:# toy|toys} seen",\n'
