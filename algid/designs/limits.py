@@ -216,11 +216,11 @@ def _missed(row: Row, limits: Limits, most: float) -> str:
         )
     assert row.joint is not None
     limit = limits.torque[row.joint]
-    arm = "arm"
+    asks = "the arm asks for"
     if row.loaded:
-        arm = "loaded arm"
+        asks = "the loaded arm asks for"
     return (
-        f"{flag('torque')}: the {arm} asks for {most * limit:.3g} N m at joint "
+        f"{flag('torque')}: {asks} {most * limit:.3g} N m at joint "
         f"{row.joint + 1} even at rest, the limit is {limit:.3g} N m (margin included); raise it, "
         f"or move {flag('range')} to where gravity pulls less"
     )
