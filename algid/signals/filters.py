@@ -23,7 +23,6 @@ _LEAST = 3  # half length that three odd moments ask for, however slowly a log w
 _SETTLED = (
     1.0  # periods of a Butterworth cutoff, times its order, after which it forgets to some 1e-4
 )
-_AT_REST = np.zeros(2)  # state of a section of second order
 _ROWS = 32  # outputs a matrix product makes at once
 
 
@@ -109,10 +108,11 @@ def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArr
 
     `cutoff` is in Hz; `order` is that of one direction.
 
-    The filter is the bilinear transform of the analogue one, in sections of second order
-    (Oppenheim & Schafer, Discrete-Time Signal Processing, sec. 6.3 and 7.1). Both ends continue by
-    point reflection, over `_SETTLED` × `order` periods of the cutoff. The sections start at rest
-    around the first sample: constants are kept exactly. N must be above 1.
+    The filter is the bilinear transform of the analogue one, in sections of second order, one of
+    third where the order is odd (Oppenheim & Schafer, Discrete-Time Signal Processing, sec. 6.3 and
+    7.1). Both ends continue by point reflection, over `_SETTLED` × `order` periods of the cutoff.
+    The sections start at rest around the first sample: constants are kept exactly. N must be above
+    1.
     """
     reach = min(math.ceil(_SETTLED * order / (cutoff * dt)), x.shape[1] - 1)
     y = _reflected(x, reach)
@@ -120,13 +120,13 @@ def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArr
         start = y[:, :1].copy()
         y = y - start
         for numerator, denominator in _sections(cutoff * dt, order):
-            y = np.stack([recursion(numerator, denominator, row, _AT_REST)[0] for row in y])
+            y = _passed(numerator, denominator, y)
         y = (y + start)[:, ::-1]
     return np.ascontiguousarray(y[:, reach : reach + x.shape[1]])
 
 
 def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
-    """Numerators and denominators (3,) of a Butterworth low pass; `cutoff` in periods a sample."""
+    """Numerators and denominators of a Butterworth low pass; `cutoff` in periods a sample."""
     warped = np.tan(np.pi * cutoff)
     sections = []
     for pair in range(order // 2):
@@ -138,9 +138,27 @@ def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
         )
         sections.append((numerator, denominator))
     if order % 2:
-        numerator = warped / (1 + warped) * np.array([1.0, 1.0, 0.0])
-        sections.append((numerator, np.array([1.0, (warped - 1) / (1 + warped), 0.0])))
+        numerator = warped / (1 + warped) * np.array([1.0, 1.0])
+        denominator = np.array([1.0, (warped - 1) / (1 + warped)])
+        if sections:  # each section is one more substitution
+            last = sections.pop()
+            numerator, denominator = (
+                np.convolve(numerator, last[0]),
+                np.convolve(denominator, last[1]),
+            )
+        sections.append((numerator, denominator))
     return sections
+
+
+def _passed(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:
+    """Signals x (m, n) after `recursion`, each from rest, in one substitution."""
+    driven = numerator[0] * x
+    for lag, weight in enumerate(numerator[1:], 1):
+        driven[:, lag:] += weight * x[:, :-lag]
+    band = np.empty((x.shape[1], denominator.size))
+    band[:] = denominator
+    y, _ = lapack.dtbtrs(band.T, driven.T, uplo="L", diag="U", overwrite_b=True)
+    return np.asarray(y.T)
 
 
 def _reflected(x: FloatArray, reach: int) -> FloatArray:
