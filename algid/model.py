@@ -332,8 +332,9 @@ def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compile
 def summed(weighted: Weighted, c: FloatArray, values: Values) -> FloatArray | float:
     """The value of an expression that is linear in the coefficients `c` (q,) or (q, N)."""
     total: FloatArray | float = 0.0
+    known = c.tolist() if c.ndim == 1 else c  # Python's numbers are faster than NumPy's
     for product, pairs in weighted.items():
-        coefficient = sum(factor * c[place] for place, factor in pairs)
+        coefficient = sum(factor * known[place] for place, factor in pairs)
         if isinstance(coefficient, np.ndarray) or coefficient:
             total = total + coefficient * values.of(product)
     return total

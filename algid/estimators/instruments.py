@@ -432,22 +432,26 @@ def _simulated(model: Model, c: FloatArray, dt: FloatArray, cut: _Cut) -> _Simul
     theta, omega, tau, measured = cut.theta, cut.omega, cut.tau, cut.measured
     # the torque where the method asks for it
     acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))
-    thetas, omegas = np.empty_like(measured), np.empty_like(measured)
-    for step, sample in enumerate(range(0, measured.shape[2], stride)):
-        rates = []
-        x, v = theta, omega
-        for now, share in ((0, 0.5), (1, 0.5), (1, 1.0), (2, 0.0)):
-            with np.errstate(
-                divide="ignore", invalid="ignore", over="ignore"
-            ):  # `_inert` judges afterwards
-                rates.append((v, acceleration(model, c, x, v, acts[2 * step + now])))
-            x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
-        (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
-        ahead = theta + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
-        faster = omega + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-        thetas[:, :, sample : sample + stride] = _cubic(theta, ahead, h * omega, h * faster, inside)
-        omegas[:, :, sample : sample + stride] = _cubic(omega, faster, h * a1, h * a4, inside)
-        theta, omega = np.clip(ahead, -1e6, 1e6), np.clip(faster, -1e6, 1e6)
+    starts, ends = [], []  # angles, velocities and their rates, a step each
+    with np.errstate(
+        divide="ignore", invalid="ignore", over="ignore"
+    ):  # `_inert` judges afterwards
+        for step in range(0, 2 * (measured.shape[2] // stride), 2):
+            rates = []
+            x, v = theta, omega
+            for now, share in ((0, 0.5), (1, 0.5), (1, 1.0), (2, 0.0)):
+                rates.append((v, acceleration(model, c, x, v, acts[step + now])))
+                x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
+            (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
+            ahead = theta + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+            faster = omega + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+            starts.append((theta, omega, a1))
+            ends.append((ahead, faster, a4))
+            theta, omega = np.clip(ahead, -1e6, 1e6), np.clip(faster, -1e6, 1e6)
+    before, after = np.stack(starts, axis=-1), np.stack(ends, axis=-1)
+    h = h[:, None]
+    thetas = _cubic(before[0], after[0], h * before[1], h * after[1], inside)
+    omegas = _cubic(before[1], after[1], h * before[2], h * after[2], inside)
     good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
     moves = _inert(model, c, thetas[:, :, ::stride])
     # A window that ran away is left out; products of its velocities would overflow.
@@ -458,10 +462,11 @@ def _simulated(model: Model, c: FloatArray, dt: FloatArray, cut: _Cut) -> _Simul
 def _cubic(
     start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray
 ) -> FloatArray:
-    """Cubic Hermite (2, R, S) at shares `s` (S,) of a step, from end values and rates (2, R)."""
+    """Cubic Hermite (2, R, K S) at shares `s` (S,) of K steps, from their ends (2, R, K)."""
     rise_of_end = s**2 * (3 - 2 * s)
     weights = np.stack([1 - rise_of_end, rise_of_end, s * (1 - s) ** 2, s**2 * (s - 1)])
-    return np.einsum("war,ws->ars", np.stack([start, end, rise, last]), weights)
+    parts = np.stack([start, end, rise, last])
+    return np.einsum("wark,ws->arks", parts, weights).reshape(*start.shape[:2], -1)
 
 
 def _started(
