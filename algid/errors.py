@@ -54,14 +54,16 @@ def without_credentials(text: str) -> str:
     In Azure's URLs a name before the @ is the container's or the account's, and stays.
     """
 
-    def kept(found: re.Match[str]) -> str:
-        scheme, mark, user = found.groups()
-        name = (
-            user.partition(":")[0].rstrip("@") if scheme.lower().startswith(("az", "abfs")) else ""
-        )
-        return f"{scheme}{mark}{name}{'@' if name else ''}"
+    def kept(url: re.Match[str]) -> str:
+        scheme, mark, user = url.groups()
+        name = user.partition(":")[0].rstrip("@")
+        if name and scheme.lower().startswith(("az", "abfs")):
+            return f"{scheme}{mark}{name}@"
+        return f"{scheme}{mark}"
 
-    return _SECRET.sub(r"\1", _USER.sub(kept, text)) if ":/" in text else text
+    if ":/" not in text:
+        return text
+    return _SECRET.sub(r"\1", _USER.sub(kept, text))
 
 
 def text_of(error: BaseException) -> str:
@@ -73,7 +75,9 @@ def text_of(error: BaseException) -> str:
         text = without_credentials(str(error))[:LONGEST_TEXT]
     except BaseException:  # its own fault, whatever it is
         return type(error).__name__
-    return text if isinstance(error, AlgidError) else f"{type(error).__name__}: {text}"
+    if isinstance(error, AlgidError):
+        return text
+    return f"{type(error).__name__}: {text}"
 
 
 def chain_of(error: BaseException) -> Iterator[BaseException]:

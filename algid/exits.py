@@ -38,21 +38,25 @@ WHAT_TO_DO: Mapping[Exit, str] = {
 }
 _ALWAYS = (Exit.OK, Exit.USAGE)
 OF_COMMAND: Mapping[str, tuple[Exit, ...]] = {
-    "inspect": (*_ALWAYS, Exit.FAILED, Exit.DATA_LOST),
-    "design": (*_ALWAYS, Exit.FAILED),
-    "identify": (*_ALWAYS, Exit.FAILED, Exit.DATA_LOST),
+    "inspect": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
+    "design": _ALWAYS + (Exit.FAILED,),
+    "identify": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
     "validate": (Exit.OK, Exit.LIMIT, Exit.USAGE),
     "batch": (Exit.OK, Exit.LIMIT, Exit.USAGE, Exit.FAILED, Exit.DATA_LOST, Exit.STOPPED),
-    "track": (*_ALWAYS, Exit.FAILED, Exit.DATA_LOST),
+    "track": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
     "check": (Exit.OK, Exit.LIMIT, Exit.USAGE),
-    "convert": (*_ALWAYS, Exit.DATA_LOST),
+    "convert": _ALWAYS + (Exit.DATA_LOST,),
 }
 """The codes that a command ends with by itself; any other command ends with `OK` or `USAGE`."""
 
 
 def exit_of(*, failed: bool, lost: bool) -> Exit:
     """How a command ends whose result has `failed`, or from whose logs data are lost."""
-    return Exit.FAILED if failed else Exit.DATA_LOST if lost else Exit.OK
+    if failed:
+        return Exit.FAILED
+    if lost:
+        return Exit.DATA_LOST
+    return Exit.OK
 
 
 def epilog(command: str) -> str:
@@ -63,9 +67,7 @@ def epilog(command: str) -> str:
 
 def table() -> str:
     """All codes as a table in Markdown, as README and guide have it."""
-    rows = [
-        f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |" for code, meaning in MEANINGS.items()
-    ]
-    return "\n".join(
-        ["| exit code | meaning | what a scheduler should do |", "|---|---|---|", *rows]
-    )
+    lines = ["| exit code | meaning | what a scheduler should do |", "|---|---|---|"]
+    for code, meaning in MEANINGS.items():
+        lines.append(f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |")
+    return "\n".join(lines)

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from algid.api.given import opened
 from algid.api.options import profile_of, with_options
 from algid.api.ranges import check
 from algid.errors import AlgidError, SettingError
@@ -155,33 +156,39 @@ def batch(
     from algid.batches.discover import jobs_of
     from algid.batches.lock import locked
     from algid.batches.run import Batch, Recipe, stopped_by_signals, sweep
-    from algid.results import Result, read_result
     from algid.stores import absolute, open_store, shown
 
-    given = [sources] if isinstance(sources, str | Path) else sources
-    names, place = [str(one) for one in given], str(out)
+    if isinstance(sources, str | Path):
+        sources = [sources]
+    names, place = [str(one) for one in sources], str(out)
     if not place.strip():
         raise SettingError("-o: expected a folder or a URL, found none; name where results go")
     check("batch", workers=workers, timeout=timeout)
-    bytes_each = None if memory_limit is None else bytes_of(memory_limit)
+    bytes_each = None
+    if memory_limit is not None:
+        bytes_each = bytes_of(memory_limit)
     if scheduler is not None and (workers is not None or memory_limit is not None):
         raise SettingError(
             f"{flag('scheduler')}: workers and their memory are the cluster's; set them where it "
             "is started"
         )
     asked, said = with_options(settings, profile, options)
-    known = (
-        parameters
-        if parameters is None or isinstance(parameters, Result)
-        else read_result(parameters)
-    )
+    known, alone = None, "logs"
+    if parameters is not None:
+        known, alone = opened(parameters), "loaded"
     if scheduler is not None:  # a worker's own folder is another
         names, place = [absolute(source) for source in names], absolute(place)
-    meant = profile_for or (lambda file: said if file is None else _over(file, options))
-    recipe = Recipe(place, asked, cache(meant), known, report)  # each file is read once
+
+    def meant(file: str | None) -> Profile | None:
+        if file is None:
+            return said
+        return _over(file, options)
+
+    recipe = Recipe(place, asked, cache(profile_for or meant), known, report)  # each file once
     recipe.profile(None)
-    alone = "logs" if known is None else "loaded"
-    jobs = [] if watch else jobs_of(names, place, alone)
+    jobs = []
+    if not watch:
+        jobs = jobs_of(names, place, alone)
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
     store = open_store(place)
@@ -191,11 +198,10 @@ def batch(
             with _workers(place, scheduler, workers, bytes_each, timeout) as (executor, slots):
                 running = Batch(store, recipe, executor, slots, progress or (lambda _: None))
                 with stopped_by_signals(running.stop):
-                    ended = (
-                        watched(running, names, place, alone, retry_failed, complain)
-                        if watch
-                        else running.run(jobs, retry_failed)
-                    )
+                    if watch:
+                        ended = watched(running, names, place, alone, retry_failed, complain)
+                    else:
+                        ended = running.run(jobs, retry_failed)
         finally:
             sweep(store)
     return Batched(

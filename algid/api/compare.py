@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from algid.api.given import opened
 from algid.errors import SettingError
 from algid.files import refuse_existing
-from algid.results import Result, read_result
+from algid.results import Result
 
 if TYPE_CHECKING:
     from algid.report.comparison import Comparison
@@ -57,16 +58,17 @@ def compare(
     """
     from algid.report.comparison import compare as compared
 
-    count = 1 if isinstance(results, str | Path | Result) else len(results)
-    if count < 2:
+    if isinstance(results, str | Path | Result):
+        results = [results]
+    if len(results) < 2:
         raise SettingError(
-            f"compare: expected two results or more, found {count}; name another one"
+            f"compare: expected two results or more, found {len(results)}; name another one"
         )
     if labels is not None and len(labels) != len(results):
         raise SettingError(f"labels: expected {len(results)}, found {len(labels)}")
     if out is not None:
         refuse_existing(page_of(Path(out)), force)
-    read = [one if isinstance(one, Result) else read_result(one) for one in results]
+    read = [opened(one) for one in results]
     paths = [Path(one) for one in results if not isinstance(one, Result)]
     if labels is None and len(paths) == len(read):
         labels = labels_of(paths)
@@ -87,10 +89,16 @@ def page_of(out: Path) -> Path:
 
 def labels_of(paths: Sequence[Path]) -> list[str]:
     """The folders' names without the suffix, with as many folders above them as tell them apart."""
-    folders = [(path.parent if path.name == "result.json" else path).resolve() for path in paths]
-    parts = [(*folder.parent.parts, folder.name.removesuffix(".algid")) for folder in folders]
+    folders, parts = [], []
+    for path in paths:
+        folder = path
+        if path.name == "result.json":
+            folder = path.parent
+        folder = folder.resolve()
+        folders.append(str(folder))
+        parts.append(folder.parent.parts + (folder.name.removesuffix(".algid"),))
     for depth in range(1, max(map(len, parts)) + 1):
         names = ["/".join(part[-depth:]) for part in parts]
         if len(set(names)) == len(names):
             return names
-    return [str(folder) for folder in folders]  # one of them is named twice
+    return folders  # one of them is named twice

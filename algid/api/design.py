@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from algid.api.given import folder_or_none, parts_of
 from algid.api.options import two_names
 from algid.api.ranges import check
 from algid.errors import SettingError
-from algid.files import refuse_existing, whole_folder
+from algid.files import refuse_existing
 from algid.options import flag
 
 if TYPE_CHECKING:
@@ -203,22 +203,31 @@ def design(
         "torque": torque,
         "runs": runs,
     }
-    flags = {name: _spelled(value) for name, value in of_flags.items()}
-    numbers = {"tip_height": tip_height, "duration": duration, "rate": rate}
-    asked = request(None if limits is None else Path(limits), {**flags, **numbers})
+    flags: dict[str, str | float | None] = {
+        "tip_height": tip_height,
+        "duration": duration,
+        "rate": rate,
+    }
+    for name, value in of_flags.items():
+        flags[name] = _spelled(value)
+    file = None
+    if limits is not None:
+        file = Path(limits)
+    asked = request(file, flags)
     names = two_names("joints", joints)
     source = str(prior)
-    folder = None if out is None else folder_of(source, Path(out))
-    if folder is not None:
+    folder = None
+    if out is not None:
+        folder = folder_of(source, Path(out))
         refuse_existing(folder, force)
-    wished = asked.get("runs", None)
-    known = prior_of(
-        source, None if wished is None else wished[1] > 0, KnownBefore(l1, l2, payload, prior_error)
-    )
+    loaded = None
+    if asked.get("runs", None) is not None:
+        loaded = asked.content["runs"][1] > 0
+    known = prior_of(source, loaded, KnownBefore(l1, l2, payload, prior_error))
     noise = noise_of(known, position_noise, torque_noise, noise_from)
     campaign = campaign_of(known, asked, noise, wanted, drive, margin, seed)
     origin = Provenance(source, command, names, known.doubts)
-    with nullcontext() if folder is None else whole_folder(folder, force) as temporary:
+    with folder_or_none(folder, force) as temporary:
         with one_blas_thread():
             planned = plan(campaign, progress)
         if temporary is not None:
@@ -247,16 +256,17 @@ def campaign_of(
     from algid.designs.request import limits_of
 
     shared = prior.belief.shared
-    runs = asked.get("runs", (1, 1) if shared.payload else (1, 0))
-    parts = wanted.split(",") if isinstance(wanted, str) else wanted
-    names = None if parts is None else [name.strip() for name in parts]
+    runs = asked.get("runs", (1, int(shared.payload)))
+    names = None
+    if wanted is not None:
+        names = [name.strip() for name in parts_of(wanted)]
     return Campaign(
         experiment=Experiment(shared, runs, noise, asked.get("rate", RATE)),
         belief=prior.belief,
         limits=limits_of(asked, prior.lengths),
         asked=asked_for(prior.belief, names, prior.source),
         duration=asked.get("duration", DURATION),
-        drive="torque" if drive == "torque" else "position",
+        drive=drive,  # type: ignore[arg-type]
         margin=margin,
         seed=seed,
     )
@@ -270,7 +280,7 @@ def noise_of(
     Raises
     ------
     SettingError
-        Where none tells.
+        Where none is known.
     """
     from algid.estimators.noise import first_guess
     from algid.estimators.whitening import NoiseLevels
@@ -280,8 +290,9 @@ def noise_of(
         from algid.log import Log
         from algid.readers import read_log
 
-        read = log if isinstance(log, Log) else read_log(log)
-        measured = first_guess(read.theta, read.tau)
+        if not isinstance(log, Log):
+            log = read_log(log)
+        measured = first_guess(log.theta, log.tau)
     levels = {}
     for option, given, name in (
         ("position_noise", position, "theta"),
@@ -305,7 +316,10 @@ def _spelled(value: Any) -> str | None:
         return value
     if not isinstance(value, tuple | list):
         return str(value)
-    parts = [
-        ":".join(map(str, one)) if isinstance(one, tuple | list) else str(one) for one in value
-    ]
+    parts = []
+    for one in value:
+        if isinstance(one, tuple | list):
+            parts.append(":".join(map(str, one)))
+        else:
+            parts.append(str(one))
     return ",".join(parts)

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from algid.api.given import called, opened
 from algid.api.ranges import check
 from algid.errors import SettingError
 from algid.files import refuse_existing, whole_file
 from algid.options import flag
-from algid.results import Result, read_result
+from algid.results import Result
 
 if TYPE_CHECKING:
     from algid.notices import Notice
@@ -91,9 +92,8 @@ def export(
     if to not in FORMATS:
         raise SettingError(f"{flag('to')}: expected one of {', '.join(FORMATS)}, found {to!r:.60}")
     check("export", l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1)
-    known = result if isinstance(result, Result) else read_result(result)
-    file = known.log.path if isinstance(result, Result) else str(result)
-    text, warnings = exported(known, file, to, Knowns(l1, l2, m1, m2, rotor1))
+    knowns = Knowns(l1, l2, m1, m2, rotor1)
+    text, warnings = exported(opened(result), called(result), to, knowns)
     if out is None:
         return Exported(text, warnings)
     path = Path(out)
@@ -107,7 +107,12 @@ def file_of(result: Path, to: str) -> Path:
     """The default file of a result's export: the result's name with the format's suffix."""
     from algid.exports.formats import FORMATS as WRITTEN
 
-    stem = (result if result.name != "result.json" else result.resolve().parent).stem or "arm"
+    folder = result
+    if result.name == "result.json":
+        folder = result.resolve().parent
+    stem = folder.stem or "arm"
     if to == "python":
         stem = re.sub(r"\W", "_", stem)
-    return Path(f"{stem}-payload.yaml" if to == "yaml" else f"{stem}{WRITTEN[to].suffix}")
+    if to == "yaml":
+        return Path(f"{stem}-payload.yaml")
+    return Path(f"{stem}{WRITTEN[to].suffix}")

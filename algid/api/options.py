@@ -94,9 +94,10 @@ def profile_of(given: ProfileLike | None) -> Profile | None:
 
 def two_names(name: str, given: object) -> tuple[str, str]:
     """The names in ``NAME,NAME`` or a pair; raises `SettingError` where there are not two."""
-    parts = given.split(",") if isinstance(given, str) else given
-    if isinstance(parts, list | tuple) and len(parts) == 2:
-        first, second = (str(part).strip() for part in parts)
+    if isinstance(given, str):
+        given = given.split(",")
+    if isinstance(given, list | tuple) and len(given) == 2:
+        first, second = str(given[0]).strip(), str(given[1]).strip()
         if first and second:
             return first, second
     raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {given!r:.60}")
@@ -125,12 +126,9 @@ def _over(profile: Profile | None, options: Mapping[str, Any]) -> Profile | None
 def _refuse_unknown(options: Mapping[str, Any], known: list[str]) -> None:
     for name in options:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            mend = (
-                f"did you mean {near[0]}?"
-                if near
-                else f"known are {', '.join(dict.fromkeys(known))}"
-            )
+            mend = f"known are {', '.join(dict.fromkeys(known))}"
+            for near in get_close_matches(name, known, n=1):
+                mend = f"did you mean {near}?"
             raise SettingError(f"{name}: no setting has this name; {mend}")
 
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, overload
 
+from algid.api.given import parts_of
 from algid.api.ranges import check
 from algid.errors import SettingError
 from algid.files import refuse_existing
@@ -201,7 +201,9 @@ class _Files:
         return Path(self.out or "") / f"{name}.{self.kind}"
 
     def refuse_existing(self, case: Case, roles: Sequence[str]) -> None:
-        for role in roles if self.out is not None else ():
+        if self.out is None:
+            return
+        for role in roles:
             refuse_existing(self.path(f"{case.name}-{role}"), self.force)
 
     def write(self, logs: Sequence[Log]) -> None:
@@ -227,7 +229,9 @@ class _Asked:
 
     @property
     def roles(self) -> tuple[str, ...]:
-        return ("unloaded", "loaded") if self.case.payload else ("unloaded",)
+        if self.case.payload:
+            return "unloaded", "loaded"
+        return ("unloaded",)
 
     def recording(self, duration: float) -> run.Recording:
         """How it is recorded; raises `SettingError` for fewer than two samples, or too many."""
@@ -278,20 +282,26 @@ def _driven(
     payload_schedule: Schedule | str | None,
 ) -> list[Log]:
     """The logs of an arm under a torque."""
-    recording = asked.recording(1.0 if asked.duration is None else asked.duration)
+    duration = asked.duration
+    if duration is None:
+        duration = 1.0
+    recording = asked.recording(duration)
     if initial is not None:
         recording = replace(recording, initial=_state(initial))
-    named = "case" if excitation is None else excitation
-    drive = _torque(asked.case, named, hold)
-    if hold != "exact" and named in run.EXCITATIONS:
-        drive = run.held(drive, asked.rate, recording.duration, "zoh" if hold == "zoh" else "foh")
+    if excitation is None:
+        excitation = "case"
+    drive = _torque(asked.case, excitation, hold)
+    if excitation in run.EXCITATIONS and hold == "zoh":
+        drive = run.held(drive, asked.rate, recording.duration, "zoh")
+    elif excitation in run.EXCITATIONS and hold == "foh":
+        drive = run.held(drive, asked.rate, recording.duration, "foh")
     if payload_schedule is not None:
         schedule = _schedule(payload_schedule)
         asked.files.refuse_existing(asked.case, ("schedule",))
         return [run.with_schedule(asked.case, drive, recording, schedule, asked.progress)]
     asked.files.refuse_existing(asked.case, asked.roles)
     logs = run.synthesise(asked.case, drive, recording, asked.progress)
-    return [*logs][: len(asked.roles)]
+    return list(logs)[: len(asked.roles)]
 
 
 def _among(flag: str, value: object, known: Sequence[str]) -> None:
@@ -301,30 +311,26 @@ def _among(flag: str, value: object, known: Sequence[str]) -> None:
 
 def _start_ns(start: datetime) -> int:
     """A date in ns since 1970, in UTC where it names no zone."""
-    aware = start if start.tzinfo is not None else start.replace(tzinfo=UTC)
-    if not FIRST_YEAR <= aware.year <= LAST_YEAR:
+    if not FIRST_YEAR <= start.year <= LAST_YEAR:
         span = f"from {FIRST_YEAR} to {LAST_YEAR}"
         raise SettingError(
             f"{flag('start_time')}: expected a date {span}, found {start.isoformat()}"
         )
-    return int(aware.timestamp()) * 10**9
+    if start.tzinfo is None:
+        start = start.replace(tzinfo=UTC)
+    return int(start.timestamp()) * 10**9
 
 
 def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
     """Times in s, increasing, and payloads in kg out of pairs, or of S=KG,…."""
-    pairs = [part.split("=") for part in given.split(",")] if isinstance(given, str) else given
+    pairs: Sequence[Sequence[float | str]] | Schedule = given
+    if isinstance(given, str):
+        pairs = [part.split("=") for part in given.split(",")]
     try:
         schedule = [(float(time), float(mass)) for time, mass in pairs]
     except (TypeError, ValueError):
         schedule = []
-    times = [time for time, _ in schedule]
-    increasing = all(earlier < later for earlier, later in pairwise(times))
-    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
-    if not (
-        schedule
-        and increasing
-        and all(0 <= time <= longest and 0 <= m <= heaviest for time, m in schedule)
-    ):
+    if not _is_schedule(schedule):
         raise SettingError(
             f"{flag('payload_schedule')}: expected increasing times and payloads of 0 or more like "
             f"2=0.05,4=0, found {given!r}"
@@ -332,11 +338,21 @@ def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
     return schedule
 
 
+def _is_schedule(schedule: Sequence[tuple[float, float]]) -> bool:
+    """Whether times increase, and times and payloads are such as a log and an arm may have."""
+    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
+    before = -math.inf
+    for time, mass in schedule:
+        if not (before < time and 0 <= time <= longest and 0 <= mass <= heaviest):
+            return False
+        before = time
+    return bool(schedule)
+
+
 def _state(given: State | str) -> tuple[float, float, float, float]:
     """Two angles in rad and two velocities in rad/s out of four numbers, or of θ1,θ2,ω1,ω2."""
-    parts = given.split(",") if isinstance(given, str) else given
     try:
-        first, second, third, fourth = (float(part) for part in parts)
+        first, second, third, fourth = (float(part) for part in parts_of(given))
     except (TypeError, ValueError):
         first = second = third = fourth = math.nan
     if not math.isfinite(first + second + third + fourth):
@@ -367,4 +383,6 @@ def _torque(case: Case, given: str | Path | Log, hold: str) -> Torque:
                 "neither"
             )
         given = read_log(given)
-    return SampledTorque(given.t, given.tau, "foh" if hold == "foh" else "zoh")
+    if hold == "foh":
+        return SampledTorque(given.t, given.tau, "foh")
+    return SampledTorque(given.t, given.tau, "zoh")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from algid.api.given import folder_or_none
 from algid.api.options import meaning
 from algid.api.ranges import check
-from algid.files import whole_folder
 
 if TYPE_CHECKING:
     from algid.api.options import ProfileLike
@@ -87,13 +86,17 @@ def track(
     from algid.tracks.run import track_log
 
     check("track", l1=l1, l2=l2)
-    said = meaning(profile, options)
-    folder = None if out is None else track_folder(_name(log), Path(out))
+    own = meaning(profile, options)
+    folder = None
+    if out is not None:
+        folder = track_folder(_name(log), Path(out))
     if progress is not None:
         progress("weighing the payload", 0, 0)
-    called = {} if command is None else {"command": command}
-    with nullcontext() if folder is None else whole_folder(folder, force) as temporary:
-        result = track_log(log, parameters, l1=l1, l2=l2, profile=said, settings=called)
+    settings = {}
+    if command is not None:
+        settings["command"] = command
+    with folder_or_none(folder, force) as temporary:
+        result = track_log(log, parameters, l1=l1, l2=l2, profile=own, settings=settings)
         if temporary is not None:
             write_track(result, temporary, mcap=export)
     return result
@@ -133,4 +136,6 @@ def _name(log: LogLike) -> str:
 
     if isinstance(log, Log):
         return log.origin.path
-    return str(log) if isinstance(log, str | Path) else "log"
+    if isinstance(log, str | Path):
+        return str(log)
+    return "log"

@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from algid.api.given import called, opened
 from algid.api.options import meaning
 from algid.api.ranges import check
-from algid.results import Result, read_result
+from algid.results import Result
 
 if TYPE_CHECKING:
     from algid.api.options import ProfileLike
@@ -75,24 +76,26 @@ def validate(
     from algid.identification.validate import validate as judge
     from algid.identification.validated import Validated
 
-    known, said = None, meaning(profile, options)
+    known, own = None, meaning(profile, options)
     check("validate", max_nrmse=max_nrmse)
-    file = result.log.path if isinstance(result, Result) else str(result)
-    warnings: tuple[str, ...] = ()
+    file = called(result)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
         from algid.exports.read_urdf import read_urdf
 
         model = read_urdf(Path(result))
     else:
-        known = result if isinstance(result, Result) else read_result(result)
-        model, said = predictor_of(known, file), reused(said, known)
+        known = opened(result)
+        model, own = predictor_of(known, file), reused(own, known)
     gravity = model.model.gravity
-    sources = open_sources(logs, "unloaded", said, gravity)
-    survey = Survey([*sources, *open_sources(loaded, "loaded", said, gravity)], progress)
+    sources = open_sources(logs, "unloaded", own, gravity)
+    sources += open_sources(loaded, "loaded", own, gravity)
+    survey = Survey(sources, progress)
     survey.begin("prediction")
     validation = judge(model, survey)
-    rolled = roll(model, survey) if simulate else None
+    rolled, warnings = None, []
+    if simulate:
+        rolled = roll(model, survey)
     if known is not None:
         summaries = [survey.summary(log) for log in survey.logs]
-        warnings += tuple(one.sentence for one in read_otherwise(summaries, known, file))
-    return Validated(validation.logs, validation.total, rolled, warnings, max_nrmse)
+        warnings = [one.sentence for one in read_otherwise(summaries, known, file)]
+    return Validated(validation.logs, validation.total, rolled, tuple(warnings), max_nrmse)

@@ -1,0 +1,43 @@
+"""What callers give in one of several forms: text or parts, results or their files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid.files import whole_folder
+
+if TYPE_CHECKING:
+    from algid.results import Result
+
+
+def parts_of(given: str | Iterable[Any]) -> Iterable[Any]:
+    """The parts of text between commas, or what comes in parts already."""
+    if isinstance(given, str):
+        return given.split(",")
+    return given
+
+
+def opened(given: Result | str | Path) -> Result:
+    """A result, read where its file or folder is given."""
+    from algid.results import Result, read_result
+
+    if isinstance(given, Result):
+        return given
+    return read_result(given)
+
+
+def called(given: Result | str | Path) -> str:
+    """What a result is called where it is wrong: its file, or its log."""
+    if isinstance(given, str | Path):
+        return str(given)
+    return given.log.path
+
+
+def folder_or_none(folder: Path | None, force: bool) -> AbstractContextManager[Path | None]:
+    """A folder to write into, whole or not at all; None where nothing is to be written."""
+    if folder is None:
+        return nullcontext()
+    return whole_folder(folder, force)
