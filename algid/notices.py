@@ -69,14 +69,16 @@ class Remedy:
         """As words of a command line."""
         words: list[str] = []
         for name, value in self.settings.items():
+            shown = _shown(name, value)
             if _own(name, value):
-                shown = _shown(name, value)
-                listed = ",".join(map(str, shown if isinstance(shown, list | tuple) else [shown]))
-                words += [flag(name), listed]
+                if isinstance(shown, list | tuple):
+                    shown = ",".join(map(str, shown))
+                words += [flag(name), str(shown)]
             else:
-                shown = _shown(name, value)
                 plain = value is None or (isinstance(value, str) and value.isalpha())
-                words += [flag("set"), f"{name}={shown if plain else _toml(name, value)}"]
+                if not plain:
+                    shown = _toml(name, value)
+                words += [flag("set"), f"{name}={shown}"]
         return tuple(words)
 
     @property
@@ -93,32 +95,40 @@ class Remedy:
                 channels.append(f"unit = {_toml(name, value)} of [{first}] and [{second}]")
                 continue
             channel, dot, key = name.partition(".")
-            value = [value] if name == "accept" and isinstance(value, str) else value
-            line = f"{key or name} = {_toml(name, value)}"
-            (channels if dot else own).append(f"{line} of [{channel}]" if dot else line)
+            if name == "accept" and isinstance(value, str):
+                value = [value]
+            if dot:
+                channels.append(f"{key} = {_toml(name, value)} of [{channel}]")
+            else:
+                own.append(f"{name} = {_toml(name, value)}")
         return ", ".join(own + channels)
 
     @property
     def keywords(self) -> dict[str, Any]:
         """As Python's keywords, a channel's settings in a dictionary of their own."""
-        found: dict[str, Any] = {}
+        keywords: dict[str, Any] = {}
         for name, value in self.settings.items():
             channel, dot, key = name.partition(".")
             if dot:
-                found.setdefault(channel, {})[key] = value
+                keywords.setdefault(channel, {})[key] = value
             else:
-                found[name] = value
-        return found
+                keywords[name] = value
+        return keywords
 
     def __str__(self) -> str:
-        when = f"{self.when}: " if self.when else ""
-        flags, lines = " ".join(map(_quoted, self.flags)), self.lines
-        return f"{when}{flags} (profile: {lines})" if lines else f"{when}{flags}"
+        text, lines = " ".join(map(_quoted, self.flags)), self.lines
+        if self.when:
+            text = f"{self.when}: {text}"
+        if lines:
+            text = f"{text} (profile: {lines})"
+        return text
 
 
 def _quoted(word: str) -> str:
     """A word as a shell takes it; what stands in plain quotation marks stays as it reads best."""
-    return word if _IN_MARKS.fullmatch(word) else shlex.quote(word)
+    if _IN_MARKS.fullmatch(word):
+        return word
+    return shlex.quote(word)
 
 
 _IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
@@ -129,16 +139,19 @@ def _shown(name: str, value: Any) -> Any:
     if value is not None:
         return value
     last = name.rpartition(".")[2]
-    known = [one.open for one in OPTIONS if one.name == last and one.open]
-    return known[0] if known else _OF_CHANNELS.get(last, "VALUE")
+    for one in OPTIONS:
+        if one.name == last and one.open:
+            return one.open
+    return _OF_CHANNELS.get(last, "VALUE")
 
 
 def _toml(name: str, value: Any) -> str:
     if value is not None:
         return json.dumps(value, ensure_ascii=False)
     shown = _shown(name, value)
-    quoted = isinstance(shown, tuple) or name.endswith(("source", "topic", "time", "file"))
-    return json.dumps(shown) if quoted else str(shown)
+    if isinstance(shown, tuple) or name.endswith(("source", "topic", "time", "file")):
+        return json.dumps(shown)
+    return str(shown)
 
 
 class _Words(string.Formatter):
@@ -151,10 +164,14 @@ class _Words(string.Formatter):
         if "|" in spec:
             shown, _, words = spec.rpartition("# ")
             one, many = words.split("|")
-            count = len(value) if isinstance(value, list | tuple) else value
+            count = value
+            if isinstance(value, list | tuple):
+                count = len(value)
             if words != spec:
                 return shown + counted(count, one, many)
-            return one if count == 1 else many
+            if count == 1:
+                return one
+            return many
         if isinstance(value, list | tuple):
             return joined(list(map(str, value)))
         return str(format(value, spec))
@@ -602,9 +619,8 @@ def _text(code: str, numbers: Mapping[str, Any]) -> str:
     form = MESSAGES[code]
     if not isinstance(form, str):
         form = form[numbers["case"]]
-    return _Words().vformat(
-        form + _ANYWHERE, (), {"flag": FLAGS, "accepted": False, "looked_at": 0, **numbers}
-    )
+    values = {"flag": FLAGS, "accepted": False, "looked_at": 0} | dict(numbers)
+    return _Words().vformat(form + _ANYWHERE, (), values)
 
 
 @dataclass(frozen=True)
@@ -645,7 +661,10 @@ class Notice:
     @property
     def remedy(self) -> Remedy | None:
         """The first remedy that can be applied as it stands."""
-        return next((one for one in self.remedies if one.complete), None)
+        for one in self.remedies:
+            if one.complete:
+                return one
+        return None
 
     @property
     def advice(self) -> str:
@@ -663,7 +682,9 @@ class Notice:
     @property
     def clause(self) -> str:
         """Text and advice."""
-        return f"{self.text}: {self.advice}" if self.remedies else self.text
+        if not self.remedies:
+            return self.text
+        return f"{self.text}: {self.advice}"
 
     def of(self, *logs: str) -> Notice:
         """The same of those logs."""
@@ -684,27 +705,27 @@ def _place(logs: Sequence[str]) -> str:
 def merged(notices: Iterable[Notice]) -> list[Notice]:
     """Of each code the first notice, with the logs of all of them.
 
-    What tells of lost samples stands by itself.
+    Each notice of lost samples stays.
     """
-    found: dict[object, Notice] = {}
+    together: dict[object, Notice] = {}
     for place, one in enumerate(notices):
-        key = place if one.lossy else (one.code, one.note)
-        known = found.get(key)
-        found[key] = (
-            one
-            if known is None
-            else replace(known, logs=tuple(dict.fromkeys((*known.logs, *one.logs))))
-        )
-    return list(found.values())
+        key: object = (one.code, one.note)
+        if one.lossy:
+            key = place
+        if key in together:
+            first = together[key]
+            one = replace(first, logs=tuple(dict.fromkeys(first.logs + one.logs)))
+        together[key] = one
+    return list(together.values())
 
 
 def from_flags(flags: Sequence[str]) -> Remedy:
     """The remedy that flags stand for, as results of an earlier schema hold them."""
     settings: dict[str, Any] = {}
     for word, value in zip(flags[::2], flags[1::2], strict=False):
-        name, text = (
-            value.partition("=")[::2] if word == flag("set") else (word.removeprefix("--"), value)
-        )
+        name, text = word.removeprefix("--"), value
+        if word == flag("set"):
+            name, _, text = value.partition("=")
         try:
             settings[name.replace("-", "_")] = json.loads(text)
         except json.JSONDecodeError:

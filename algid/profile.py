@@ -65,17 +65,23 @@ _RATE = range_of(PROFILE, "rate")
 
 def _parts(text: object) -> object:
     """The parts of ``one,two``."""
-    return [part.strip() for part in text.split(",")] if isinstance(text, str) else text
+    if not isinstance(text, str):
+        return text
+    return [part.strip() for part in text.split(",")]
 
 
 def _plain(path: object) -> object:
     """A path as text."""
-    return str(path) if isinstance(path, Path) else path
+    if isinstance(path, Path):
+        return str(path)
+    return path
 
 
 def _number(text: object) -> object:
     """The number that a flag's text is."""
-    return int(text) if isinstance(text, str) and text.isdecimal() else text
+    if isinstance(text, str) and text.isdecimal():
+        return int(text)
+    return text
 
 
 class _Strict(BaseModel):
@@ -242,18 +248,20 @@ class Profile(_Strict):
 
     def half(self, *quantities: str) -> Profile:
         """The same for a file that holds only these quantities, as ``"tau"``, and is read whole."""
-        found = self.model_copy(update=dict.fromkeys(("torque_file", "start", "end", "segment")))
-        found._channels = tuple(name for name in ALL_CHANNELS if name[:-1] in quantities)
-        return found
+        half = self.model_copy(update=dict.fromkeys(("torque_file", "start", "end", "segment")))
+        half._channels = tuple(name for name in ALL_CHANNELS if name[:-1] in quantities)
+        return half
 
     def told_by(self, setting: str) -> Literal["flag", "profile"]:
         """Who set `setting`, such as ``joints`` or ``tau1.unit``: a flag beats the file."""
-        return "flag" if setting in self._flags else "profile"
+        if setting in self._flags:
+            return "flag"
+        return "profile"
 
     def place(self, name: str) -> tuple[str | None, str | None]:
         """Topic and field of the canonical channel `name`.
 
-        a source may be both, ``/joint_states: effort[elbow]``.
+        A source may be both, ``/joint_states: effort[elbow]``.
         """
         channel = self.channel(name)
         topic, colon, field = (channel.column or "").partition(": ")
@@ -263,8 +271,8 @@ class Profile(_Strict):
 
     def channel(self, name: str) -> Angle | Velocity | Torque:
         """The profile of the canonical channel `name`."""
-        found: Angle | Velocity | Torque = getattr(self, name)
-        return found
+        channel: Angle | Velocity | Torque = getattr(self, name)
+        return channel
 
 
 class ProfileSettingError(SettingError):
@@ -286,16 +294,19 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     merged = profile.model_dump(exclude_unset=True)
     flags = set(profile._flags)
     for name, value in settings.items():
-        one_channel = isinstance(value, Mapping)
-        merged[name] = {**merged.get(name, {}), **value} if one_channel else value
-        flags |= {f"{name}.{inner}" for inner in value} if one_channel else {name}
+        if isinstance(value, Mapping):  # settings of one channel
+            merged[name] = merged.get(name, {}) | dict(value)
+            flags |= {f"{name}.{inner}" for inner in value}
+        else:
+            merged[name] = value
+            flags.add(name)
     try:
-        found = Profile.model_validate(merged)
+        changed = Profile.model_validate(merged)
     except ValidationError as error:
         place, why = misfit(error)
         raise ProfileSettingError(f"setting {place}: {why}", place, why) from error
-    found._flags = frozenset(flags)
-    return found
+    changed._flags = frozenset(flags)
+    return changed
 
 
 def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
@@ -314,9 +325,9 @@ def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
     known._flags = frozenset()
     if profile is None:
         return known
-    found = with_settings(known, profile.model_dump(exclude_unset=True))
-    found._flags = profile._flags
-    return found
+    together = with_settings(known, profile.model_dump(exclude_unset=True))
+    together._flags = profile._flags
+    return together
 
 
 def load_profile(path: Path) -> Profile:

@@ -154,7 +154,7 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
     Raises
     ------
     SettingError
-        If there is no such parameter, or the prior cannot tell it from zero, so that it has no
+        If there is no such parameter, or it is not significant in the prior, so that it has no
         relative bound.
     """
     every, mean = belief.shared.names, belief.mean

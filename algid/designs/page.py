@@ -26,7 +26,7 @@ def page_html(design: Design, source: str, doubts: Sequence[Notice] = ()) -> str
 
 
 def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) -> Document:
-    """The report of a design for the arm that `source` tells of."""
+    """The report of a design for the arm that `source` describes."""
     campaign, name = design.campaign, file_name(source)
     return Document(
         title=f"Design for {name}",

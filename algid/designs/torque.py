@@ -35,7 +35,7 @@ CHECKED_ARMS = 24  # drawn for the last check of the limits
 END = 0.1  # of the largest velocity, that may be left of it at the end
 _BROKEN = 1.001  # of a limit: beyond it by more than rounding
 _PENALTY = 20.0  # on each share of a limit beyond it
-_LOST = 0.5  # beyond the limits by so much, what a motion tells does not matter
+_LOST = 0.5  # beyond the limits by so much, the motion does not matter
 _INFORMATION_RATE = 100.0  # Hz, about
 
 

@@ -11,7 +11,7 @@ with the same terms and the same prior, and the residual with the torque after i
 V is the long-run variance of the difference of both estimates' influences, window by window
 (Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1); the
 variance of a cross-correlation is Bartlett's 1946. Instruments stand in place of least squares
-where h tells that they differ, the instrument does not answer, and a constant moves by its own
+where h shows that they differ, the instrument does not answer, and a constant moves by its own
 standard deviation: below that an interval loses less than 5 points of its coverage.
 
 ======  =======================================================  ==========  =================

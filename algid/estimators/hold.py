@@ -1,12 +1,12 @@
 """Whether a logged torque is held from each sample to the next, by how late it acts.
 
 A digital controller holds its torque h = dt / 2 late in the mean; a torque that moves evenly from
-sample to sample is not late. Logs tell how late with a deviation s, beside all that is fitted, and
+sample to sample is not late. Logs show how late with a deviation s, beside all that is fitted, and
 the log of the odds for a held torque is
 
     (d² − (d − h)²) / 2 s²
 
-with d what they tell. Where neither is likelier by far, the delay stays a parameter, with the two
+with d what they show. Where neither is likelier by far, the delay stays a parameter, with the two
 as its prior: mean h / 2 and deviation h / 2. The posterior's error is then what it says, whichever
 is true.
 """
@@ -68,12 +68,12 @@ class Lateness:
 
     @property
     def hold(self) -> Hold:
-        """What the log tells; not held where it tells neither, or another delay."""
+        """The hold that the log shows; not held where it shows neither, or another delay."""
         return "zoh" if self.odds >= SURE and not self.another else "foh"
 
     @property
     def another(self) -> bool:
-        """Whether the log tells a delay that is longer, or shorter, than half a sample and none."""
+        """Whether the log shows a delay that is longer, or shorter, than half a sample and none."""
         off = abs(self.late - self.half)
         return self.odds >= SURE and off > max(_NEAR * self.half, _SIGMAS * self.std)
 
@@ -84,7 +84,7 @@ class Lateness:
         return Prior(DELAYS, np.array([spread]), np.array([[spread**-2]]))
 
     def after(self, mean: float, std: float) -> Lateness:
-        """What a posterior of `mean` and `std`, in s, tells without the prior."""
+        """The same by a posterior of `mean` and `std`, in s, without the prior."""
         spread = 0.5 * self.half
         precision = max(std**-2 - spread**-2, 1e-6 * spread**-2)
         late = (mean * std**-2 - spread * spread**-2) / precision

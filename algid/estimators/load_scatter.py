@@ -7,7 +7,7 @@ the order in which they lie along the drive. Between both is
     e (|L + D| − |L|) tanh(ω / ω_s) ≈ e |D| sgn L
 
 a torque that looks like a gain common to both joints: it moves all constants together, and no
-scatter from log to log or from window to window tells it. Where the residual is white the model
+scatter from log to log or from window to window shows it. Where the residual is white the model
 holds, and its convention with it. Where it is not, the change of the estimate is part of its error:
 
     W = V + d dᵀ,   d = β_torque − β_load

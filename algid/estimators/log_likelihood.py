@@ -1,4 +1,4 @@
-"""What one log tells at given coefficients: its training set, its passes, its noise levels.
+"""The likelihood of one log at given coefficients: its training set, its passes, its noise levels.
 
 A pass linearises every piece of a log, whitens it, and adds up information and scores by stretch.
 Between the passes of the training stay the pieces' trajectories and the log's noise levels, which
@@ -40,11 +40,11 @@ from algid.signals.segments import Segment, pieces, spread_pieces
 
 PIECE_SAMPLES = 16384
 _TRAINED = 4  # whole pieces of a log in the training set, up to twice as many
-SHORTEST = 8 * POINTS  # samples: shorter pieces tell nothing
+SHORTEST = 8 * POINTS  # samples: shorter pieces do not inform
 _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
-_EXCESS = 10.0  # torque error beyond the sensor's noise and jumps that tells unmodelled dynamics
+_EXCESS = 10.0  # torque error beyond the sensor's noise and jumps that means unmodelled dynamics
 # Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its
 # angles' noise.
 _SURE = 0.9
@@ -133,10 +133,8 @@ class LogEvidence:
         self._trajectories = [_first_trajectory(piece) for piece in self.kept]
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
-        theta, tau = (
-            medians(np.transpose([getattr(level, name) for level in guesses]))
-            for name in ("theta", "tau")
-        )
+        theta = medians(np.transpose([level.theta for level in guesses]))
+        tau = medians(np.transpose([level.tau for level in guesses]))
         self._guess = guess = floored(NoiseLevels(theta, tau), floor)
         self.noise = known or guess
         squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)

@@ -266,7 +266,7 @@ def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Pr
                 return step
             if float(np.max(log.noise.tau / before)) < _GROWING:
                 break
-    except np.linalg.LinAlgError:  # it leaves open what others may tell
+    except np.linalg.LinAlgError:  # it leaves open what others may determine
         return 0
     finally:
         log.restore(untrained)

@@ -86,7 +86,7 @@ def running(fit: Fit, durations: Sequence[float], moments: int = MOMENTS) -> Run
 
 
 def _estimate(fit: Fit, logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
-    """Parameters (Q,) that some of the fit's logs tell, and their standard deviations (Q,).
+    """Parameters (Q,) by some of the fit's logs, and their standard deviations (Q,).
 
     NaN where they are open.
     """

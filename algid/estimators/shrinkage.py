@@ -17,7 +17,7 @@ symbol  name                                                             shape  
 S, g    information and score of all logs                                (Q, Q), Q  1 / (unit unit)
 p       shared parameters where prior and logs meet                      (Q,)       mixed
 m, s    the prior's mean, and the spread that physics allows, of a term  (m,)       its own
-τ       the spread that the logs tell, at most s                         (m,)       its own
+τ       the spread that the logs show, at most s                         (m,)       its own
 φ       overdispersion: variance of the scores over the information      scalar     1
 ======  ===============================================================  =========  ===============
 """
@@ -44,7 +44,7 @@ _STEPS = 200
 _SETTLED = 1e-3  # change of log τ
 _LEAST = 1e-4  # of s: a spread that counts as nothing
 _PRIOR_LOGS = 4.0  # logs that the white information counts as, beside the scores' own scatter
-_FEWEST = 3  # logs whose scatter tells an overdispersion
+_FEWEST = 3  # logs whose scatter shows an overdispersion
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +199,7 @@ def spread(
     logs : each log's quadratic likelihood, divided by φ
     beta : (Q,), p
     prior : Prior
-        With the spreads found.
+        With the estimated spreads.
     without : (n, Q)
         The parameters without each log, with the same spreads and φ.
 

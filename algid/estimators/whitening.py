@@ -56,7 +56,7 @@ class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
     `factor` holds L as LAPACK's lower band; `first` is the angle sample of the first stencil's
-    first point; `held` tells whether F is `held_torque`.
+    first point; `held` says whether F is `held_torque`.
     """
 
     columns: FloatArray

@@ -1,6 +1,6 @@
-"""What a choice of the weak windows' length moves, where few logs tell little of the model's error.
+"""What a choice of the weak windows' length moves, where few logs show little of the model's error.
 
-From four logs on, leaving them out tells how far an estimate moves with what the model lacks. With
+From four logs on, leaving them out shows how far an estimate moves with what the model lacks. With
 fewer, its windows are all that speak: longer ones weigh slow errors more, shorter ones fast ones.
 Where the model holds all lengths agree within the error bars; where it does not, the scatter of the
 estimates about the one reported is part of their error:

@@ -88,7 +88,7 @@ def _of_mass(fit: Fit) -> Iterator[Notice]:
 
 
 def _of_gains(fit: Fit) -> Iterator[Notice]:
-    """That the gains of the two torques differ, where the logs tell them apart."""
+    """That the gains of the two torques differ, where the logs show a difference."""
     if "gain2" not in fit.names:
         return
     place = fit.names.index("gain2")
@@ -129,7 +129,7 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
 
 
 def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
-    """That logs tell of a held torque, or that they do not tell."""
+    """That logs show a held torque, or leave it open."""
     if hold.told is None or hold.half is None:
         return
     if not hold.told:

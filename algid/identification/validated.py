@@ -80,7 +80,7 @@ class Validated:
             yield self._rolled()
 
     def _called(self) -> dict[str, str]:
-        """What tables call the logs: their files' names where those tell them apart."""
+        """What tables call the logs: their files' names where those differ."""
         called = {name: file_name(name) for name in self.logs}
         if len(set(called.values())) < len(called):
             called = {name: visible(name) for name in self.logs}

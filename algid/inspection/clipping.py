@@ -1,4 +1,4 @@
-"""Torques that a sensor or a drive cuts off: found by motion, told, and left out."""
+"""Torques that a sensor or a drive cuts off: found by motion, reported, and left out."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from algid.signals.segments import segments
 
 CODE = "CLIPPED_TORQUE"
 LOOKED_AT = 1 << 18
-"""Samples at the beginning of a log that tell of its limits."""
+"""Samples at the beginning of a log in which its limits are looked for."""
 
 
 def saturation(log: Log, *, gravity: float = 9.81, effort: str | None = None) -> Saturation:
     """The limits that cut off torques of a log, and the joints whose limits are sound.
 
-    The beginning of a log tells them, at most `LOOKED_AT` samples.
+    They are looked for in the beginning of a log, at most `LOOKED_AT` samples.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def saturation(log: Log, *, gravity: float = 9.81, effort: str | None = None) ->
     gravity : float, m/s^2
         0 for an arm in a horizontal plane.
     effort : str, as in a profile
-        An external torque is not what moves the arm, and tells no limit.
+        An external torque is not what moves the arm, and shows no limit.
     """
     if effort == "external" or len(log) < 2 or CODE in log.origin.reading.accepted:
         return UNSEEN

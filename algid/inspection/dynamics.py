@@ -1,7 +1,7 @@
 """Rough check of a log's dynamics: enough motion, and a torque that carries the arm's weight.
 
 The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and
-once with gravity turned by a right angle. That is no identification; it tells a wrong sign or zero
+once with gravity turned by a right angle. That is no identification; it separates a wrong sign or zero
 from a right one.
 """
 
@@ -29,7 +29,7 @@ _LEAST_PULL = 1.3
 
 @dataclass(frozen=True)
 class DynamicFigures:
-    """What the rough fit tells.
+    """Figures of the rough fit.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Suspicion:
 def gravity_findings(figures: DynamicFigures) -> Suspicion | None:
     """What a rough fit that explains the torques says of gravity: none, upwards, or sideways.
 
-    None where it pulls down, or the motion does not tell.
+    None where it pulls down, or the motion leaves it open.
     """
     if figures.condition > 1e6 or figures.explained < 0.3:
         return None
@@ -135,7 +135,7 @@ def gravity_findings(figures: DynamicFigures) -> Suspicion | None:
 
 
 def _of_turn(figures: DynamicFigures) -> Suspicion | None:
-    """What is wrong where gravity does not pull down: inertia tells a torque's sign from an arm's.
+    """What is wrong where gravity does not pull down: inertia separates a torque's sign from an arm's.
 
     Torques the other way round turn inertia and friction round too; an arm that is seen from
     behind keeps both, and its gravity pulls upwards.
@@ -180,8 +180,8 @@ def _fit(matrix: FloatArray, target: FloatArray) -> FloatArray:
     return np.asarray(c / scale)
 
 
-def _left(matrix: FloatArray, found: FloatArray, target: FloatArray) -> float:
-    return float(np.sum((target - matrix @ found) ** 2))
+def _left(matrix: FloatArray, solution: FloatArray, target: FloatArray) -> float:
+    return float(np.sum((target - matrix @ solution) ** 2))
 
 
 def _standing_out(columns: FloatArray, others: FloatArray) -> float:

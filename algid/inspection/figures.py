@@ -18,7 +18,7 @@ from algid.readers.runs import PAUSE
 from algid.signals.spacing import near_stamps, spaced
 
 ENOUGH = 1 << 18
-"""Values that tell a quantile of any number of them: a median to 0.25 % of the deviation."""
+"""Values that give a quantile of any number of them: a median to 0.25 % of the deviation."""
 
 
 def thinned(values: Any) -> Any:

@@ -43,7 +43,7 @@ class Parameter:
     scale : Scale
     sign : "+" where physics allows no negative value, else "±"
     plausible : (low, high), in the unit
-        Beyond, a value is another convention, or what a log that tells little makes of its noise.
+        Beyond, a value is another convention, or what a log of little information makes of its noise.
     weighs : bool
         Whether it acts by gravity alone: an arm in a horizontal plane does not have it.
     payload : int or None
@@ -66,7 +66,7 @@ PAYLOAD = (
     Parameter("l1", "l₁", "m", "length of link 1", LENGTH, "+"),
     Parameter("l2", "l₂", "m", "distance of the payload from joint 2, along link 2", LENGTH, "+"),
 )
-"""What loaded logs tell beside the arm."""
+"""What loaded logs determine beside the arm."""
 BODY = (
     Parameter(
         "y_p", "y_p", "m", "distance of the payload's centre of mass off link 2's line", LENGTH

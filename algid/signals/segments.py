@@ -105,12 +105,12 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
 
 def _first_stamps(blocks: Iterable[Log]) -> IntArray:
     """The first `PERIOD_SAMPLES` stamps; the other signals are not copied."""
-    found: list[IntArray] = []
+    stamps: list[IntArray] = []
     for block in blocks:
-        found.append(block.stamp_ns)
-        if sum(map(len, found)) >= PERIOD_SAMPLES:
+        stamps.append(block.stamp_ns)
+        if sum(map(len, stamps)) >= PERIOD_SAMPLES:
             break
-    return np.concatenate(found)[:PERIOD_SAMPLES]
+    return np.concatenate(stamps)[:PERIOD_SAMPLES]
 
 
 class _Sampler:

@@ -94,7 +94,7 @@ def _settled(log: Log, before: Log | None, period: float) -> Log:
         return log
     first = np.concatenate([[0], np.flatnonzero(far) + 1])
     size = np.diff(first, append=len(log))
-    # nothing tells whether the log's first samples are late: the last one is not
+    # nothing shows whether the log's first samples are late: the last one is not
     if before is None and size[0] > 1:
         return _settled(log.part(int(size[0]) - 1, len(log)), None, period)
     known = log if before is None else join([before, log])

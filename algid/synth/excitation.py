@@ -1,7 +1,7 @@
 """Torques that drive a simulated arm.
 
 A torque maps times (M,) in s to (2, M) N m. Smooth torques are plain callables; a sampled one also
-tells where it is not smooth, so that the integrator can step onto those instants.
+says where it is not smooth, so that the integrator can step onto those instants.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ the largest excess over block lengths up to a second is what intervals and chang
 to. Blocks lie within stretches. While changes are sought medians are taken, so that a few that are
 not known do not pass for errors.
 
-Whitened rows remember, so that a change shows late in cells, and may show twice. Cells tell that
+Whitened rows remember, so that a change shows late in cells, and may show twice. Cells show that
 there is one; `algid.tracks.placing` has the rows around it say whether there is, and when.
 """
 
@@ -30,8 +30,8 @@ from algid.tracks.drift import BLOCK, Drift, drift_of
 
 FIRST_SPANS = (1, 2, 3, 5, 8)  # cells: blocks of which few hold a change, before any is known
 SPANS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 50)  # cells: 0.02 to 1 s
-LIGHTEST = 1e-6  # information of a block that tells anything, of the largest
-FEWEST = 8  # pairs of blocks that tell a variance
+LIGHTEST = 1e-6  # information of a block that counts, of the largest
+FEWEST = 8  # pairs of blocks that give a variance
 _MEDIAN = 0.454936  # of a squared standard normal
 _SPREAD = 2.33  # standard deviation of the median of n squares over _MEDIAN, times √n
 _MEAN_SPREAD = 1.73  # of the mean of n squares of neighbouring differences, times √n

@@ -58,7 +58,7 @@ class TrackResult:
         return all(status is StretchStatus.OK for status in self.statuses)
 
     def truth(self, stretch: Stretch) -> float | None:
-        """True payload in kg amid a stretch, where the log tells."""
+        """True payload in kg amid a stretch, where the log states it."""
         if self.schedule is None:
             return None
         middle = (stretch.start + stretch.end) / 2
