@@ -1,8 +1,8 @@
 """How well a torque is predicted where a joint moves, and where it stands.
 
-Where a joint stands, dry friction is any torque up to ± f: no model predicts which. Of a joint slower
-than friction's step ω_s is therefore stated, beside the residual r, how far the torque lies from all
-that friction f may be there,
+Where a joint stands, dry friction is any torque up to ± f: no model predicts which. Of a joint
+slower than friction's step ω_s is therefore stated, beside the residual r, how far the torque lies
+from all that friction f may be there,
 
     d = |r + f tanh(ω / ω_s)| − f, where that is positive; else 0
 """

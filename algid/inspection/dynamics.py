@@ -1,8 +1,8 @@
 """Rough check of a log's dynamics: enough motion, and a torque that carries the arm's weight.
 
 The model of eq. (1) is fitted by least squares to smoothed signals, once with gravity as it is and
-once with gravity turned by a right angle. That is no identification; it separates a wrong sign or zero
-from a right one.
+once with gravity turned by a right angle. That is no identification; it separates a wrong sign or
+zero from a right one.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def gravity_findings(figures: DynamicFigures) -> Suspicion | None:
 
 
 def _of_turn(figures: DynamicFigures) -> Suspicion | None:
-    """What is wrong where gravity does not pull down: inertia separates a torque's sign from an arm's.
+    """What is wrong where gravity does not pull down: inertia tells signs of torque and arm apart.
 
     Torques the other way round turn inertia and friction round too; an arm that is seen from
     behind keeps both, and its gravity pulls upwards.

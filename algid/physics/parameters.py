@@ -43,7 +43,7 @@ class Parameter:
     scale : Scale
     sign : "+" where physics allows no negative value, else "±"
     plausible : (low, high), in the unit
-        Beyond, a value is another convention, or what a log of little information makes of its noise.
+        Beyond, a value is another convention, or made of noise by a log of little information.
     weighs : bool
         Whether it acts by gravity alone: an arm in a horizontal plane does not have it.
     payload : int or None
