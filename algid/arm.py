@@ -112,7 +112,9 @@ class Arm:
         Its centre of mass is at `x` (the tip by default), `y` m in the frame of link 2, its
         inertia about it is `J`.
         """
-        z = payload_phasors(m_p, self.l1, complex(self.l2 if x is None else x, y), J, self.g)
+        if x is None:
+            x = self.l2
+        z = payload_phasors(m_p, self.l1, complex(x, y), J, self.g)
         k = with_payload(self.constants(), np.array([z[0], z[1], z[2].real, z[3].real, z[4].real]))
         return np.concatenate([k, self.sines() + np.array([z[2].imag, z[4].imag, z[3].imag])])
 
@@ -163,8 +165,10 @@ Moment = tuple[FloatArray, FloatArray]
 
 def _moments(k: FloatArray) -> tuple[Moment, Moment, Moment]:
     """The moments k1, k2 and k4 of constants (7, ...), or with their sine parts (10, ...)."""
-    sines = k[7:] if len(k) > 7 else np.zeros(3)
-    return (k[0], sines[0]), (k[1], sines[1]), (k[3], sines[2])
+    if len(k) == 7:
+        none = np.zeros(())
+        return (k[0], none), (k[1], none), (k[3], none)
+    return (k[0], k[7]), (k[1], k[8]), (k[3], k[9])
 
 
 def _turned(moment: Moment, angle: FloatArray) -> tuple[FloatArray, FloatArray]:

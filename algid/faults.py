@@ -55,21 +55,22 @@ def fault(error: BaseException) -> tuple[str, int]:
         `EXIT_USAGE` where memory, the system or a library refused a file; `EXIT_INTERNAL` where
         algid is wrong.
     """
-    notes = [note for note in getattr(error, "__notes__", []) if note.startswith("while ")]
-    doing = notes[0] if notes else ""
-    place = f"{doing}: " if doing else ""
+    place = ""
+    for note in getattr(error, "__notes__", []):
+        if note.startswith("while "):
+            place = f"{note}: "
+            break
     reason = text_of(error).partition("\n")[0][:_LONGEST_REASON]
     trace = f"see where with {TRACEBACK}=1"
     if isinstance(error, MemoryError):
         cut = f"{flag('start')} and {flag('end')}"
-        return (
-            f"{place}not enough memory ({reason}); cut the log with {cut}",
-            EXIT_USAGE,
-        )
+        return f"{place}not enough memory ({reason}); cut the log with {cut}", EXIT_USAGE
     if isinstance(error, OSError) and error.strerror:
-        name = "" if error.filename is None else f"{error.filename}: "
-        return f"{place}{name}{error.strerror}; mend that and run it again, or {trace}", EXIT_USAGE
-    if doing and not _ours(error.__traceback__):
+        what = error.strerror
+        if error.filename is not None:
+            what = f"{error.filename}: {what}"
+        return f"{place}{what}; mend that and run it again, or {trace}", EXIT_USAGE
+    if place and not _ours(error.__traceback__):
         remedy = "look at the file, or write it anew in another format"
         return f"{place}a library cannot take it ({reason}); {remedy}; {trace}", EXIT_USAGE
     return (

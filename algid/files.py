@@ -133,7 +133,10 @@ def _put_open_file(temporary: Path, target: Path, *, replace: bool) -> None:
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files in the order of their names."""
     digest = hashlib.sha256()
-    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+    files = [path]
+    if path.is_dir():
+        files = sorted(path.iterdir())
+    for file in files:
         # one of none is empty, or waits for ever, as /proc/kmsg does
         if file.is_file() and file.stat().st_size:
             with file.open("rb") as opened:
@@ -174,7 +177,9 @@ def read_start(path: Path, most: int) -> bytes:
         status = os.fstat(handle)
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "it is no regular file", str(path))
-        return stream.read(most) if status.st_size else b""
+        if not status.st_size:
+            return b""
+        return stream.read(most)
 
 
 def read_text(path: Path, encoding: str = "utf-8") -> str:
@@ -267,9 +272,11 @@ def first_misfit(error: ValidationError) -> str:
 
 def misfit(error: ValidationError) -> tuple[str, str]:
     """Where a pydantic model was not met; and what was expected and what was found."""
-    first, *others = error.errors(include_url=False, include_context=False)
-    place = ".".join(str(part) for part in first["loc"]) or "top level"
-    more = f" (and {len(others)} more)" if others else ""
+    errors = error.errors(include_url=False, include_context=False)
+    first, more = errors[0], ""
+    place = ".".join(map(str, first["loc"])) or "top level"
+    if len(errors) > 1:
+        more = f" (and {len(errors) - 1} more)"
     # the same misfit has other words in a dataclass than in a model
     if first["type"] == "unexpected_keyword_argument":
         said = "extra inputs are not permitted"
@@ -289,7 +296,9 @@ TEMPORARY = "algid"
 
 def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path:
     """Where the result of a log goes: `parent/NAME.algid`, NAME the log's stem by default."""
-    return parent / f"{Path(first_log).stem or 'log' if name is None else name}.algid"
+    if name is None:
+        name = Path(first_log).stem or "log"
+    return parent / f"{name}.algid"
 
 
 def refuse_misleading(name: str | None) -> None:

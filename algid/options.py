@@ -58,8 +58,12 @@ class Option:
 
 def _either(names: Sequence[str]) -> str:
     """Names as a command line takes them, the last behind "or"."""
-    *most, last = (f'"{name}"' if " " in name else name for name in names)
-    return f"{', '.join(most)} or {last}."
+    words = []
+    for name in names:
+        if " " in name:
+            name = f'"{name}"'
+        words.append(name)
+    return f"{', '.join(words[:-1])} or {words[-1]}."
 
 
 _LENGTH: Range = (1e-3, 1e3)
@@ -297,4 +301,6 @@ def flag(name: str, *, off: bool = False) -> str:
     KeyError
         If there is no option of that name.
     """
-    return FLAGS[name].replace("--", "--no-") if off else FLAGS[name]
+    if off:
+        return FLAGS[name].replace("--", "--no-")
+    return FLAGS[name]

@@ -38,17 +38,23 @@ def is_url(path: str) -> bool:
 
 def absolute(place: str) -> str:
     """A path as it reads in every folder; a URL does already."""
-    return place if is_url(place) else str(Path(place).absolute())
+    if is_url(place):
+        return place
+    return str(Path(place).absolute())
 
 
 def public(path: str) -> str:
     """A path or URL as it is printed and kept: without credentials."""
-    return without_credentials(path) if is_url(path) else path
+    if not is_url(path):
+        return path
+    return without_credentials(path)
 
 
 def shown(place: str) -> str:
     """A folder's path or URL for messages: without credentials and without the query."""
-    return public(place).partition("?")[0].rstrip("/") if is_url(place) else place
+    if not is_url(place):
+        return place
+    return public(place).partition("?")[0].rstrip("/")
 
 
 @dataclass(frozen=True)
@@ -193,7 +199,8 @@ def connect(url: str) -> tuple[FileSystem, str]:
         raise OutputError(f"{url}: no # may stand in a URL; write %23 for one in a key")
     base, mark, query = url.partition("?")
     scheme, _, path = base.partition("://")
-    scheme = "abfs" if scheme == "az" else scheme
+    if scheme == "az":
+        scheme = "abfs"
     with _translated(url, OutputError, "the object store cannot be reached", "check the URL"):
         path = quote(re.sub("%(?![0-9A-Fa-f]{2})", "%25", path), safe=_SAFE)
         filesystem, place = FileSystem.from_uri(f"{scheme}://{path}{mark}{query}")
@@ -205,7 +212,8 @@ def list_urls(url: str) -> list[tuple[str, str]]:
 
     Raises `OutputError` as `Store.names` does.
     """
-    store = Store(*connect(url), shown(url))
+    filesystem, root = connect(url)
+    store = Store(filesystem, root, shown(url))
     base, mark, query = url.partition("?")
     below = [(f"{base.rstrip('/')}/{quote(name)}{mark}{query}", name) for name in store.names("")]
     return below or [(url, store.root.rpartition("/")[2])]
@@ -221,7 +229,9 @@ def object_stat(url: str) -> tuple[int, int]:
     """
     with reading(url) as (filesystem, path):
         info = filesystem.get_file_info(path)
-    return (info.size, info.mtime_ns) if info.is_file else (0, 0)
+    if not info.is_file:
+        return 0, 0
+    return info.size, info.mtime_ns
 
 
 @contextmanager

@@ -49,10 +49,9 @@ class Verdict:
     @property
     def sentence(self) -> str:
         """Grade and headline, and where it is usable with reservations the first of them."""
-        but = (
-            f", but {self.reasons[0].text}" if self.grade == "reservations" and self.reasons else ""
-        )
-        return f"{self.word}: {self.headline}{but}."
+        if self.grade == "reservations" and self.reasons:
+            return f"{self.word}: {self.headline}, but {self.reasons[0].text}."
+        return f"{self.word}: {self.headline}."
 
     @property
     def failed(self) -> bool:
@@ -70,10 +69,9 @@ def graded(
     command: str | None = None,
 ) -> Verdict:
     """The verdict on `headline`: failed on a `failure`, after which `things` must not be used."""
+    grade: Grade = "good"
     if failure is not None:
-        return Verdict(
-            "failed", f"{failure}; do not use these {things}", tuple(reasons), tuple(notes), command
-        )
-    return Verdict(
-        "reservations" if reasons else "good", headline, tuple(reasons), tuple(notes), command
-    )
+        grade, headline = "failed", f"{failure}; do not use these {things}"
+    elif reasons:
+        grade = "reservations"
+    return Verdict(grade, headline, tuple(reasons), tuple(notes), command)

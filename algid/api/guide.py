@@ -64,8 +64,9 @@ def text_of(topic: str) -> str:
 
 def _markdown(*rows: Sequence[str]) -> str:
     """A table; the first row is its head."""
-    head, *others = (f"| {' | '.join(cells)} |" for cells in rows)
-    return "\n".join((head, "|---" * len(rows[0]) + "|", *others))
+    lines = [f"| {' | '.join(cells)} |" for cells in rows]
+    lines.insert(1, "|---" * len(rows[0]) + "|")
+    return "\n".join(lines)
 
 
 def _terms() -> Iterator[Sequence[str]]:
@@ -74,8 +75,10 @@ def _terms() -> Iterator[Sequence[str]]:
     yield "term", "what it is", "what it adds to the torque", "its parameters"
     for term in OPTIONAL:
         meanings = "; ".join(f"{one.name}, {one.unit}: {one.meaning}" for one in term.parameters)
-        needs = f", beside `{term.needs}`" if term.needs else ""
-        yield f"`{term.name}`", f"{term.title}{needs}", term.equation.replace("|", "\\|"), meanings
+        title = term.title
+        if term.needs:
+            title += f", beside `{term.needs}`"
+        yield f"`{term.name}`", title, term.equation.replace("|", "\\|"), meanings
 
 
 def _estimators() -> Iterator[Sequence[str]]:
@@ -83,8 +86,10 @@ def _estimators() -> Iterator[Sequence[str]]:
 
     yield f"`{flag('estimator')}`", "what it does", "when"
     for one in ESTIMATORS:
-        default = " (default)" if one is ESTIMATORS[0] else ""
-        yield f"`{one.name}`{default}", one.does, one.when
+        name = f"`{one.name}`"
+        if one is ESTIMATORS[0]:
+            name += " (default)"
+        yield name, one.does, one.when
 
 
 def _formats() -> Iterator[Sequence[str]]:

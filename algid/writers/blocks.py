@@ -15,15 +15,19 @@ _EXACT_SECONDS_NS = 1 << 53
 
 def as_blocks(log: Log | Iterable[Log]) -> Iterator[Log]:
     """The blocks of a log, whether it is given whole or in blocks."""
-    return iter((log,) if isinstance(log, Log) else log)
+    if isinstance(log, Log):
+        return iter([log])
+    return iter(log)
 
 
 def columns(block: Log) -> dict[str, NDArray[Any]]:
     """Columns (N,) by canonical name, ``t`` in s first and ``stamp_ns`` last."""
     by_name: dict[str, NDArray[Any]] = {"t": seconds(block)}
     pairs = [("theta", block.theta), ("tau", block.tau)]
-    pairs += [("omega", block.omega)] if block.omega is not None else []
-    pairs += [("q_des", block.reference)] if block.reference is not None else []
+    if block.omega is not None:
+        pairs.append(("omega", block.omega))
+    if block.reference is not None:
+        pairs.append(("q_des", block.reference))
     for name, (first, second) in pairs:
         by_name |= {f"{name}1": first, f"{name}2": second}
     return by_name | {"stamp_ns": block.stamp_ns}

@@ -31,20 +31,17 @@ def write(
         with temporary.open("wb") as stream:
             for block in as_blocks(log):
                 first = stamped is None
-                stamped = not exact_in_seconds(block.stamp_ns) if stamped is None else stamped
+                if stamped is None:
+                    stamped = not exact_in_seconds(block.stamp_ns)
                 by_name = columns(block)
                 if not stamped:
                     del by_name["stamp_ns"]
                 summed(sums, by_name)
                 pl.DataFrame(by_name).write_csv(stream, include_header=first)
-    _beside(path, Companion(truth, sums) if truth is not None else None)
-
-
-def _beside(path: Path, companion: Companion | None) -> None:
     beside = path.with_name(path.name + ".truth.json")
-    if companion is None:
+    if truth is None:
         # what an older file of this name left there is not this log's truth
         beside.unlink(missing_ok=True)
         return
     with whole_file(beside) as temporary:
-        temporary.write_text(companion.dumps() + "\n", encoding="utf-8")
+        temporary.write_text(Companion(truth, sums).dumps() + "\n", encoding="utf-8")

@@ -61,10 +61,12 @@ def write(
     from algid.writers.chunks import ChunkedFile, message_bytes
 
     blocks = as_blocks(log)
+    topics: tuple[str, ...] = (TOPIC,)
     first_block = next(blocks, None)
-    blocks = chain([] if first_block is None else [first_block], blocks)
-    followed = first_block is not None and first_block.reference is not None
-    topics = (TOPIC, REFERENCES) if followed else (TOPIC,)
+    if first_block is not None:
+        blocks = chain([first_block], blocks)
+        if first_block.reference is not None:
+            topics = (TOPIC, REFERENCES)
     with whole_file(path, force=force) as temporary, temporary.open("wb") as stream:
         file = ChunkedFile(
             stream,
