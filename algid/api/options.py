@@ -94,10 +94,11 @@ def profile_of(given: ProfileLike | None) -> Profile | None:
 
 def two_names(name: str, given: object) -> tuple[str, str]:
     """The names in ``NAME,NAME`` or a pair; raises `SettingError` where there are not two."""
+    parts = given
     if isinstance(given, str):
-        given = given.split(",")
-    if isinstance(given, list | tuple) and len(given) == 2:
-        first, second = str(given[0]).strip(), str(given[1]).strip()
+        parts = given.split(",")
+    if isinstance(parts, list | tuple) and len(parts) == 2:
+        first, second = str(parts[0]).strip(), str(parts[1]).strip()
         if first and second:
             return first, second
     raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {given!r:.60}")
