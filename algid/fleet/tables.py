@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +30,9 @@ def robot_table(history: History) -> Table:
     standing_out = dict(
         history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows()
     )
-    changed = {} if history.changes is None else _days_of(history.changes)
+    changed: dict[str, list[str]] = {}
+    if history.changes is not None:
+        changed = _days_of(history.changes)
     columns = (
         Column("Robot", "name"),
         Column("Logs", "number"),
@@ -40,29 +43,36 @@ def robot_table(history: History) -> Table:
         Column("Stand out", "number"),
     )
     shown = history.roster.head(MOST_ROWS)
-    rows = tuple(
-        (
-            visible(row["robot"]),
-            str(row["logs"]),
-            *(
-                ABSENT if row[end] is None else row[end].date().isoformat()
-                for end in ("first", "last")
-            ),
-            joined(drifting.get(row["robot"], [])) or ("none" if row["tested"] else "not tested"),
-            joined(changed.get(row["robot"], [])) or ABSENT,
-            str(standing_out.get(row["robot"], 0)),
+    rows = []
+    for row in shown.iter_rows(named=True):
+        robot = row["robot"]
+        no_drift = "none" if row["tested"] else "not tested"
+        rows.append(
+            (
+                visible(robot),
+                str(row["logs"]),
+                _day(row["first"]),
+                _day(row["last"]),
+                joined(drifting.get(robot, [])) or no_drift,
+                joined(changed.get(robot, [])) or ABSENT,
+                str(standing_out.get(robot, 0)),
+            )
         )
-        for row in shown.iter_rows(named=True)
-    )
-    note = (
-        ""
-        if shown.height == history.robots
-        else f"{counted(history.robots, 'robot')}; the first {shown.height} are shown."
-    )
+    notes = []
+    if shown.height < history.robots:
+        notes.append(f"{counted(history.robots, 'robot')}; the first {shown.height} are shown.")
     if history.scattered is not None:
-        note = f"{note} {history.scattered.text}".strip()
-    table = Table("Robots", columns, rows, note)
-    return table if changed else table.without(("Changed",))
+        notes.append(history.scattered.text)
+    table = Table("Robots", columns, tuple(rows), " ".join(notes))
+    if not changed:
+        return table.without(("Changed",))
+    return table
+
+
+def _day(time: datetime | None) -> str:
+    if time is None:
+        return ABSENT
+    return time.date().isoformat()
 
 
 def _days_of(changes: pl.DataFrame) -> dict[str, list[str]]:
@@ -83,25 +93,24 @@ def change_table(history: History) -> Table:
         Column("Step", "number", rank=1),
         Column("Unit", "text", rank=2),
     )
-    changes = None if history.changes is None else history.changes.head(MOST_ROWS)
-    rows = tuple(
-        (
-            visible(row["robot"]),
-            f"{row['before'].date().isoformat()} and {row['after'].date().isoformat()}",
-            row["parameter"],
-            f"{100 * row['share']:+.3g}",
-            " ± ".join(
-                (resolved(row["step"], row["step_std"]), significant(NORMAL * row["step_std"], 2))
-            ),
-            unit_text(UNITS[row["parameter"]]),
-        )
-        for row in (() if changes is None else changes.iter_rows(named=True))
-    )
+    rows = []
+    if history.changes is not None:
+        for row in history.changes.head(MOST_ROWS).iter_rows(named=True):
+            rows.append(
+                (
+                    visible(row["robot"]),
+                    f"{_day(row['before'])} and {_day(row['after'])}",
+                    row["parameter"],
+                    f"{100 * row['share']:+.3g}",
+                    _with_half(row["step"], row["step_std"]),
+                    unit_text(UNITS[row["parameter"]]),
+                )
+            )
     note = (
         "An arm, a drive or a convention was replaced: what came before and what comes after are "
         f"tested apart. Significant at p < {significant(CHANGED, 1)} in a robot's life."
     )
-    return Table("Changed at once", columns, rows, note)
+    return Table("Changed at once", columns, tuple(rows), note)
 
 
 def parameter_table(history: History, robot: str, jobs: pl.DataFrame) -> Table:
@@ -124,8 +133,9 @@ def parameter_table(history: History, robot: str, jobs: pl.DataFrame) -> Table:
         if not part.height:
             continue
         last, std = part.row(-1, named=True), f"{parameter}_std"
-        latest = jobs.filter(pl.col(std) > 0).head(1)
-        value = _with_half(latest[parameter][0], latest[std][0]) if latest.height else ABSENT
+        latest, value = jobs.filter(pl.col(std) > 0), ABSENT
+        if latest.height:
+            value = _with_half(latest[parameter][0], latest[std][0])
         rows.append(
             (
                 parameter,
@@ -156,14 +166,15 @@ def _found(history: History, robot: str, parameter: str) -> str:
     import polars as pl
 
     own = (pl.col("robot") == robot) & (pl.col("parameter") == parameter)
-    words = ["drifts"] if history.drifts.filter(own).height else []
+    words = []
+    if history.drifts.filter(own).height:
+        words.append("drifts")
     if history.changes is not None:
-        words += [
-            f"changed by {100 * row['share']:+.2g} % on {row['after'].date().isoformat()}"
-            for row in history.changes.filter(own).iter_rows(named=True)
-        ]
+        for row in history.changes.filter(own).iter_rows(named=True):
+            words.append(f"changed by {100 * row['share']:+.2g} % on {_day(row['after'])}")
     outlying = history.findings.filter(own & (pl.col("kind") == "outlier")).height
-    words += [counted(outlying, "outlier")] if outlying else []
+    if outlying:
+        words.append(counted(outlying, "outlier"))
     return joined(words) or ABSENT
 
 
@@ -216,19 +227,21 @@ def finding_table(history: History) -> Table:
         Column("σ away", "number"),
     )
     worst = history.findings.sort(pl.col("sigmas").abs(), descending=True).head(MOST_ROWS)
-    rows = tuple(
-        (
-            visible(row["job"]),
-            visible(row["robot"]),
-            {"payload": "payload unlike its label", "outlier": "outlier"}[row["kind"]],
-            row["parameter"],
-            significant(row["value"]),
-            significant(row["expected"]),
-            f"{row['sigmas']:+.1f}",
+    kinds = {"payload": "payload unlike its label", "outlier": "outlier"}
+    rows = []
+    for row in worst.iter_rows(named=True):
+        rows.append(
+            (
+                visible(row["job"]),
+                visible(row["robot"]),
+                kinds[row["kind"]],
+                row["parameter"],
+                significant(row["value"]),
+                significant(row["expected"]),
+                f"{row['sigmas']:+.1f}",
+            )
         )
-        for row in worst.iter_rows(named=True)
-    )
     note = f"{history.findings.height} found."
     if history.findings.height > len(rows):
         note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
-    return Table("Logs that stand out", columns, rows, note)
+    return Table("Logs that stand out", columns, tuple(rows), note)

@@ -43,7 +43,7 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
     roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
     units = units_of_schema(file.schema, roots)
     profile = timed_by_index(profile, kinds)
-    columns = assign(str(path), [*cells_by_name, *other], profile, units)
+    columns = assign(str(path), list(cells_by_name) + other, profile, units)
     for name, source in columns.sources.items():
         if source in other:
             kind = file.schema.field(source).type
@@ -55,13 +55,13 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
         numbers = [number(name, *cells_by_name[source]) for name, source in columns.sources.items()]
-        left = most
+        read = 0
         for frame in file.frames({roots[source] for source in columns.sources.values()}, rows):
-            yield from (
-                (frame if left is None else frame.head(left)).select(numbers).iter_slices(rows)
-            )
-            left = None if left is None else left - frame.height
-            if left is not None and left <= 0:
+            if most is not None:
+                frame = frame.head(most - read)
+            yield from frame.select(numbers).iter_slices(rows)
+            read += frame.height
+            if most is not None and read >= most:
                 return
 
     return flat_reader(str(path), "feather", columns, frames, profile, file.rows)
@@ -88,8 +88,9 @@ class Feather:
         import polars as pl
 
         first = next(self.frames({column}, 1), None)
-        longest = None if first is None else first.select(pl.col(column).list.len().max()).item()
-        return int(longest or 0)
+        if first is None:
+            return 0
+        return int(first.select(pl.col(column).list.len().max()).item() or 0)
 
     def frames(self, columns: Collection[str], rows: int) -> Iterator[pl.DataFrame]:
         """Frames of columns, of `rows` rows or more but for the last."""
@@ -159,7 +160,7 @@ def _is_taken(kind: pa.DataType) -> bool:
         return _is_taken(kind.value_type)
     if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
         return not types.is_nested(kind.value_type) and _is_taken(kind.value_type)
-    plain = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_null)
+    numbers = (types.is_integer, types.is_floating, types.is_decimal, types.is_boolean)
     times = (types.is_timestamp, types.is_duration, types.is_time, types.is_date)
-    texts = (types.is_string, types.is_large_string)
-    return any(one(kind) for one in (*plain, *times, *texts))
+    others = (types.is_null, types.is_string, types.is_large_string)
+    return any(is_one(kind) for is_one in numbers + times + others)

@@ -55,22 +55,21 @@ def open_halves(log: Any, profile: Profile, open_one: Opener) -> TableReader:
         main = in_order(path, angles.tables(rows))
         return aligned(_overlap(path, main, torque_series), [torque_series])
 
+    channels = dict(angles.conversion.channels) | dict(torques.conversion.channels)
     return TableReader(
         _joined(angles.origin, torques.origin, other, profile),
         tables,
-        replace(
-            angles.conversion,
-            channels={**angles.conversion.channels, **torques.conversion.channels},
-        ),
-        (*angles.notices, *torques.notices),
+        replace(angles.conversion, channels=channels),
+        angles.notices + torques.notices,
         angles.rows,
     )
 
 
 def _beside(log: Any, name: str) -> Path:
     """The file of the torques: beside the log, or as its name says."""
-    near = [Path(log).parent / name] if isinstance(log, str | Path) else []
-    places = list(dict.fromkeys([*near, Path(name)]))
+    places = [Path(name)]
+    if isinstance(log, str | Path):
+        places.insert(0, Path(log).parent / name)
     for place in places:
         if place.exists():
             return place
@@ -97,23 +96,24 @@ def _torques(other: Path, profile: Profile, angles: Origin, open_one: Opener) ->
 
 def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> Origin:
     """Where each channel of both files comes from, and how it was read."""
-    sources = {
-        name: f"{other.name}: {source}" for name, source in torques.mapping.items() if name != "t"
-    }
-    of_torques = {
-        name: replace(one, source=sources[name]) if one.factor else one
-        for name, one in torques.reading.channels.items()
-    }
+    mapping, channels = dict(angles.mapping), dict(angles.reading.channels)
+    for name, source in torques.mapping.items():
+        if name != "t":
+            mapping[name] = f"{other.name}: {source}"
+    for name, channel in torques.reading.channels.items():
+        if channel.factor:
+            channel = replace(channel, source=mapping[name])
+        channels[name] = channel
     reading = replace(
         angles.reading,
-        channels={**angles.reading.channels, **of_torques},
-        topics=(*angles.reading.topics, *torques.reading.topics),
+        channels=channels,
+        topics=angles.reading.topics + torques.reading.topics,
         torque_file=str(other),
         start=profile.start,
         end=profile.end,
         segment=profile.segment,
     )
-    return replace(angles, mapping={**angles.mapping, **sources}, reading=reading)
+    return replace(angles, mapping=mapping, reading=reading)
 
 
 def _overlap(path: str, main: Iterator[SampleTable], other: Series) -> Iterator[SampleTable]:
@@ -125,23 +125,24 @@ def _overlap(path: str, main: Iterator[SampleTable], other: Series) -> Iterator[
         if held is not None:
             yield held
         if len(table):
-            begin = int(table.stamp_ns[0]) if begin is None else begin
+            if begin is None:
+                begin = int(table.stamp_ns[0])
             end = int(table.stamp_ns[-1])
         within = (table.stamp_ns >= first) & (table.stamp_ns <= last)
         rows, inside = rows + len(table), inside + int(np.count_nonzero(within))
         held = table if within.all() else table.take(within)
     if rows and inside < 2:
-        spans = [
-            f"{low * 1e-9:.6f} to {high * 1e-9:.6f} s"
-            for low, high in ((begin or 0, end), (first, last))
-        ]
         raise LogError(
-            f"{path}: its angles run from {spans[0]} and the torques of {other.topic} from "
-            f"{spans[1]}: expected files that overlap in time, stamped by one clock; shift the "
-            "times of one of them"
+            f"{path}: its angles run from {_span(begin or 0, end)} and the torques of "
+            f"{other.topic} from {_span(first, last)}: expected files that overlap in time, "
+            "stamped by one clock; shift the times of one of them"
         )
     if held is not None:
-        numbers = {"file": other.topic, "count": rows - inside}
-        yield held.noting(
-            *([Notice("OVERLAP", numbers=numbers, note=True)] if rows > inside else [])
-        )
+        if rows > inside:
+            numbers = {"file": other.topic, "count": rows - inside}
+            held = held.noting(Notice("OVERLAP", numbers=numbers, note=True))
+        yield held
+
+
+def _span(first_ns: int, last_ns: int) -> str:
+    return f"{first_ns * 1e-9:.6f} to {last_ns * 1e-9:.6f} s"

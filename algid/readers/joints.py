@@ -68,7 +68,9 @@ def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names
     ranks = _ranks(first, second)
     if ranks is None:
         return (first, second), "order"
-    return ((first, second) if ranks[0] < ranks[1] else (second, first)), "names"
+    if ranks[0] >= ranks[1]:
+        first, second = second, first
+    return (first, second), "names"
 
 
 def order_notice(
@@ -98,23 +100,34 @@ def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[N
 
 def _ranks(first: str, second: str) -> tuple[int, int] | None:
     """Comparable places of the two names along the arm; None where the names do not tell."""
-    words = [_words(first), _words(second)]
-    if len(words[0]) == len(words[1]):
-        differing = [pair for pair in zip(*words, strict=True) if pair[0] != pair[1]]
+    words, others = _words(first), _words(second)
+    if len(words) == len(others):
+        differing = [pair for pair in zip(words, others, strict=True) if pair[0] != pair[1]]
         if len(differing) == 1:
-            pair = differing[0]
-            if all(word.isdecimal() for word in pair):
-                return int(pair[0]), int(pair[1])
-            if all(word in _LETTERS for word in pair):
-                return _LETTERS[pair[0]], _LETTERS[pair[1]]
-    places = []
-    for one in words:  # the first word, or pair of words, that stands for a place
-        pairs = [f"{before}_{after}" for before, after in pairwise(one)]
-        places.append(next((_RANKS[word] for word in [*pairs, *one] if word in _RANKS), None))
-    if places[0] is not None and places[1] is not None and places[0] != places[1]:
-        return places[0], places[1]
-    at_base = [place == 0 for place in places]
-    return None if at_base[0] == at_base[1] else (int(at_base[1]), int(at_base[0]))
+            one, other = differing[0]
+            if one.isdecimal() and other.isdecimal():
+                return int(one), int(other)
+            if one in _LETTERS and other in _LETTERS:
+                return _LETTERS[one], _LETTERS[other]
+    place, beside = _place(words), _place(others)
+    if place == beside:
+        return None
+    if place is not None and beside is not None:
+        return place, beside
+    if place == 0:  # a base comes before anything
+        return 0, 1
+    if beside == 0:
+        return 1, 0
+    return None
+
+
+def _place(words: Sequence[str]) -> int | None:
+    """What the first word, or pair of words, that stands for a place on an arm says."""
+    pairs = [f"{before}_{after}" for before, after in pairwise(words)]
+    for word in pairs + list(words):
+        if word in _RANKS:
+            return _RANKS[word]
+    return None
 
 
 def _words(name: str) -> list[str]:
@@ -140,14 +153,15 @@ def moving_joints(
     joints = {f"joint {number}": joint for number, joint in enumerate(positions)}
     if not joints:
         return ()
+    places = {name: positions[joint] for name, joint in joints.items()}
+    table = None
     try:
-        table = next(
-            (one for one in tables({name: positions[joints[name]] for name in joints}) if len(one)),
-            None,
-        )
+        for table in tables(places):
+            if len(table):
+                break
     except LogError:  # the joints that are read tell of what is wrong
         return ()
-    if table is None:
+    if table is None or not len(table):
         return ()
     moved: dict[str, float] = {}
     for name, values in table.columns.items():
@@ -158,6 +172,7 @@ def moving_joints(
         return ()
     furthest = sorted(moved, key=lambda joint: -moved[joint])
     listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
-    more = f" and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
-    numbers = {"count": len(moved), "joints": f"{listed}{more}", "samples": len(table)}
+    if len(moved) > _NAMED:
+        listed += f" and {len(moved) - _NAMED} more"
+    numbers = {"count": len(moved), "joints": listed, "samples": len(table)}
     return (Notice("OTHER_JOINTS", numbers=numbers),)

@@ -48,8 +48,10 @@ def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
             continue
         ordered, added = _sorted(path, table)
         counts += added
-        if pending is None or len(pending) == 0:
-            pending = ordered if pending is None else ordered.noting(*pending.notices)
+        if pending is None:
+            pending = ordered
+        elif len(pending) == 0:
+            pending = ordered.noting(*pending.notices)
         elif ordered.stamp_ns[0] > pending.stamp_ns[-1]:
             yield pending
             pending = ordered
@@ -59,14 +61,17 @@ def in_order(path: str, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
             keep = max(0, len(merged) - max(HORIZON, len(ordered) // 2))
             if keep:
                 yield merged.part(0, keep)
-            pending = merged.part(keep, len(merged)) if keep else merged
+                merged = merged.part(keep, len(merged))
+            pending = merged
     late, repeated, lost = counts.tolist()
     said = []
     if late:
         said.append(Notice("UNSORTED_STAMPS", numbers={"count": late}))
     if repeated:
-        others = counted(lost, "with other values is", "with other values are")
-        numbers = {"count": repeated, "others": f"; {others} lost" if lost else ""}
+        others = ""
+        if lost:
+            others = f"; {counted(lost, 'with other values is', 'with other values are')} lost"
+        numbers = {"count": repeated, "others": others}
         said.append(Notice("DUPLICATE_STAMPS", numbers=numbers, lossy=lost > 0))
     if pending is not None:
         yield pending.noting(*said)
@@ -107,9 +112,12 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
     back = np.flatnonzero(np.diff(stamps) < 0)
     order = np.argsort(stamps, kind="stable")
     moved = order - np.arange(rows)
-    place_back = set_back(table) if back.size else None
-    if place_back is not None or back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON:
-        place = back[0] if place_back is None else place_back
+    place = None
+    if back.size:
+        place = set_back(table)
+        if place is None and (back.size > BACKWARD_SHARE * rows or np.abs(moved).max() > HORIZON):
+            place = back[0]
+    if place is not None:
         last = stamps[place]
         raise LogError(
             f"{path}: time goes backwards by {(last - stamps[place + 1]) * 1e-9:.6g} s behind "
@@ -202,18 +210,18 @@ class Series:
     def at(self, stamps: IntArray) -> dict[str, FloatArray]:
         """The channels at the stamps (N,), linear between samples."""
         start = self.table.stamp_ns[0]
-        own, wanted = (
-            (self.table.stamp_ns - start).astype(np.float64),
-            (stamps - start).astype(np.float64),
-        )
+        own = (self.table.stamp_ns - start).astype(np.float64)
+        wanted = (stamps - start).astype(np.float64)
         return {name: np.interp(wanted, own, values) for name, values in self.table.columns.items()}
 
     def error(self) -> str:
         """Error of linear interpolation by channel: RMS of an eighth of the second differences."""
         costs = []
         for name, values in self.table.columns.items():
-            bend = np.diff(values, 2) / 8
-            costs.append(f"{name} {float(np.sqrt(np.mean(bend**2))) if bend.size else 0.0:.2g}")
+            cost = 0.0
+            if values.size > 2:
+                cost = float(np.sqrt(np.mean((np.diff(values, 2) / 8) ** 2)))
+            costs.append(f"{name} {cost:.2g}")
         return ", ".join(costs)
 
 
@@ -253,10 +261,9 @@ def aligned(
     for table in main:
         if held is not None:
             yield held
-        covered = np.all(
-            [np.ones(len(table), np.bool_), *(other.covers(table.stamp_ns) for other in others)],
-            axis=0,
-        )
+        covered = np.ones(len(table), np.bool_)
+        for other in others:
+            covered &= other.covers(table.stamp_ns)
         lost += len(table) - int(np.count_nonzero(covered))
         kept = table if covered.all() else table.take(covered)
         columns = dict(kept.columns)
@@ -268,21 +275,15 @@ def aligned(
             at_stamps = other.at(kept.stamp_ns)
             columns |= {name: np.where(known, values, np.nan) for name, values in at_stamps.items()}
         held = SampleTable(kept.stamp_ns, columns, kept.notices)
-    said = [
-        Notice(
-            "ALIGNED",
-            numbers={
-                "topic": other.topic,
-                "rate": 1e9 / other.period if other.period else 0.0,
-                "error": other.error(),
-            },
-        )
-        for other in others
-        if between[other.topic]
-    ]
+    said = list(notices)
+    for other in others:
+        if between[other.topic]:
+            rate = 1e9 / other.period if other.period else 0.0
+            numbers = {"topic": other.topic, "rate": rate, "error": other.error()}
+            said.append(Notice("ALIGNED", numbers=numbers))
     if lost:
         said.append(Notice("NOT_COVERED", numbers={"count": lost}, lossy=True))
+    for other in others:
+        said += other.table.notices
     if held is not None:
-        yield held.noting(
-            *notices, *said, *(notice for other in others for notice in other.table.notices)
-        )
+        yield held.noting(*said)

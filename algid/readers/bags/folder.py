@@ -33,15 +33,10 @@ def bag_files(folder: Path) -> Bag:
     metadata = folder / "metadata.yaml"
     if metadata.is_file():
         names = _listed(metadata)
-    else:  # the files themselves, by the numbers that end their names
-        files = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
-        numbers = [(re.search(r"_(\d+)$", path.stem), path.name) for path in files]
-        names = [
-            name
-            for _, name in sorted(
-                (int(number[1]) if number else 0, name) for number, name in numbers
-            )
-        ]
+    else:
+        names = [path.name for path in folder.glob("*.mcap")]
+        names += [path.name for path in folder.glob("*.db3")]
+        names.sort(key=_numbered)
     paths = [folder / name for name in names]
     there = [path for path in paths if path.is_file()]
     if not there:
@@ -51,10 +46,20 @@ def bag_files(folder: Path) -> Bag:
         raise LogError(
             f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it"
         )
+    notices = []
     missing = [path.name for path in paths if path not in there]
-    counts = {"missing": len(missing), "files": len(paths), "names": ", ".join(missing[:3])}
-    notices = (Notice("MISSING_SPLIT", numbers=counts, lossy=True),) if missing else ()
-    return Bag(tuple(there), kinds.pop().lstrip("."), notices)
+    if missing:
+        counts = {"missing": len(missing), "files": len(paths), "names": ", ".join(missing[:3])}
+        notices.append(Notice("MISSING_SPLIT", numbers=counts, lossy=True))
+    return Bag(tuple(there), kinds.pop().lstrip("."), tuple(notices))
+
+
+def _numbered(name: str) -> tuple[int, str]:
+    """The number that ends a file's name, 0 where none does, and the name."""
+    match = re.search(r"_(\d+)$", Path(name).stem)
+    if match is None:
+        return 0, name
+    return int(match[1]), name
 
 
 def _listed(metadata: Path) -> list[str]:
@@ -70,17 +75,14 @@ def _listed(metadata: Path) -> list[str]:
     # the one list that matters, without a YAML package: a block, one name a line, or [one, two]
     block = re.search(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*\S.*\n?)+)", text, re.MULTILINE)
     flow = re.search(r"^\s*relative_file_paths:\s*\[([^\]]*)\]", text, re.MULTILINE)
-    if block is None and flow is None:
+    if block is not None:
+        lines = block[1].splitlines()
+    elif flow is not None:
+        lines = [one for one in flow[1].split(",") if one.strip()]
+    else:
         raise LogError(
             f"{metadata}: no relative_file_paths; expected the metadata of a rosbag2 folder"
         )
-    lines = (
-        block[1].splitlines()
-        if block
-        else [one for one in flow[1].split(",") if one.strip()]
-        if flow
-        else []
-    )
     names = [line.strip().removeprefix("-").strip().strip("\"'") for line in lines]
     for name in names:
         if Path(name).name != name or name in ("", ".", ".."):

@@ -60,7 +60,8 @@ class RunningCourse:
 def running(path: Path, result: Result) -> Figure | Missing:
     """A panel a parameter that has an estimate at the end. Raises `ResultError`."""
     names = [name.removesuffix(HALF) for name in columns_of(path) if name.endswith(HALF)]
-    logs = list(by_log(blocks(path, ["log", "t", *names, *(name + HALF for name in names)])))
+    columns = ["log", "t"] + names + [name + HALF for name in names]
+    logs = list(by_log(blocks(path, columns)))
     if not names or not logs:
         return Missing("running", TITLE, f"{path.name} holds no series")
     ranges: dict[int, LogRange] = {}
@@ -72,16 +73,12 @@ def running(path: Path, result: Result) -> Figure | Missing:
     def whole(name: str) -> FloatArray:
         return np.concatenate([block[name] for _, block in logs])
 
-    courses = [
-        RunningCourse(name, whole(name), whole(name + HALF))
-        for name in names
-        if name in result.estimates
-    ]
-    courses = [
-        course
-        for course in courses
-        if np.isfinite(course.value[-1]) and result.estimates[course.name].estimate is not None
-    ]
+    courses = []
+    for name in names:
+        if name in result.estimates and result.estimates[name].estimate is not None:
+            course = RunningCourse(name, whole(name), whole(name + HALF))
+            if np.isfinite(course.value[-1]):
+                courses.append(course)
     if not courses:
         return Missing("running", TITLE, "no parameter is determined")
     starts = separators(ranges, moved, result.logs).get("shapes", [])
@@ -94,19 +91,18 @@ def _panel(course: RunningCourse, t: FloatArray, final: Estimate, starts: list[L
     name, value, half = course.name, course.value, course.half
     unit = unit_text(final.unit)
     hover = f"{label(name)} %{{y:.5g}} {unit}<br>by %{{x:.4g}} s<extra></extra>"
-    traces = [
-        *between(t, value - half, value + half, "@blue/0.25", "band"),
-        line(t, value, "@blue", label(name), "estimate", hover=hover),
-    ]
+    traces = list(between(t, value - half, value + half, "@blue/0.25", "band"))
+    traces.append(line(t, value, "@blue", label(name), "estimate", hover=hover))
     # the final interval several times over, and the last two thirds of the series with its band
     later = np.flatnonzero(np.isfinite(value) & np.isfinite(half))
     later = later[later.size // 3 :]
-    low = [float(value[-1] - SETTLED * half[-1]), *(value[later] - half[later]).tolist()]
-    high = [float(value[-1] + SETTLED * half[-1]), *(value[later] + half[later]).tolist()]
+    low, high = value[-1] - SETTLED * half[-1], value[-1] + SETTLED * half[-1]
+    low = np.min(value[later] - half[later], initial=low)
+    high = np.max(value[later] + half[later], initial=high)
     layout = {
         "xaxis": axis("time, s", range=[0.0, float(t[-1])]),
-        "yaxis": axis(unit, range=[min(low), max(high)]),
-        "shapes": [*starts, level(float(value[-1]), "@muted", "dash", 1.0)],
+        "yaxis": axis(unit, range=[float(low), float(high)]),
+        "shapes": starts + [level(float(value[-1]), "@muted", "dash", 1.0)],
         "hovermode": "closest",
     }
     says = f"{name} over time, in the end {resolved(final.estimate, final.std)} {unit}"
@@ -121,16 +117,15 @@ def _note(courses: list[RunningCourse], t: FloatArray, result: Result) -> str:
         latest = max(late, key=lambda name: late[name])
         when = f"{significant(late[latest], 3)} s of {significant(float(t[-1]), 3)} s"
         note = f"The last band to miss its final estimate was that of {latest}, at {when}."
-    truth = {
-        row.parameter: row.truth for row in result.table4 if row.truth is not None
-    } | result.truth
-    known = [course for course in courses if course.name in truth]
-    held = sum(
-        int(np.sum(np.abs(course.value - truth[course.name]) <= course.half)) for course in known
-    )
-    count = sum(int(np.isfinite(course.half).sum()) for course in known)
-    return note + (
-        f" The bands hold the truth {significant(100 * held / count, 3)} % of the time."
-        if count
-        else ""
-    )
+    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
+    truth |= result.truth
+    held = count = 0
+    for course in courses:
+        if course.name in truth:
+            within = np.abs(course.value - truth[course.name]) <= course.half
+            held += int(np.count_nonzero(within))
+            count += int(np.count_nonzero(np.isfinite(course.half)))
+    if count:
+        share = significant(100 * held / count, 3)
+        note += f" The bands hold the truth {share} % of the time."
+    return note
