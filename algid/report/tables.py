@@ -128,8 +128,24 @@ def terms_tables(result: Result) -> tuple[Table, ...]:
             )
         if fit.model.chosen_by == "logs":
             depth = Depth.TERMINAL
-    rows = tuple(_term_row(term) for term in fit.terms)
-    return filled(Table("Terms tried", columns, rows, note, depth).without_empty())
+    return filled(Table("Terms tried", columns, _term_rows(fit.terms), note, depth).without_empty())
+
+
+def _term_rows(terms: Sequence[TermCriterion]) -> tuple[tuple[str, ...], ...]:
+    """A row a term; those without a number of which the same is said share one."""
+    rows: list[tuple[str, ...]] = []
+    alike: dict[tuple[str, ...], int] = {}
+    for term in terms:
+        row = _term_row(term)
+        if term.gain_heldout is not None or term.evidence is not None or term.delta_bic is not None:
+            rows.append(row)
+        elif row[1:] in alike:
+            place = alike[row[1:]]
+            rows[place] = (f"{rows[place][0]}, {row[0]}", *row[1:])
+        else:
+            alike[row[1:]] = len(rows)
+            rows.append(row)
+    return tuple(rows)
 
 
 def _term_row(term: TermCriterion) -> tuple[str, ...]:

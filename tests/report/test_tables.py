@@ -324,3 +324,17 @@ def test_a_term_that_lowers_the_error_has_a_minus(result: Result) -> None:
         ("offset", "+3.2", "–", "–", "no", "left out"),
     )
     assert terms_tables(result.model_copy(update={"fit": None})) == ()
+
+
+def test_terms_without_a_number_of_which_the_same_is_said_share_a_row(result: Result) -> None:
+    assert result.fit is not None
+    terms = [
+        TermCriterion(term="coulomb", kept=True, why="shrunk"),
+        TermCriterion(term="offset", kept=True, evidence=2.0, why="shrunk"),
+        TermCriterion(term="load", kept=True, why="shrunk"),
+        TermCriterion(term="gain", kept=False, why="shrunk"),
+    ]
+    (table,) = terms_tables(
+        result.model_copy(update={"fit": result.fit.model_copy(update={"terms": terms})})
+    )
+    assert [row[0] for row in table.rows] == ["coulomb, load", "offset", "gain"]
