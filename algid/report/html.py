@@ -34,12 +34,12 @@ KEYS = "Arrow keys move, plus and minus zoom, 0 resets."
 SIGNS = {"good": "✓", "reservations": "!", "failed": "✕"}
 
 
-_FLAG = re.compile(r"(?<![\w-])--[a-z][\w-]*")
+_WHOLE = re.compile(r"(?<![\w-])(?:--[a-z][\w-]*|\d{4}-\d\d-\d\d(?![\w-]))")
 
 
 def unbroken(text: str) -> str:
-    """`text` for an element; no line of it ends within a flag."""
-    return _FLAG.sub(r'<span class="flag">\g<0></span>', escaped(text))
+    """`text` for an element; no line of it ends within a flag or a date."""
+    return _WHOLE.sub(r'<span class="whole">\g<0></span>', escaped(text))
 
 
 def banner(judged: Verdict) -> str:
@@ -109,7 +109,7 @@ def section_html(section: Section) -> str:
     if not section.content:
         return ""
     inner = "\n".join(map(content_html, section.content))
-    key, title = section.key, escaped(section.title)
+    key, title = section.key, unbroken(section.title)
     if section.fold:
         opened = " open" if section.fold == "open" else ""
         kind = "paper" if section.listed else "paper one"

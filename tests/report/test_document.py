@@ -328,15 +328,19 @@ WIDE = Table(
 
 def test_texts_on_a_card_have_their_heading_but_those_that_need_none() -> None:
     columns = (Column("Robot", "name"), *(Column(one, "text") for one in ("Changed", "To", "Unit")))
-    text = table_html(Table("Robots", columns, (("r1", "2026-02-08", "", "N m"),)))
-    assert '<td class="text" data-label="Changed">2026-02-08</td>' in text
+    text = table_html(Table("Robots", columns, (("r1", "in May", "", "N m"),)))
+    assert '<td class="text" data-label="Changed">in May</td>' in text
     assert '<td class="text"></td>' in text
     assert '<td class="text">N m</td>' in text
 
 
-def test_no_line_ends_within_a_flag() -> None:
+def test_no_line_ends_within_a_flag_or_a_date() -> None:
     assert unbroken("run --zero hanging, a--b <--l1>") == (
-        'run <span class="flag">--zero</span> hanging, a--b &lt;<span class="flag">--l1</span>&gt;'
+        'run <span class="whole">--zero</span> hanging, a--b '
+        '&lt;<span class="whole">--l1</span>&gt;'
+    )
+    assert unbroken("2026-01-05 20260105-1 1-2026-01-05") == (
+        '<span class="whole">2026-01-05</span> 20260105-1 1-2026-01-05'
     )
 
 
