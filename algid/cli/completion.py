@@ -12,21 +12,14 @@ from algid.api.choices import CASES
 Completion = Callable[[str], list[str]]
 
 
-def words(*known: str) -> Completion:
-    """Completes some words."""
-    return lambda incomplete: [word for word in known if word.startswith(incomplete)]
-
-
 def listed(known: Callable[[], list[str]]) -> Completion:
     """Complete the last of several words, separated by commas and each used once."""
 
     def complete(incomplete: str) -> list[str]:
-        *before, last = incomplete.split(",")
-        return [
-            ",".join([*before, word])
-            for word in known()
-            if word.startswith(last) and word not in before
-        ]
+        before, comma, last = incomplete.rpartition(",")
+        used = before.split(",")
+        words = [word for word in known() if word.startswith(last) and word not in used]
+        return [f"{before}{comma}{word}" for word in words]
 
     return complete
 
@@ -57,32 +50,34 @@ def settings_of_profile(incomplete: str) -> list[str]:
 
     key, equals, value = incomplete.partition("=")
     found = []
-    for name, field in Profile.model_fields.items():
-        inner = getattr(field.annotation, "model_fields", None)
-        lines = (
-            {name: field}
-            if inner is None
-            else {f"{name}.{one}": part for one, part in inner.items()}
-        )
-        for line, part in lines.items():
-            if not equals and line.startswith(key):
-                found.append(f"{line}=")
-            elif equals and line == key:
-                found += [
-                    f"{key}={word}" for word in _choices(part.annotation) if word.startswith(value)
-                ]
+    for line, annotation in _lines(Profile):
+        if not equals and line.startswith(key):
+            found.append(f"{line}=")
+        elif equals and line == key:
+            words = [word for word in _choices(annotation) if word.startswith(value)]
+            found += [f"{key}={word}" for word in words]
     return found
+
+
+def _lines(profile: Any) -> Iterator[tuple[str, Any]]:
+    """A profile's settings, those of channels by their dotted names, with their annotations."""
+    for name, field in profile.model_fields.items():
+        channel = getattr(field.annotation, "model_fields", None)
+        if channel is None:
+            yield name, field.annotation
+        else:
+            for key, part in channel.items():
+                yield f"{name}.{key}", part.annotation
 
 
 def or_files(*known: str) -> Completion:
     """Completes some words, and files."""
 
     def complete(incomplete: str) -> list[str]:
-        paths = sorted(glob.glob(f"{glob.escape(incomplete)}*"))  # noqa: PTH207  # as it was typed
-        return [
-            *words(*known)(incomplete),
-            *(f"{path}/" if Path(path).is_dir() else path for path in paths),
-        ]
+        shown = [word for word in known if word.startswith(incomplete)]
+        for path in sorted(glob.glob(f"{glob.escape(incomplete)}*")):  # noqa: PTH207  # as typed
+            shown.append(f"{path}/" if Path(path).is_dir() else path)
+        return shown
 
     return complete
 

@@ -7,7 +7,7 @@ A command declares its own options; `takes_settings` and `takes_profile` add the
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
@@ -109,14 +109,12 @@ class Choice:
         SettingError
             If an option is wrong.
         """
-        given = {name: value for name, value in self.settings_flags.items() if value is not None}
+        given = _given(self.settings_flags)
         refuse_contradictions(given)
-        return Settings(
-            **{
-                name: PARSERS[name](value) if name in PARSERS else value
-                for name, value in given.items()
-            }
-        )
+        for name, parse in PARSERS.items():
+            if name in given:
+                given[name] = parse(given[name])
+        return Settings(**given)
 
     def profile(self, file: Path | None = None) -> Profile | None:
         """The profile of `file`, or of ``--profile``, with the flags over it.
@@ -128,16 +126,21 @@ class Choice:
         SettingError
             If the file or a flag is wrong.
         """
-        found = profile_from(
-            {**self.profile_flags, "profile": file or self.profile_flags.get("profile")}
-        )
-        said = {name: self.settings_flags.get(name) for name in OF_BOTH}
-        given = {name: value for name, value in said.items() if value is not None}
+        flags = dict(self.profile_flags)
+        if file:
+            flags["profile"] = file
+        found = profile_from(flags)
+        given = _given({name: self.settings_flags.get(name) for name in OF_BOTH})
         if not given or (found is None and "effort" not in given):
             return found
         from algid.profile import Profile, with_settings
 
         return with_settings(found or Profile(), given)
+
+
+def _given(flags: Mapping[str, Any]) -> dict[str, Any]:
+    """The flags that were given."""
+    return {name: value for name, value in flags.items() if value is not None}
 
 
 def profile_from(flags: Mapping[str, Any]) -> Profile | None:
@@ -148,15 +151,16 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
     SettingError
         If the file or a flag is wrong: the flag is named, and the profile's line beside it.
     """
-    given = {name: value for name, value in flags.items() if value not in (None, [])}
-    if not given:
+    given = _given(flags)
+    file, lines = given.pop("profile", None), given.pop("set", [])
+    meanings = [(name, text) for name, text in given.items()]
+    meanings += [("set", line) for line in lines]
+    if not file and not meanings:
         return None
     from algid.profile import Profile, ProfileSettingError, load_profile, with_settings
 
-    file = given.pop("profile", None)
     found = load_profile(file) if file else Profile()
-    texts = {name: value if name == "set" else [value] for name, value in given.items()}
-    for name, text in ((name, text) for name, every in texts.items() for text in every):
+    for name, text in meanings:
         meaning = _meaning(name, text)
         try:
             found = with_settings(found, meaning)
@@ -192,33 +196,28 @@ def _meaning(name: str, text: str) -> dict[str, Any]:
 
 def takes_settings(command: Callable[..., None]) -> Callable[..., None]:
     """Give `command`, whose first parameter is `Choice`, the options of logs and then settings."""
-    return _taking(command, [*options_of_profile()], [*options_of_settings()])
+    return _taking(command, list(options_of_profile()), list(options_of_settings()))
 
 
 def takes_profile(command: Callable[..., None]) -> Callable[..., None]:
     """Give `command`, whose first parameter is the `Choice`, the options of logs after its own."""
-    return _taking(command, [*options_of_profile()], [])
+    return _taking(command, list(options_of_profile()), [])
 
 
 def _taking(
     command: Callable[..., None],
-    profile: Sequence[inspect.Parameter],
-    settings: Sequence[inspect.Parameter],
+    profile: list[inspect.Parameter],
+    settings: list[inspect.Parameter],
 ) -> Callable[..., None]:
-    _, *own = inspect.signature(command, eval_str=True).parameters.values()
+    own = list(inspect.signature(command, eval_str=True).parameters.values())[1:]
 
     @wraps(command)
     def with_options(**values: Any) -> None:
-        chosen, meaning = (
-            {one.name: values.pop(one.name) for one in part} for part in (settings, profile)
-        )
+        chosen = {one.name: values.pop(one.name) for one in settings}
+        meaning = {one.name: values.pop(one.name) for one in profile}
         command(Choice(chosen, meaning), **values)
 
-    every = [
-        *(one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own),
-        *profile,
-        *settings,
-    ]
+    every = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own] + profile + settings
     # typer reads it
     with_options.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     with_options.__annotations__ = {parameter.name: parameter.annotation for parameter in every}

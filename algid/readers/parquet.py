@@ -81,7 +81,7 @@ def _of_plain_numbers(path: Path, profile: Profile) -> TableReader | None:
     units = units_of_schema(schema, {name: name for name in names})
     columns = _assigned(path, names, profile, units, companion)
     kinds = dict(zip(names, schema.types, strict=True))
-    wanted = {*columns.sources.values(), *columns.others.values()}
+    wanted = set(columns.sources.values()) | set(columns.others.values())
     if not all(_plain(kinds[name]) for name in wanted):
         return None
     groups = _PlainGroups(path, metadata, companion.sums)
@@ -109,7 +109,9 @@ def _of_any_cells(path: Path, profile: Profile) -> TableReader:
     def width(column: str) -> int:
         _check_pages(path, {column}, most=1)
         first = pl.scan_parquet(path, glob=False).select(pl.col(column)).head(1).collect()
-        return len(first.item()) if first.height and first.item() is not None else 0
+        if not first.height or first.item() is None:
+            return 0
+        return len(first.item())
 
     with _readable(path):
         metadata = pq.read_metadata(path)
@@ -122,9 +124,8 @@ def _of_any_cells(path: Path, profile: Profile) -> TableReader:
     except (pa.ArrowException, OSError, ValueError):  # types that polars reads and pyarrow does not
         units = {}
     columns = _assigned(path, list(cells_by_name), profile, units, companion)
-    columns = of_numbers(
-        str(path), columns, {name: kind for name, (_, kind) in cells_by_name.items()}
-    )
+    types = {name: kind for name, (_, kind) in cells_by_name.items()}
+    columns = of_numbers(str(path), columns, types)
     groups = _Groups(path, cells_by_name, roots, companion.sums)
     return flat_reader(str(path), "parquet", columns, groups.frames, profile, rows, companion)
 
@@ -145,9 +146,11 @@ def _refuse_wide(path: Path, names: Collection[str]) -> None:
 
 def _companion(path: Path, metadata: pq.FileMetaData) -> Companion:
     """The truth and the sums that algid wrote into the file."""
+    text = (metadata.metadata or {}).get(KEY.encode())
+    if text is None:
+        return NO_COMPANION
     try:
-        text = (metadata.metadata or {}).get(KEY.encode())
-        return NO_COMPANION if text is None else loads(text)
+        return loads(text)
     except ValueError as error:
         raise LogError(
             f"{path}: the truth in the file's metadata cannot be read ({error})"
@@ -163,8 +166,9 @@ def _assigned(
 ) -> Columns:
     """The columns of the channels, with a word where algid's own columns have no sums."""
     columns = assign(str(path), names, profile, units, companion.sums)
-    if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= set(names):
-        return replace(columns, notices=(*columns.notices, _NO_SUMS))
+    own = {"stamp_ns"}.union(CANONICAL_COLUMNS)
+    if not companion.sums and own <= set(names):
+        return replace(columns, notices=columns.notices + (_NO_SUMS,))
     return columns
 
 
@@ -192,20 +196,21 @@ def counted_rows(path: Path) -> int:
         If they do not: polars would believe one of them without a word.
     """
     footer = _footer(path)
-    columns = [(pages, group.rows) for group in footer.groups for pages in group.columns]
-    # a list column has more values than rows, a flat one just as many
-    flat = all(len(pages.path) == 1 for pages, _ in columns)
-    agree = sum(group.rows for group in footer.groups) == footer.rows and all(
-        pages.values == rows if flat else pages.values >= rows for pages, rows in columns
-    )
     size = path.stat().st_size
-    inside = all(0 < pages.first <= pages.end <= size for pages, _ in columns)
-    if not inside:  # polars panics at these, which takes it seconds
-        raise LogError(
-            f"{path}: the Parquet footer claims pages beyond the end of the file; copy the file "
-            "again"
-        )
-    if not agree:
+    rows, flat, fewest, most = 0, True, 0, 0  # values less rows of a column
+    for group in footer.groups:
+        rows += group.rows
+        for pages in group.columns:
+            if not 0 < pages.first <= pages.end <= size:  # polars panics here, which takes seconds
+                raise LogError(
+                    f"{path}: the Parquet footer claims pages beyond the end of the file; copy the "
+                    "file again"
+                )
+            flat = flat and len(pages.path) == 1
+            fewest = min(fewest, pages.values - group.rows)
+            most = max(most, pages.values - group.rows)
+    # a list column has more values than rows, a flat one just as many
+    if rows != footer.rows or fewest < 0 or (flat and most > 0):
         raise LogError(
             f"{path}: the Parquet footer contradicts itself about its rows; copy the file again"
         )
@@ -220,20 +225,22 @@ def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, st
     units = in_metadata(_decoded(schema.metadata), list(roots))
     times = Counter(schema.names)
     for name, root in roots.items():
-        own = _decoded(schema.field(root).metadata) if times[root] == 1 else {}
-        unit = next(
-            (value for key, value in own.items() if key.lower() in ("unit", "units")), ""
-        ).strip()
-        if unit.lower() not in _NO_UNIT:
-            units[name] = unit[: LIMITS.unit_letters]
+        if times[root] != 1:
+            continue
+        for key, value in _decoded(schema.field(root).metadata).items():
+            if key.lower() in ("unit", "units"):
+                unit = value.strip()
+                if unit.lower() not in _NO_UNIT:
+                    units[name] = unit[: LIMITS.unit_letters]
+                break
     return units
 
 
 def _decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
-    return {
-        key.decode(errors="replace"): value.decode(errors="replace")
-        for key, value in (metadata or {}).items()
-    }
+    decoded = {}
+    for key, value in (metadata or {}).items():
+        decoded[key.decode(errors="replace")] = value.decode(errors="replace")
+    return decoded
 
 
 @contextmanager
@@ -317,18 +324,20 @@ class _Groups:
             _check_pages(self.path, roots, self.sums, most)
             self.checked = most is None
         frame = pl.scan_parquet(self.path, glob=False)
-        frame = frame if most is None else frame.head(most)
+        if most is not None:
+            frame = frame.head(most)
         numbers = [number(name, *self.cells[source]) for name, source in columns.sources.items()]
         # both joints in one lot: they may share a list column
         middle = (len(numbers) // 2 + 1) // 2 * 2
         with _readable(self.path):
-            # both begin here and run while the frames are being used; a joint that is looked at
-            # alone leaves one lot
-            lots = [frame.select(lot) for lot in (numbers[:middle], numbers[middle:]) if lot]
-            for first, *rest in zip(
-                *(lot.collect_batches(chunk_size=rows) for lot in lots), strict=True
-            ):
-                yield first.hstack(rest[0]) if rest else first
+            if middle in (0, len(numbers)):  # a joint that is looked at alone
+                yield from frame.select(numbers).collect_batches(chunk_size=rows)
+                return
+            # both lots begin here and run while the frames are being used
+            first = frame.select(numbers[:middle]).collect_batches(chunk_size=rows)
+            second = frame.select(numbers[middle:]).collect_batches(chunk_size=rows)
+            for one, other in zip(first, second, strict=True):
+                yield one.hstack(other)
 
 
 @dataclass
@@ -417,7 +426,8 @@ def _check_column(
                 FooterError(f"a page at byte {place} claims {counted(header.values, 'value')}"),
             )
         place += header.length
-        seen += 0 if header.dictionary else header.values
+        if not header.dictionary:
+            seen += header.values
         if checksums and header.crc is not None:
             stream.seek(place)
             if zlib.crc32(stream.read(header.packed)) != header.crc:
