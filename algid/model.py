@@ -334,7 +334,9 @@ def summed(weighted: Weighted, c: FloatArray, values: Values) -> FloatArray | fl
     total: FloatArray | float = 0.0
     known = c.tolist() if c.ndim == 1 else c  # Python's numbers are faster than NumPy's
     for product, pairs in weighted.items():
-        coefficient = sum(factor * known[place] for place, factor in pairs)
+        coefficient = 0.0
+        for place, factor in pairs:
+            coefficient = coefficient + factor * known[place]
         if isinstance(coefficient, np.ndarray) or coefficient:
             total = total + coefficient * values.of(product)
     return total
