@@ -72,10 +72,10 @@ def courses(history: History, most: int) -> list[Drawn]:
     for (parameter,), rows in history.windows.filter(pl.col("robot").is_in(shown)).group_by(
         "parameter", maintain_order=True
     ):
-        own = {
-            visible(robot): _course(str(parameter), part, (robot, parameter) in drifting)
-            for (robot,), part in rows.group_by("robot", maintain_order=True)
-        }
+        own = {}
+        for (robot,), part in rows.group_by("robot", maintain_order=True):
+            drifts = (robot, parameter) in drifting
+            own[visible(robot)] = _course(str(parameter), part, drifts)
         columns.append(Drawn(str(parameter), sparklines(own), small=True))
     return columns
 
@@ -84,12 +84,14 @@ def _course(parameter: str, rows: pl.DataFrame, drifts: bool) -> Course:
     rows = rows.sort("month", "end").drop_nulls(["mean", "mean_std"])
     t = rows["end"].dt.epoch("ms").to_numpy().astype(np.float64)
     mean, half = rows["mean"].to_numpy(), NORMAL * rows["mean_std"].to_numpy()
-    ends = (
-        f"{significant(mean[0])} to {significant(mean[-1])}"
-        if mean.size > 1
-        else "".join(map(significant, mean))
-    )
-    return Course(t, mean, half, f"{parameter} {ends}{', drifts' if drifts else ''}", drifts)
+    says = f"{parameter} "
+    if mean.size:
+        says += significant(mean[0])
+    if mean.size > 1:
+        says += f" to {significant(mean[-1])}"
+    if drifts:
+        says += ", drifts"
+    return Course(t, mean, half, says, drifts)
 
 
 def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
@@ -102,31 +104,27 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
     pairs = _worth_a_look(history)
     if len(robots) <= SIDE_BY_SIDE or not pairs:
         robots = robots[:MOST_ROBOTS]
-        colours = COLOURS if len(robots) <= SIDE_BY_SIDE else COLOURS[:1] * len(robots)
+        colour_of = dict.fromkeys(robots, COLOURS[0])
+        legend = []
+        if len(robots) <= SIDE_BY_SIDE:
+            colour_of = dict(zip(robots, COLOURS, strict=False))
+            for place, (robot, colour) in enumerate(colour_of.items()):
+                legend.append(Legend(f"robot{place}", visible(robot), colour, "point"))
         panels = tuple(
-            _side_by_side(history, dict(zip(robots, colours, strict=False)), name, reports)
-            for name in history.parameters
-        )
-        legend = tuple(
-            Legend(f"robot{place}", visible(robot), COLOURS[place], "point")
-            for place, robot in enumerate(robots)
-            if len(robots) <= SIDE_BY_SIDE
+            _side_by_side(history, colour_of, name, reports) for name in history.parameters
         )
         reading = _reading(shown_in(panels))
-        return Figure("logs", "Every log of every robot", panels, reading, legend, columns=2)
-    panels = tuple(
-        _panel(
-            history,
-            history.jobs.filter(pl.col("robot") == robot),
-            (robot, name),
-            reports,
-            f"{label(robot)}: {name}",
-        )
-        for robot, name in pairs
-    )
-    count = history.drifts.height + history.findings.height + _changed(history)
-    title = "What was found, log by log" if count else "The clearest trends, which are no drift"
-    return _log_by_log("logs", title, panels) if panels else None
+        title = "Every log of every robot"
+        return Figure("logs", title, panels, reading, tuple(legend), columns=2)
+    found = []
+    for robot, name in pairs:
+        jobs = history.jobs.filter(pl.col("robot") == robot)
+        title = f"{label(robot)}: {name}"
+        found.append(_panel(history, jobs, (robot, name), reports, title))
+    title = "The clearest trends, which are no drift"
+    if history.drifts.height or history.findings.height or _changed(history):
+        title = "What was found, log by log"
+    return _log_by_log("logs", title, tuple(found))
 
 
 def _log_by_log(key: str, title: str, panels: tuple[Panel, ...], note: str = "") -> Figure:
@@ -189,8 +187,10 @@ def _worth_a_look(history: History) -> list[Marked]:
 
     outlying = history.findings.filter(pl.col("kind") == "outlier")
     outlying = outlying.sort(pl.col("sigmas").abs(), descending=True)
-    frames = [history.drifts, *([] if history.changes is None else [history.changes]), outlying]
-    pairs = [pair for frame in frames for pair in frame.select("robot", "parameter").rows()]
+    pairs = history.drifts.select("robot", "parameter").rows()
+    if history.changes is not None:
+        pairs += history.changes.select("robot", "parameter").rows()
+    pairs += outlying.select("robot", "parameter").rows()
     if not pairs:
         tested = history.windows.filter(pl.col("p").is_not_nan()).sort("p", "robot", "parameter")
         pairs = tested.select("robot", "parameter").unique(maintain_order=True).head(4).rows()
@@ -215,11 +215,9 @@ def _panel(
         days = history.changes.filter(pl.col("robot") == robot)["after"].unique()
         shapes = [upright(day.isoformat(), "@red", "dash") for day in days]
         windows = _broken(windows, days)
-    traces = [
-        _line(windows, "@measured", "mean"),
-        *_drifts(history, jobs, which, "drift"),
-        *_points(history, jobs, which, reports, "@blue", "log"),
-    ]
+    traces = [_line(windows, "@measured", "mean")]
+    traces += _drifts(history, jobs, which, "drift")
+    traces += _points(history, jobs, which, reports, "@blue", "log")
     says = f"{visible(robot)}, {parameter}, {counted(jobs.height, 'log')}"
     return Panel(traces, _layout(parameter, shapes), says, title, HEIGHT)
 
@@ -239,31 +237,15 @@ def _side_by_side(
     import polars as pl
 
     assert history.jobs is not None
-    traces = [
-        trace
-        for place, (robot, colour) in enumerate(robots.items())
-        for trace in _points(
-            history,
-            history.jobs.filter(pl.col("robot") == robot),
-            (robot, parameter),
-            reports,
-            colour,
-            f"robot{place}",
-        )
-    ]
-    traces += [
-        line
-        for place, robot in enumerate(robots)
-        for line in _drifts(
-            history,
-            history.jobs.filter(pl.col("robot") == robot),
-            (robot, parameter),
-            f"robot{place}",
-        )
-    ]
+    points, lines = list[Trace](), list[Trace]()
+    for place, (robot, colour) in enumerate(robots.items()):
+        jobs = history.jobs.filter(pl.col("robot") == robot)
+        which, group = (robot, parameter), f"robot{place}"
+        points += _points(history, jobs, which, reports, colour, group)
+        lines += _drifts(history, jobs, which, group)
     title = f"{parameter}: {PARAMETERS[parameter].meaning}"
     says = f"{parameter} of {counted(len(robots), 'robot')}"
-    return Panel(traces, _layout(parameter, []), says, title, HEIGHT)
+    return Panel(points + lines, _layout(parameter, []), says, title, HEIGHT)
 
 
 def _layout(parameter: str, shapes: list[Layout]) -> Layout:

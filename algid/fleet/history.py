@@ -48,14 +48,11 @@ def read_jobs(path: Path) -> pl.DataFrame:
         raise ResultError(f"{path}: {problem}; expected jobs.parquet of algid batch")
     try:
         names = list(pl.read_parquet_schema(path))
-        wanted = [
-            n
-            for n in names
-            if n in ("job", "robot", "time", "status", "label_payload", "m_p", "m_p_std")
-        ]
-        wanted += [
-            n for p in PARAMETERS if p in names and f"{p}_std" in names for n in (p, f"{p}_std")
-        ]
+        own = ("job", "robot", "time", "status", "label_payload", "m_p", "m_p_std")
+        wanted = [name for name in names if name in own]
+        for parameter in PARAMETERS:
+            if parameter in names and f"{parameter}_std" in names:
+                wanted += [parameter, f"{parameter}_std"]
         jobs = pl.read_parquet(path, columns=wanted)
     # a panic of polars is no Exception
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
