@@ -113,6 +113,14 @@ class Selection:
     hold_by: Literal["logs", "settings", "parameters"] = "settings"
     late: Lateness | None = None
 
+    def left_out(self, terms: Collection[str], reason: str) -> Selection:
+        """The same with the trials of `terms` ending in their being left out for this `reason`."""
+        trials = list(self.trials)
+        for place, trial in enumerate(trials):
+            if trial.term in terms:
+                trials[place] = replace(trial, kept=False, reason=reason)
+        return replace(self, trials=tuple(trials))
+
     @property
     def undecided(self) -> Lateness | None:
         """The torque's lateness, if the logs were to choose its hold and do not determine it."""

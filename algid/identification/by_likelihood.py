@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 
@@ -86,37 +87,39 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
 
 
 def _with_model(survey: Survey, settings: Settings, earlier: Result | None) -> Selection:
-    """The model where the hold is said, by the settings or by the earlier result."""
-    hold, said = settings.torque_hold, "settings"
-    if hold == "auto":
-        hold = "foh" if earlier is None else Settings.of(earlier.settings).torque_hold
-        said = "settings" if earlier is None else "parameters"
-    hold = "zoh" if hold == "zoh" else "foh"
+    """The model where the hold is given, by the settings or by the earlier result."""
+    asked = settings.torque_hold
+    hold_by: Literal["settings", "parameters"] = "settings"
+    if asked == "auto" and earlier is not None:
+        asked, hold_by = Settings.of(earlier.settings).torque_hold, "parameters"
+    hold: Hold = "foh"
+    if asked == "zoh":
+        hold = "zoh"
     if settings.chooses and earlier is not None:
-        terms = DELAYS if set(DELAYS) & set(earlier.parameters) else ()
+        terms = tuple(name for name in DELAYS if name in earlier.parameters)
         chosen = replace(_given(model_of(earlier), terms), chosen_by="parameters")
     else:
         chosen = _modelled(survey, settings, hold)
-    return replace(chosen, hold=hold, hold_by=said)  # type: ignore[arg-type]
+    return replace(chosen, hold=hold, hold_by=hold_by)
 
 
 def _with_hold(survey: Survey, settings: Settings) -> Selection:
-    """The model and the hold that the logs tell: not held where a delay is set or asked for."""
+    """The model and the hold that the logs show: not held where a delay is set or asked for."""
     chosen = _modelled(survey, settings, "foh")
     lagged = chosen.model.lag_name is not None
     if settings.delay != 0 or set(DELAYS) & set(settings.terms) or lagged:
         return chosen
     late = chosen.late
     if late is None:
-        passes = _passes(survey, settings)
-        late = lateness(*passes, _weak_settings(settings, chosen))
+        unloaded, loaded = _passes(survey, settings)
+        late = lateness(unloaded, loaded, _weak_settings(settings, chosen))
     if late.hold == "zoh":
         chosen = _modelled(survey, settings, "zoh")
     elif not late.decided and not chosen.delay:
-        why = "kept: the logs do not tell whether the torque is held, half a sample late"
-        open_delay = [TermTrial(term, True, np.nan, np.nan, why) for term in DELAYS]
+        why = "kept: the logs leave open whether the torque is held, half a sample late"
         trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
-        chosen = replace(chosen, delay=True, trials=(*trials, *open_delay))
+        trials += [TermTrial(term, True, np.nan, np.nan, why) for term in DELAYS]
+        chosen = replace(chosen, delay=True, trials=tuple(trials))
     return replace(chosen, hold=late.hold, hold_by="logs", late=late)
 
 
@@ -125,11 +128,15 @@ def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
     plain = Model(gravity=settings.gravity)
     if not settings.chooses and not needs_shape(settings.terms):
         return replace(_given(plain, settings.terms), hold=hold)
-    candidates = (
-        (CHOICE if settings.delay == 0 else without_delay(CHOICE)) if settings.chooses else ()
-    )
+    candidates: tuple[str, ...] = ()
+    if settings.chooses and settings.delay == 0:
+        candidates = CHOICE
+    elif settings.chooses:
+        candidates = without_delay(CHOICE)
+    unloaded, loaded = _passes(survey, settings)
     chosen = select(
-        *_passes(survey, settings),
+        unloaded,
+        loaded,
         _weak_settings(settings, replace(_given(plain, ()), hold=hold)),
         without_terms(settings.effort, candidates),
         settings.terms,
@@ -149,18 +156,14 @@ def with_hold_of_fit(fit: Fit, chosen: Selection) -> Selection:
         return replace(chosen, late=replace(late, effect=np.inf))
     if late.another:
         return replace(chosen, late=late)
-    trials = tuple(
-        replace(trial, kept=False, reason="left out: the fit tells whether the torque is held")
-        if trial.term in DELAYS
-        else trial
-        for trial in chosen.trials
-    )
-    return replace(chosen, hold=late.hold, late=late, delay=False, trials=trials)
+    chosen = chosen.left_out(DELAYS, "left out: the fit shows whether the torque is held")
+    return replace(chosen, hold=late.hold, late=late, delay=False)
 
 
 def _given(model: Model, terms: Sequence[str]) -> Selection:
-    wanted = without_delay((*model.terms, *terms))
-    return Selection(replace(model, terms=wanted), len(without_delay(terms)) < len(terms))
+    """The model with more terms, of which a delay is estimated beside it."""
+    own = without_delay(terms)
+    return Selection(replace(model, terms=model.terms + own), len(own) < len(terms))
 
 
 def run_fit(
@@ -197,12 +200,10 @@ def run_fit(
         raise ValueError(f"{estimator.name} gives time series, not a fit")
     sums: dict[LogSource, PredictionSums] = {}
     ours = _weak_settings(settings, chosen)
-    scored = (
-        chosen.model.linear and not chosen.delay and chosen.model.lag_name is None
-    )  # depends on no estimate
-    unloaded, loaded = _passes(
-        survey, settings, partial(_scored, chosen.model, settings, sums) if scored else None
-    )
+    watched = None
+    if chosen.model.linear and not chosen.delay and chosen.model.lag_name is None:
+        watched = partial(_scored, chosen.model, settings, sums)  # which depends on no estimate
+    unloaded, loaded = _passes(survey, settings, watched)
     nothing = absent(settings.effort, chosen.model.names)
     try:
         known = without(prior, nothing)
@@ -214,9 +215,8 @@ def run_fit(
             sums.clear()
         else:
             fit = _unsure_of_load(fit, unloaded, loaded, ours, settings, known)
-        if (
-            not chosen.shrunk and fit.shared.model != chosen.model
-        ):  # the fit has found the width of friction's step
+        if not chosen.shrunk and fit.shared.model != chosen.model:
+            # the fit has estimated the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
             sums.clear()
         better = _of_motorless(fit, survey, settings, chosen, prior)
@@ -231,7 +231,9 @@ def run_fit(
             f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
         ) from error
     fit = averaged_over_bodies(with_body(fit))
-    return constrained(fit) if settings.constrain else fit, sums, chosen
+    if settings.constrain:
+        fit = constrained(fit)
+    return fit, sums, chosen
 
 
 def _unsure_of_load(
@@ -258,10 +260,10 @@ _BY_NOTHING = "left out: it was judged beside constants near nothing"
 def _of_motorless(
     fit: Fit, survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None
 ) -> tuple[Fit, Selection] | None:
-    """The fit by instruments of an arm whose joint without a motor least squares does not tell.
+    """The fit by instruments, where least squares leaves open what a joint without a motor does.
 
     It has the most common of the chosen terms: the others, and the hold, were judged beside
-    constants near nothing. None where least squares tells them, or instruments do not either.
+    constants near nothing. None where least squares determines them, or instruments do not either.
     """
     unloaded, loaded = _passes(survey, settings)
     passive = any(log.origin.reading.passive for log in survey.logs)
@@ -269,21 +271,20 @@ def _of_motorless(
         return None
     if doubted_without_motor(fit, unloaded, loaded, _weak_settings(settings, chosen)) is fit:
         return None
-    by_logs = chosen.chosen_by == "logs"
-    terms = tuple(term for term in chosen.model.terms if not by_logs or term in FIRST_TERMS)
-    trials = tuple(
-        replace(trial, kept=False, reason=_BY_NOTHING)
-        if trial.kept and trial.term not in terms
-        else trial
-        for trial in chosen.trials
-    )
-    hold: Hold = "foh" if chosen.hold_by == "logs" else chosen.hold
+    terms = chosen.model.terms
+    if chosen.chosen_by == "logs":
+        terms = tuple(term for term in terms if term in FIRST_TERMS)
+    dropped = {trial.term for trial in chosen.trials if trial.kept}.difference(terms)
     model = replace(chosen.model, terms=terms)
-    plainer = replace(chosen, model=model, delay=False, trials=trials, hold=hold, late=None)
+    plainer = replace(chosen.left_out(dropped, _BY_NOTHING), model=model, delay=False, late=None)
+    if plainer.hold_by == "logs":
+        plainer = replace(plainer, hold="foh")
     ours = _weak_settings(settings, plainer)
     known = without(prior, absent(settings.effort, model.names))
     better = motorless.by_instruments(unloaded, ours, settings.lengths, known)
-    return None if better is None else (better, plainer)
+    if better is None:
+        return None
+    return better, plainer
 
 
 _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
@@ -299,8 +300,9 @@ def _shrunk(
     prior: Prior | None,
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk in place of the `refuted` one's, and its model."""
-    by_logs = chosen.hold_by == "logs"  # by a likelihood that does not hold: a term tells the delay
-    hold: Hold = "foh" if by_logs else chosen.hold
+    hold: Hold = chosen.hold
+    if chosen.hold_by == "logs":
+        hold = "foh"  # else by a likelihood that does not hold: a term takes up the delay
     shift = replace(ours.shift, held=hold == "zoh")
     shaped = replace(ours, model=chosen.shapes or chosen.model, shift=shift)
     every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
@@ -311,12 +313,15 @@ def _shrunk(
     fit = scattered(fit, least, unloaded, loaded, shaped, settings.lengths, known)
 
     def refit(model: Model) -> Fit:
-        # every term is offered anew: a model's shapes and its friction by load are what it tells
+        # every term is offered anew: of a model its shapes and its friction by load count
         return shrunk.fit(unloaded, loaded, replace(shaped, model=model), settings.lengths, known)
 
     fit = load_scatter.widened(fit, refit, least)
-    fit = replace(fit, notes=(*refuted.notes, Notice("SHRUNK_TERMS", note=True), *fit.notes))
-    terms = (*fit.shared.model.terms, *(DELAYS if fit.shared.delay else ()))
+    notes = refuted.notes + (Notice("SHRUNK_TERMS", note=True),) + fit.notes
+    fit = replace(fit, notes=notes)
+    terms = fit.shared.model.terms
+    if fit.shared.delay:
+        terms += DELAYS
     trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)
     shrunken = Selection(
         fit.shared.model,
@@ -343,12 +348,14 @@ def residual_of(
     if fit.delay is not None:
         weak_settings = replace(weak_settings.delayed(fit.delay), estimate_delay=False)
     unloaded, loaded = _passes(survey, settings)
-    sums = [
-        weak.residuals(moving, weak_settings, torque_coefficients(fit, role))
-        for role, passes in (("unloaded", unloaded), ("loaded", loaded))
-        for moving in passes
-    ]
-    return pooled([one for one in sums if one is not None])
+    sums = []
+    for role, passes in (("unloaded", unloaded), ("loaded", loaded)):
+        c = torque_coefficients(fit, role)
+        for moving in passes:
+            of_log = weak.residuals(moving, weak_settings, c)
+            if of_log is not None:
+                sums.append(of_log)
+    return pooled(sums)
 
 
 def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
@@ -359,14 +366,14 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
     contradiction is reported.
     """
     if any(log.origin.reading.passive for log in survey.logs):
-        fit = doubted_without_motor(
-            fit, *_passes(survey, settings), _weak_settings(settings, chosen)
-        )
+        unloaded, loaded = _passes(survey, settings)
+        fit = doubted_without_motor(fit, unloaded, loaded, _weak_settings(settings, chosen))
     if not (fit.refuted and settings.chooses):
         return fit
-    far = [
-        b.bound for b in broken_bounds(fit) if b.distance is not None and b.distance > FAR_BEYOND
-    ]
+    far = []
+    for broken in broken_bounds(fit):
+        if broken.distance is not None and broken.distance > FAR_BEYOND:
+            far.append(broken.bound)
     if far:
         lawful = constrained(fit)
         if not lawful.converged or _explains_little(lawful, survey, settings):
@@ -374,10 +381,8 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
         doubt = Notice("BOUNDS_DOUBTED", numbers={"bounds": far})
         return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
     unloaded, loaded = _passes(survey, settings)
-    common = _weak_settings(
-        settings, replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
-    )
-    return doubted(fit, unloaded, loaded, common)
+    common = replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
+    return doubted(fit, unloaded, loaded, _weak_settings(settings, common))
 
 
 def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
@@ -395,12 +400,8 @@ def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selec
     if fit.endogeneity is not None:
         return fit
     unloaded, loaded = _passes(survey, settings)
-    return replace(
-        fit,
-        endogeneity=instruments.endogeneity(
-            unloaded, loaded, _weak_settings(settings, chosen), fit
-        ),
-    )
+    ours = _weak_settings(settings, chosen)
+    return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, ours, fit))
 
 
 def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selection:
@@ -411,37 +412,45 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
     """
     if chosen.chosen_by != "logs" or chosen.shrunk:
         return chosen
-    size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
-    nothing = {
-        term
-        for term in CHOICES
-        if (term in chosen.model.terms or set(EVERY_TERM[term].names) & set(fit.names))
-        and not (chosen.undecided is not None and term in DELAYS)
-        and term not in settings.terms
-        and all(size.get(name, 0.0) < NOTHING for name in EVERY_TERM[term].names)
-        and not (EVERY_TERM[term].sines and "y_p" in fit.shared.body)  # what tells the payload's
-    }
-    trials = tuple(
-        replace(trial, kept=False, reason="the fit finds it to be zero within its error")
-        if trial.term in nothing
-        else trial
-        for trial in chosen.trials
-    )
+    nothing = _insignificant(chosen, fit).difference(settings.terms)
+    if not nothing:
+        return chosen
+    chosen = chosen.left_out(nothing, "the fit finds it to be zero within its error")
     terms = tuple(term for term in chosen.model.terms if term not in nothing)
     delay = chosen.delay and nothing == set(without_delay(nothing))
-    fewer = replace(chosen, model=replace(chosen.model, terms=terms), delay=delay, trials=trials)
-    return fewer if nothing else chosen
+    return replace(chosen, model=replace(chosen.model, terms=terms), delay=delay)
+
+
+def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
+    """Terms of the fit whose coefficients are all within `NOTHING` deviations of zero."""
+    size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
+    terms = set()
+    for name in CHOICES:
+        term = EVERY_TERM[name]
+        if name not in chosen.model.terms and set(term.names).isdisjoint(fit.names):
+            continue
+        if name in DELAYS and chosen.undecided is not None:
+            continue
+        if term.sines and "y_p" in fit.shared.body:  # the payload's offset shows in them
+            continue
+        if max(size.get(parameter, 0.0) for parameter in term.names) < NOTHING:
+            terms.add(name)
+    return terms
 
 
 def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
-    own_velocities = settings.velocity == "measured" or settings.luenberger
+    """The settings of estimators for the chosen model."""
     ours = weak.WeakSettings(
         model=chosen.model,
-        bandwidth=None if own_velocities else settings.bandwidth,
+        bandwidth=settings.bandwidth,
         shift=TorqueShift(chosen.hold == "zoh", settings.delay),
         estimate_delay=chosen.delay,
     )
-    return ours if settings.window is None else replace(ours, window=settings.window)
+    if settings.velocity == "measured" or settings.luenberger:
+        ours = replace(ours, bandwidth=None)
+    if settings.window is not None:
+        ours = replace(ours, window=settings.window)
+    return ours
 
 
 def _passes(
@@ -461,7 +470,9 @@ def _passes(
         moving: Pass = partial(survey.segments, log)
         if own:
             moving = partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
-        return moving if watched is None else partial(watched, log, moving)
+        if watched is None:
+            return moving
+        return partial(watched, log, moving)
 
     return [passed(log) for log in survey.unloaded], [passed(log) for log in survey.loaded]
 
