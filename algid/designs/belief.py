@@ -96,13 +96,19 @@ class Belief:
         """Arms (count, Q) drawn from the belief."""
         rng = np.random.default_rng(seed)
         shape = (count, self.spread.shape[1])
-        u = rng.uniform(-1, 1, shape) if self.box else rng.standard_normal(shape)
+        if self.box:
+            u = rng.uniform(-1, 1, shape)
+        else:
+            u = rng.standard_normal(shape)
         return self.mean + u @ self.spread.T
 
     @property
     def std(self) -> FloatArray:
         """Standard deviations (Q,)."""
-        return np.sqrt(np.sum(self.spread**2, axis=1) * (1 / 3 if self.box else 1.0))
+        variance = np.sum(self.spread**2, axis=1)
+        if self.box:
+            variance = variance * (1 / 3)
+        return np.sqrt(variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +170,9 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
         return Asked(size, known, known & ~np.isin(every, DELAYS))
     for name in names:
         if name not in every:
-            hint = " (there are no loaded runs)" if name in PAYLOAD_PARAMETERS else ""
+            hint = ""
+            if name in PAYLOAD_PARAMETERS:
+                hint = " (there are no loaded runs)"
             raise SettingError(
                 f"{flag('for')} {name}: expected some of {', '.join(every)}, found {name!r}{hint}; "
                 "leave it out"

@@ -30,7 +30,7 @@ def _motion(design: Design) -> Figure:
         ),
     ]
     for loaded, torque in design.torque.items():
-        kind = "loaded" if loaded else "unloaded"
+        kind = {True: "loaded", False: "unloaded"}[loaded]
         panels.append(
             _panel(
                 design, f"torques, {kind}", torque, "torque, N m", (-limits.torque, limits.torque)

@@ -208,12 +208,13 @@ def informations(
     """The information of each kind's runs, from every `every`-th of `rate` samples a second."""
     gathered = []
     for loaded, motion in motions.items():
-        runs = (0, experiment.runs[1]) if loaded else (experiment.runs[0], 0)
+        runs = (experiment.runs[0], 0)
+        if loaded:
+            runs = (0, experiment.runs[1])
         own = Experiment(experiment.shared, runs, experiment.noise, experiment.rate)
         thinned = Motion(
-            *(signal[:, ::every] for signal in (motion.theta, motion.omega, motion.alpha))
+            motion.theta[:, ::every], motion.omega[:, ::every], motion.alpha[:, ::every]
         )
-        gathered.append(
-            Information(own, beta, Slopes(experiment.shared.model, thinned, rate / every))
-        )
+        slopes = Slopes(experiment.shared.model, thinned, rate / every)
+        gathered.append(Information(own, beta, slopes))
     return gathered

@@ -100,7 +100,7 @@ class Saturation:
 
 
 UNSEEN = Saturation((), frozenset())
-"""Where motion tells nothing of limits."""
+"""Where motion shows no limits."""
 
 
 def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturation:
@@ -114,13 +114,16 @@ def saturation_of(pieces: Sequence[Segment], gravity: float = 9.81) -> Saturatio
     rows = _Rows.of(pieces, WeakSettings(model=Model(gravity=gravity, terms=FIRST_TERMS)))
     if rows is None:
         return UNSEEN
-    found: dict[int, Limit] = {}
+    limits: dict[int, Limit] = {}
     for look in (_at_plateaus, _beyond_drive):
-        found |= _looked(rows, look, found)
-    return Saturation(
-        tuple(_widened(rows, found[joint]) for joint in sorted(found)),
-        frozenset(joint for joint in (0, 1) if joint not in found and _true(rows, found, joint)),
-    )
+        limits |= _looked(rows, look, limits)
+    widened, true = [], set()
+    for joint in (0, 1):
+        if joint in limits:
+            widened.append(_widened(rows, limits[joint]))
+        elif _true(rows, limits, joint):
+            true.add(joint)
+    return Saturation(tuple(widened), frozenset(true))
 
 
 def _looked(
@@ -130,34 +133,37 @@ def _looked(
 
     What cuts off one joint hides what cuts off the other: each is looked for beside the other's.
     """
-    found = dict(known)
+    limits = dict(known)
     for _ in range(_ROUNDS):
-        before = dict(found)
+        before = dict(limits)
         for joint in (0, 1):
             if joint not in known and rows.driven(joint):
-                one = look(_with(rows, found, joint), joint)
-                found |= {} if one is None else {joint: one}
-        if found == before:
+                one = look(_with(rows, limits, joint), joint)
+                if one is not None:
+                    limits[joint] = one
+        if limits == before:
             break
-    while wrong := [one for one in found.values() if not _stands(rows, found, one)]:
-        del found[wrong[0].joint]
-    return found
+    while wrong := [one for one in limits.values() if not _stands(rows, limits, one)]:
+        del limits[wrong[0].joint]
+    return limits
 
 
-def _with(rows: _Rows, found: Mapping[int, Limit], but: int | None) -> _Rows:
-    """The equations with the limits found, but for that of the joint `but`."""
-    for joint, one in found.items():
+def _with(rows: _Rows, limits: Mapping[int, Limit], but: int | None) -> _Rows:
+    """The equations with these limits, but for that of the joint `but`."""
+    for joint, one in limits.items():
         if joint != but:
             rows = rows.with_candidates(joint, _candidates_of(one))
     return rows
 
 
-def _stands(rows: _Rows, found: Mapping[int, Limit], one: Limit) -> bool:
+def _stands(rows: _Rows, limits: Mapping[int, Limit], one: Limit) -> bool:
     """Whether a limit is certain, beside that of the other joint, and is what it is taken for."""
-    others = _with(rows, found, one.joint)
-    candidates = _candidates_of(one)
-    with_limit = others.with_candidates(one.joint, candidates)
-    after = _solved(with_limit.gram, 1 if one.cause == "drive" else 2)
+    others = _with(rows, limits, one.joint)
+    with_limit = others.with_candidates(one.joint, _candidates_of(one))
+    columns = 2
+    if one.cause == "drive":
+        columns = 1
+    after = _solved(with_limit.gram, columns)
     inertias = -after.rest[list(rows.inertias)]
     if np.any(inertias <= 0) or not _certain(_solved(others.gram, 0), after, one):
         return False
@@ -166,12 +172,13 @@ def _stands(rows: _Rows, found: Mapping[int, Limit], one: Limit) -> bool:
     return _excess(rows, one, after)[0] > 0
 
 
-def _true(rows: _Rows, found: Mapping[int, Limit], joint: int) -> bool:
+def _true(rows: _Rows, limits: Mapping[int, Limit], joint: int) -> bool:
     """Whether the joint's torque stands at a limit, and the motion is sure that it is true."""
     one = _at_plateaus(rows, joint)
     if one is None:
         return False
-    after = _solved(_with(rows, found, joint).with_candidates(joint, _candidates_of(one)).gram, 2)
+    others = _with(rows, limits, joint)
+    after = _solved(others.with_candidates(joint, _candidates_of(one)).gram, 2)
     mean, std = _excess(rows, one, after)
     level = max(abs(side) for side in (one.low, one.high) if np.isfinite(side))
     return bool(
@@ -197,30 +204,33 @@ def _widened(rows: _Rows, one: Limit) -> Limit:
     return replace(one, low=one.low + margin, high=one.high - margin)
 
 
-def sound(segments: Iterable[Segment], found: Sequence[Limit]) -> Iterator[Segment]:
+def sound(segments: Iterable[Segment], limits: Sequence[Limit]) -> Iterator[Segment]:
     """The stretches of a log's segments whose torques no limit cuts off, in time order.
 
     What is within `_GUARD` of a sample that lies beyond a limit is left out too: that a sample does
     not lie beyond it depends on its noise, which would not be nothing in the mean of what is left.
     What comes out does not depend on how the segments were cut.
     """
-    if not found:
+    if not limits:
         yield from segments
         return
     held: Segment | None = None
     decided = 0  # samples of what is held that were given out, or left out
     for piece in segments:
         if held is not None and not piece.continues:
-            yield from _cut(held, found, decided, len(held))
+            yield from _cut(held, limits, decided, len(held))
             held = None
-        held, decided = (piece, 0) if held is None else (append(held, piece), decided)
+        if held is None:
+            held, decided = piece, 0
+        else:
+            held = append(held, piece)
         guard = _guard(piece.dt)
         ready = max(decided, len(held) - guard)  # of the rest, what follows is not known yet
-        yield from _cut(held, found, decided, ready)
+        yield from _cut(held, limits, decided, ready)
         first = max(0, ready - guard - 1)
         held, decided = held.part(first, len(held)), ready - first
     if held is not None:
-        yield from _cut(held, found, decided, len(held))
+        yield from _cut(held, limits, decided, len(held))
 
 
 def _guard(dt: float) -> int:
@@ -228,25 +238,28 @@ def _guard(dt: float) -> int:
     return max(2, round(_GUARD / dt))
 
 
-def _spread(found: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Samples (N,) that lie within `reach` of one that was found.
+def _spread(beyond: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Samples (N,) that lie within `reach` of one that is `beyond`.
 
     (`scipy.ndimage.binary_dilation` does the same; its import takes longer than a short log.)
     """
-    count = np.concatenate([[0], np.cumsum(np.pad(found, reach))])
+    count = np.concatenate([[0], np.cumsum(np.pad(beyond, reach))])
     return np.asarray(count[2 * reach + 1 :] > count[: -2 * reach - 1])
 
 
-def _cut(held: Segment, found: Sequence[Limit], first: int, last: int) -> Iterator[Segment]:
+def _cut(held: Segment, limits: Sequence[Limit], first: int, last: int) -> Iterator[Segment]:
     """The stretches from sample `first` to `last` - 1 that lie far enough from any limit."""
     beyond = np.zeros(len(held), dtype=bool)
-    for one in found:
+    for one in limits:
         beyond |= one.beyond(held.tau)
-    beyond = _spread(beyond, _guard(held.dt)) if beyond.any() else beyond
+    if beyond.any():
+        beyond = _spread(beyond, _guard(held.dt))
     inside = np.concatenate([[True], beyond[first:last], [True]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int8))) + first
     for start, end in edges.reshape(-1, 2).tolist():
-        follows = not beyond[start - 1] if start else held.continues
+        follows = held.continues
+        if start:
+            follows = not beyond[start - 1]
         yield replace(held.part(start, end), continues=follows)
 
 
@@ -270,7 +283,9 @@ class _Rows:
             if (X := windows.equations(settings.model, piece, True)).shape[2]
         )
         places = tuple(settings.model.names.index(name) for name in _INERTIAS)
-        return cls(parts, places) if parts else None
+        if not parts:
+            return None
+        return cls(parts, places)
 
     def torque(self, joint: int) -> FloatArray:
         """The joint's torque (N,), the samples that windows share twice."""
@@ -427,7 +442,7 @@ def _plateaus(tau: FloatArray, dt: float, limit: Limit) -> FloatArray:
 
     Each with the limit's sign.
     """
-    found = np.zeros((2, tau.size))
+    columns = np.zeros((2, tau.size))
     for sign, at in ((1.0, tau >= limit.high), (-1.0, tau <= limit.low)):
         places = np.flatnonzero(at)
         if not places.size:
@@ -436,9 +451,9 @@ def _plateaus(tau: FloatArray, dt: float, limit: Limit) -> FloatArray:
             inside = slice(run[0], run[-1] + 1)
             count = run[-1] - run[0] + 2
             step = np.arange(1, count)
-            found[0, inside] = sign
-            found[1, inside] = sign * step * (count - step) * dt**2
-    return found
+            columns[0, inside] = sign
+            columns[1, inside] = sign * step * (count - step) * dt**2
+    return columns
 
 
 def _noise(tau: FloatArray) -> float:
@@ -448,4 +463,6 @@ def _noise(tau: FloatArray) -> float:
     """
     off = np.abs(np.diff(tau, 3))
     off = off[off > 0]
-    return 1.4826 * median(off) / np.sqrt(20.0) if off.size else 0.0
+    if not off.size:
+        return 0.0
+    return 1.4826 * median(off) / np.sqrt(20.0)

@@ -41,8 +41,9 @@ def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str,
                 and not _COMMANDED.search(field)
                 and not field.endswith("(empty)")
             ):
-                home = {f"{channel}.topic": topic} if topic else {}
-                source = f"{topic}: {field}" if topic else field
+                home, source = {}, field
+                if topic:
+                    home, source = {f"{channel}.topic": topic}, f"{topic}: {field}"
                 yield (
                     source,
                     Remedy({**home, f"{channel}.source": field, **unit}, "the log also holds"),

@@ -95,7 +95,9 @@ def grid_step(values: FloatArray) -> float:
     if not np.isfinite(smallest):
         return 0.0
     ratios = steps / smallest
-    return smallest if float(np.abs(ratios - np.rint(ratios)).max()) < 0.05 else 0.0
+    if float(np.abs(ratios - np.rint(ratios)).max()) >= 0.05:
+        return 0.0
+    return smallest
 
 
 def saturated_share(values: FloatArray) -> float:
