@@ -350,8 +350,8 @@ def residual_of(
     unloaded, loaded = _passes(survey, settings)
     sums = []
     for role, passes in (("unloaded", unloaded), ("loaded", loaded)):
-        c = torque_coefficients(fit, role)
         for moving in passes:
+            c = torque_coefficients(fit, role)
             of_log = weak.residuals(moving, weak_settings, c)
             if of_log is not None:
                 sums.append(of_log)
