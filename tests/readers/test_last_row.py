@@ -114,3 +114,17 @@ def test_a_short_table_has_no_form(tmp_path: Path) -> None:
     assert judged(row, 3 * text, dialect, 4) is LastRow.WHOLE
     assert judged(row[:-1], 3 * text, dialect, 4) is LastRow.CUT
     assert judged(b"", text, dialect, 4) is LastRow.WHOLE
+
+
+@pytest.mark.parametrize("mark", MARKS.values(), ids=MARKS)
+@pytest.mark.parametrize(
+    ("tail", "outcome"),
+    [("   ", WHOLE), ("\t", WHOLE), ("\r", WHOLE), ("# the end", WHOLE), ('"', CUT), ('1,"', CUT)],
+)
+def test_what_stands_behind_the_last_line_end_is_a_row_or_nothing(
+    tail: str, outcome: tuple[int, list[tuple[str, bool]]], mark: str, tmp_path: Path
+) -> None:
+    """A quote that is left open made polars panic."""
+    whole = "# a comment\n" + "\n".join([*lines(".9f", mark), ""])
+    kept, said = read(tmp_path / "log.csv", whole + tail.replace(",", mark))
+    assert (kept, said) == (ROWS, outcome[1])
