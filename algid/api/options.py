@@ -44,15 +44,18 @@ def with_options(
         return given, known
     from algid.profile import with_settings
 
-    own = {field.name: PARSERS.get(field.name) for field in fields(Settings)}
-    _refuse_unknown(options, [*own, *_of_profile()])
-    of_settings = {name: value for name, value in options.items() if name in own}
-    for name, value in of_settings.items():
-        parse = own[name]
-        if parse is not None and value is not None:
-            of_settings[name] = parse(_text(name, value))
+    own = [field.name for field in fields(Settings)]
+    _refuse_unknown(options, own + _of_profile())
+    of_settings, of_profile = {}, {}
+    for name, value in options.items():
+        if name not in own:
+            of_profile[name] = value
+        elif name in PARSERS and value is not None:
+            of_settings[name] = PARSERS[name](_text(name, value))
+        else:
+            of_settings[name] = value
     refuse_contradictions(options)
-    known = _over(known, {name: value for name, value in options.items() if name not in own})
+    known = _over(known, of_profile)
     of_both = {name: of_settings[name] for name in OF_BOTH if name in of_settings}
     if known is not None and of_both:
         known = with_settings(known, of_both)
@@ -107,7 +110,7 @@ def two_names(name: str, given: object) -> tuple[str, str]:
 def _of_profile() -> list[str]:
     from algid.profile import Profile
 
-    return [*Profile.model_fields, *CHANNELS_OF]
+    return list(Profile.model_fields) + list(CHANNELS_OF)
 
 
 def _over(profile: Profile | None, options: Mapping[str, Any]) -> Profile | None:

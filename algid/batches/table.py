@@ -71,8 +71,12 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
             [record.job.labels.get(name) for record in records]
         )
     for name in _names([record.estimates for record in records]):
-        estimates = [record.estimates.get(name, (None, None, None)) for record in records]
-        values, stds, statuses = zip(*estimates, strict=True)
+        values, stds, statuses = list[float | None](), list[float | None](), list[str | None]()
+        for record in records:
+            value, std, status = record.estimates.get(name, (None, None, None))
+            values.append(value)
+            stds.append(std)
+            statuses.append(status)
         columns[name] = pl.Series(values, dtype=pl.Float64)
         columns[f"{name}_std"] = pl.Series(stds, dtype=pl.Float64)
         columns[f"{name}_status"] = pl.Series(statuses, dtype=pl.String)
@@ -83,15 +87,17 @@ def _label_column(labels: Sequence[Label | None]) -> pl.Series:
     """Numbers where every label is one, else text."""
     import polars as pl
 
-    numeric = all(label is None or type(label) in (int, float) for label in labels)
-    kind, dtype = (float, pl.Float64) if numeric else (str, pl.String)
-    cells = [None if label is None else kind(label) for label in labels]
-    return pl.Series(cells, dtype=dtype)
+    if all(label is None or type(label) in (int, float) for label in labels):
+        return pl.Series(labels, dtype=pl.Float64, strict=False)
+    texts = [None if label is None else str(label) for label in labels]
+    return pl.Series(texts, dtype=pl.String)
 
 
 def _in_int64(number: int) -> int | None:
     """A time in ns; None where it lies too far off, as file systems may say."""
-    return number if -(2**63) <= number < 2**63 else None
+    if not -(2**63) <= number < 2**63:
+        return None
+    return number
 
 
 def time_of(record: JobRecord) -> datetime | None:
@@ -104,4 +110,7 @@ def time_of(record: JobRecord) -> datetime | None:
 
 
 def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
-    return sorted({name for one in several for name in one})
+    names: set[str] = set()
+    for one in several:
+        names.update(one)
+    return sorted(names)
