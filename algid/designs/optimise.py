@@ -188,7 +188,9 @@ class _Search:
             options={"maxiter": stage.iterations, "ftol": _DONE},
         )
         self._done = start + stage.iterations
-        return ended.x if np.all(np.isfinite(ended.x)) else x
+        if not np.all(np.isfinite(ended.x)):
+            return x
+        return ended.x
 
     def _evaluated(self, x: FloatArray, stage: Stage) -> Evaluation:
         """The evaluation of `x`.

@@ -54,5 +54,8 @@ def _arm(design: Design) -> ArmDrawing | None:
     if design.campaign.experiment.runs[1]:
         mass = float(design.campaign.belief.mean[list(design.names).index("m_p")])
         payload = f"payload of {significant(mass, 3)} kg"
-    reading = _READING.format(_LIMIT if np.isfinite(limits.height) else "")
+    height = ""
+    if np.isfinite(limits.height):
+        height = _LIMIT
+    reading = _READING.format(height)
     return ArmDrawing(l1, l2, design.t, design.motion.theta, reading, payload, limits.height)

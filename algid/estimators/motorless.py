@@ -59,7 +59,9 @@ def by_instruments(
     if any(distance is None or distance > better.quantile for distance in broken):
         return None
     checked = doubted_without_motor(better, unloaded, (), settings)
-    return better.noted(Notice("MOTORLESS_INSTRUMENTS", note=True)) if checked is better else None
+    if checked is not better:
+        return None
+    return better.noted(Notice("MOTORLESS_INSTRUMENTS", note=True))
 
 
 def _equally_weighted(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:

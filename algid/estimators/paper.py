@@ -197,9 +197,10 @@ def _norm1(matrix: FloatArray) -> FloatArray:
 
 
 def _inverse_where(p: FloatArray, regular: NDArray[np.bool_]) -> FloatArray:
-    return np.linalg.inv(
-        p if regular.all() else np.where(regular[..., None, None], p, np.eye(p.shape[-1]))
-    )
+    """Inverses of matrices (..., n, n), the identity in the place of those that are not regular."""
+    if not regular.all():
+        p = np.where(regular[..., None, None], p, np.eye(p.shape[-1]))
+    return np.linalg.inv(p)
 
 
 EPSILON = 0.2  # s: the estimates are arbitrary before (the paper's ε)

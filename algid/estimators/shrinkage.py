@@ -229,15 +229,18 @@ def spread(
             scores.append(by_stretch.sum(axis=0) @ T)
         S += own
         n = len(scores)
-        weight = (n - 1) / (n - 1 + _PRIOR_LOGS) if n else 0.0
+        weight = 0.0
         if n > 1:
+            weight = (n - 1) / (n - 1 + _PRIOR_LOGS)
             meat += weight * n / (n - 1) * np.transpose(scores) @ np.array(scores)
         meat += (1 - weight) * own
     inverse = scaled_pinv(S + precision)
     freedom = max(2, stretches - _rank(S))
     moved = jackknife(logs, without)
+    if moved is not None:
+        moved = moved + inverse @ precision @ inverse
     return Spread(
-        None if moved is None else moved + inverse @ precision @ inverse,
+        moved,
         inverse @ (meat + precision) @ inverse,
         inverse @ (long_run * (max(stretches, freedom + 1) / freedom) + precision) @ inverse,
         freedom,

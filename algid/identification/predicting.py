@@ -25,6 +25,8 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
     source = open_source(log, role, reused(profile, result), known.model.gravity)
     coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
     blocks = list(torque_blocks(Survey([source]), known.model, coefficients, known.shift))
-    names = [name for name in blocks[0] if name != "log"] if blocks else []
+    names = []
+    if blocks:
+        names = [name for name in blocks[0] if name != "log"]
     columns = {name: np.concatenate([block[name] for block in blocks]) for name in names}
     return pl.DataFrame(columns)

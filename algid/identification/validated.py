@@ -39,7 +39,9 @@ class Validated:
     max_nrmse: float | None = None
 
     def __repr__(self) -> str:
-        r2 = "unknown" if self.total is None else ", ".join(f"{one:.4f}" for one in self.total.r2)
+        r2 = "unknown"
+        if self.total is not None:
+            r2 = ", ".join(f"{one:.4f}" for one in self.total.r2)
         return f"Validated(logs: {len(self.logs)}, R² {r2})"
 
     @property

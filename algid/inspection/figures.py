@@ -64,7 +64,9 @@ def signal_figures(values: FloatArray) -> SignalFigures:
     The noise floor is the robust deviation of its third differences over √20: smooth motion has
     none.
     """
-    noise = robust_deviation(differences(values, 3)) / np.sqrt(20) if values.size > 3 else 0.0
+    noise = 0.0
+    if values.size > 3:
+        noise = robust_deviation(differences(values, 3)) / np.sqrt(20)
     low, high = float(values.min()), float(values.max())
     return SignalFigures(low, high, float(noise), grid_step(values), saturated_share(values))
 
