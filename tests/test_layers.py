@@ -31,6 +31,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "notices": room("options text words"),
     "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
+    "arrow": room(packages="numpy pyarrow"),
     "compiled": room("arm", "numpy scipy"),
     "quantiles": room("arm", "numpy"),
     "physics": room("arm", "numpy", PURE),
@@ -52,23 +53,23 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model results synth"),
-    "writers": room("errors files log ros2", "mcap numpy polars pyarrow zstandard"),
+    "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
-        "arm criteria errors faults files limits log notices options profile quantiles ros2 "
-        "runtime units words",
+        "arm arrow criteria errors faults files limits log notices options profile quantiles "
+        "ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
                        "readers signals units words", "numpy"),
     "report": room(
-        "arm criteria errors files inspection methods model notices options progress "
+        "arm arrow criteria errors files inspection methods model notices options progress "
         "results ros2 significance text verdict words",
         "matplotlib mcap numpy plotly pyarrow rich"
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
-        "arm errors estimators files inspection log methods model notices options physics "
+        "arm arrow errors estimators files inspection log methods model notices options physics "
         "profile progress readers report results runtime settings signals significance "
         "table4 text units",
         "numpy polars pyarrow",

@@ -12,7 +12,7 @@ import pytest
 import algid
 from algid.writers import write_log
 
-HEAVY = ("polars", "scipy.linalg", "scipy.special", "scipy.signal", "pyarrow.dataset")
+HEAVY = ("pandas", "polars", "scipy.linalg", "scipy.special", "scipy.signal", "pyarrow.dataset")
 SCRIPT = """
 import json, sys, algid
 algid.identify(sys.argv[1], out=sys.argv[2], report=json.loads(sys.argv[3]))

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.arrow import table_of_columns
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
 from algid.estimators.noise import first_guess
@@ -140,13 +141,12 @@ def write_columns(
     path: Path, blocks: Iterable[Mapping[str, object]], start_ns: Sequence[int]
 ) -> None:
     """Write blocks of flat columns as one Parquet file, each log's first stamp in its metadata."""
-    import pyarrow
     import pyarrow.parquet
 
     writer: pyarrow.parquet.ParquetWriter | None = None
     try:
         for block in blocks:
-            table = pyarrow.table(dict(block))
+            table = table_of_columns(block)
             if writer is None:
                 schema = table.schema.with_metadata({START_KEY: json.dumps(list(start_ns))})
                 # floats of an estimate hardly ever repeat: a dictionary would only cost time

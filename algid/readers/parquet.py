@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
+from algid.arrow import whole_column
 from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
@@ -380,7 +381,7 @@ def _of_batch(columns: Columns, batch: pa.RecordBatch) -> WholeRows:
         batch = batch.drop_null()
     arrays = {}
     for name, source in columns.sources.items():
-        values = batch.column(source).to_numpy()
+        values = whole_column(batch.column(source))
         whole = name == "t" and np.issubdtype(values.dtype, np.integer)
         arrays[name] = values.astype(np.int64 if whole else np.float64, copy=False)
     return WholeRows(arrays, read - batch.num_rows, cut_off)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.arrow import numbers_of
 from algid.errors import ResultError
 
 ROWS = 1 << 18
@@ -77,9 +78,7 @@ def blocks(
         for batch in file.iter_batches(batch_size=rows, columns=list(names)):
             block = {}
             for name in names:
-                values = np.asarray(
-                    batch.column(name).to_numpy(zero_copy_only=False), dtype=np.float64
-                )
+                values = numbers_of(batch.column(name))
                 beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
                 block[name] = np.where(beyond, np.nan, values) if beyond.any() else values
             for name in (name for name in names if name in finite):
@@ -152,9 +151,7 @@ def between(
             if all(_overlaps(footer.row_group(place), *bound) for bound in bounds.items())
         ]
         table = file.read_row_groups(groups, columns=list(wanted))
-        columns = {
-            name: np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in wanted
-        }
+        columns = {name: numbers_of(table.column(name).combine_chunks()) for name in wanted}
     near = (columns["log"] == log) & (columns["t"] >= low) & (columns["t"] <= high)
     return tuple(columns[name][near] for name in names)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from algid.arrow import table_of_columns
 from algid.errors import OutputError
 from algid.files import whole_file
 from algid.log import KEY, Companion, Log, Truth
@@ -21,7 +22,6 @@ def write(
     OutputError
         If the file cannot be written there, or exists and `force` is not set, or there is no block.
     """
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     sums: dict[str, int] = {}
@@ -31,7 +31,7 @@ def write(
             for block in as_blocks(log):
                 by_name = columns(block)
                 summed(sums, by_name)
-                table = pa.table(by_name)
+                table = table_of_columns(by_name)
                 # floats of a measured signal hardly ever repeat: a dictionary would only cost time
                 writer = writer or pq.ParquetWriter(
                     temporary,
