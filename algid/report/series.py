@@ -246,7 +246,7 @@ def read_torque(path: Path, progress: Progress | None = None) -> TorqueLog:
         if progress is not None:
             progress("report", sum(span.samples for span in gathering.ranges.values()), total)
     for name in MOTION:
-        if np.isnan(gathering.extremes.get(name, (0.0, 0.0))[0]):
+        if np.isnan(gathering.extremes.get(name, (np.nan, np.nan))[0]):
             raise ResultError(f"{path}: the column {name!r} holds no number; identify again")
     return gathering.result()
 

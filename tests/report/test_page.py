@@ -208,10 +208,12 @@ def test_a_log_without_prediction_has_its_torque_alone(folder: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_motion_without_numbers_is_not_drawn(folder: Path) -> None:
+@pytest.mark.parametrize("lost", ["numbers", "rows"])
+def test_a_motion_without_numbers_is_not_drawn(folder: Path, lost: str) -> None:
     path = folder / "torque.parquet"
-    lost = pl.lit(None, pl.Float64).alias("theta1")
-    pl.read_parquet(path).with_columns(lost).write_parquet(path)
+    whole = pl.read_parquet(path)
+    numbers = whole.with_columns(pl.lit(None, pl.Float64).alias("theta1"))
+    {"numbers": numbers, "rows": whole.clear()}[lost].write_parquet(path)
     text = write_report(folder).read_text(encoding="utf-8")
     assert "the column 'theta1' holds no number" in html.unescape(text)
 
