@@ -126,12 +126,16 @@ class Asked:
         """Covariance (Q, Q) of the estimates.
 
         A direction that S leaves open is held at `UNKNOWN` sizes.  S has no negative eigenvalue
-        but by rounding.
+        but by rounding; what then comes out below zero is computed by eigenvalues.
         """
-        scaled = S * np.outer(self.size, self.size)
-        values, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
-        held = np.maximum(values, 0.0) + 1 / UNKNOWN**2
-        return (axes / held) @ axes.T * np.outer(self.size, self.size)
+        size = np.outer(self.size, self.size)
+        scaled = S * size
+        held = scaled + np.eye(self.size.size) / UNKNOWN**2
+        C = np.linalg.inv(0.5 * (held + held.T))
+        if np.diag(C).min() <= 0:
+            values, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
+            C = (axes / (np.maximum(values, 0.0) + 1 / UNKNOWN**2)) @ axes.T
+        return C * size
 
     def relative(self, S: FloatArray) -> FloatArray:
         """Relative bounds (Q,)."""
