@@ -7,11 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import pytest
 
 import algid
 from algid.writers import write_log
 
+CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 HEAVY = ("pandas", "polars", "scipy.linalg", "scipy.special", "scipy.signal", "pyarrow.dataset")
 SCRIPT = """
 import json, sys, algid
@@ -50,3 +53,22 @@ def test_a_command_hardly_searches_for_cycles_and_not_for_plugins() -> None:
     done = subprocess.run([sys.executable, "-c", COMMAND], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stderr.splitlines()[-1] == "True None"
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.feather", "log.npz"])
+def test_no_log_needs_pandas(tmp_path: Path, name: str) -> None:
+    t = np.arange(2000) / 100
+    columns = {channel: np.sin(t + place) for place, channel in enumerate(CHANNELS)} | {"t": t}
+    path = tmp_path / name
+    write = {"log.csv": pl.DataFrame.write_csv, "log.feather": pl.DataFrame.write_ipc}
+    if name in write:
+        write[name](pl.DataFrame(columns), path)  # type: ignore[operator]
+    else:
+        np.savez(path, **columns)  # type: ignore[arg-type]
+    code = (
+        "import json, sys, algid; algid.read_log(sys.argv[1]); print(json.dumps(list(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    assert "pandas" not in json.loads(done.stdout)

@@ -241,6 +241,7 @@ def _named(bounds: Sequence[BrokenBound]) -> list[str]:
     return names
 
 
+_SINGULAR = 1e-9  # of the largest eigenvalue of a correlation matrix
 _UNLIKE = 0.5  # of the larger of two values: more than any error of a model that is of use
 
 
@@ -350,7 +351,8 @@ def payload_distance(fit: Fit) -> float | None:
     -------
     float or None
         In standard deviations of a normal variable as unlikely; None where the logs of either kind
-        do not determine their own constants.
+        do not determine their own constants, or have fewer stretches than constants: directions
+        without a variance are rounding's.
 
     Notes
     -----
@@ -366,12 +368,23 @@ def payload_distance(fit: Fit) -> float | None:
     c_loaded, covariance_loaded, determined_loaded = by_themselves(fit.shared, loaded)
     if not (determined and determined_loaded):
         return None
+    if _singular(covariance) or _singular(covariance_loaded):
+        return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
     arm = Prior.of(fit.shared.log_names, c, covariance)
     S = scaled_pinv(covariance_loaded)
     information = LogInformation(True, c_loaded, S[None], np.zeros_like(c_loaded)[None])
     _, _, value = combine(fit.shared, [information], fit.values, arm)
     return max(0.0, normal_exceeded(float(chi2_tail(freedom, max(0.0, -2 * value)))))
+
+
+def _singular(covariance: FloatArray) -> bool:
+    """Whether a covariance, scaled to unit diagonal, has directions without a variance."""
+    std = np.sqrt(np.diag(covariance))
+    known = std > 0
+    correlation = covariance[np.ix_(known, known)] / np.outer(std[known], std[known])
+    values = np.linalg.eigvalsh(correlation)
+    return bool(values[0] < _SINGULAR * values[-1])
 
 
 @dataclass(frozen=True, eq=False)

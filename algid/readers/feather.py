@@ -81,7 +81,7 @@ class Feather:
 
         with natively(self.path, "feather"):
             taken = pa.schema([field for field in self.schema if _is_taken(field.type)])
-            return dict(self._taken(taken.empty_table()).schema)
+            return dict(self._taken(pa.Table.from_batches([], schema=taken)).schema)
 
     def width(self, column: str) -> int:
         """Cells of the longest list of a column in the first rows."""

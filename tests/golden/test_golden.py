@@ -14,6 +14,8 @@ from tests.golden.record import EXPECTED
 
 SHARE = 1e-6
 """Of a standard deviation: kernels sum in different orders, amplified to 1e-8 by weak problems."""
+OF_SPREAD = 1e-5
+"""Of a deviation itself: along what a log hardly tells, kernels differ by 2e-6."""
 EXACT = 1e-7
 """Of a number's own size, if its deviation is smaller: kernels differ by 1e-8 without noise."""
 ROUNDING = 1e-6
@@ -52,4 +54,4 @@ def test_a_result_is_what_it_was(case: Case, tmp_path: Path) -> None:
         allowed = max(SHARE * (spread or 0.0), EXACT * abs(value))
         assert own == pytest.approx(value, abs=allowed), name
         if spread is not None and spread > ROUNDING * abs(value):
-            assert own_spread == pytest.approx(spread, rel=SHARE), name
+            assert own_spread == pytest.approx(spread, rel=OF_SPREAD), name
