@@ -38,7 +38,10 @@ def main() -> None:
     sys.unraisablehook = stopping.swallowed
     harden_streams()
     bound_by_environment()  # before anything loads numpy
-    code = run(sys.argv[1:])
+    try:
+        code = run(sys.argv[1:])
+    finally:
+        gc.freeze()  # else the interpreter's end searches all that was imported for cycles
     if code:
         sys.exit(code)
 
