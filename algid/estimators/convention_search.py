@@ -46,7 +46,7 @@ _FINE, _COARSE = (
 )
 _EACH = 10.0  # s of each of several logs, at least
 _SHORTEST = 6 * WINDOW  # of motion
-_QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)
+_QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)  # the last two half a turn behind the first
 _SHIFTED = 3  # conventions, of the best, whose zeros are set free
 _REACH, _SETTLED = 0.2, 1e-5  # rad, of the grid on which free zeros are sought
 _MOST_GRIDS = 100
@@ -73,6 +73,11 @@ LEAST = 1e-5
 """A residual share below this is no merit: one exact equation must not outweigh the other."""
 EXPLAINED = 0.2
 """A convention that leaves more than this share of a torque explains nothing."""
+
+
+def _merits(left: FloatArray) -> FloatArray:
+    """Scores (…) of what is left of both torques (…, 2), where a share below `LEAST` is none."""
+    return _sizes(np.maximum(left, LEAST))
 
 
 def _sizes(left: FloatArray) -> FloatArray:
@@ -335,16 +340,26 @@ class _Trials:
             weighs = np.array([PARAMETERS[name].weighs for name in COLUMNS])
             self._free = np.delete(self._free, weighs, axis=1)
             turns = (0.0,)
-        self._zeros = [(turn, half) for half in (0.0, pi) for turn in turns]
+        self._turns = turns
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two distinct conventions differ."""
         self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
 
     def under(self, convention: Convention) -> Candidate:
         """The candidate of one convention."""
-        family = replace(convention, zero=AS_READ.zero)
-        (candidate,) = self._with_zeros([family], [convention.zero])
-        return candidate
+        family, zero = replace(convention, zero=AS_READ.zero), convention.zero
+        sums = self._sums(family, self._fine)
+        c, left, covariance = self._solved(sums, [family], self._place(zero)[None])
+        return Candidate(
+            family,
+            zero,
+            self._names,
+            c[0],
+            covariance[0],
+            left[0],
+            float(_merits(left)[0]),
+            sums.speed,
+        )
 
     def zeroed(self, family: Convention) -> Candidate:
         """The candidate of a family with the zeros that fit best."""
@@ -353,7 +368,7 @@ class _Trials:
     def discrete(self) -> Iterator[Candidate]:
         """Every convention without a scale, its zeros by quarter and half turns."""
         for families in _families(self._passive):
-            yield from self._with_zeros(families, self._zeros)
+            yield from self._turned(families)
 
     def shifted(self, discrete: Sequence[Candidate]) -> Iterator[Candidate]:
         """Conventions of least residual when both zeros are free, with the zeros that fit best."""
@@ -371,28 +386,57 @@ class _Trials:
             family = self._scaled(joints)
             if family is None:
                 continue
-            candidates = list(self._with_zeros([family], self._zeros))
+            candidates = list(self._turned([family]))
             yield from candidates
             yield from self._with_free_zero(family, candidates)
 
-    def _with_zeros(
-        self, families: Sequence[Convention], zeros: Sequence[tuple[float, float]]
-    ) -> Iterator[Candidate]:
-        """Each family of the same angles and drive with each of the zeros."""
+    def _turned(self, families: Sequence[Convention]) -> Iterator[Candidate]:
+        """Each family of the same angles and drive, its zeros by quarter and half turns.
+
+        The sign of both torques, and half a turn of a zero, turn signs of coefficients and nothing
+        else: conventions that differ so share a fit.
+        """
         sums = self._sums(families[0], self._fine)
-        T = np.stack([self._place(zero) for zero in zeros])
-        c, left, covariance = self._solved(sums, families, T)
-        scores = _sizes(np.maximum(left, LEAST)).tolist()
-        for n, (family, zero) in enumerate(product(families, zeros)):
-            yield Candidate(
-                family, zero, self._names, c[n], covariance[n], left[n], scores[n], sums.speed
-            )
+        plain = self._turns[:2]
+        T = np.stack([self._place((turn, 0.0)) for turn in plain])
+        upright = list(dict.fromkeys(map(_upright, families)))
+        c, left, covariance = self._solved(sums, upright, T)
+        scores = _merits(left).tolist()
+        signs = self._signs()
+        k = c[:, None] * signs
+        covariances = signs[:, :, None] * signs[:, None] * covariance[:, None]
+        for family in families:
+            first = len(plain) * upright.index(_upright(family))
+            for half, (number, turn) in product((0, 1), enumerate(self._turns)):
+                fit, turned = first + number % 2, 2 * (number // 2) + half
+                yield Candidate(
+                    family,
+                    (turn, half * pi),
+                    self._names,
+                    family.torque_signs[0] * k[fit, turned],
+                    covariances[fit, turned],
+                    left[fit],
+                    scores[fit],
+                    sums.speed,
+                )
+
+    def _signs(self) -> FloatArray:
+        """Signs (4, q) of coefficients where neither, the second, the first or both zeros turn.
+
+        By half a turn.
+        """
+        signs = np.ones((4, len(self._names)))
+        for row, (one, two) in zip(signs, product((1, -1), repeat=2), strict=True):
+            for name, sign in ((K4, one), (K1, two), (K2, one * two)):
+                if name in self._names:
+                    row[self._names.index(name)] = sign
+        return signs
 
     def _with_free_zero(
         self, family: Convention, discrete: Sequence[Candidate]
     ) -> Iterator[Candidate]:
         """The zeros that fit best, where they leave far less than the discrete ones."""
-        (free,) = self._with_zeros([family], [self._best_zero(family)])
+        free = self.zeroed(family)
         if free.score < min(one.score for one in discrete if one.family == family) - self.apart:
             yield free
 
@@ -503,6 +547,12 @@ def _families(passive: int | None = None) -> Iterator[list[Convention]]:
                 every.append(replace(angles, torques_swapped=swap, torque_signs=signs))
         if passive is None or not base:
             yield every
+
+
+def _upright(family: Convention) -> Convention:
+    """The family whose fit differs by the sign of all coefficients at most."""
+    one, two = family.torque_signs
+    return replace(family, torque_signs=(1, one * two))
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:

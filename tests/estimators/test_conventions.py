@@ -16,6 +16,7 @@ from algid.estimators.convention_search import (
     Recorded,
     _demands,
     _least,
+    _trials,
     judge,
     judge_together,
 )
@@ -210,6 +211,29 @@ def test_an_arm_with_one_motor_tells_its_convention(
     assert found.alone
     assert (found.best.convention == AS_READ) == (mistake == "none")
     np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
+
+
+@pytest.mark.parametrize(("gravity", "passive"), [(True, None), (False, None), (True, 2)])
+def test_conventions_that_share_a_fit_have_what_a_fit_of_their_own_gives(
+    bench: Bench, gravity: bool, passive: int | None
+) -> None:
+    theta, tau = measured(bench.bare)
+    if passive is not None:
+        tau[passive - 1] = 0.0
+    trials = _trials([Recorded(theta, tau, DT, passive)], gravity)
+    assert trials is not None
+    every = list(trials.discrete())
+    assert len({one.convention for one in every}) == len(every)
+    for shared in every[::7]:  # every turn of the zeros, with every sign
+        own = trials.under(shared.convention)
+        size = np.sqrt(np.diag(own.covariance))
+        np.testing.assert_allclose(shared.k / size, own.k / size, rtol=0, atol=1e-6)
+        scale = np.outer(size, size)
+        np.testing.assert_allclose(
+            shared.covariance / scale, own.covariance / scale, rtol=0, atol=1e-6
+        )
+        np.testing.assert_allclose(shared.left, own.left, rtol=1e-9, atol=1e-13)
+        assert shared.score == pytest.approx(own.score, abs=1e-9)
 
 
 def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:
