@@ -31,6 +31,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "notices": room("options text words"),
     "verdict": room("notices"),
     "arm": room(packages="numpy", library=PURE),
+    "blocks": room(packages="numpy"),
     "arrow": room(packages="numpy pyarrow"),
     "compiled": room("arm", "numpy scipy"),
     "quantiles": room("arm", "numpy"),
@@ -56,8 +57,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow zstandard"),
     "example": room("arm files log synth writers", "numpy"),
     "readers": room(
-        "arm arrow criteria errors faults files limits log notices options profile quantiles "
-        "ros2 runtime units words",
+        "arm arrow blocks criteria errors faults files limits log notices options profile "
+        "quantiles ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
@@ -76,7 +77,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "batches": room(
         "construction errors files identification limits options profile readers results "
-        "runtime settings stores text verdict",
+        "runtime settings stores text verdict words",
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(

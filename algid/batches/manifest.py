@@ -11,7 +11,6 @@ import csv
 import io
 import math
 import reprlib
-from collections import Counter
 from collections.abc import Mapping
 from datetime import date, datetime
 from datetime import time as clock
@@ -22,6 +21,7 @@ from algid.errors import SettingError
 from algid.files import parsed_toml, read_start, read_text
 from algid.limits import LIMITS
 from algid.text import visible
+from algid.words import repeated
 
 
 def is_manifest(path: Path) -> bool:
@@ -80,7 +80,7 @@ def _tables(path: Path) -> list[dict[str, object]]:
 def _rows(path: Path) -> list[dict[str, object]]:
     reader = csv.DictReader(io.StringIO(read_text(path, "utf-8-sig")))
     header = reader.fieldnames or ()
-    twice = [name for name, count in Counter(header).items() if count > 1 and name]
+    twice = repeated(filter(None, header))
     if twice:
         raise SettingError(f"{path}: two columns are named {twice[0]!r:.60}; rename one")
     cells = list(reader)

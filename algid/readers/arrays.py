@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from algid.readers.jsonlines import frame_of_lines
 from algid.readers.matfile import check_elements
 from algid.readers.names import TIMES
 from algid.readers.natives import natively
-from algid.words import counted
+from algid.words import counted, repeated
 
 _MOST_TOLD = 12
 """Arrays that fit nothing and are listed."""
@@ -116,8 +115,11 @@ class Content:
 
         if isinstance(self.columns, pl.DataFrame):
             return self.columns[first:last]
-        wanted = [name for name in self.columns if names is None or name in names]
-        return pl.DataFrame({name: _native(self.columns[name][first:last]) for name in wanted})
+        part = {}
+        for name, column in self.columns.items():
+            if names is None or name in names:
+                part[name] = _native(column[first:last])
+        return pl.DataFrame(part)
 
 
 def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
@@ -167,7 +169,7 @@ def _npy(path: Path) -> dict[str, NDArray[Any]]:
 def _npz(path: Path) -> dict[str, NDArray[Any]]:
     with zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
-        twice = [name for name, count in Counter(archive.namelist()).items() if count > 1]
+        twice = repeated(archive.namelist())
     if twice:
         raise LogError(f"{path}: the array {twice[0]!r} stands in the archive twice; save it again")
     if claimed > LIMITS.whole_bytes:
@@ -218,18 +220,12 @@ def columns_of(
     LogError
         If no array has two samples.
     """
-    numbers = {
-        name: np.squeeze(array) for name, array in arrays.items() if array.dtype.kind in "iuf"
-    }
-    last = {name: name.rpartition(".")[2] for name in numbers}
-    short = Counter(last.values())
-    numbers = {
-        last[name] if short[last[name]] == 1 else name: array for name, array in numbers.items()
-    }
-    clocks = [
-        array.size for name, array in numbers.items() if name.lower() in TIMES and array.ndim == 1
-    ]
-    rows = max(clocks or [max(array.shape, default=0) for array in numbers.values()], default=0)
+    numbers = {}
+    for name, array in arrays.items():
+        if array.dtype.kind in "iuf":
+            numbers[name] = np.squeeze(array)
+    numbers = _by_short_names(numbers)
+    rows = _rows_of(numbers)
     if rows < 2:
         raise LogError(
             f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}"
@@ -241,10 +237,32 @@ def columns_of(
             columns[name] = array
         elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
             upright = array if array.shape[0] == rows else array.T
-            columns |= {f"{name}[{place}]": upright[:, place] for place in range(upright.shape[1])}
+            for place, column in enumerate(upright.T):
+                columns[f"{name}[{place}]"] = column
         else:
             others.append(f"{name} ({' × '.join(map(str, array.shape)) or 'one number'})")
     return columns, tuple(others)
+
+
+def _by_short_names(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Arrays by the last part of their nested names, where that is unique."""
+    last = {name: name.rpartition(".")[2] for name in arrays}
+    twice = repeated(last.values())
+    named = {}
+    for name, array in arrays.items():
+        named[name if last[name] in twice else last[name]] = array
+    return named
+
+
+def _rows_of(arrays: Mapping[str, NDArray[Any]]) -> int:
+    """As many rows as the longest time has; without a time, as the longest array."""
+    longest = 0
+    clocks = []
+    for name, array in arrays.items():
+        longest = max(longest, *array.shape, 0)
+        if name.lower() in TIMES and array.ndim == 1:
+            clocks.append(array.size)
+    return max(clocks, default=longest)
 
 
 def _native(array: NDArray[Any]) -> NDArray[Any]:

@@ -125,8 +125,8 @@ class TableReader:
                 held, notices = (table, notices), ()
         if total < 2:
             said = held[1] + notices if held else notices
-            worst = sorted(said, key=lambda notice: not notice.lossy)[:1]
-            why = "".join(f" ({notice.text})" for notice in worst)
+            worst = min(said, key=lambda notice: not notice.lossy, default=None)
+            why = "" if worst is None else f" ({worst.text})"
             raise LogError(
                 f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
             )
@@ -172,13 +172,9 @@ class TableReader:
                 yield held
             held = table
             if "NOT_FINITE" in self.origin.reading.accepted:
-                good = np.all(
-                    [
-                        np.abs(values) < LIMITS.largest_value
-                        for values in self._measured(table).values()
-                    ],
-                    axis=0,
-                )
+                good = np.ones(len(table), np.bool_)
+                for values in self._measured(table).values():
+                    good &= np.abs(values) < LIMITS.largest_value
                 dropped += len(table) - int(np.count_nonzero(good))
                 held = table.take(good)
             else:
@@ -204,10 +200,10 @@ class TableReader:
         names = f"tau{passive}", f"tau{3 - (passive or 1)}"
         if passive is None or not set(names) <= set(mapping):
             return ()
-        own, other = (table.columns.get(name) for name in names)
+        own, other = table.columns.get(names[0]), table.columns.get(names[1])
         if own is None or other is None or mapping[names[0]] == mapping[names[1]]:
             return ()
-        size, driving = (float(np.sqrt(np.mean(np.square(values)))) for values in (own, other))
+        size, driving = _rms(own), _rms(other)
         if not (np.isfinite(size) and size > PASSIVE_TORQUE * driving > 0):
             return ()
         numbers = {
@@ -233,6 +229,10 @@ class TableReader:
                 f"{values[row]}; "
                 f"{cut}; {accept}"
             )
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def reader_of(

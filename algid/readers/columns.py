@@ -91,7 +91,7 @@ def assign(
         named["t"] = profile.time
     sources, choice = _sources(path, available, named, profile)
     beside = {name: stated[column] for name, column in sources.items() if column in stated}
-    torques = [sources[name] for name in ("tau1", "tau2") if name in sources]
+    torques = _chosen(sources, ("tau1", "tau2"))
     units, foreign = _units(sources, choice, beside)
     currents = []
     for name in ("tau1", "tau2"):
@@ -114,8 +114,7 @@ def assign(
     of_time = profile.time_unit or units.get("t")
     if sources["t"] == "t" and all(sources[name] == name for name in profile.needed):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
-    angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
-    others = other_joints(available, angles)
+    others = other_joints(available, _chosen(sources, ("theta1", "theta2")))
     if profile.rate is not None:
         # any column has a cell in each row that is counted
         sources["t"] = sources[profile.needed[0]]
@@ -191,6 +190,11 @@ def _sources(
             f"{text}; name them: {_naming(missing)}{_or_a_rate(missing)}{_or_a_law(missing)}"
         )
     return sources, choice
+
+
+def _chosen(sources: Mapping[str, str], channels: Sequence[str]) -> list[str]:
+    """The columns of those channels that have one."""
+    return [sources[name] for name in channels if name in sources]
 
 
 def _leave_out(sources: dict[str, str], channels: Iterable[str]) -> None:
@@ -271,10 +275,16 @@ def _of_motors(
         if given in TORQUE:
             numbers = {"column": sources[name], "name": name, "given": given}
             yield Notice("CURRENT_AS_TORQUE", numbers=numbers)
-    here = [name for name in JOINT_CHANNELS if name in sources]
-    motors = [name for name in here if on_motor_side(sources[name])]
-    geared = [name for name in CHANNELS if "gear_ratio" in profile.channel(name).model_fields_set]
-    open_ones = [name for name in motors if name not in currents and name not in geared]
+    of_joints = False
+    open_ones = []
+    for name in JOINT_CHANNELS:
+        if name not in sources:
+            continue
+        geared = "gear_ratio" in profile.channel(name).model_fields_set
+        if not on_motor_side(sources[name]):
+            of_joints = True
+        elif name not in currents and not geared:
+            open_ones.append(name)
     if not open_ones:
         return
     named = ", ".join(f"{name} ({sources[name]})" for name in open_ones)
@@ -282,7 +292,7 @@ def _of_motors(
         {f"{name}.gear_ratio": None for name in open_ones},
         "tell the gear, turns of the motor in one of the joint, 1 for a direct drive",
     )
-    if len(motors) < len(here):
+    if of_joints:
         raise LogError(f"{path}: {named}: signals of motors beside those of joints; {gears}")
     yield Notice("MOTOR_SIDE", numbers={"columns": named}, remedies=(gears,))
 

@@ -56,10 +56,8 @@ class Room:
 
     def part(self, first: int, last: int) -> Room:
         """Samples `first` to `last` - 1 as views."""
-        omega, reference = (
-            None if signal is None else signal[:, first:last]
-            for signal in (self.omega, self.reference)
-        )
+        omega = None if self.omega is None else self.omega[:, first:last]
+        reference = None if self.reference is None else self.reference[:, first:last]
         return Room(
             self.stamp_ns[first:last],
             self.theta[:, first:last],
@@ -128,8 +126,7 @@ def laws_of(
     LogError
         If one lacks its gain or its desired angle, or brakes by velocities that are not recorded.
     """
-    first, second = (_law(path, joint, profile, mapping) for joint in (1, 2))
-    return first, second
+    return _law(path, 1, profile, mapping), _law(path, 2, profile, mapping)
 
 
 def _law(path: str, joint: int, profile: Profile, mapping: Mapping[str, str]) -> Law | None:
@@ -223,7 +220,9 @@ def channel_readings(
         If a torque is in amperes without a torque constant, or counts without counts a turn.
     """
     readings = {}
-    for name in [name for name in CHANNELS if name in mapping]:
+    for name in CHANNELS:
+        if name not in mapping:
+            continue
         joint = int(name[-1]) - 1
         like = f"theta{joint + 1}" if _is_desired(name, profile) else name
         channel = _channel(like, profile)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -185,11 +185,11 @@ def _lines(path: Path, kind: str, dialect: Dialect) -> Iterator[tuple[int, bytes
         If a line is no table's.
     """
     comment = dialect.comment.encode() if dialect.comment else b"\n"
-    marks = (dialect.separator.encode(), b'"')
+    separator = dialect.separator.encode()
     rest, number = b"", 0
     for piece in chain(_small(pieces(path, kind)), [b"\n"]):
         text = rest + piece
-        if not any(mark in text for mark in marks):
+        if separator not in text and b'"' not in text:
             number += text.count(b"\n")
             lines, rest = [], text[text.rfind(b"\n") + 1 :]
         else:
@@ -217,16 +217,25 @@ def _without_values(path: Path, kind: str, dialect: Dialect, columns: Columns) -
     if not separator:
         return 0
     comment = dialect.comment.encode() if dialect.comment else b"\n"
-    needed = [dialect.columns.index(column) for column in columns.sources.values()]
+    needed = _places(dialect, columns)
     suspects = _lines_without(min(needed), separator)
     lost = 0
     for text in _table(path, kind, dialect):
         for line in suspects.findall(text):
             if separator in line and not line.startswith(comment):
-                cells = line.split(separator)
-                values = [cells[place] for place in needed if place < len(cells)]
-                lost += not any(value.strip(b' \t\r"') for value in values)
+                lost += _is_empty(line.split(separator), needed)
     return lost
+
+
+def _is_empty(cells: list[bytes], places: Sequence[int]) -> bool:
+    """Whether the cells at some places of a row hold nothing."""
+    held = [cells[place].strip(b' \t\r"') for place in places if place < len(cells)]
+    return not any(held)
+
+
+def _places(dialect: Dialect, columns: Columns) -> list[int]:
+    """Where the cells of the channels stand in a row."""
+    return [dialect.columns.index(column) for column in columns.sources.values()]
 
 
 def _lines_without(place: int, separator: bytes) -> re.Pattern[bytes]:
@@ -280,7 +289,7 @@ def _parsed(
     if kind == "csv" and dialect.separator and ends_with_a_line(path):
         yield from scan(path, dialect.skip).collect_batches(chunk_size=rows)
         return
-    last = max(dialect.columns.index(column) for column in columns.sources.values())
+    last = max(_places(dialect, columns))
     skip, before = dialect.skip, b""
     for text in whole_lines(path, kind):
         if not text.endswith(b"\n"):
@@ -302,10 +311,14 @@ def _scan(
 
     whole = dialect.whole & {columns.sources["t"]}
     plain = set() if dialect.padded else set(columns.sources.values()) - dialect.dates
-    types = [
-        pl.String if column not in plain else pl.Int64 if column in whole else pl.Float64
-        for column in dialect.columns
-    ]
+    schema: dict[str, type[pl.DataType]] = {}
+    for place, column in enumerate(dialect.columns):
+        kind: type[pl.DataType] = pl.String
+        if column in plain:
+            kind = pl.Int64 if column in whole else pl.Float64
+        schema[str(place)] = kind
+    # polars drops cells past the last column without a word: one more column catches them
+    schema[_EXCESS] = pl.String
     frame = pl.scan_csv(
         source,
         has_header=False,
@@ -314,8 +327,7 @@ def _scan(
         comment_prefix=dialect.comment,
         skip_lines=skip,
         n_rows=most,
-        # polars drops cells past the last column without a word: one more column catches them
-        schema={**{str(place): type_ for place, type_ in enumerate(types)}, _EXCESS: pl.String},
+        schema=schema,
         missing_columns="insert",
         glob=False,
     )

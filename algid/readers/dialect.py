@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from algid.notices import Remedy
 from algid.options import flag
 from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
-from algid.words import counted
+from algid.words import counted, repeated
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|", "")
@@ -87,7 +86,7 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
     number, header = data[0]
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
-    separator = _separator(path, header, [line for _, line in data[1:20]])
+    separator = _separator(path, header, _texts(data[1:20]))
     first_row = 1
     if all(_is_number(cell) for cell in split(header, separator) if cell):
         cells, first_row = split(header, separator), 0
@@ -119,7 +118,7 @@ def described(path: Path, head: bytes) -> Dialect:
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
     """Numbered lines from the header on, which has as many cells as the numbers below it."""
     for first in range(min(len(data), LIMITS.title_lines)):
-        lines = [line for _, line in data[first : first + 5]]
+        lines = _texts(data[first : first + 5])
         if any(_begins_table(lines, separator) for separator in _SEPARATORS):
             return data[first:]
     return data
@@ -129,7 +128,7 @@ def _begins_table(lines: Sequence[str], separator: str) -> bool:
     """Whether the first line is a header, for it has as many cells as the numbers below it."""
     header, *rows = (split(line, separator) for line in lines)
     whole = rows if len(rows) < 2 else rows[:-1]  # the last line may break off
-    if len(header) < 2 or any(len(row) != len(header) for row in whole):
+    if len(header) < 2 or set(map(len, whole)) - {len(header)}:
         return False
     if len(rows) > 1 and _units(header, rows[0]):
         rows = rows[1:]
@@ -150,26 +149,29 @@ def _is_number(cell: str) -> bool:
 
 def _units(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
     """By column its unit, if every cell of a row names one or is empty; else nothing."""
-    texts = [cell.strip("[]() ") for cell in cells]
-    known = [bool(text) and (unit_of(text) is not None or is_foreign(text)) for text in texts]
-    if len(cells) != len(columns) or not any(known):
+    if len(cells) != len(columns):
         return {}
-    if not all(one or text in ("", "-", "1") for one, text in zip(known, texts, strict=True)):
-        return {}
-    return {column: text for column, text, one in zip(columns, texts, known, strict=True) if one}
+    units = {}
+    for column, cell in zip(columns, cells, strict=True):
+        text = cell.strip("[]() ")
+        if text and (unit_of(text) is not None or is_foreign(text)):
+            units[column] = text
+        elif text not in ("", "-", "1"):
+            return {}
+    return units
 
 
 def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
     """By column "Int64", "Float64" or "String", as far as the first lines tell."""
     lines = _lines(path, head)[found.skip :]
     lines = lines[:-1] or lines  # the last may break off in the middle of a number
-    rows = [line for _, line in _numbered(lines, found.comment)]
+    rows = _texts(_numbered(lines, found.comment))
     kinds = {}
     for column, cells in _cells_by_column(found.columns, rows, found.separator).items():
         kinds[column] = "String"
         if column in found.whole:
             kinds[column] = "Int64"
-        elif all(not cell or _is_number(cell) for cell in cells):
+        elif all(map(_is_number, filter(None, cells))):
             kinds[column] = "Float64"
     return kinds
 
@@ -235,6 +237,11 @@ def _numbered(lines: Sequence[str], comment: str | None) -> Iterator[tuple[int, 
             yield number, line
 
 
+def _texts(numbered: Iterable[tuple[int, str]]) -> list[str]:
+    """Lines without their numbers."""
+    return [line for _, line in numbered]
+
+
 def _separator(path: Path, header: str, rows: list[str]) -> str:
     for separator in _SEPARATORS:
         wanted = len(split(header, separator))
@@ -283,7 +290,7 @@ def _checked(
 ) -> Dialect:
     """The dialect of a table with such columns and numbered rows."""
     skip, first = data[0]
-    rows = [line for _, line in data]
+    rows = _texts(data)
     if len(columns) > LIMITS.columns:
         raise LogError(
             f"{path}: {counted(len(columns), 'column')}; expected {LIMITS.columns} at most"
@@ -294,9 +301,9 @@ def _checked(
             f"{path}: line {skip + 1} has {counted(len(cells), 'cell')} under a header "
             f"of {len(columns)}; mend the header"
         )
-    repeated = sorted(name for name, count in Counter(columns).items() if name and count > 1)
-    if repeated:
-        raise LogError(f"{path}: the column {repeated[0]!r} stands in the header twice; rename one")
+    twice = repeated(filter(None, columns))
+    if twice:
+        raise LogError(f"{path}: the column {min(twice)!r} stands in the header twice; rename one")
     comma = padded = False
     if separator != ",":
         comma = any(_has_decimal_comma(row, separator) for row in rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +11,19 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.readers.assemble import TableReader
 from algid.readers.columns import Columns, assign
-from algid.readers.frames import cells, flat_reader, number, of_numbers, timed_by_index
+from algid.readers.frames import (
+    cells,
+    flat_reader,
+    numbers_of,
+    of_numbers,
+    roots_of,
+    timed_by_index,
+    types_of,
+)
 from algid.readers.ipc import claims
 from algid.readers.natives import natively
 from algid.readers.parquet import units_of_schema
-from algid.words import counted
+from algid.words import counted, repeated
 
 if TYPE_CHECKING:
     import polars as pl
@@ -40,7 +47,7 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
     cells_by_name = cells(kinds, file.width)
     # of types that hold no numbers
     other = [name for name in file.schema.names if name not in kinds]
-    roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
+    roots = roots_of(cells_by_name)
     units = units_of_schema(file.schema, roots)
     profile = timed_by_index(profile, kinds)
     columns = assign(str(path), list(cells_by_name) + other, profile, units)
@@ -50,11 +57,11 @@ def open_feather(path: Path, profile: Profile) -> TableReader:
             raise LogError(
                 f"{path}: column {source!r} for {name} holds {str(kind)[:80]}; expected numbers"
             )
-    types: dict[str, pl.DataType] = {name: kind for name, (_, kind) in cells_by_name.items()}
-    columns = of_numbers(str(path), columns, types | dict.fromkeys(other, pl.Null()))
+    types = types_of(cells_by_name) | dict.fromkeys(other, pl.Null())
+    columns = of_numbers(str(path), columns, types)
 
     def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
-        numbers = [number(name, *cells_by_name[source]) for name, source in columns.sources.items()]
+        numbers = numbers_of(columns, cells_by_name)
         read = 0
         for frame in file.frames({roots[source] for source in columns.sources.values()}, rows):
             if most is not None:
@@ -80,8 +87,7 @@ class Feather:
         import pyarrow as pa
 
         with natively(self.path, "feather"):
-            taken = pa.schema([field for field in self.schema if _is_taken(field.type)])
-            return dict(self._taken(pa.Table.from_batches([], schema=taken)).schema)
+            return dict(self._taken(pa.Table.from_batches([], schema=self.schema)).schema)
 
     def width(self, column: str) -> int:
         """Cells of the longest list of a column in the first rows."""
@@ -145,7 +151,7 @@ def opened(path: Path) -> Feather:
         raise LogError(
             f"{path}: {counted(len(schema), 'column')}; expected {LIMITS.columns} at most"
         )
-    twice = [name for name, count in Counter(schema.names).items() if count > 1]
+    twice = repeated(schema.names)
     if twice:
         raise LogError(f"{path}: the column {twice[0][:80]!r} stands in the file twice; rename one")
     return Feather(path, schema, rows)

@@ -48,7 +48,7 @@ class Pages:
     def first(self) -> int:
         """Where the first of them stands; 0 where that is not stated."""
         offsets = (self.numbers.get(number, 0) for number in (_DICTIONARY, _DATA))
-        return min((offset for offset in offsets if offset), default=0)
+        return min(filter(None, offsets), default=0)
 
     @property
     def end(self) -> int:

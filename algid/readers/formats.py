@@ -7,7 +7,7 @@ is a module and an entry.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -187,8 +187,12 @@ def _open_parquet(path: Path, profile: Profile) -> TableReader:
 def _parquet_entries(path: Path) -> Entries:
     from algid.readers.parquet import counted_rows, schema_of
 
-    rows = _known(lambda: counted_rows(path))
-    return tuple(Entry(name, str(kind), rows) for name, kind in schema_of(path).items())
+    return _entries(schema_of(path), _known(lambda: counted_rows(path)))
+
+
+def _entries(kinds: Mapping[str, object], rows: int | None) -> Entries:
+    """The columns of so many rows with the names of their types."""
+    return tuple(Entry(name, str(kind), rows) for name, kind in kinds.items())
 
 
 def _open_csv(kind: str, path: Path, profile: Profile) -> TableReader:
@@ -204,7 +208,7 @@ def _csv_entries(kind: str, path: Path) -> Entries:
     head = head_of(path, kind)
     dialect = described(path, head)
     rows = _known(lambda: counted_rows(path, kind, dialect))
-    return tuple(Entry(name, dtype, rows) for name, dtype in kinds(path, head, dialect).items())
+    return _entries(kinds(path, head, dialect), rows)
 
 
 def _known(count: Callable[[], int]) -> int | None:
@@ -225,8 +229,8 @@ def _array_entries(kind: str, path: Path) -> Entries:
     from algid.readers.arrays import contents_of
 
     content, others = contents_of(path, kind)
-    columns = [Entry(name, str(dtype), content.rows) for name, dtype in content.schema.items()]
-    return (*columns, *(Entry(name, "of another length") for name in others))
+    columns = _entries(content.schema, content.rows)
+    return columns + _entries(dict.fromkeys(others, "of another length"), None)
 
 
 def _open_feather(path: Path, profile: Profile) -> TableReader:
@@ -385,5 +389,4 @@ def in_memory(given: object) -> tuple[str, Entries]:
     from algid.readers.memory import content_of
 
     kind, content = content_of(given)
-    columns = [Entry(name, str(dtype), content.rows) for name, dtype in content.schema.items()]
-    return kind, tuple(columns)
+    return kind, _entries(content.schema, content.rows)

@@ -129,6 +129,25 @@ def cells(
     return by_name
 
 
+Cells = Mapping[str, tuple["pl.Expr", "pl.DataType"]]
+"""Expression and type of every cell of a row by name."""
+
+
+def types_of(cells: Cells) -> dict[str, pl.DataType]:
+    """The type of each cell."""
+    return {name: kind for name, (_, kind) in cells.items()}
+
+
+def roots_of(cells: Cells) -> dict[str, str]:
+    """The column that each cell is taken from."""
+    return {name: cell.meta.root_names()[0] for name, (cell, _) in cells.items()}
+
+
+def numbers_of(columns: Columns, cells: Cells) -> list[pl.Expr]:
+    """The number of each channel out of a row's cells."""
+    return [number(name, *cells[source]) for name, source in columns.sources.items()]
+
+
 INDEX = "__index_level_0__"
 """What pandas calls an index without a name where a frame becomes Arrow or Parquet."""
 
@@ -300,7 +319,8 @@ def tables(
             ) from error
         if unit and not (done or columns.time_stated):
             notices += _slow(columns.sources["t"], stamps, unit)
-        channels = {name: values for name, values in frame.items() if name != "t"}
+        channels = dict(frame)
+        del channels["t"]
         done += times.size
         yield SampleTable(stamps, channels, tuple(notices))
     wrong = [name for name, total in seen.items() if total != expected[name]]
@@ -329,7 +349,7 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
 
 
 def _whole_rows(frame: pl.DataFrame) -> WholeRows:
-    cut_off = bool(frame.height) and any(value is None for value in frame.row(-1))
+    cut_off = bool(frame.height) and None in frame.row(-1)
     whole = frame.drop_nulls() if any(frame.null_count().row(0)) else frame
     columns = {name: whole[name].to_numpy() for name in whole.columns}
     return WholeRows(columns, frame.height - whole.height, cut_off)

@@ -91,9 +91,8 @@ def _read(path: str, most_bytes: int, most_arrays: int) -> dict[str, NDArray[Any
             and not (one.is_virtual or one.external)
             and not name.startswith("#")
         ):
-            kinds = one.dtype.names or ()
-            fields = {f"{name}/{field}": one.dtype[field] for field in kinds} or {name: one.dtype}
-            if one.ndim <= 2 and all(kind.kind in "iuf" for kind in fields.values()):
+            kinds = [one.dtype[field] for field in one.dtype.names or ()] or [one.dtype]
+            if one.ndim <= 2 and all(kind.kind in "iuf" for kind in kinds):
                 by_path[name] = one
 
     with h5py.File(path, "r") as file:
@@ -108,11 +107,11 @@ def _read(path: str, most_bytes: int, most_arrays: int) -> dict[str, NDArray[Any
             _check_stored(name, one)
             values = one[()]
             plain = name.replace("/", ".")
-            arrays |= (
-                {f"{plain}.{field}": values[field] for field in values.dtype.names}
-                if values.dtype.names
-                else {plain: np.atleast_1d(values)}
-            )
+            if not values.dtype.names:
+                arrays[plain] = np.atleast_1d(values)
+                continue
+            for field in values.dtype.names:
+                arrays[f"{plain}.{field}"] = values[field]
     return arrays
 
 
@@ -128,7 +127,7 @@ def _check_stored(name: str, one: Any) -> None:
         stored, expected, unit = one.id.get_storage_size(), one.nbytes, "bytes"
     else:
         stored, unit = one.id.get_num_chunks(), "chunks"
-        counts = [-(-size // chunk) for size, chunk in zip(one.shape, one.chunks, strict=True)]
+        counts = -(-np.array(one.shape) // np.array(one.chunks))
         expected = int(np.prod(counts)) if one.size else stored
     if stored != expected:
         raise ValueError(

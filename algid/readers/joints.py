@@ -52,9 +52,16 @@ _FROM_BASE_TO_TIP = (
     ("wrist", "ankle", "hand", "foot", "tip", "bucket", "third"),
 )
 _ALSO_SECOND = ("secondary", "tilt")
-_RANKS = {
-    word: rank for rank, words in enumerate(_FROM_BASE_TO_TIP) for word in words
-} | dict.fromkeys(_ALSO_SECOND, 2)
+
+
+def _rank_by_word() -> dict[str, int]:
+    ranks = dict.fromkeys(_ALSO_SECOND, 2)
+    for rank, words in enumerate(_FROM_BASE_TO_TIP):
+        ranks |= dict.fromkeys(words, rank)
+    return ranks
+
+
+_RANKS = _rank_by_word()
 _LETTERS = {"a": 1, "b": 2, "i": 1, "ii": 2, "one": 1, "two": 2}
 
 
@@ -123,8 +130,7 @@ def _ranks(first: str, second: str) -> tuple[int, int] | None:
 
 def _place(words: Sequence[str]) -> int | None:
     """What the first word, or pair of words, that stands for a place on an arm says."""
-    pairs = [f"{before}_{after}" for before, after in pairwise(words)]
-    for word in pairs + list(words):
+    for word in [*map("_".join, pairwise(words)), *words]:
         if word in _RANKS:
             return _RANKS[word]
     return None
@@ -149,11 +155,12 @@ def moving_joints(
     Where they move, the two-link model lacks their torque. `positions` has by joint the path of
     its position, in `unit` rad.
     """
-    # no name of which is a stamp's
-    joints = {f"joint {number}": joint for number, joint in enumerate(positions)}
+    joints, places = {}, {}
+    for number, (joint, place) in enumerate(positions.items()):
+        name = f"joint {number}"  # none is called as a stamp is
+        joints[name], places[name] = joint, place
     if not joints:
         return ()
-    places = {name: positions[joint] for name, joint in joints.items()}
     table = None
     try:
         for table in tables(places):

@@ -103,9 +103,10 @@ def _depth_of(line: bytes) -> float:
         return 0
     while level := [one for one in level if isinstance(one, list | dict)]:
         deepest += 1
-        level = [
-            inner for one in level for inner in (one.values() if isinstance(one, dict) else one)
-        ]
+        inner: list[object] = []
+        for one in level:
+            inner += one.values() if isinstance(one, dict) else one
+        level = inner
     return deepest
 
 

@@ -116,7 +116,7 @@ def _frame(given: Columns) -> tuple[pl.DataFrame, dict[str, str]]:
             raise LogError(
                 f"{NAME}: the frame cannot be taken over ({reason}); give columns of numbers"
             ) from error
-        units = units_of_schema(table.schema, {name: name for name in table.column_names})
+        units = units_of_schema(table.schema)
 
     def width(column: str) -> int:
         first = frame[column].drop_nulls().head(1)

@@ -11,6 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import chain
 
 from algid.limits import LIMITS
 from algid.readers.joints import along_the_arm
@@ -78,9 +79,7 @@ _NO_JOINTS = frozenset(
     )
 )
 """Words before or behind a stem that name no joint."""
-_STEMS = sorted(
-    {stem for known in STEMS.values() for stem in known}, key=lambda stem: (-len(stem), stem)
-)
+_STEMS = sorted(set(chain.from_iterable(STEMS.values())), key=lambda stem: (-len(stem), stem))
 """The stems of every quantity, the longest first."""
 _MOTOR_SIDE = frozenset({"motor", "rotor", "drive"})
 _BRACKET_UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
@@ -203,7 +202,7 @@ def choose(
         If a quantity stands there for more than two joints and `joints` does not choose, if there
         are no such joints, or if two columns have one name but for its writing.
     """
-    parts = {column: take_apart(column) for column in columns}
+    parts = _parts_of(columns)
     chosen = _pairs(parts, joints)
     if not set(needed) <= chosen.keys():
         states = parts | _of_states(parts)
@@ -248,6 +247,11 @@ def _joints_of(parts: dict[str, Name]) -> list[str]:
         if name.joint and name.stem in _STEMS and name.own not in joints:
             joints.append(name.own)
     return joints
+
+
+def _parts_of(columns: Iterable[str]) -> dict[str, Name]:
+    """The parts of each column's name."""
+    return {column: take_apart(column) for column in columns}
 
 
 def _refuse_twin(column: str, parts: dict[str, Name]) -> None:
@@ -326,11 +330,14 @@ _NO_NAMES = frozenset(
 
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
     """Angle columns by joint of the joints that are not read, named alike those in `angles`."""
-    parts = {column: take_apart(column) for column in columns}
+    parts = _parts_of(columns)
     parts |= _worded(parts)
-    read = [parts[column] for column in angles]
-    kinds = {(name.stem, name.topic) for name in read if name.stem not in _NO_NAMES}
-    joints = {name.joint for name in read}
+    kinds, joints = set(), set()
+    for column in angles:
+        name = parts[column]
+        joints.add(name.joint)
+        if name.stem not in _NO_NAMES:
+            kinds.add((name.stem, name.topic))
     others = {}
     for column, name in parts.items():
         if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds:
@@ -419,7 +426,7 @@ def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, st
 
 def has_a_time(columns: Iterable[str]) -> bool:
     """Whether a column is a time by its name."""
-    return _time({column: take_apart(column) for column in columns}) is not None
+    return _time(_parts_of(columns)) is not None
 
 
 def _time(parts: dict[str, Name]) -> str | None:

@@ -28,12 +28,15 @@ from algid.readers.footer import Footer, FooterError, Pages, page_header, parsed
 from algid.readers.frames import (
     INDEX,
     NO_COMPANION,
+    Cells,
     WholeRows,
     cells,
     flat_reader,
-    number,
+    numbers_of,
     of_numbers,
+    roots_of,
     timed_by_index,
+    types_of,
 )
 from algid.readers.stated import in_metadata
 from algid.words import counted
@@ -72,14 +75,14 @@ def _of_plain_numbers(path: Path, profile: Profile) -> TableReader | None:
     except (pa.ArrowException, OSError, ValueError):
         return None
     names = list(schema.names)
-    nested = any(pa.types.is_nested(kind) for kind in schema.types)
+    nested = any(map(pa.types.is_nested, schema.types))
     dated = INDEX in names and pa.types.is_temporal(schema.field(INDEX).type)
     if nested or dated or len(set(names)) < len(names):
         return None
     _refuse_wide(path, names)
     companion = _companion(path, metadata)
     rows = counted_rows(path)
-    units = units_of_schema(schema, {name: name for name in names})
+    units = units_of_schema(schema)
     columns = _assigned(path, names, profile, units, companion)
     kinds = dict(zip(names, schema.types, strict=True))
     wanted = set(columns.sources.values()) | set(columns.others.values())
@@ -119,14 +122,13 @@ def _of_any_cells(path: Path, profile: Profile) -> TableReader:
         companion = _companion(path, metadata)
         cells_by_name = cells(schema, width)
         rows = counted_rows(path)
-    roots = {name: cell.meta.root_names()[0] for name, (cell, _) in cells_by_name.items()}
+    roots = roots_of(cells_by_name)
     try:
         units = units_of_schema(metadata.schema.to_arrow_schema(), roots)
     except (pa.ArrowException, OSError, ValueError):  # types that polars reads and pyarrow does not
         units = {}
     columns = _assigned(path, list(cells_by_name), profile, units, companion)
-    types = {name: kind for name, (_, kind) in cells_by_name.items()}
-    columns = of_numbers(str(path), columns, types)
+    columns = of_numbers(str(path), columns, types_of(cells_by_name))
     groups = _Groups(path, cells_by_name, roots, companion.sums)
     return flat_reader(str(path), "parquet", columns, groups.frames, profile, rows, companion)
 
@@ -218,11 +220,13 @@ def counted_rows(path: Path) -> int:
     return footer.rows
 
 
-def units_of_schema(schema: pa.Schema, roots: Mapping[str, str]) -> dict[str, str]:
+def units_of_schema(schema: pa.Schema, roots: Mapping[str, str] | None = None) -> dict[str, str]:
     """By name the unit that an Arrow schema's metadata state.
 
-    `roots` are the fields that the names belong to.
+    `roots` are the fields that the names belong to; without them the names are the fields' own.
     """
+    if roots is None:
+        roots = dict(zip(schema.names, schema.names, strict=True))
     units = in_metadata(_decoded(schema.metadata), list(roots))
     times = Counter(schema.names)
     for name, root in roots.items():
@@ -308,7 +312,7 @@ class _Groups:
     """
 
     path: Path
-    cells: Mapping[str, tuple[pl.Expr, pl.DataType]]
+    cells: Cells
     roots: Mapping[str, str]
     sums: Mapping[str, int]
     checked: bool = False
@@ -327,7 +331,7 @@ class _Groups:
         frame = pl.scan_parquet(self.path, glob=False)
         if most is not None:
             frame = frame.head(most)
-        numbers = [number(name, *self.cells[source]) for name, source in columns.sources.items()]
+        numbers = numbers_of(columns, self.cells)
         # both joints in one lot: they may share a list column
         middle = (len(numbers) // 2 + 1) // 2 * 2
         with _readable(self.path):

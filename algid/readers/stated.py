@@ -26,7 +26,7 @@ _STATEMENT = re.compile(
     re.IGNORECASE,
 )
 _UNITS_LINE = re.compile(r"^\s*units?\s*[:=]\s*(?P<list>.+)$", re.IGNORECASE)
-_WORDS = {
+_WORDS: dict[str, set[str]] = {
     "theta": {*STEMS["theta"], "joint angles", "joint positions"},
     "omega": {*STEMS["omega"], "speeds"},
     "tau": {*STEMS["tau"], "motor_torques", "joint_torques"},
@@ -107,14 +107,12 @@ def _statements(line: str, columns: _Named) -> Stated:
             *others, last = re.split(r" ?(?:,|&|\band\b) ?", match["names"])
             yield columns.of(last), unit
             for name in others:
-                yield (
-                    [
-                        one
-                        for one in columns.of(name)
-                        if unit_of(unit) in _UNITS.get(_quantity(one) or "", {})
-                    ],
-                    unit,
-                )
+                yield [one for one in columns.of(name) if _can_have(one, unit)], unit
+
+
+def _can_have(column: str, unit: str) -> bool:
+    """Whether a column is of a quantity that is measured in a unit."""
+    return unit_of(unit) in _UNITS.get(_quantity(column) or "", {})
 
 
 def _listed(text: str, columns: _Named) -> Stated:
@@ -123,7 +121,8 @@ def _listed(text: str, columns: _Named) -> Stated:
     if not all(map(_is_unit, units)):
         yield from _statements(text, columns)
     elif len(units) == len(columns.names):
-        yield from (([column], unit) for column, unit in zip(columns.names, units, strict=True))
+        for column, unit in zip(columns.names, units, strict=True):
+            yield [column], unit
     else:
         for quantity, known in _UNITS.items():
             own = {unit for unit in units if unit_of(unit) in known and "/" not in unit}
@@ -162,24 +161,25 @@ class _Named:
             return self._columns.get((part.stem, part.joint), [])
         if (part.stem,) in self._columns:
             return self._columns[(part.stem,)]
-        meant = (
-            one for one, words in _WORDS.items() if part.stem in words or f"{part.stem}s" in words
-        )
-        quantity = next(meant, None)
+        quantity = _called(part.stem, f"{part.stem}s")
         return (
             [] if quantity is None else self._columns.get((quantity, part.stem in CURRENTS, ""), [])
         )
 
     def of_quantity(self, quantity: str) -> Sequence[str]:
         """The columns of a quantity, measured or as a current."""
-        return [
-            one
-            for current in (False, True)
-            for one in self._columns.get((quantity, current, ""), [])
-        ]
+        measured = self._columns.get((quantity, False, ""), [])
+        return measured + self._columns.get((quantity, True, ""), [])
 
 
 def _quantity(column: str) -> str | None:
     """The quantity that a column's name tells."""
-    stem = take_apart(column).stem
-    return next((quantity for quantity, words in _WORDS.items() if stem in words), None)
+    return _called(take_apart(column).stem)
+
+
+def _called(*names: str) -> str | None:
+    """The quantity that goes by one of the names."""
+    for quantity, words in _WORDS.items():
+        if not words.isdisjoint(names):
+            return quantity
+    return None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.blocks import concatenated, rows_of
 from algid.log import IntArray
 from algid.notices import Notice
 
@@ -40,13 +41,12 @@ class SampleTable:
 
     def part(self, first: int, last: int) -> SampleTable:
         """Rows `first` to `last` - 1 as views; the notices stay with the first part."""
-        columns = {name: values[first:last] for name, values in self.columns.items()}
+        columns = rows_of(self.columns, slice(first, last))
         return SampleTable(self.stamp_ns[first:last], columns, self.notices if first == 0 else ())
 
     def take(self, rows: IntArray | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> SampleTable:
         """The rows of an index or mask, with all notices."""
-        columns = {name: values[rows] for name, values in self.columns.items()}
-        return SampleTable(self.stamp_ns[rows], columns, self.notices)
+        return SampleTable(self.stamp_ns[rows], rows_of(self.columns, rows), self.notices)
 
     def noting(self, *notices: Notice) -> SampleTable:
         """The table with more notices."""
@@ -59,12 +59,13 @@ def stack(tables: Sequence[SampleTable]) -> SampleTable:
     """One table out of several with the same channels, in their order."""
     if len(tables) == 1:
         return tables[0]
-    columns = {
-        name: np.concatenate([table.columns[name] for table in tables])
-        for name in tables[0].columns
-    }
-    notices = tuple(notice for table in tables for notice in table.notices)
-    return SampleTable(np.concatenate([table.stamp_ns for table in tables]), columns, notices)
+    stamps, columns = [], []
+    notices: tuple[Notice, ...] = ()
+    for table in tables:
+        stamps.append(table.stamp_ns)
+        columns.append(table.columns)
+        notices += table.notices
+    return SampleTable(np.concatenate(stamps), concatenated(columns), notices)
 
 
 def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:

@@ -135,16 +135,18 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
         )
     kept = order[fresh]
     gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
-    same = np.all(
-        [_equal(values[gone], values[instead]) for values in table.columns.values()], axis=0
-    )
+    same = _alike(table, gone, instead)
     late, lost = np.count_nonzero(moved > 0), gone.size - np.count_nonzero(same)
     return table.take(kept), (int(late), repeated, int(lost))
 
 
-def _equal(one: FloatArray, other: FloatArray) -> NDArray[np.bool_]:
-    """Which values are the same; what is missing in both is."""
-    return np.asarray((one == other) | (np.isnan(one) & np.isnan(other)))
+def _alike(table: SampleTable, rows: IntArray, others: IntArray) -> NDArray[np.bool_]:
+    """Which rows (R,) hold what the others (R,) hold; what is missing in both is the same."""
+    same = np.ones(rows.size, np.bool_)
+    for values in table.columns.values():
+        one, other = values[rows], values[others]
+        same &= (one == other) | (np.isnan(one) & np.isnan(other))
+    return same
 
 
 def set_back(table: SampleTable) -> int | None:
@@ -171,9 +173,7 @@ def set_back(table: SampleTable) -> int | None:
         nearer = np.abs(stamps[left] - stamps[run]) < np.abs(stamps[nearest] - stamps[run])
         nearest = np.where(nearer, left, nearest)
         crowded = np.abs(stamps[nearest] - stamps[run]) <= period / 2
-        again = np.all(
-            [_equal(values[nearest], values[run]) for values in table.columns.values()], axis=0
-        )
+        again = _alike(table, nearest, run)
         if np.count_nonzero(crowded & ~again) > run.size / 2:
             return int(run[0]) - 1
     return None
@@ -257,7 +257,7 @@ def aligned(
     units, and has the `notices`.
     """
     lost, held = 0, None
-    between = dict.fromkeys((other.topic for other in others), False)
+    between: set[str] = set()
     for table in main:
         if held is not None:
             yield held
@@ -269,15 +269,17 @@ def aligned(
         columns = dict(kept.columns)
         for other in others:
             columns |= other.at(kept.stamp_ns)
-            between[other.topic] |= not other.holds(kept.stamp_ns)
+            if not other.holds(kept.stamp_ns):
+                between.add(other.topic)
         for other in beside:
             known = other.covers(kept.stamp_ns)
             at_stamps = other.at(kept.stamp_ns)
-            columns |= {name: np.where(known, values, np.nan) for name, values in at_stamps.items()}
+            for name, values in at_stamps.items():
+                columns[name] = np.where(known, values, np.nan)
         held = SampleTable(kept.stamp_ns, columns, kept.notices)
     said = list(notices)
     for other in others:
-        if between[other.topic]:
+        if other.topic in between:
             rate = 1e9 / other.period if other.period else 0.0
             numbers = {"topic": other.topic, "rate": rate, "error": other.error()}
             said.append(Notice("ALIGNED", numbers=numbers))

@@ -34,11 +34,15 @@ def bag_files(folder: Path) -> Bag:
     if metadata.is_file():
         names = _listed(metadata)
     else:
-        names = [path.name for path in folder.glob("*.mcap")]
-        names += [path.name for path in folder.glob("*.db3")]
-        names.sort(key=_numbered)
-    paths = [folder / name for name in names]
-    there = [path for path in paths if path.is_file()]
+        parts = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
+        names = sorted((path.name for path in parts), key=_numbered)
+    there, missing = [], []
+    for name in names:
+        path = folder / name
+        if path.is_file():
+            there.append(path)
+        else:
+            missing.append(name)
     if not there:
         raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
     kinds = {path.suffix for path in there}
@@ -47,9 +51,8 @@ def bag_files(folder: Path) -> Bag:
             f"{folder}: the bag mixes files of {', '.join(sorted(kinds))}; read one file of it"
         )
     notices = []
-    missing = [path.name for path in paths if path not in there]
     if missing:
-        counts = {"missing": len(missing), "files": len(paths), "names": ", ".join(missing[:3])}
+        counts = {"missing": len(missing), "files": len(names), "names": ", ".join(missing[:3])}
         notices.append(Notice("MISSING_SPLIT", numbers=counts, lossy=True))
     return Bag(tuple(there), kinds.pop().lstrip("."), tuple(notices))
 
@@ -78,7 +81,7 @@ def _listed(metadata: Path) -> list[str]:
     if block is not None:
         lines = block[1].splitlines()
     elif flow is not None:
-        lines = [one for one in flow[1].split(",") if one.strip()]
+        lines = list(filter(str.strip, flow[1].split(",")))
     else:
         raise LogError(
             f"{metadata}: no relative_file_paths; expected the metadata of a rosbag2 folder"

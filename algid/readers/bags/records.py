@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from algid.limits import LIMITS
 from algid.log import IntArray
-from algid.readers.messages.batch import Messages, gather
+from algid.readers.messages.batch import Messages, beside, gather
 from algid.readers.messages.source import MessageChannel
 from algid.words import counted
 
@@ -217,15 +217,12 @@ def _between(content: bytes, starts: IntArray, ends: IntArray) -> Others | None:
 
     None where anything else stands there, or is missing.
     """
-    gaps = np.flatnonzero(ends[:-1] != starts[1:])
-    if gaps.size > LIMITS.index_gaps or ends[-1] > len(content):
+    borders = beside(starts, ends, len(content))
+    if borders is None:
         return None
-    borders = [(0, int(starts[0])), *((int(ends[one]), int(starts[one + 1])) for one in gaps)]
     others: Others = []
     try:
-        for first, last in [*borders, (int(ends[-1]), len(content))]:
-            if first > last:
-                return None
+        for first, last in borders:
             for fields, start, end in _inside(content, first, last):
                 if fields.get("op") != bytes([CONNECTION]):
                     return None

@@ -67,6 +67,11 @@ class BagPart:
     loose: bool = False
     indexes: dict[int, tuple[int, int]] = field(default_factory=dict)
 
+    @property
+    def counts(self) -> dict[int, int]:
+        """The messages by connection, of those that have any."""
+        return {number: count for number, (_, count) in self.indexes.items() if count}
+
 
 @dataclass
 class BagLayout:
@@ -250,7 +255,8 @@ class _Outline:
         self._indexed_counts[record.number("chunk_pos", 8)] = {
             number: count for number, count in pairs if count
         }
-        self._times += [nanoseconds(record.number(name, 8)) for name in ("start_time", "end_time")]
+        for name in ("start_time", "end_time"):
+            self._times.append(nanoseconds(record.number(name, 8)))
 
     def broken(self, place: int, why: str) -> None:
         """Note that nothing is read from byte `place` on."""
@@ -278,10 +284,9 @@ class _Outline:
         head, summary = self._head, self._found
         if head is None or head.number("index_pos", 8) == 0:
             return "it was not closed, so what its recorder still held is lost", True
-        own = {
-            start: {number: count for number, (_, count) in part.indexes.items() if count}
-            for start, part in zip(self._starts, summary.parts, strict=True)
-        }
+        own = {}
+        for start, part in zip(self._starts, summary.parts, strict=True):
+            own[start] = part.counts
         chunks, connections = head.number("chunk_count"), head.number("conn_count")
         if chunks != len(summary.parts):
             return (
@@ -313,7 +318,7 @@ class Ros1Source(Source):
         if layout.agreed:
             self.counts = dict.fromkeys(self.channels, 0)
             for part in layout.parts:
-                for number, (_, count) in part.indexes.items():
+                for number, count in part.counts.items():
                     self.counts[number] = self.counts.get(number, 0) + count
         else:
             self._define_inside()
@@ -352,9 +357,8 @@ class Ros1Source(Source):
         for part in self._layout.parts:
             if self._layout.agreed and not channels & part.indexes.keys():
                 continue
-            promised = sum(
-                count for number, (_, count) in part.indexes.items() if number in channels
-            )
+            counts = part.counts
+            promised = sum(counts.get(number, 0) for number in channels)
             place = f"(at byte {part.start})"
             try:
                 records, others = self._records(part)

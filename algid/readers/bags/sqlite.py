@@ -120,15 +120,14 @@ def _contents(path: Path, base: sqlite3.Connection) -> Contents:
     if len(topics) > LIMITS.bag_topics:
         raise LogError(f"{path}: more than {LIMITS.bag_topics} topics; expected a bag of rosbag2")
     definitions = _definitions(path, base)
-    channels = {
-        int(number): _channel(str(name), str(kind), str(encoding), definitions)
-        for number, name, kind, encoding in topics
-        if isinstance(number, int)
-    }
+    channels = {}
+    for number, name, kind, encoding in topics:
+        if isinstance(number, int):
+            channels[number] = _channel(str(name), str(kind), str(encoding), definitions)
     each = "".join(f", TOTAL(topic_id IS {number})" for number in channels)
     query = f"SELECT COUNT(*), MIN(timestamp), MAX(timestamp){each} FROM messages NOT INDEXED"
     rows, first, last, *sums = base.execute(query).fetchone()
-    counts = {number: int(count) for number, count in zip(channels, sums, strict=True)}
+    counts = dict(zip(channels, map(int, sums), strict=True))
     span = (first, last) if type(first) is type(last) is int else None
     return Contents(channels, counts, span, rows - sum(counts.values()))
 
@@ -150,7 +149,10 @@ def _check_table(path: Path, base: sqlite3.Connection, table: str, needed: set[s
 def _columns(base: sqlite3.Connection, table: str) -> dict[str, bool]:
     """The columns of a table, and whether each is stored as it is, not computed."""
     rows = base.execute(f"PRAGMA table_xinfo({table})").fetchmany(LIMITS.columns)
-    return {str(name): hidden == 0 for _, name, _, _, _, _, hidden in rows}
+    columns = {}
+    for _, name, _, _, _, _, hidden in rows:
+        columns[str(name)] = hidden == 0
+    return columns
 
 
 def _definitions(path: Path, base: sqlite3.Connection) -> dict[str, tuple[str, bytes]]:
@@ -166,8 +168,11 @@ def _definitions(path: Path, base: sqlite3.Connection) -> dict[str, tuple[str, b
         "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions NOT "
         "INDEXED"
     )
-    rows = itertools.islice(base.execute(query), LIMITS.bag_topics)
-    return {str(kind): (str(encoding), str(text).encode()) for kind, encoding, text in rows if text}
+    definitions = {}
+    for kind, encoding, text in itertools.islice(base.execute(query), LIMITS.bag_topics):
+        if text:
+            definitions[str(kind)] = str(encoding), str(text).encode()
+    return definitions
 
 
 def _channel(
@@ -228,7 +233,7 @@ class SqliteSource(Source):
         LogError
             Where there are more messages than a file of this size can hold.
         """
-        numbers = ",".join(str(number) for number in sorted(channels))
+        numbers = ",".join(map(str, sorted(channels)))
         query = (
             f"SELECT timestamp, data FROM messages NOT INDEXED WHERE topic_id IN ({numbers}) "
             "ORDER BY rowid"

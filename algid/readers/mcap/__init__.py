@@ -101,12 +101,14 @@ class McapSource(Source):
 
     def used(self) -> frozenset[int]:
         """The channels that have messages, as far as the file tells."""
-        spans = self._found.spans
-        if self.counts is None and all(span.channels is not None for span in spans):
-            return frozenset(self.channels) & frozenset[int]().union(
-                *(span.channels or () for span in spans)
-            )
-        return super().used()
+        if self.counts is not None:
+            return super().used()
+        used: set[int] = set()
+        for span in self._found.spans:
+            if span.channels is None:
+                return super().used()
+            used |= span.channels
+        return frozenset(used.intersection(self.channels))
 
     def truth(self) -> Truth | None:
         """What the metadata tell of a simulated arm."""

@@ -292,13 +292,15 @@ def _end(chunk: ChunkIndex) -> int:
 
 def between(chunks: list[ChunkIndex], end: int) -> list[tuple[int, int]]:
     """Bytes [start, end) between chunks and their indexes, in file order up to the summary."""
-    ends = [_end(chunk) for chunk in chunks]
-    starts = [chunk.chunk_start_offset for chunk in chunks]
-    return [
-        pair
-        for pair in zip([len(framing.MAGIC), *ends], [*starts, end], strict=True)
-        if pair[0] != pair[1]
-    ]
+    apart = []
+    last = len(framing.MAGIC)
+    for chunk in chunks:
+        if chunk.chunk_start_offset != last:
+            apart.append((last, chunk.chunk_start_offset))
+        last = _end(chunk)
+    if last != end:
+        apart.append((last, end))
+    return apart
 
 
 def _walked(file: File) -> Catalogue:
@@ -374,10 +376,11 @@ class _Spans:
 
     def all(self) -> list[Span]:
         """The spans so far."""
-        return [
-            Span(start, length, max(0, kind), loose=kind == _LOOSE, torn=kind == _TORN)
-            for start, length, kind in self._places
-        ]
+        spans = []
+        for start, length, kind in self._places:
+            loose, torn = kind == _LOOSE, kind == _TORN
+            spans.append(Span(start, length, max(0, kind), loose=loose, torn=torn))
+        return spans
 
 
 def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -> list[Notice]:
@@ -389,10 +392,13 @@ def _missing(file: File, gaps: list[Gap], ended: int | None, found: Catalogue) -
     last = inside.pop() if inside and inside[-1].end == file.size else None
     said = []
     if inside:
-        size = sum(gap.end - gap.start for gap in inside)
+        size = 0
+        for gap in inside:
+            size += gap.end - gap.start
+            found.damage.append(f"no record at byte {gap.start}")
         numbers = {"bytes": size, "places": len(inside), "first": inside[0].start}
         said.append(Notice("BROKEN_RECORD", numbers=numbers, lossy=True))
-        found.damage += [f"no record at byte {gap.start}" for gap in inside]
+
     if last is not None:
         case = "chunk" if last.torn else "record"
         unfinished = {"case": case, "bytes": last.end - last.start}

@@ -177,11 +177,10 @@ def _opened(
         ):
             raise DamagedError("a channel or its schema is defined anew and differently")
     except DamagedError as error:
-        lost = sum(
-            places.size
-            for channel, places in entries(content[span.length :])
-            if channel in channels
-        )
+        lost = 0
+        for channel, places in entries(content[span.length :]):
+            if channel in channels:
+                lost += places.size
         return MessageBatch(None, checked=True, reason=f"{error} (at byte {span.start})", lost=lost)
     size = claimed(content) if span.torn else None
     broken = size is not None and size != records.content.size

@@ -18,7 +18,7 @@ from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.readers.mcap import framing
 from algid.readers.mcap.framing import BrokenOffError, DamagedError
-from algid.readers.messages.batch import Messages, gather
+from algid.readers.messages.batch import Messages, beside, gather
 
 HEAD = 31
 """Bytes of a message record before the payload: code, length, channel, sequence, two times."""
@@ -78,9 +78,12 @@ def joined(several: Sequence[Records]) -> Records:
     """
     if len(several) == 1:
         return several[0]
-    bases = np.cumsum([0, *(one.content.size for one in several[:-1])])
-    offsets = [one.offsets + base for one, base in zip(several, bases, strict=True)]
-    return Records(np.concatenate([one.content for one in several]), np.concatenate(offsets))
+    contents, offsets, size = [], [], 0
+    for one in several:
+        contents.append(one.content)
+        offsets.append(one.offsets + size)
+        size += one.content.size
+    return Records(np.concatenate(contents), np.concatenate(offsets))
 
 
 def records_in(
@@ -169,26 +172,19 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
         or lengths.min() < _LEAST
     ):
         return None
-    ends = records + 9 + lengths.astype(np.int64)
-    gaps = np.flatnonzero(ends[:-1] != records[1:])
-    if gaps.size > LIMITS.index_gaps:
+    borders = beside(records, records + 9 + lengths.astype(np.int64), len(content))
+    if borders is None:
         return None
-    borders = [(0, int(records[0])), *((int(ends[gap]), int(records[gap + 1])) for gap in gaps)]
-    borders.append((int(ends[-1]), len(content)))
     others: list[tuple[int, bytes]] = []
     try:
         for start, end in borders:
-            if start > end:
-                return None
-            between = framing.walk_bytes(content, start, end)
-            others += [(record.code, content[record.start : record.end]) for record in between]
+            for record in framing.walk_bytes(content, start, end):
+                if record.code == framing.MESSAGE:
+                    return None
+                others.append((record.code, content[record.start : record.end]))
     except DamagedError:
         return None
-    return (
-        None
-        if any(code == framing.MESSAGE for code, _ in others)
-        else Records(octets, records, tuple(others))
-    )
+    return Records(octets, records, tuple(others))
 
 
 def entries(index: bytes) -> list[tuple[int, IntArray]]:

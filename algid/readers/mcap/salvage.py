@@ -32,10 +32,8 @@ _FOLLOWERS = 3
 _OUTER = (framing.CHUNK, framing.MESSAGE_INDEX, framing.DATA_END)
 """What cannot stand within a chunk."""
 _ANY = (*_OUTER, framing.SCHEMA, framing.CHANNEL, framing.MESSAGE, framing.METADATA)
-_LEAST, _MOST = (
-    np.array([framing.SIZES.get(code, (1, 0))[side] for code in range(256)], np.uint64)
-    for side in (0, 1)
-)
+_SIZES = np.array([framing.SIZES.get(code, (1, 0)) for code in range(256)], np.uint64)
+_LEAST, _MOST = np.ascontiguousarray(_SIZES.T)
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.blocks import concatenated, rows_of
 from algid.limits import LIMITS
 from algid.readers.messages.batch import Messages
 from algid.words import counted
@@ -89,12 +90,7 @@ class Shape:
             if not part.startswith("["):
                 place += part
                 continue
-            lists = (
-                texts
-                for one, texts in self.texts.items()
-                if one.rpartition(".")[0] == parent and name in texts
-            )
-            names = next(lists, ())  # a name first: joints may be called "1" and "2"
+            names = self._list_with(name, parent)  # a name first: joints may be called "1" and "2"
             if names.count(name) > 1 or not (names or name.isdigit()):
                 return None
             place += f"[{names.index(name)}]" if names else part
@@ -109,19 +105,34 @@ class Shape:
             return None
         return Numbers(numbers.offset + index * int(numbers.kind[-1]), numbers.kind)
 
+    def has(self, paths: Iterable[str]) -> bool:
+        """Whether the message has the numbers at all of the paths."""
+        return all(self.find(path) is not None for path in paths)
+
+    def _list_with(self, name: str, parent: str) -> Sequence[str]:
+        """The first list of strings within `parent` that holds a name; empty where none does."""
+        for path, texts in self.texts.items():
+            if path.rpartition(".")[0] == parent and name in texts:
+                return texts
+        return ()
+
     def of_others(self, paths: Iterable[str]) -> bool:
         """Whether the message is of other joints than those of `paths` such as ``effort[elbow]``.
 
         A message that names one of them, or numbers without any name, is no other publisher's: it
         lacks something.
         """
-        joints = {
-            match[1] for path in paths if (match := _NAMED.match(path)) and not match[1].isdigit()
-        }
-        lists = [texts for texts in self.texts.values() if texts]
-        if not joints or any(joints.intersection(texts) for texts in lists):
+        joints, listed = set(), set()
+        for path in paths:
+            place, bracket, _ = path.partition("[")
+            if bracket:
+                listed.add(place)
+            named = _NAMED.match(path)
+            if named and not named[1].isdigit():
+                joints.add(named[1])
+        lists = list(filter(None, self.texts.values()))
+        if not joints or any(map(joints.intersection, lists)):
             return False
-        listed = {path.partition("[")[0] for path in paths if "[" in path}
         return bool(lists) or not any(
             one.count and path.partition("[")[0] in listed for path, one in self.numbers.items()
         )
@@ -189,11 +200,15 @@ def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
     mask = np.zeros(lead + len(payload), np.uint8)
     for start, end in shape.fixed:
         mask[lead + start : lead + end] = 0xFF
-    mask[[lead + place for place in shape.flags]] |= 0x80
+    mask[lead + np.array(shape.flags, np.intp)] |= 0x80
     masks = mask.view(np.uint64)
     words = np.flatnonzero(masks)
     whole = np.frombuffer(bytes(lead) + payload, np.uint64)
-    places = {name: at for name, path in wanted.items() if (at := shape.find(path)) is not None}
+    places = {}
+    for name, path in wanted.items():
+        at = shape.find(path)
+        if at is not None:
+            places[name] = at
     if len(places) == len(wanted):
         return Layout(lead, words, masks[words], whole[words] & masks[words], places)
     return Layout(
@@ -314,13 +329,12 @@ class ColumnDecoder(Decoder):
             for chosen, fields in self._of_one_size(messages, size, rows):
                 held[chosen] = True
                 parts.append((chosen, fields))
-        if len(parts) < 2:
-            return parts[0][1] if parts else {name: np.empty(0) for name in self.wanted}
-        places = np.argsort(np.concatenate([chosen for chosen, _ in parts]))
-        return {
-            name: np.concatenate([fields[name] for _, fields in parts])[places]
-            for name in parts[0][1]
-        }
+        if not parts:
+            return dict.fromkeys(self.wanted, np.empty(0))
+        if len(parts) == 1:
+            return parts[0][1]
+        chosen_rows, several = zip(*parts, strict=True)
+        return rows_of(concatenated(several), np.argsort(np.concatenate(chosen_rows)))
 
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]

@@ -12,6 +12,7 @@ times end it in a RecursionError.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from algid.limits import LIMITS
@@ -64,8 +65,10 @@ def parse_ros1(root: str, text: str) -> Types:
     DefinitionError
         As `parse_msg`.
     """
-    types = parse_msg(root, text, _TIMES_OF_ROS1)
-    return {name: tuple(one for one in fields if one != _NOTHING) for name, fields in types.items()}
+    types = dict(parse_msg(root, text, _TIMES_OF_ROS1))
+    for name, fields in types.items():
+        types[name] = tuple(one for one in fields if one != _NOTHING)
+    return types
 
 
 def parse_msg(root: str, text: str, known: Types | None = None) -> Types:
@@ -85,10 +88,9 @@ def parse_msg(root: str, text: str, known: Types | None = None) -> Types:
         if heading is None:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
         types[heading[1]] = _fields(heading[1], body)
-    resolved = {
-        name: tuple(_resolved(field, name, types) for field in fields)
-        for name, fields in types.items()
-    }
+    resolved = {}
+    for name, fields in types.items():
+        resolved[name] = tuple(_resolved(field, name, types) for field in fields)
     _check_depth(root, resolved, {})
     return resolved
 
@@ -148,12 +150,11 @@ def _check_depth(name: str, types: Types, known: dict[str, int], above: int = 0)
         Where types are nested too deep.
     """
     if name not in known and above <= LIMITS.definition_depth:
-        below = (
-            _check_depth(field.type, types, known, above + 1)
-            for field in types[name]
-            if field.type in types
-        )
-        known[name] = 1 + max(below, default=0)
+        deepest = 0
+        for field in types[name]:
+            if field.type in types:
+                deepest = max(deepest, _check_depth(field.type, types, known, above + 1))
+        known[name] = 1 + deepest
     if above + known.get(name, 1) > LIMITS.definition_depth:
         raise DefinitionError(f"{name}: types nested more than {LIMITS.definition_depth} deep")
     return known[name]
@@ -171,11 +172,17 @@ _NUMBERS = {
     "long long": "int64", "unsigned long long": "uint64", "float": "float32",
     "double": "float64",
 }  # fmt: skip
-_LONGER = frozenset(
-    " ".join(words[: size + 1])
-    for words in (name.split() for name in _NUMBERS)
-    for size in range(1, len(words))
-)
+
+
+def _longer(names: Iterable[str]) -> Iterator[str]:
+    """What names of several words begin with, of two words or more."""
+    for name in names:
+        words = name.split()
+        for size in range(2, len(words) + 1):
+            yield " ".join(words[:size])
+
+
+_LONGER = frozenset(_longer(_NUMBERS))
 """Names of numbers that go on behind a blank: ``unsigned long`` and ``unsigned long long``."""
 
 
@@ -195,10 +202,9 @@ def parse_idl(root: str, text: str) -> Types:
     if root not in definitions.structures:
         there = ", ".join(list(definitions.structures)[:8]) or "no structure"
         raise DefinitionError(f"{root}: not defined; found {there}")
-    types = {
-        owner: tuple(definitions.resolved(owner, name, spec) for name, spec in members)
-        for owner, members in definitions.structures.items()
-    }
+    types = {}
+    for owner, members in definitions.structures.items():
+        types[owner] = tuple(definitions.resolved(owner, name, spec) for name, spec in members)
     _check_depth(root, types, {})
     return types
 
@@ -233,14 +239,7 @@ class _Definitions:
         for _ in range(LIMITS.definition_depth):
             if spec.name in PRIMITIVES or spec.name in TEXTS:
                 return Field(name, spec.name, spec.count)
-            meant = next(
-                (
-                    one
-                    for one in spec.candidates()
-                    if one in self.structures or one in self.typedefs
-                ),
-                None,
-            )
+            meant = self._defined(spec.candidates())
             if meant is None:
                 raise DefinitionError(f"{owner}: the type {spec.name!r} of {name!r} is not defined")
             if meant in self.structures:
@@ -252,6 +251,13 @@ class _Definitions:
         raise DefinitionError(
             f"{owner}: typedefs of {name!r} nested more than {LIMITS.definition_depth} deep"
         )
+
+    def _defined(self, names: Iterable[str]) -> str | None:
+        """The first of the names that is defined."""
+        for name in names:
+            if name in self.structures or name in self.typedefs:
+                return name
+        return None
 
 
 @dataclass
@@ -280,9 +286,8 @@ class _Parser:
             elif kind == "struct":
                 self._structure(scope)
             elif kind == "typedef":
-                self.found.typedefs |= {
-                    "/".join((*scope, name)): spec for name, spec in self._declared(scope)
-                }
+                for name, spec in self._declared(scope):
+                    self.found.typedefs["/".join((*scope, name))] = spec
             elif kind == "const":
                 while self._next() != ";":
                     pass

@@ -96,9 +96,10 @@ class JsonDecoder(Decoder):
                 rows.append(values)
             else:
                 self._without(content, values)
-        return {
-            name: _column([row[place] for row in rows]) for place, name in enumerate(self.wanted)
-        }
+        columns: Fields = {}
+        for place, name in enumerate(self.wanted):
+            columns[name] = _column([row[place] for row in rows])
+        return columns
 
     def _without(self, found: dict[str, Any], values: list[int | float | None]) -> None:
         shape = Shape()
@@ -121,10 +122,11 @@ def _column(values: list[int | float]) -> NDArray[np.int64] | NDArray[np.float64
         return np.array(values, np.int64)
     with suppress(OverflowError):
         return np.array(values, np.float64)
-    beyond = [
-        math.inf if isinstance(value, int) and abs(value) >= _BEYOND else value for value in values
-    ]
-    return np.array(beyond, np.float64)
+    numbers = np.empty(len(values))
+    for place, value in enumerate(values):
+        beyond = isinstance(value, int) and abs(value) >= _BEYOND
+        numbers[place] = math.inf if beyond else value
+    return numbers
 
 
 _PART = re.compile(r"\[[^\]]*\]|[^.\[\]]+")
@@ -148,11 +150,7 @@ class _Paths:
                 continue
             name, index = part[1:-1], None
             if isinstance(parent, dict):
-                if id(parent) not in self._lists:
-                    self._lists[id(parent)] = [
-                        one for one in parent.values() if isinstance(one, list)
-                    ]
-                names = next((one for one in self._lists[id(parent)] if name in one), None)
+                names = self._list_with(name, parent)
                 if names is not None:  # one that stands there twice has no place
                     index = names.index(name) if names.count(name) == 1 else len(names)
             if index is None and name.isdigit():
@@ -163,3 +161,14 @@ class _Paths:
                 else None
             )
         return inner if isinstance(inner, (int, float)) and not isinstance(inner, bool) else None
+
+    def _list_with(self, name: str, parent: dict[str, Any]) -> list[Any] | None:
+        """The first list within `parent` that holds a name."""
+        lists = self._lists.get(id(parent))
+        if lists is None:
+            lists = [one for one in parent.values() if isinstance(one, list)]
+            self._lists[id(parent)] = lists
+        for one in lists:
+            if name in one:
+                return one
+        return None

@@ -117,8 +117,12 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     if profile is not None and not profile.velocity:
         for name in VELOCITIES:
             sources.pop(name, None)
-    mapping = {channel: f"{topic}: {path}" for channel, (topic, path) in sources.items()}
-    homes = list(dict.fromkeys(topic for topic, _ in sources.values()))
+    mapping = {}
+    homes = []
+    for channel, (topic, path) in sources.items():
+        mapping[channel] = f"{topic}: {path}"
+        if topic not in homes:
+            homes.append(topic)
     topics = tuple(_topic(source, one, sources, profile) for one in homes)
     main = topics[0]
     if main.clock == "log" or main.fields.stamp is None:
@@ -192,7 +196,10 @@ def _topic(
     source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
 ) -> Topic:
     """A topic by its name, with its own `sources`, of the type that lacks the fewest of them."""
-    paths = {channel: path for channel, (topic, path) in sources.items() if topic == name}
+    paths = {}
+    for channel, (home, path) in sources.items():
+        if home == name:
+            paths[channel] = path
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
     for topic, kind in kinds(source):
         if topic != name:

@@ -66,11 +66,10 @@ def parse(root: str, data: bytes) -> Types:
             f"{LIMITS.definition_letters} at most"
         )
     try:
-        known = {
-            name: (message, _implicit(file))
-            for file in FileDescriptorSet.FromString(data).file
-            for name, message in _messages(file.package, file.message_type)
-        }
+        known = {}
+        for file in FileDescriptorSet.FromString(data).file:
+            for name, message in _messages(file.package, file.message_type):
+                known[name] = message, _implicit(file)
         types: Types = {}
         waiting = [root]
         while waiting:
@@ -156,7 +155,8 @@ def walk(payload: bytes, root: str, types: Types) -> Shape:
     """
     walk = _Walk(payload, types, root)
     walk.message(0, len(payload), root, "", 0)
-    walk.shape.texts |= {path: tuple(spans) for path, spans in walk.texts.items()}
+    for path, texts in walk.texts.items():
+        walk.shape.texts[path] = tuple(texts)
     return walk.shape
 
 
@@ -251,10 +251,9 @@ class _Walk:
     def _unset(self, path: str) -> None:
         """Forget what was found of a field."""
         for known in (self.shape.numbers, self.texts, self.counts):
-            for one in [
-                one for one in known if one == path or one.startswith((f"{path}.", f"{path}["))
-            ]:
-                del known[one]
+            for one in list(known):
+                if one == path or one.startswith((f"{path}.", f"{path}[")):
+                    del known[one]
         self.there = {one for one in self.there if one != path and not one.startswith(f"{path}.")}
 
     def _single(self, path: str) -> None:

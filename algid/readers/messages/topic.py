@@ -53,16 +53,20 @@ def stamp_paths(shape: Shape) -> tuple[str, str] | None:
     for base in _STAMPS:
         for seconds, nanoseconds in _PARTS:
             pair = (f"{base}.{seconds}", f"{base}.{nanoseconds}")
-            if all(shape.find(path) is not None for path in pair):
+            if shape.has(pair):
                 return pair
     return None
 
 
 def joint_names(shape: Shape, channels: Collection[str]) -> list[str]:
     """Joints for which a message of this shape has all `channels`, such as position and effort."""
-    names = names_in(shape) or tuple(str(place) for place in range(LIMITS.joint_cells))
+    names = names_in(shape) or tuple(map(str, range(LIMITS.joint_cells)))
     quantities = {name[:-1] for name in channels}
-    return [name for name in names if all(_path(shape, name, one) for one in quantities)]
+    joints = []
+    for name in names:
+        if all(_path(shape, name, quantity) for quantity in quantities):
+            joints.append(name)
+    return joints
 
 
 def other_positions(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
@@ -120,7 +124,7 @@ def reference_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
         return {}
     for positions in _REFERENCES:
         paths = [f"{positions}[{names.index(joint)}]" for joint in joints]
-        if all(shape.find(path) is not None for path in paths):
+        if shape.has(paths):
             return dict(zip(REFERENCES, paths, strict=True))
     return {}
 
@@ -221,7 +225,7 @@ class Topic:
         notices: tuple[Notice, ...] = ()
         stamps = table.stamp_ns
         if _STAMP[0] in columns:
-            seconds, nanoseconds = (columns.pop(part) for part in _STAMP)
+            seconds, nanoseconds = map(columns.pop, _STAMP)
             header = self._nanoseconds(path, seconds, nanoseconds)
             if self._chosen is None and len(table):
                 self._chosen = "header"
