@@ -60,7 +60,7 @@ _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarte
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
-_EXAMINED = 4  # pieces of each log that `endogeneity` looks at
+_EXAMINED = 2  # pieces of each log that `endogeneity` looks at
 _MOST_EXAMINED = 64  # logs of a kind, evenly spread, that it looks at
 
 

@@ -175,9 +175,7 @@ class Windows:
         self._fill(X, model, motion, theta.shape[1], known)
         if at is not None and attributes(model, "by_load"):
             place = model.compiled.place
-            for name, joint, dissipated in self._dissipated(
-                model, at, theta, self._velocity(piece)
-            ):
+            for name, joint, dissipated in self._dissipated(model, at, theta, motion().omega):
                 X[joint, place[name]] = self.moments(dissipated[None], self._plain[0])[0]
         X *= gains(model, here)[:, None, None]
         X[:, -1] = self._of_torque(tau, 0, known)

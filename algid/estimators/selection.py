@@ -145,7 +145,8 @@ class _Look:
 
     def shaped(self, shape: str, values: FloatArray, terms: Sequence[str]) -> _Look:
         """With the value of a shape at which the model with `terms` fits best."""
-        costs = [self.grams(terms, **{shape: float(value)}).cost for value in values]
+        halves = replace(self, logs=tuple(log.half for log in self.logs))
+        costs = [halves.grams(terms, **{shape: float(value)}).cost for value in values]
         best = float(np.exp(_lowest(np.log(values), costs)))
         model = replace(self.settings.model, **{shape: best})  # type: ignore[arg-type]
         return replace(self, settings=replace(self.settings, model=model))

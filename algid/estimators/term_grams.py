@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -48,10 +49,11 @@ CHANGE = next(iter(DELAYS), "change of the delay")
 
 @dataclass(frozen=True, eq=False)
 class Training:
-    """Evenly spread pieces of a log, all of it where it is short."""
+    """Evenly spread pieces of a log, the `whole` of it where it is short."""
 
     pieces: tuple[Segment, ...]
     loaded: bool
+    whole: bool = True
     known: dict[Hashable, Known] = field(default_factory=dict)
     """Moments that the models have in common."""
 
@@ -59,7 +61,15 @@ class Training:
     def of(cls, source: Source, loaded: bool) -> Training:
         """The pieces of one pass over a log."""
         every = pieces(source(), _PIECE_SAMPLES)
-        return cls(tuple(spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0]), loaded)
+        spread, whole = spread_pieces(every, _PIECES, _PIECE_SAMPLES)
+        return cls(tuple(spread), loaded, whole)
+
+    @cached_property
+    def half(self) -> Training:
+        """Every second piece, enough for a shape; a log that is short is not halved."""
+        if self.whole:
+            return self
+        return Training(self.pieces[::2], self.loaded, self.whole)
 
     @property
     def driven(self) -> bool:
