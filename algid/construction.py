@@ -155,16 +155,18 @@ def folders_below(root: Path) -> Iterator[tuple[str, list[str]]]:
     pending = [str(root)]
     while pending:
         folder = pending.pop()
+        names, inner = [], []
         try:
             with os.scandir(folder) as entries:
-                inner = [
-                    (e.name, e.is_dir(follow_symlinks=False) and not _LEFT.fullmatch(e.name))
-                    for e in entries
-                ]
+                for one in entries:
+                    if one.is_dir(follow_symlinks=False) and not _LEFT.fullmatch(one.name):
+                        inner.append(f"{folder}/{one.name}")
+                    else:
+                        names.append(one.name)
         except OSError:
             continue
-        yield folder, [name for name, is_folder in inner if not is_folder]
-        pending += [f"{folder}/{name}" for name, is_folder in inner if is_folder]
+        yield folder, names
+        pending += inner
 
 
 def remove_left(folder: Path, name: str | None = None) -> None:
@@ -193,9 +195,12 @@ def _left_in(folder: Path, name: str | None) -> list[_Left]:
             names = [entry.name for entry in entries if MARK in entry.name]
     except OSError:
         return []
-    matches = ((entry, _LEFT.fullmatch(entry)) for entry in names)
-    left = [_Left(folder, entry, match) for entry, match in matches if match]
-    return [one for one in left if name is None or one.target.name == name]
+    left = []
+    for entry in names:
+        match = _LEFT.fullmatch(entry)
+        if match and name in (None, match["name"]):
+            left.append(_Left(folder, entry, match))
+    return left
 
 
 def _take_away(found: _Left) -> None:

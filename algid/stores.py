@@ -142,12 +142,11 @@ class Store:
                 raise OutputError(
                     f"{self.place}: there is no bucket {bucket}; check its name, or make it"
                 )
-        files = (
-            info
-            for info in entries
-            if info.type == FileType.File and not info.base_name.startswith(".")
-        )
-        return sorted(info.path.removeprefix(f"{self.root}/") for info in files)
+        names = []
+        for info in entries:
+            if info.type == FileType.File and not info.base_name.startswith("."):
+                names.append(info.path.removeprefix(f"{self.root}/"))
+        return sorted(names)
 
     def exists(self, name: str) -> bool:
         """Whether there is such a file. Raises `LogError` where that cannot be known."""
@@ -158,13 +157,13 @@ class Store:
 def _names_below(root: Path, under: str) -> list[str]:
     """Names in a local folder; links to folders and unreadable entries are skipped."""
     start = len(str(root)) + 1
-    paths = (
-        f"{folder}/{name}"
-        for folder, names in folders_below(root / under)
-        for name in names
-        if name[0] != "."
-    )
-    return sorted(path[start:] for path in paths if Path(path).is_file())
+    below = []
+    for folder, names in folders_below(root / under):
+        for name in names:
+            path = f"{folder}/{name}"
+            if name[0] != "." and Path(path).is_file():
+                below.append(path[start:])
+    return sorted(below)
 
 
 def open_store(place: str) -> Store:

@@ -64,7 +64,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
                        "readers signals units words", "numpy"),
     "report": room(
-        "arm arrow criteria errors files inspection methods model notices options progress "
+        "arm arrow blocks criteria errors files inspection methods model notices options progress "
         "results ros2 significance text verdict words",
         "matplotlib mcap numpy plotly pyarrow rich"
     ),

@@ -32,6 +32,7 @@ from algid.stores import public, reading
 if TYPE_CHECKING:
     from pyarrow import NativeFile
     from pyarrow.fs import FileSystem
+    from pyarrow.parquet import ColumnChunkMetaData, FileMetaData
 
     from algid.profile import Profile
 
@@ -53,6 +54,13 @@ _METADATA_INDEX = 0x0D
 
 class UnforeseenError(Exception):
     """A reader asks for bytes that were not fetched."""
+
+
+def _pieces(ranges: Iterable[Range]) -> Iterator[Range]:
+    """The ranges in pieces that one request fetches."""
+    for start, end in ranges:
+        for place in range(start, end, _PIECE):
+            yield place, min(place + _PIECE, end)
 
 
 class Partial(File):
@@ -105,12 +113,7 @@ class Partial(File):
                 view, start = view[written:], start + written
 
         with ThreadPoolExecutor(_REQUESTS, thread_name_prefix="algid-fetch") as pool:
-            pieces = [
-                (p, min(p + _PIECE, end))
-                for start, end in wanted
-                for p in range(start, end, _PIECE)
-            ]
-            for _ in pool.map(lambda piece: copy(*piece), pieces):
+            for _ in pool.map(lambda piece: copy(*piece), _pieces(wanted)):
                 pass
         self._held = merged([*self._held, *wanted])
 
@@ -253,30 +256,34 @@ def _wanted_of_mcap(part: Partial, profile: Profile | None) -> list[Range]:
         body = content[record.start : record.end]
         if record.code == framing.CHUNK_INDEX:
             chunks.append(framing.chunk_index(body))
-            wanted += [
-                (offset, offset + _INDEX_HEAD)
-                for offset in chunks[-1].message_index_offsets.values()
-            ]
+            for offset in chunks[-1].message_index_offsets.values():
+                wanted.append((offset, offset + _INDEX_HEAD))
         elif record.code == _METADATA_INDEX:
             place = framing.parse(records.MetadataIndex, body)
             if place.length <= LIMITS.record_bytes:
                 wanted.append((place.offset, place.offset + place.length))
     chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
-    part.fetch(
-        [
-            *wanted,
-            *((first, last) for first, last in between(chunks, start) if last - first <= SMALL),
-        ]
-    )
+    for first, last in between(chunks, start):
+        if last - first <= SMALL:
+            wanted.append((first, last))
+    part.fetch(wanted)
     index = catalogue(part)  # a scan of the whole is unforeseen
     part.on_demand = True
     source = McapSource(part, index)
     topics = plan(source, profile).topics
-    channels = frozenset[int]().union(
-        *(channels_of(source, topic.name, topic.type) for topic in topics)
-    )
+    channels = frozenset[int]()
+    for topic in topics:
+        channels |= channels_of(source, topic.name, topic.type)
     spans = [*spans_of(index, channels), *spans_beside(index, channels)]
     return [(span.start, span.start + span.length + span.index_length) for span in spans]
+
+
+def _pages_of(metadata: FileMetaData) -> Iterator[ColumnChunkMetaData]:
+    """What is told of the pages of each column in each row group."""
+    for place in range(metadata.num_row_groups):
+        group = metadata.row_group(place)
+        for column in range(group.num_columns):
+            yield group.column(column)
 
 
 def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
@@ -301,9 +308,8 @@ def _wanted_of_parquet(part: Partial, profile: Profile | None) -> list[Range]:
         names = set(open_parquet(part.path, profile or Profile()).origin.mapping.values())
     except (pa.ArrowException, OSError, LogError) as error:
         raise UnforeseenError(str(error)) from error
-    groups = [metadata.row_group(place) for place in range(metadata.num_row_groups)]
     last, wanted = 0, []
-    for pages in (group.column(place) for group in groups for place in range(group.num_columns)):
+    for pages in _pages_of(metadata):
         offsets = (pages.dictionary_page_offset, pages.data_page_offset)
         first = min(offset for offset in offsets if offset is not None)
         end = first + pages.total_compressed_size

@@ -141,10 +141,13 @@ def _standing(record: JobRecord | None, task: Task, store: Store) -> JobRecord |
     if _has_result(record) and not store.exists(f"{task.job.name}.algid/result.json"):
         return None
     paths = (*task.job.logs, *task.job.loaded)
-    inputs = [unchanged(before, path) for before, path in zip(record.inputs, paths, strict=True)]
-    if not inputs or None in inputs:
-        return None
-    return replace(record, job=job, inputs=tuple(one for one in inputs if one is not None))
+    inputs = []
+    for before, path in zip(record.inputs, paths, strict=True):
+        now = unchanged(before, path)
+        if now is None:
+            return None
+        inputs.append(now)
+    return replace(record, job=job, inputs=tuple(inputs)) if inputs else None
 
 
 def _has_result(record: JobRecord) -> bool:
@@ -322,13 +325,16 @@ class Settling:
 
     def settled(self, jobs: Sequence[Job]) -> list[Job]:
         """Those of `jobs` whose logs are as the last call saw them, and hold something."""
-        now = {path: _seen(path) for job in jobs for path in (*job.logs, *job.loaded)}
+        now = {}
+        for job in jobs:
+            for path in (*job.logs, *job.loaded):
+                now[path] = _seen(path)
         before, self._before = self._before, now
-        still = {
-            p
-            for p, seen in now.items()
-            if p in before and seen == before[p] and (seen is None or seen.size > 0)
-        }
+        still = set()
+        for path, seen in now.items():
+            same = path in before and seen == before[path]
+            if same and (seen is None or seen.size > 0):
+                still.add(path)
         return [job for job in jobs if still.issuperset((*job.logs, *job.loaded))]
 
 

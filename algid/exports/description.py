@@ -328,6 +328,11 @@ def lacking(arm: Description, held: frozenset[str]) -> list[str]:
 _FRAME = "theta1 from the horizontal, theta2 from link 1, counterclockwise; gravity pulls down;"
 
 
+def comment(arm: Description, remarks: list[str], before: str) -> str:
+    """The header with something before each line."""
+    return "\n".join(f"{before}{line}".rstrip() for line in header(arm, remarks))
+
+
 def header(arm: Description, remarks: list[str]) -> list[str]:
     """Lines of the comment at the top of a file."""
     lines = [

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from string import Template
 
-from algid.exports.description import Description, header, lacking
+from algid.exports.description import Description, comment, header, lacking
 from algid.model import TERMS, Model, Weighted, attributes
 from algid.physics.expressions import Atom, Product
 from algid.physics.motion import Widths
@@ -28,7 +28,7 @@ def c99(arm: Description) -> str:
 
     Without the bodies where ``ARM_DECLARATIONS_ONLY`` is defined.
     """
-    text = "\n".join(f" * {line}".rstrip() for line in header(arm, lacking(arm, HELD)))
+    text = comment(arm, lacking(arm, HELD), " * ")
     constants = ""
     for name, value in _constants(arm).items():
         constants += f"static const double {name} = {value!r};\n"
@@ -132,7 +132,9 @@ class _Expressions:
 
 def _moves(product: Product) -> bool:
     """Whether a product has a velocity in it."""
-    slopes = [name for atom in product for name in atom.slopes()]
+    slopes: list[str] = []
+    for atom in product:
+        slopes += atom.slopes()
     return any("omega" in name for name in slopes)
 
 

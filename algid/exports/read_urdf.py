@@ -101,9 +101,14 @@ class _Robot:
     def __init__(self, robot: ET.Element) -> None:
         self._links = {_attribute(link, "name"): link for link in robot.findall("link")}
         self._joints = robot.findall("joint")
-        self._moving = [joint for joint in self._joints if _attribute(joint, "type") != "fixed"]
-        kinds = {_attribute(joint, "type") for joint in self._moving}
-        if len(self._moving) != 2 or not kinds <= {"revolute", "continuous"}:
+        self._moving = []
+        turning = True
+        for joint in self._joints:
+            kind = _attribute(joint, "type")
+            if kind != "fixed":
+                self._moving.append(joint)
+                turning &= kind in ("revolute", "continuous")
+        if len(self._moving) != 2 or not turning:
             raise ValueError(
                 f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn"
             )
@@ -268,7 +273,7 @@ def _axis(joint: ET.Element) -> FloatArray:
 
 
 def _three(text: str) -> FloatArray:
-    numbers = np.array([_number(part) for part in text.split()])
+    numbers = np.array(list(map(_number, text.split())))
     if numbers.shape != (3,):
         raise ValueError(f"expected three numbers, found {text!r:.60}")
     return numbers

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from algid.exports.description import Description, header, lacking
+from algid.exports.description import Description, comment, lacking
 from algid.exports.links import Link
 from algid.model import EVERY_TERM
 
@@ -27,9 +27,9 @@ class Joint:
     """A joint of the formats: damping N m s/rad, Coulomb friction N m, rotor inertia kg m^2."""
 
     name: str
-    damping: float
-    friction: float
-    rotor: float
+    damping: float = 0.0
+    friction: float = 0.0
+    rotor: float = 0.0
 
 
 def urdf(arm: Description) -> str:
@@ -191,9 +191,14 @@ def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], lis
     """The joints, none of their values negative, and remarks on what the format cannot hold."""
     value, model = arm.coefficients.value, arm.coefficients.model
     kinds = ("damping", "friction", "rotor") if rotors else ("damping", "friction")
-    held = [term for term in EVERY_TERM.values() if any(getattr(term, kind) for kind in kinds)]
-    bent = [term.name for term in EVERY_TERM.values() if term.sines]  # where the links' centres are
-    remarks = lacking(arm, frozenset([*(term.name for term in held), *bent]))
+    held, names = [], set()
+    for term in EVERY_TERM.values():
+        if any(getattr(term, kind) for kind in kinds):
+            held.append(term)
+            names.add(term.name)
+        elif term.sines:  # where the links' centres are
+            names.add(term.name)
+    remarks = lacking(arm, frozenset(names))
     if any(term.friction and term.name in model.terms for term in held):
         remarks.insert(0, JUMP.format(width=model.coulomb_speed))
     of_joints: list[dict[str, float]] = [{}, {}]
@@ -204,11 +209,7 @@ def _joints(arm: Description, *, rotors: bool) -> tuple[tuple[Joint, Joint], lis
                     remarks.append(f"leaves out {name}, which is negative: {value[name]:.6g}")
                 of_joints[joint][kind] = max(value[name], 0.0)
     of_joints[0]["rotor"] = arm.rotor1
-    first, second = (
-        Joint(name, own.get("damping", 0.0), own.get("friction", 0.0), own.get("rotor", 0.0))
-        for name, own in zip(("joint1", "joint2"), of_joints, strict=True)
-    )
-    return (first, second), remarks
+    return (Joint("joint1", **of_joints[0]), Joint("joint2", **of_joints[1])), remarks
 
 
 def _rotorless(
@@ -248,7 +249,7 @@ def _box(link: Link) -> str:
 
 def _comment(arm: Description, remarks: list[str]) -> str:
     """An XML comment, in which two hyphens may not stand together."""
-    text = "\n".join(f"  {line}".rstrip() for line in header(arm, remarks))
+    text = comment(arm, remarks, "  ")
     return f"<!--\n{text.replace('--', HYPHENS)}\n-->"
 
 

@@ -75,9 +75,8 @@ def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataF
     ordered = jobs.sort("robot", "time", nulls_last=False, maintain_order=True)
     dated = ordered["time"].is_not_null().to_numpy()
     robots = ordered["robot"].rle_id().to_numpy()
-    y, std = (
-        np.stack([_numbers(ordered[f"{name}{end}"]) for name in parameters]) for end in ("", "_std")
-    )
+    y = np.stack([_numbers(ordered[name]) for name in parameters])
+    std = np.stack([_numbers(ordered[f"{name}_std"]) for name in parameters])
     known = np.isfinite(y) & (std > 0)
     w = np.where(known, 1 / np.where(known, std, 1.0) ** 2, 0.0)
     y = np.where(w > 0, y, 0.0)

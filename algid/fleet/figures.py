@@ -161,17 +161,17 @@ def robot_figure(
     history: History, robot: str, jobs: pl.DataFrame, reports: Mapping[str, str], key: str
 ) -> Figure:
     """Every parameter of a robot, whose logs are `jobs`, log by log."""
-    panels = tuple(
-        _panel(history, jobs, (robot, name), reports, f"{name}: {PARAMETERS[name].meaning}")
-        for name in history.parameters
-        if (jobs[f"{name}_std"] > 0).any()
-    )
+    panels = []
+    for name in history.parameters:
+        if (jobs[f"{name}_std"] > 0).any():
+            title = f"{name}: {PARAMETERS[name].meaning}"
+            panels.append(_panel(history, jobs, (robot, name), reports, title))
     note = (
         f"The latest {MOST_POINTS} of {counted(jobs.height, 'log')} are drawn."
         if jobs.height > MOST_POINTS
         else ""
     )
-    return _log_by_log(key, f"{visible(robot)}, log by log", panels, note)
+    return _log_by_log(key, f"{visible(robot)}, log by log", tuple(panels), note)
 
 
 def _changed(history: History) -> int:

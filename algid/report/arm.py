@@ -111,7 +111,7 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
 
     Without gravity only that of joint 2 is known.
     """
-    value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
+    value = _values(result)
     if not set(value) & set(SINES):
         return 0.0, None
     first, second, fourth = moments_of(value)
@@ -121,6 +121,11 @@ def _phases(result: Result) -> tuple[float, tuple[float, float] | None]:
     if fourth:
         load = cmath.phase(fourth * cmath.exp(-1j * turn))
     return turn, (load, cmath.phase(first))
+
+
+def _values(result: Result) -> dict[str, float]:
+    """By constant its estimate; zero where there is none."""
+    return {name: one.estimate or 0.0 for name, one in result.parameters.items()}
 
 
 def _length(result: Result, name: str) -> float | None:
@@ -138,7 +143,7 @@ def _coupling_length(result: Result) -> float | None:
 
     None where gravity does not act or the constants are no arm's.
     """
-    value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
+    value = _values(result)
     gravity = result.settings.get("gravity")
     if not isinstance(gravity, int | float):
         return None

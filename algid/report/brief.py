@@ -60,7 +60,7 @@ def run_first(command: str | None) -> list[str]:
     """The command to run first; a long one continues behind a backslash, as shells read it."""
     if not command:
         return []
-    words = [shlex.quote(word) for word in shlex.split(command)]
+    words = list(map(shlex.quote, shlex.split(command)))
     lines, line = [], "Run first:"
     for place, word in enumerate(words, start=1):
         length = len(line) + 1 + len(word)

@@ -89,7 +89,7 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
 
 def _distinct(labels: Sequence[str]) -> list[str]:
     """The labels as they are printed; with their numbers where two would look alike."""
-    shown = [visible(label) for label in labels]
+    shown = list(map(visible, labels))
     if len(set(shown)) == len(shown):
         return shown
     return [f"{number} {label}" for number, label in enumerate(shown, start=1)]
@@ -107,12 +107,12 @@ def comparison_json(compared: Comparison, results: Sequence[Result]) -> str:
     """The comparison as JSON: estimates, standard deviations and distances in σ by parameter."""
     parameters = {}
     for name, distances in compared.sigma.items():
-        estimates = [result.estimates.get(name, _NONE) for result in results]
-        parameters[name] = {
-            "estimate": [one.estimate for one in estimates],
-            "std": [one.std for one in estimates],
-            "sigma": (None,) + distances,
-        }
+        values, stds = [], []
+        for result in results:
+            one = result.estimates.get(name, _NONE)
+            values.append(one.estimate)
+            stds.append(one.std)
+        parameters[name] = {"estimate": values, "std": stds, "sigma": (None,) + distances}
     settings = {row[0]: row[1:] for row in compared.settings.rows}
     content = {"labels": list(compared.labels), "parameters": parameters, "settings": settings}
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -143,8 +143,7 @@ def _estimates(
         columns += [Column(label, "number"), change, distance]
     rows = []
     for name, distances in sigma.items():
-        every = [result.estimates.get(name) for result in results]
-        unit = next(unit_text(one.unit) for one in every if one is not None)
+        every, unit = _of_all(results, name)
         cells = [visible(name), unit, with_std(every[0])]
         for other, far in zip(every[1:], distances, strict=True):
             cells += [with_std(other), _change(every[0], other), formatted(far, _SIGMAS)]
@@ -152,6 +151,13 @@ def _estimates(
     note = f"Differences are against {labels[0]}; ± is one standard deviation, σ combines both."
     table = Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
     return replace(table, upright=_upright(results, labels, sigma, note))
+
+
+def _of_all(results: Sequence[Result], name: str) -> tuple[list[Estimate | None], str]:
+    """Each result's estimate of a parameter, and its unit."""
+    estimates = [result.estimates.get(name) for result in results]
+    unit = next(unit_text(one.unit) for one in estimates if one is not None)
+    return estimates, unit
 
 
 def _change(first: Estimate | None, other: Estimate | None) -> str:
@@ -180,8 +186,7 @@ def _upright(
     )
     rows: list[tuple[str, ...]] = []
     for name, distances in sigma.items():
-        estimates = [result.estimates.get(name) for result in results]
-        unit = next(unit_text(one.unit) for one in estimates if one is not None)
+        estimates, unit = _of_all(results, name)
         headings = [visible(name), unit] + [""] * (len(results) - 2)  # the unit under its name
         for place, (label, estimate) in enumerate(zip(labels, estimates, strict=True)):
             far = ""
@@ -205,7 +210,7 @@ def with_std(estimate: Estimate | None) -> str:
 
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     """What was set otherwise, and how the first log of each kind was read otherwise."""
-    roles = set.intersection(*({log.role for log in result.logs} for result in results))
+    roles = set.intersection(*map(_roles, results))
     every = [_made_with(result, roles) for result in results]
     rows: list[tuple[str, ...]] = []
     for name in _names(every):
@@ -228,6 +233,11 @@ def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     return replace(table, upright=replace(table, columns=headings, rows=tuple(upright)))
 
 
+def _roles(result: Result) -> set[str]:
+    """Which kinds of logs a result is made from."""
+    return {log.role for log in result.logs}
+
+
 def _made_with(result: Result, roles: Collection[str]) -> dict[str, str]:
     """The settings of a result, and how the first log of each of the roles was read."""
     settings = flat_settings(result.settings)
@@ -238,7 +248,8 @@ def _made_with(result: Result, roles: Collection[str]) -> dict[str, str]:
         if role not in roles:
             settings[f"{role} log"] = file_name(log.path)
         else:
-            settings |= {f"{role} log: {name}": text for name, text in _read(log).items()}
+            for name, text in _read(log).items():
+                settings[f"{role} log: {name}"] = text
     return settings
 
 

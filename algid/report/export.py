@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.blocks import stacked
 from algid.errors import ResultError
 from algid.files import whole_file
 from algid.progress import Progress
@@ -94,7 +95,7 @@ def start_stamps(path: Path, logs: int) -> list[int]:
     """
     starts = metadata_of(path, START_KEY)
     try:
-        known = [int(stamp) for stamp in json.loads(starts or "[]")]
+        known = list(map(int, json.loads(starts or "[]")))
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise ResultError(
             f"{path}: {START_KEY.decode()}: expected stamps in ns, found {starts!r:.60}; identify "
@@ -114,8 +115,8 @@ def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | N
     for log, block in by_log(blocks(path, SIGNALS, ROWS)):
         stamps = _stamps(path, block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
-        measured = np.stack([block[name] for name in MEASURED], axis=1)
-        predicted = np.stack([block[name] for name in PREDICTED], axis=1)
+        measured = stacked(block, MEASURED, axis=1)
+        predicted = stacked(block, PREDICTED, axis=1)
         for name, message, signals in (
             ("measured", whole, measured),
             ("predicted", torque, predicted),
@@ -144,7 +145,7 @@ def write_series(writer: Writer, path: Path, topic: str) -> None:
     schema = writer.register_schema(ESTIMATES, "ros2msg", definition.encode())
     channel = writer.register_channel(topic, "cdr", schema)
     for block in blocks(path, ["t"] + names, ROWS):
-        rows = np.stack([block[name] for name in names], axis=1).tolist()
+        rows = stacked(block, names, axis=1).tolist()
         for stamp, row in zip(_stamps(path, block["t"], start), rows, strict=True):
             writer.add_message(channel, stamp, numbers_message(stamp, row), stamp)
 

@@ -77,8 +77,13 @@ def _folded(title: str, notices: Sequence[Notice]) -> str:
     )
 
 
-def _listed(sentences: tuple[str, ...]) -> str:
-    return "".join(f"<li>{unbroken(sentence)}</li>" for sentence in sentences)
+def _listed(sentences: Iterable[str]) -> str:
+    return _items(map(unbroken, sentences))
+
+
+def _items(entries: Iterable[str]) -> str:
+    """Entries of a list, which are HTML."""
+    return "".join(f"<li>{entry}</li>" for entry in entries)
 
 
 def contents(document: Document) -> str:
@@ -86,7 +91,7 @@ def contents(document: Document) -> str:
     links = [("numbers", "Numbers")]
     for section in document.sections:
         links += _links(section)
-    listed = "".join(f'<li><a href="#{key}">{escaped(title)}</a></li>' for key, title in links)
+    listed = _items(f'<a href="#{key}">{escaped(title)}</a>' for key, title in links)
     return (
         '<nav aria-label="Contents"><details '
         f"open><summary>Contents</summary><ul>{listed}</ul></details></nav>"
@@ -261,9 +266,9 @@ def figure_html(figure: Figure | Missing) -> str:
     head = f'<h2 id="{figure.key}">{escaped(figure.title)}</h2>\n'
     if isinstance(figure, Missing):
         return f'{head}<p class="missing">Not shown: {escaped(figure.why)}.</p>\n'
-    panels = "".join(
-        _panel(panel, panel_id(figure, place)) for place, panel in enumerate(figure.panels)
-    )
+    panels = ""
+    for place, panel in enumerate(figure.panels):
+        panels += _panel(panel, panel_id(figure, place))
     columns = " two" if figure.columns == 2 else ""
     return (
         f'<figure aria-labelledby="{figure.key}">{head}{_views(figure)}{_legend(figure)}'
@@ -291,10 +296,9 @@ def _views(figure: Figure) -> str:
     """A choice among the logs, which the script makes the panels show."""
     if not figure.views:
         return ""
-    options = "".join(
-        f'<option value="{low:.9g},{high:.9g}">{escaped(name)}</option>'
-        for name, low, high in figure.views
-    )
+    options = ""
+    for name, low, high in figure.views:
+        options += f'<option value="{low:.9g},{high:.9g}">{escaped(name)}</option>'
     return (
         f'<label class="views">Show <select data-figure="{figure.key}"><option value="">all '
         f"logs</option>{options}"
@@ -322,5 +326,4 @@ def _legend(figure: Figure) -> str:
             entries.append(f'<span class="entry">{words}</span>')
     if not entries:
         return ""
-    listed = "".join(f"<li>{entry}</li>" for entry in entries)
-    return f'<ul class="legend" aria-label="Legend">{listed}</ul>'
+    return f'<ul class="legend" aria-label="Legend">{_items(entries)}</ul>'

@@ -28,6 +28,7 @@ from algid.report.series import TorqueLog
 from algid.report.tables import (
     estimate_tables,
     fit_tables,
+    known_truth,
     log_tables,
     quality_tables,
     result_provenance,
@@ -120,7 +121,7 @@ def result_document(result: Result, shown: Gallery | None = None) -> Document:
         torque, figures = shown.torque, shown.figures
         paper = shown.paper + paper
         first, terms = _with_intervals(first, result), _with_gains(result)
-    fold: Fold = "open" if _truth(result) else "closed"  # folded where a real log is
+    fold: Fold = "open" if known_truth(result) else "closed"  # folded where a real log is
     leads = settles(result.estimator)
     sections = [Section(tuple(first + second), beside=arm_of(result, torque))]
     if leads:
@@ -175,7 +176,7 @@ def _with_intervals(tables: Sequence[Table], result: Result) -> list[Table]:
 
     The last one says what is drawn.
     """
-    logs, truth = _own(result), _truth(result)
+    logs, truth = _own(result), known_truth(result)
     drawn = forest(result.parameters | result.payload, truth, logs)
     shown = [table.without(TOLD_ELSEWHERE) for table in tables]
     if not shown or not drawn.rows:
@@ -210,12 +211,6 @@ def _own(result: Result) -> dict[str, list[float]]:
             if name in result.parameters and one.estimate is not None:
                 own.setdefault(name, []).append(one.estimate)
     return {name: values for name, values in own.items() if len(values) > 1}
-
-
-def _truth(result: Result) -> dict[str, float]:
-    """What a synthetic log was made with, by parameter."""
-    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
-    return truth | result.truth
 
 
 def _with_gains(result: Result) -> list[Content]:

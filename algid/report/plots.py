@@ -244,7 +244,7 @@ def _filled(
 def _heatmap(axes: Axes, trace: Trace, colours: Colours) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
-    rows, columns = (int(part) for part in trace["z"]["shape"].split(","))
+    rows, columns = map(int, trace["z"]["shape"].split(","))
     z = _values(trace["z"]).reshape(rows, columns)
     x = _values(trace["x"])
     scale = [(place, _blended(colours(token))) for place, token in trace["colorscale"]]
@@ -257,9 +257,9 @@ def _heatmap(axes: Axes, trace: Trace, colours: Colours) -> None:
     limits: dict[str, Any] = {"vmin": trace.get("zmin"), "vmax": trace.get("zmax")}
     drawn = axes.pcolormesh(edges, np.arange(rows + 1) - 0.5, z, cmap=shades, **limits)
     axes.figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=30)
-    axes.set_yticks(range(rows), [_text(name) for name in trace["y"]])
+    axes.set_yticks(range(rows), list(map(_text, trace["y"])))
     if named:
-        axes.set_xticks(range(columns), [_text(name) for name in x])
+        axes.set_xticks(range(columns), list(map(_text, x)))
     if "texttemplate" in trace:
         for i, j in np.ndindex(rows, columns):
             if np.isfinite(z[i, j]):
@@ -268,8 +268,8 @@ def _heatmap(axes: Axes, trace: Trace, colours: Colours) -> None:
 
 def _blended(colour: tuple[str, float]) -> tuple[float, ...]:
     """A pale colour on white."""
-    channels = [int(colour[0][at : at + 2], 16) / 255 for at in (1, 3, 5)]
-    return tuple(1 - colour[1] * (1 - channel) for channel in channels)
+    shade, opacity = colour
+    return tuple(1 - opacity * (1 - part / 255) for part in bytes.fromhex(shade[1:7]))
 
 
 def _shape(axes: Axes, shape: Mapping[str, Any], colours: Colours) -> None:
@@ -305,7 +305,7 @@ def _axes(axes: Axes, layout: Mapping[str, Any], way: Literal["x", "y"]) -> None
     if logarithmic:
         getattr(axes, f"set_{way}scale")("log")
     if "ticktext" in layout:
-        one.set_ticks(list(layout["tickvals"]), [_text(text) for text in layout["ticktext"]])
+        one.set_ticks(list(layout["tickvals"]), list(map(_text, layout["ticktext"])))
         one.set_ticks([], minor=True)
     if layout.get("range") is not None:
         low, high = layout["range"]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.arrow import numbers_of
+from algid.blocks import rows_of
 from algid.errors import ResultError
 
 ROWS = 1 << 18
@@ -81,8 +82,8 @@ def blocks(
                 values = numbers_of(batch.column(name))
                 beyond = np.isfinite(values) & (np.abs(values) > LARGEST)
                 block[name] = np.where(beyond, np.nan, values) if beyond.any() else values
-            for name in (name for name in names if name in finite):
-                if not np.all(np.isfinite(block[name])):
+            for name in names:
+                if name in finite and not np.all(np.isfinite(block[name])):
                     raise ResultError(
                         f"{path}: column {name!r}: expected a number in every row; identify again "
                         "with this version"
@@ -143,26 +144,25 @@ def between(
     wanted = tuple(dict.fromkeys(("log", "t", *names)))
     _check_columns(path, wanted, numbers=wanted)
     with _reading(path), pyarrow.parquet.ParquetFile(path) as file:
-        footer = file.metadata
-        bounds = {"log": (log, log), "t": (low, high)}
-        groups = [
-            place
-            for place in range(footer.num_row_groups)
-            if all(_overlaps(footer.row_group(place), *bound) for bound in bounds.items())
-        ]
+        groups = []
+        for place in range(file.num_row_groups):
+            group = file.metadata.row_group(place)
+            if _overlaps(group, "log", log, log) and _overlaps(group, "t", low, high):
+                groups.append(place)
         table = file.read_row_groups(groups, columns=list(wanted))
         columns = {name: numbers_of(table.column(name).combine_chunks()) for name in wanted}
     near = (columns["log"] == log) & (columns["t"] >= low) & (columns["t"] <= high)
     return tuple(columns[name][near] for name in names)
 
 
-def _overlaps(group: Any, name: str, bound: tuple[float, float]) -> bool:
-    """Whether a row group may hold values of the column `name` within a bound, ends included."""
-    columns = (group.column(place) for place in range(group.num_columns))
-    sums = next(column.statistics for column in columns if column.path_in_schema == name)
-    if sums is None or not sums.has_min_max:
-        return True
-    return bool(sums.min <= bound[1] and sums.max >= bound[0])
+def _overlaps(group: Any, name: str, low: float, high: float) -> bool:
+    """Whether a row group may hold values of the column `name` in [low, high]."""
+    for place in range(group.num_columns):
+        column = group.column(place)
+        sums = column.statistics
+        if column.path_in_schema == name and sums is not None and sums.has_min_max:
+            return bool(sums.min <= high and sums.max >= low)
+    return True
 
 
 def metadata_of(path: Path, key: bytes) -> bytes | None:
@@ -189,7 +189,7 @@ def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
         edges = [0, *(np.flatnonzero(np.diff(log)) + 1).tolist(), log.size]
         for first, last in pairwise(edges):
             if last > first:
-                yield int(log[first]), {name: column[first:last] for name, column in block.items()}
+                yield int(log[first]), rows_of(block, slice(first, last))
 
 
 GOLDEN = 0.6180339887498949
@@ -230,7 +230,8 @@ class MinMax:
             kept.append(_extremes(self._rest[0][None], self._rest[1][None]))
         if not kept:
             return np.empty(0), np.empty(0)
-        return np.concatenate([x for x, _ in kept]), np.concatenate([y for _, y in kept])
+        x, y = zip(*kept, strict=True)
+        return np.concatenate(x), np.concatenate(y)
 
 
 def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

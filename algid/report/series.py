@@ -5,7 +5,7 @@ Each is gathered in one pass of bounded memory.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.blocks import stacked
 from algid.criteria import CUT
 from algid.errors import ResultError
 from algid.methods import settles
@@ -66,7 +67,7 @@ class SeriesLog:
     @property
     def windows(self) -> list[float]:
         """When each window starts, in s."""
-        return [float(begin) for begin in np.arange(self.start, self.end, self.window)]
+        return list(map(float, np.arange(self.start, self.end, self.window)))
 
     @property
     def any_singular(self) -> bool:
@@ -107,7 +108,7 @@ class _SeriesGathering:
         self._start: float | None = None
         self._end = 0.0
         self._size = bucket_size(total, SERIES_POINTS)
-        self._lines = {name: MinMax(self._size) for name in names}
+        self._lines = _reducers(names, self._size)
         self._singular = {name: Share(max(total // STRETCHES, 1)) for name in names}
         self._condition = MinMax(self._size)
         self._samples = Thinned(total // SAMPLES)
@@ -129,7 +130,7 @@ class _SeriesGathering:
         if "condition" in block:
             condition = block["condition"]
             self._condition.feed(t, np.where(np.isfinite(condition), condition, np.nan))
-        self._samples.feed(np.stack([t] + [block[name] for name in self.names]))
+        self._samples.feed(stacked(block, ["t"] + self.names))
 
     def result(self, with_condition: bool) -> SeriesLog:
         """What was gathered."""
@@ -142,12 +143,22 @@ class _SeriesGathering:
             end=self._end,
             window=self._window,
             coarse=self._size * period >= EPSILON,
-            lines={name: line.result() for name, line in self._lines.items()},
+            lines=_results(self._lines),
             samples=named,
             middles={name: _medians(samples[0], values) for name, values in named.items()},
-            singular={name: share.result() for name, share in self._singular.items()},
+            singular=_results(self._singular),
             condition=self._condition.result() if with_condition else None,
         )
+
+
+def _reducers(names: Iterable[str], size: int) -> dict[str, MinMax]:
+    """One of its own for each series."""
+    return {name: MinMax(size) for name in names}
+
+
+def _results(reducers: Mapping[str, MinMax | Share]) -> dict[str, Series]:
+    """What is left of each series."""
+    return {name: reducer.result() for name, reducer in reducers.items()}
 
 
 def _ill_conditioned(name: str, block: Block) -> NDArray[np.bool_]:
@@ -269,10 +280,10 @@ class _Gathering:
         """Add the next block of the log of that number."""
         _add_residuals(block)
         self._range(log, block["t"])
-        reducers = self.reducers.setdefault(log, {name: MinMax(self.size) for name in SERIES})
+        reducers = self.reducers.setdefault(log, _reducers(SERIES, self.size))
         for name, reducer in reducers.items():
             reducer.feed(block["t"], block[name])
-        self.motion.feed(np.stack([block[name] for name in MOTION]))
+        self.motion.feed(stacked(block, MOTION))
         for name in SERIES:
             low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
             old = self.extremes.get(name, (low, high))
@@ -302,9 +313,11 @@ class _Gathering:
     def result(self) -> TorqueLog:
         """What was gathered."""
         rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
-        series = {}
+        series, worst = {}, {}
         for log, reducers in self.reducers.items():
             series[log] = _broken(reducers, CUT * self.size * self.ranges[log].period)
+        for joint, (_, log, moment) in self.worst.items():
+            worst[joint] = log, moment
         return TorqueLog(
             ranges=self.ranges,
             series=series,
@@ -313,7 +326,7 @@ class _Gathering:
             rms=(float(rms[0]), float(rms[1])),
             residual_rms=(float(rms[2]), float(rms[3])),
             unpredicted=int(self.counts[0] - self.counts[2]),
-            worst={joint: (log, moment) for joint, (_, log, moment) in self.worst.items()},
+            worst=worst,
             reduced=self.size > 2,
         )
 
@@ -344,7 +357,7 @@ def read_scored(path: Path) -> dict[int, dict[str, Series]]:
     steps: dict[int, float] = {}
     for log, block in by_log(blocks(path, ("log", "t") + SCORED)):
         _add_residuals(block)
-        own = reducers.setdefault(log, {name: MinMax(size) for name in SCORED + RESIDUALS})
+        own = reducers.setdefault(log, _reducers(SCORED + RESIDUALS, size))
         for name, reducer in own.items():
             reducer.feed(block["t"], block[name])
         if block["t"].size > 1:

@@ -256,7 +256,8 @@ def _conventions(logs: Sequence[LogSummary]) -> dict[str, str]:
         if len(set(values.values())) == 1:
             read[words] = next(iter(values.values()))
         else:
-            read |= {f"{words} of the {role} log": value for role, value in values.items()}
+            for role, value in values.items():
+                read[f"{words} of the {role} log"] = value
     return read
 
 
@@ -426,6 +427,12 @@ def _table4(result: Result) -> Table:
         "its torque: that of the synthetic cases was sought for this table."
     )
     return Table("Table 4", TABLE4_COLUMNS, tuple(rows), note)
+
+
+def known_truth(result: Result) -> dict[str, float]:
+    """What a synthetic log was made with, by parameter."""
+    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
+    return truth | result.truth
 
 
 def _moments_table(result: Result) -> Table:

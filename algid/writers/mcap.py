@@ -143,12 +143,13 @@ def _layout(velocity: bool, effort: bool = True) -> np.dtype[np.void]:
             if place % 8:
                 fields.append((f"{name}_padding", "V4", 4))
             fields.append((name, ("<f8", 2), 16))
-    offsets = np.cumsum([0] + [width for *_, width in fields]).tolist()
+    names, kinds, widths = zip(*fields, strict=True)
+    ends = np.cumsum(widths)
     return np.dtype(
         {
-            "names": [name for name, *_ in fields],
-            "formats": [kind for _, kind, _ in fields],
-            "offsets": offsets[:-1],
-            "itemsize": offsets[-1],
+            "names": list(names),
+            "formats": list(kinds),
+            "offsets": (ends - widths).tolist(),
+            "itemsize": int(ends[-1]),
         }
     )

@@ -50,8 +50,10 @@ def convergence(path: Path, result: Result, loaded: bool = False) -> Figure | Mi
     read = read_series(path, result.settings)
     if not read.lines:
         return Missing(key, title, f"{path.name} holds no series")
-    targets = {name: _target(name, result, loaded) for name in read.lines}
-    panels = [_panel(read, name, target, key) for name, target in targets.items()]
+    targets, panels = {}, []
+    for name in read.lines:
+        targets[name] = _target(name, result, loaded)
+        panels.append(_panel(read, name, targets[name], key))
     if read.condition is not None:
         panels.append(_condition(read, read.condition, key))
     windows = ""

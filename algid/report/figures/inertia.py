@@ -32,9 +32,11 @@ LEGEND = (
 
 def inertia(result: Result, found: TorqueLog | None) -> Figure | Missing:
     """M11, M12 and M22 over one turn of joint 2."""
-    estimates = [result.parameters.get(name) for name in NAMES]
-    values = [estimate.estimate for estimate in estimates if estimate is not None]
-    known = [value for value in values if value is not None]
+    known = []
+    for name in NAMES:
+        one = result.parameters.get(name)
+        if one is not None and one.estimate is not None:
+            known.append(one.estimate)
     if len(known) < len(NAMES):
         return Missing("inertia", TITLE, "k1, k3 or k5 has no estimate that can be drawn")
     theta2 = np.linspace(-np.pi, np.pi, 181)
@@ -85,7 +87,7 @@ def _stds(result: Result, theta2: FloatArray) -> FloatArray | None:
     covariance = result.fit.covariance_of(NAMES)
     if not np.isfinite(covariance).all():
         return None
-    slopes = np.stack([_parts([float(i == j) for j in range(3)], theta2) for i in range(3)])
+    slopes = np.stack([_parts(unit, theta2) for unit in np.eye(3).tolist()])
     variance = np.einsum("ipn,ij,jpn->pn", slopes, covariance, slopes)
     return np.sqrt(np.maximum(variance, 0))
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.blocks import concatenated, stacked
 from algid.report.figures.base import Figure, Layout, Missing, Panel, axis, label, packed, times
 from algid.report.figures.timeline import offsets, separators
 from algid.report.reduce import Block, blocks, by_log, columns_of
@@ -25,7 +26,7 @@ SCALE: Scale = [[0, "@page"], [0.5, "@blue/0.55"], [1, "@blue"]]
 def information(path: Path, result: Result) -> Figure | Missing:
     """Each parameter's information, in shares of what all logs gave it."""
     names = [name for name in columns_of(path) if name not in ("log", "t")]
-    logs = [(log, block) for log, block in by_log(blocks(path, ["log", "t", *names]))]
+    logs = list(by_log(blocks(path, ["log", "t", *names])))
     if not names or not logs:
         return Missing("information", TITLE, f"{path.name} holds no second")
     x, gained, ranges = _summed(names, logs)
@@ -54,9 +55,7 @@ def _summed(
         span.last = float(block["t"][-1]) + 1.0
     moved = offsets(ranges)
     x = np.concatenate([block["t"] + 0.5 + moved[log] for log, block in found])
-    gained = np.concatenate(
-        [np.stack([block[name] for name in names]) for _, block in found], axis=1
-    )
+    gained = stacked(concatenated([block for _, block in found]), names)
     step = int(np.ceil(x.size / MOST_CELLS))
     starts = np.arange(0, x.size, step)
     counts = np.diff(starts, append=x.size)

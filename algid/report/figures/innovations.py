@@ -205,7 +205,7 @@ def _correlation(curves: Curves, joint: int) -> Panel:
         shapes.append(band(low, high, "@blue/0.25") | step)
     reach = max(float(np.abs(curve.value).max()), 2 * float(curve.high.max()))
     if _is_faint(curve):
-        shapes += [level(sign * FAINT, "@muted", "dash", 1.0) for sign in (-1, 1)]
+        shapes += [level(-FAINT, "@muted", "dash", 1.0), level(FAINT, "@muted", "dash", 1.0)]
         reach = max(reach, FAINT)
     reach *= 1.15
     layout = {

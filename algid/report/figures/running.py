@@ -24,6 +24,7 @@ from algid.report.figures.base import (
 from algid.report.figures.timeline import offsets, separators, views
 from algid.report.reduce import blocks, by_log, columns_of
 from algid.report.series import LogRange
+from algid.report.tables import known_truth
 from algid.results import Estimate, Result
 from algid.text import resolved, significant, unit_text
 
@@ -117,8 +118,7 @@ def _note(courses: list[RunningCourse], t: FloatArray, result: Result) -> str:
         latest = max(late, key=lambda name: late[name])
         when = f"{significant(late[latest], 3)} s of {significant(float(t[-1]), 3)} s"
         note = f"The last band to miss its final estimate was that of {latest}, at {when}."
-    truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
-    truth |= result.truth
+    truth = known_truth(result)
     held = count = 0
     for course in courses:
         if course.name in truth:

@@ -56,13 +56,14 @@ def torque(found: TorqueLog, logs: list[LogSummary], scored: Scored | None = Non
             (found.series, f"tau{joint}_predicted", "@blue", "predicted", 1.3),
             (found.series, f"residual{joint}", "@orange", "residual", 1.0),
         )
-        rms, left = (significant(both[joint - 1], 3) for both in (found.rms, found.residual_rms))
-        says = f"Torque of joint {joint}: RMS {rms} N m; residual RMS {left} N m"
+        rms, left = found.rms[joint - 1], found.residual_rms[joint - 1]
+        says = (
+            f"Torque of joint {joint}: RMS {significant(rms, 3)} N m; "
+            f"residual RMS {significant(left, 3)} N m"
+        )
         panels.append(_torque_panel(found, logs, joint, lines, says))
-    pairs = list(zip(found.residual_rms, found.rms, strict=True))
     note = f"Residual of joint 1: {_shares(found)[0]}; of joint 2: {_shares(found)[1]}."
-    if any(2 * left > rms for left, rms in pairs):
-        note += f" {DIFFERENTIATED}"
+    note += _of_large(found)
     legend = (MEASURED, PREDICTED, Legend("residual", "residual: measured − predicted", "@orange"))
     return Figure(
         "torque", TITLE, tuple(panels), READING, legend, note, views=views(found.ranges, logs)
@@ -91,8 +92,7 @@ def _scored(found: TorqueLog, logs: list[LogSummary], scored: Scored) -> Figure:
         f"Residual{band}, which the table of predictions scores: joint 1 {shares[0]}; joint 2 "
         f"{shares[1]}. As recorded: joint 1 {whole[0]}; joint 2 {whole[1]}."
     )
-    if any(2 * left > rms for left, rms in zip(found.residual_rms, found.rms, strict=True)):
-        note += f" {DIFFERENTIATED}"
+    note += _of_large(found)
     legend = (
         MEASURED,
         PREDICTED,
@@ -112,6 +112,13 @@ def _scored(found: TorqueLog, logs: list[LogSummary], scored: Scored) -> Figure:
     )
 
 
+def _of_large(found: TorqueLog) -> str:
+    """Where a joint's residual has half of its torque: why it may be that large."""
+    if np.any(2 * np.array(found.residual_rms) > found.rms):
+        return f" {DIFFERENTIATED}"
+    return ""
+
+
 def _torque_panel(
     found: TorqueLog,
     logs: list[LogSummary],
@@ -123,9 +130,9 @@ def _torque_panel(
     moved = offsets(found.ranges)
     traces = []
     for series, name, colour, group, width in lines:
-        of_log = {log: own[name] for log, own in series.items()}
+        x, y = chained(_of_each_log(series, name), moved)
         hover = f"{group} %{{y:.4g}} N m at %{{x:.4f}} s<extra></extra>"
-        traces.append(line(*chained(of_log, moved), colour, group, group, width=width, hover=hover))
+        traces.append(line(x, y, colour, group, group, width=width, hover=hover))
         if name.startswith("residual"):
             traces[-1]["yaxis"] = "y2"
     layout = {
@@ -136,6 +143,11 @@ def _torque_panel(
         **separators(found.ranges, moved, logs),
     }
     return Panel(traces, layout, says, f"Joint {joint}", 340, "torque")
+
+
+def _of_each_log(series: Mapping[int, Mapping[str, Series]], name: str) -> dict[int, Series]:
+    """The series of one name by log."""
+    return {log: own[name] for log, own in series.items()}
 
 
 def _shares(found: TorqueLog) -> list[str]:
@@ -196,9 +208,7 @@ def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
     ):
         traces: list[Trace] = []
         for joint, colour in enumerate(COLOURS, start=1):
-            x, y = chained(
-                {log: series[f"{name}{joint}"] for log, series in found.series.items()}, moved
-            )
+            x, y = chained(_of_each_log(found.series, f"{name}{joint}"), moved)
             hover = f"joint {joint} %{{y:.4g}} {unit} at %{{x:.4f}} s<extra></extra>"
             traces.append(
                 line(x, y, colour, f"joint {joint}", f"joint{joint}", width=1.2, hover=hover)
@@ -209,8 +219,8 @@ def signals(found: TorqueLog, logs: list[LogSummary]) -> Figure:
             "hovermode": "closest",
             **separators(found.ranges, moved, logs),
         }
-        lows, highs = zip(*(found.extremes[f"{name}{joint}"] for joint in (1, 2)), strict=True)
-        says = f"{words} of both joints, {min(lows):.4g} to {max(highs):.4g} {unit}"
+        reach = (*found.extremes[f"{name}1"], *found.extremes[f"{name}2"])
+        says = f"{words} of both joints, {min(reach):.4g} to {max(reach):.4g} {unit}"
         panels.append(Panel(traces, layout, says, words, 200, "torque"))
     reading = (
         "Read: look for jumps, flat stretches and clipped tops; what is odd here is odd in "
