@@ -213,7 +213,7 @@ def _filtered(
         whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
         Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
     X = np.concatenate([Y, signals[2:, None]], axis=1)
-    felt = X.any(axis=2)  # k4 is nothing to joint 2, k7 to joint 1
+    felt = np.asarray(X.any(axis=2))  # k4 is nothing to joint 2, k7 to joint 1
     alike = np.all(X[0] == X[1], axis=1)  # and k2, k3 to both the same
     felt[1] &= ~alike
     X[felt] = butterworth(X[felt], dt, min(by.cutoff, 0.45 / dt), by.order)
