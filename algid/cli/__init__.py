@@ -63,7 +63,7 @@ def run(arguments: Sequence[str]) -> int:
     from algid.faults import TRACEBACK, fault
     from algid.runtime import check_environment
 
-    found: BaseException
+    cause: BaseException
     try:
         try:
             check_environment()
@@ -74,18 +74,18 @@ def run(arguments: Sequence[str]) -> int:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
         return 0
     except AlgidError as error:
-        line, code, found = str(error), int(Exit.USAGE), error
+        line, code, cause = str(error), int(Exit.USAGE), error
     except _StoppedError:
         complain("stopped; nothing half-written is left")
         raise
     except (SystemExit, KeyboardInterrupt):
         raise
     except BaseException as error:  # whatever a library raises, a panic too
-        (line, code), found = fault(error), error
+        (line, code), cause = fault(error), error
     if os.environ.get(TRACEBACK) == "1":
         import traceback
 
-        remark("".join(traceback.format_exception(found)))
+        remark("".join(traceback.format_exception(cause)))
     complain(line)
     return code
 

@@ -27,9 +27,9 @@ def compare(
     from algid.api.compare import compare as run
     from algid.api.compare import page_of
 
-    found = run(results, out=out, force=force)
+    comparison = run(results, out=out, force=force)
     if quiet:
         return
-    print_tables(found.tables(), found.as_json, form)
+    print_tables(comparison.tables(), comparison.as_json, form)
     if out is not None:
         remark(f"wrote {page_of(out)}")

@@ -49,14 +49,14 @@ def settings_of_profile(incomplete: str) -> list[str]:
     from algid.profile import Profile
 
     key, equals, value = incomplete.partition("=")
-    found = []
+    completions = []
     for line, annotation in _lines(Profile):
         if not equals and line.startswith(key):
-            found.append(f"{line}=")
+            completions.append(f"{line}=")
         elif equals and line == key:
             words = [word for word in _choices(annotation) if word.startswith(value)]
-            found += [f"{key}={word}" for word in words]
-    return found
+            completions += [f"{key}={word}" for word in words]
+    return completions
 
 
 def _lines(profile: Any) -> Iterator[tuple[str, Any]]:

@@ -41,12 +41,12 @@ def inspect(
     from algid.runtime import keep_freed
 
     keep_freed()
-    found = run(log, profile=choice.profile())
+    inspection = run(log, profile=choice.profile())
     if not quiet and form == "json":
-        say(as_json(found), end="")
+        say(as_json(inspection), end="")
     elif not quiet:
         terminal = console()
-        for part in content(found):
+        for part in content(inspection):
             if isinstance(part, Table):
                 print_table(part, terminal)
                 terminal.print()
@@ -54,5 +54,7 @@ def inspect(
                 for line in lines_of(part, terminal.width, rest="    "):
                     say(line)
     raise typer.Exit(
-        Exit.USAGE if found.refused else exit_of(failed=found.contradicted, lost=found.lossy)
+        Exit.USAGE
+        if inspection.refused
+        else exit_of(failed=inspection.contradicted, lost=inspection.lossy)
     )

@@ -129,13 +129,13 @@ class Choice:
         flags = dict(self.profile_flags)
         if file:
             flags["profile"] = file
-        found = profile_from(flags)
+        profile = profile_from(flags)
         given = _given({name: self.settings_flags.get(name) for name in OF_BOTH})
-        if not given or (found is None and "effort" not in given):
-            return found
+        if not given or (profile is None and "effort" not in given):
+            return profile
         from algid.profile import Profile, with_settings
 
-        return with_settings(found or Profile(), given)
+        return with_settings(profile or Profile(), given)
 
 
 def _given(flags: Mapping[str, Any]) -> dict[str, Any]:
@@ -159,15 +159,15 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
         return None
     from algid.profile import Profile, ProfileSettingError, load_profile, with_settings
 
-    found = load_profile(file) if file else Profile()
+    profile = load_profile(file) if file else Profile()
     for name, text in meanings:
         meaning = _meaning(name, text)
         try:
-            found = with_settings(found, meaning)
+            profile = with_settings(profile, meaning)
         except ProfileSettingError as error:
             where = f"{flag(name)} (profile: {error.place})"
             raise SettingError(f"{where}: {error.why}") from error
-    return found
+    return profile
 
 
 def _meaning(name: str, text: str) -> dict[str, Any]:

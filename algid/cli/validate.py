@@ -54,7 +54,7 @@ def validate(
     from algid.report.progress import progress
 
     with progress("samples", quiet) as shown:
-        found = run(
+        validated = run(
             result,
             logs,
             loaded,
@@ -64,10 +64,10 @@ def validate(
             progress=shown,
         )
     if not quiet:
-        for warning in found.warnings:
+        for warning in validated.warnings:
             complain(warning)
-        print_tables(found.tables(), found.as_json, form)
-        if found.over and form is ResultFormat.TABLE:
+        print_tables(validated.tables(), validated.as_json, form)
+        if validated.over and form is ResultFormat.TABLE:
             say(f"OVER: normalised RMSE past {max_nrmse:g}")
-    if found.over:
+    if validated.over:
         raise typer.Exit(Exit.LIMIT)

@@ -116,15 +116,15 @@ def overview(history: History, reports: Mapping[str, str]) -> Figure | None:
         reading = _reading(shown_in(panels))
         title = "Every log of every robot"
         return Figure("logs", title, panels, reading, tuple(legend), columns=2)
-    found = []
+    clearest = []
     for robot, name in pairs:
         jobs = history.jobs.filter(pl.col("robot") == robot)
         title = f"{label(robot)}: {name}"
-        found.append(_panel(history, jobs, (robot, name), reports, title))
+        clearest.append(_panel(history, jobs, (robot, name), reports, title))
     title = "The clearest trends, which are no drift"
     if history.drifts.height or history.findings.height or _changed(history):
         title = "What was found, log by log"
-    return _log_by_log("logs", title, tuple(found))
+    return _log_by_log("logs", title, tuple(clearest))
 
 
 def _log_by_log(key: str, title: str, panels: tuple[Panel, ...], note: str = "") -> Figure:

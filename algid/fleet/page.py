@@ -244,11 +244,11 @@ def verdict(history: History) -> Verdict:
 
     drifts, findings = history.drifts.height, history.findings.height
     statement = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}: "
-    found = [counted(drifts, "drift"), counted(findings, "finding")]
+    counts = [counted(drifts, "drift"), counted(findings, "finding")]
     if history.changes is not None and history.changes.height:
         steps = history.changes.n_unique(["robot", "after"])
-        found.insert(1, counted(steps, "change"))
-    statement += joined(found)
+        counts.insert(1, counted(steps, "change"))
+    statement += joined(counts)
     tested = history.windows.filter(pl.col("p").is_not_nan() & (pl.col("mean") != 0.0))
     if tested.height:  # the clearest trend of all that were tested, whether it drifts or not
         row = tested.sort("p", "robot", "parameter").row(0, named=True)

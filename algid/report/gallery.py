@@ -56,25 +56,27 @@ def gallery(folder: Path, result: Result, progress: Progress | None = None) -> G
         for name in ("estimates", "loaded", "torque", "innovations", "running", "information")
     )
     scored = folder / "scored.parquet"
-    found = _try(
+    measured = _try(
         "torque", f"{TORQUE}, residual, coverage", torques, lambda: read_torque(torques, progress)
     )
-    read = None if isinstance(found, Missing) else found
+    read = None if isinstance(measured, Missing) else measured
     figures: list[Figure | Missing] = []
-    if isinstance(found, Missing):
-        figures.append(found)
+    if isinstance(measured, Missing):
+        figures.append(measured)
     else:
         figures.append(
             _try(
                 "torque",
                 f"{TORQUE}, residual",
                 torques,
-                lambda: torque(found, result.logs, _scored(scored, result, found.ranges.keys())),
+                lambda: torque(
+                    measured, result.logs, _scored(scored, result, measured.ranges.keys())
+                ),
             )
         )
-        if found.reduced:
+        if measured.reduced:
             figures.append(
-                _try("closeup", CLOSEUP, torques, lambda: closeup(torques, found, result.logs))
+                _try("closeup", CLOSEUP, torques, lambda: closeup(torques, measured, result.logs))
             )
     figures.append(_try("innovations", INNOVATIONS, left, lambda: innovations(left, result)))
     figures.append(_try("running", RUNNING, so_far, lambda: running(so_far, result)))

@@ -123,7 +123,7 @@ def _flat(profile: Mapping[str, Any]) -> dict[str, Any]:
 
 def is_implausible(result: Result) -> bool:
     """Whether physics or the torque contradict the estimates."""
-    return any(found.status == "IMPLAUSIBLE" for found in result.estimates.values())
+    return any(one.status == "IMPLAUSIBLE" for one in result.estimates.values())
 
 
 def _worst_bound(fit: FitSummary | None) -> Bound | None:
@@ -284,18 +284,18 @@ def _asked_for(result: Result) -> dict[str, Estimate]:
             term = EVERY_TERM[name]
             if not term.sines:
                 own |= set(term.names)
-    return {name: found for name, found in result.estimates.items() if name not in own}
+    return {name: one for name, one in result.estimates.items() if name not in own}
 
 
 def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:
     for status in STATUS_WORDS:
-        names = [visible(name) for name, found in estimates.items() if found.status == status]
+        names = [visible(name) for name, one in estimates.items() if one.status == status]
         if names:
             yield Notice(status, numbers={"names": names})
     wide = []
-    for name, found in estimates.items():
-        spread = _spread(found)
-        if found.status == "OK" and found.estimate and spread > LARGEST_SPREAD:
+    for name, one in estimates.items():
+        spread = _spread(one)
+        if one.status == "OK" and one.estimate and spread > LARGEST_SPREAD:
             wide.append(f"{visible(name)} (±{significant(196 * spread, 2)} %)")
     if wide:
         yield Notice("WIDE_INTERVAL", numbers={"names": wide})

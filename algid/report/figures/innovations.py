@@ -105,15 +105,15 @@ def read_curves(path: Path) -> Curves:
     rows = table_of(path, COLUMNS, numbers=COLUMNS[1:])
     quantity = np.array(rows.pop("quantity"))
     numbers = {name: np.array(values, dtype=np.float64) for name, values in rows.items()}
-    found: Curves = {}
+    curves: Curves = {}
     for kind in dict.fromkeys(quantity.tolist()):
         for joint in (1, 2):
             own = (quantity == kind) & (numbers["joint"] == joint)
             if own.any():
                 x, value, low, high = (numbers[name][own] for name in COLUMNS[2:])
-                found[kind, joint] = Curve(x, value, low, high)
-                _check(path, kind, found[kind, joint])
-    return found
+                curves[kind, joint] = Curve(x, value, low, high)
+                _check(path, kind, curves[kind, joint])
+    return curves
 
 
 def _check(path: Path, kind: str, curve: Curve) -> None:
