@@ -16,13 +16,14 @@ business; here they are put in order once a model (`Compiled`) and evaluated alo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.names import by_name, names_in, outside, within
 from algid.physics.expressions import Expression, Product, Values
 from algid.physics.motion import Motion, Widths, sine_cosine
 from algid.physics.parameters import BODY, PAYLOAD, Parameter
@@ -60,16 +61,16 @@ def names_of(terms: Iterable[Term]) -> tuple[str, ...]:
     return tuple(names)
 
 
-EVERY_TERM = {term.name: term for term in ALWAYS + OPTIONAL}
+EVERY_TERM = by_name(ALWAYS + OPTIONAL)
 TERMS = {term.name: term for term in OPTIONAL if not term.delays}
 """Terms that a model may have; a delay acts before a model does, on the log's times."""
 DELAYS = names_of(term for term in OPTIONAL if term.delays)
-CHOICES = tuple(term.name for term in OPTIONAL)
+CHOICES = names_in(OPTIONAL)
 """Names that ``--model`` takes."""
 PARAMETERS: dict[str, Parameter] = {}
 for _term in EVERY_TERM.values():
-    PARAMETERS |= {parameter.name: parameter for parameter in _term.parameters}
-PARAMETERS |= {parameter.name: parameter for parameter in PAYLOAD + BODY}
+    PARAMETERS |= by_name(_term.parameters)
+PARAMETERS |= by_name(PAYLOAD + BODY)
 UNITS = {name: parameter.unit for name, parameter in PARAMETERS.items()}
 COLUMN_NAMES = names_of(ALWAYS) + names_of(TERMS.values())
 RIGID = names_of(term for term in ALWAYS if term.inertial)
@@ -116,10 +117,10 @@ class Model:
     by_torque: bool = False
 
     def __post_init__(self) -> None:
-        unknown = [term for term in self.terms if term not in TERMS]
+        unknown = outside(self.terms, TERMS)
         if unknown:
             raise ValueError(f"terms: expected some of {', '.join(TERMS)}, got {unknown[0]!r}")
-        object.__setattr__(self, "terms", tuple(term for term in TERMS if term in self.terms))
+        object.__setattr__(self, "terms", within(TERMS, self.terms))
 
     @property
     def shape(self) -> Widths:
@@ -139,7 +140,7 @@ class Model:
     @cached_property
     def columns(self) -> list[int]:
         """Where each column stands in `COLUMN_NAMES`."""
-        return [COLUMN_NAMES.index(name) for name in self.names]
+        return list(map(COLUMN_NAMES.index, self.names))
 
     @property
     def linear(self) -> bool:
@@ -181,7 +182,7 @@ class Model:
 
 def without_delay(terms: Iterable[str]) -> tuple[str, ...]:
     """Those of the names in `CHOICES` that a model may have."""
-    return tuple(term for term in terms if term in TERMS)
+    return within(terms, TERMS)
 
 
 Weighted = Mapping[Product, tuple[tuple[int, float], ...]]
@@ -210,7 +211,7 @@ class Compiled:
     @cached_property
     def place(self) -> dict[str, int]:
         """Where each column stands."""
-        return {name: number for number, name in enumerate(self.names)}
+        return dict(zip(self.names, range(len(self.names)), strict=True))
 
     @cached_property
     def s(self) -> tuple[Entry, ...]:
@@ -228,6 +229,18 @@ class Compiled:
         return self._entries(lambda column, joint: column.f[joint])
 
     @cached_property
+    def products(self) -> tuple[list[Product], ...]:
+        """The products in f, p and s, each once and in order, without the one of no signal."""
+        by_part = []
+        for entries in (self.f, self.p, self.s):
+            products: dict[Product, None] = {}
+            for _, _, entry in entries:
+                products |= dict.fromkeys(entry.products)
+            products.pop((), None)
+            by_part.append(list(products))
+        return tuple(by_part)
+
+    @cached_property
     def regressor(self) -> tuple[Entry, ...]:
         """Entries of Y."""
         return self._entries(_whole)
@@ -235,18 +248,19 @@ class Compiled:
     @cached_property
     def partials(self) -> Mapping[tuple[int, int, int], Weighted]:
         """Derivatives by order of θ's derivative, torque's joint and angle's joint."""
-        return {
-            (order, row, angle): self._derivative(f"{signal}{angle + 1}", row)
-            for order, signal in enumerate(("theta", "omega", "alpha"))
-            for row, angle in _JOINT_PAIRS
-        }
+        partials = {}
+        for order, signal in enumerate(("theta", "omega", "alpha")):
+            for row, angle in _JOINT_PAIRS:
+                partials[order, row, angle] = self._derivative(f"{signal}{angle + 1}", row)
+        return partials
 
     @cached_property
     def inertia(self) -> Mapping[tuple[int, int], Weighted]:
         """What multiplies the accelerations, by torque's joint and angle's joint."""
-        return {
-            (row, angle): self._derivative(f"alpha{angle + 1}", row) for row, angle in _JOINT_PAIRS
-        }
+        inertia = {}
+        for row, angle in _JOINT_PAIRS:
+            inertia[row, angle] = self._derivative(f"alpha{angle + 1}", row)
+        return inertia
 
     @cached_property
     def rest(self) -> tuple[Weighted, Weighted]:
@@ -313,19 +327,26 @@ def _at_rest(column: TorqueColumn, joint: int) -> Expression:
     return _whole(column, joint).without(ACCELERATIONS)
 
 
+def terms_named(names: Iterable[str]) -> Iterator[Term]:
+    """The terms with these names."""
+    return map(EVERY_TERM.__getitem__, names)
+
+
 @lru_cache(maxsize=256)
 def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compiled:
     names: list[str] = []
     columns: list[TorqueColumn] = []
     loads: list[int] = []
-    for term in ALWAYS + tuple(TERMS[name] for name in terms):
+    for term in (*ALWAYS, *terms_named(terms)):
         is_load = term.inertial or (by_torque and term.linear and not term.lags)
         for parameter in term.parameters:
             if gravity or not parameter.weighs:
                 if is_load:
                     loads.append(len(names))
                 names.append(parameter.name)
-        columns += (column for column in term.columns if column.parameter in names)
+        for column in term.columns:
+            if column.parameter in names:
+                columns.append(column)
     return Compiled(tuple(names), tuple(columns), tuple(loads))
 
 

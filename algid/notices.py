@@ -719,6 +719,26 @@ def merged(notices: Iterable[Notice]) -> list[Notice]:
     return list(together.values())
 
 
+def has_code(notices: Iterable[Notice], *codes: str) -> bool:
+    """Whether a notice has one of the codes."""
+    return any(one.code in codes for one in notices)
+
+
+def lossy(notices: Iterable[Notice]) -> bool:
+    """Whether a notice says that data were lost."""
+    return any(one.lossy for one in notices)
+
+
+def warnings_of(notices: Iterable[Notice]) -> list[Notice]:
+    """Those of the notices that make a result doubtful."""
+    return [one for one in notices if not one.note]
+
+
+def notes_of(notices: Iterable[Notice]) -> list[Notice]:
+    """Those of the notices that say how things were read and done."""
+    return [one for one in notices if one.note]
+
+
 def from_flags(flags: Sequence[str]) -> Remedy:
     """The remedy that flags stand for, as results of an earlier schema hold them."""
     settings: dict[str, Any] = {}

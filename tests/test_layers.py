@@ -35,13 +35,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "arrow": room(packages="numpy pyarrow"),
     "compiled": room("arm", "numpy scipy"),
     "quantiles": room("arm", "numpy"),
-    "physics": room("arm", "numpy", PURE),
-    "model": room("arm physics", "numpy", PURE),
+    "names": room("arm", "numpy", PURE),
+    "physics": room("arm names", "numpy", PURE),
+    "model": room("arm names physics", "numpy", PURE),
     "log": room("arm notices quantiles", "numpy"),
     "signals": room("arm compiled criteria log", "numpy", PURE),
     "estimators": room(
-        "arm compiled criteria model notices physics progress quantiles signals significance",
-        "numpy scipy", PURE
+        "arm compiled criteria model names notices physics progress quantiles signals "
+        "significance", "numpy scipy", PURE
     ),
     "methods": room("estimators progress"),
     "files": room("construction errors limits options", "pydantic"),
@@ -50,7 +51,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "profile": room("errors files options units", "pydantic"),
     "settings": room("errors limits methods model options physics signals"),
     "results": room(
-        "errors files limits log model notices options settings significance text verdict "
+        "errors files limits log model names notices options settings significance text verdict "
         "words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model results synth"),
@@ -70,8 +71,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
-        "arm arrow errors estimators files inspection log methods model notices options physics "
-        "profile progress readers report results runtime settings signals significance "
+        "arm arrow errors estimators files inspection log methods model names notices options "
+        "physics profile progress readers report results runtime settings signals significance "
         "table4 text units",
         "numpy polars pyarrow",
     ),

@@ -17,6 +17,7 @@ from algid.estimators.fit import Fit, conclude
 from algid.estimators.parametrisation import BODY_PARAMETERS
 from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
+from algid.names import outside, vector, within
 from algid.physics.parameters import BODY
 from algid.significance import sigmas
 
@@ -73,9 +74,9 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     values, covariances, weights = [fit.values], [fit.covariance], [1.0]
     for body in _larger_bodies(fit):
         other = with_body_of(fit, body)
-        weight = _weight(other, [name for name in body if name not in fit.shared.body])
+        weight = _weight(other, outside(body, fit.shared.body))
         if weight > 0:
-            places = [other.names.index(name) for name in fit.names]
+            places = list(map(other.names.index, fit.names))
             values.append(other.values[places])
             covariances.append(other.covariance[np.ix_(places, places)])
             weights.append(weight)
@@ -87,14 +88,14 @@ def averaged_over_bodies(fit: Fit) -> Fit:
     return replace(fit, values=beta, covariance=mixed)
 
 
-def _larger_bodies(fit: Fit) -> Iterator[list[str]]:
+def _larger_bodies(fit: Fit) -> Iterator[tuple[str, ...]]:
     """Sets of parameters of the body that hold those of the fit and more, the smallest first."""
     names, _ = _candidates(fit)
-    others = [name for name in names if name not in fit.shared.body]
+    others = outside(names, fit.shared.body)
     for count in range(1, len(others) + 1):
         for more in combinations(others, count):
             own = fit.shared.body + more
-            yield [name for name in BODY_PARAMETERS if name in own]
+            yield within(BODY_PARAMETERS, own)
 
 
 _MOST = 100.0  # W / 2, beyond which a weight is all there is
@@ -104,7 +105,7 @@ def _weight(fit: Fit, more: Sequence[str]) -> float:
     """exp(W / 2 - n) of the parameters `more`; 0 of what no object has, or the logs leave open."""
     if not fit.converged or not all(_worths(fit)):
         return 0.0
-    places = [fit.names.index(name) for name in more]
+    places = list(map(fit.names.index, more))
     value, C = fit.values[places], fit.covariance[np.ix_(places, places)]
     wald = float(value @ np.linalg.solve(C, value))
     return float(np.exp(min(0.5 * wald, _MOST) - len(more)))
@@ -134,7 +135,7 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
         return fit
     shared = replace(fit.shared, body=tuple(body))
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
-    start = np.array([known.get(name, 0.0) for name in shared.names])
+    start = vector(shared.names, known, otherwise=0.0)
     if fit.shrinkage is not None and fit.prior is not None:
         changed = concluded(
             shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved, fit.repeats

@@ -14,7 +14,7 @@ explain. When the stretches become too many, neighbours are added up.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +22,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.estimators.parametrisation import Shared
+from algid.names import outside
 
 RANK_TOLERANCE = 1e-13  # relative eigenvalue of the scaled information that counts as nothing
 _STEPS = 60
@@ -70,7 +71,7 @@ class Prior:
 
     def places(self, names: Sequence[str]) -> list[int]:
         """Where its parameters stand among `names`."""
-        return [names.index(name) for name in self.names]
+        return list(map(names.index, self.names))
 
 
 _NOTHING = 1e-6  # standard deviation of what is absent, in its unit: far below any estimate's
@@ -88,7 +89,7 @@ def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
     precision = np.zeros((count + len(absent), count + len(absent)))
     precision[:count, :count] = prior.precision[np.ix_(kept, kept)]
     precision[count:, count:] = none.precision
-    names = tuple(name for name in prior.names if name not in absent) + absent
+    names = outside(prior.names, absent) + absent
     return Prior(names, np.append(prior.mean[kept], none.mean), precision, absent)
 
 
@@ -169,11 +170,16 @@ def combine(
     return beta, S, value + offset
 
 
+def of_kind(logs: Iterable[LogInformation], loaded: bool) -> list[LogInformation]:
+    """Those of the logs that are loaded, or those that are not."""
+    return [log for log in logs if log.loaded is loaded]
+
+
 def _by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
     """Unloaded and loaded logs in one sum each, and what that adds to their likelihood."""
     sums, offset = [], 0.0
     for loaded in (False, True):
-        own = [log for log in logs if log.loaded is loaded]
+        own = of_kind(logs, loaded)
         if len(own) < 2:
             sums += own
             continue
@@ -269,8 +275,8 @@ def left_out(
     estimates = np.empty((len(logs), len(shared.names)))
     loaded = np.array([log.loaded for log in logs])
     for kind in (False, True):
-        others, _ = _by_kind([log for log in logs if log.loaded is not kind])
-        own = [log for log in logs if log.loaded is kind]
+        others, _ = _by_kind(of_kind(logs, not kind))
+        own = of_kind(logs, kind)
         for place, rest in zip(np.flatnonzero(loaded == kind), _without_each(own), strict=True):
             estimates[place] = combine(shared, list(others) + rest, beta, prior)[0]
     return estimates
@@ -284,8 +290,10 @@ def _without_each(own: Sequence[LogInformation]) -> list[list[LogInformation]]:
     if len(own) < 2:
         return [[]] * len(own)
     c0, loaded = own[0].c0, own[0].loaded
-    S = np.stack([log.total[0] for log in own])
-    g = np.stack([log.total[1] - log.total[0] @ (c0 - log.c0) for log in own])
+    S, g = np.zeros((len(own), c0.size, c0.size)), np.zeros((len(own), c0.size))
+    for place, log in enumerate(own):
+        S[place], score = log.total
+        g[place] = score - S[place] @ (c0 - log.c0)
 
     def rest(parts: FloatArray) -> FloatArray:
         nothing = np.zeros_like(parts[:1])
@@ -293,8 +301,10 @@ def _without_each(own: Sequence[LogInformation]) -> list[list[LogInformation]]:
         after = np.cumsum(np.concatenate([nothing, parts[:0:-1]]), axis=0)[::-1]
         return before + after
 
-    pairs = zip(rest(S), rest(g), strict=True)
-    return [[LogInformation(loaded, c0, each[None], score[None])] for each, score in pairs]
+    others = []
+    for each, score in zip(rest(S), rest(g), strict=True):
+        others.append([LogInformation(loaded, c0, each[None], score[None])])
+    return others
 
 
 FEWEST_LOGS = 4

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import ceil, copysign, pi, remainder
+from math import ceil, copysign, inf, pi, remainder
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from algid.estimators.convention_sums import (
 )
 from algid.estimators.conventions import AS_READ, Convention
 from algid.model import F1, F2, J2, K1, K2, K3, K4, K5, K6, K7, LARGEST_PHASE, MOMENTS, PARAMETERS
+from algid.names import outside, vector
 from algid.significance import SURE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
@@ -285,8 +286,10 @@ class _Windowed:
     @classmethod
     def of(cls, logs: Sequence[Recorded], rate: float, longest: float) -> _Windowed:
         longest = seconds_of_each(len(logs), longest)
-        thin = tuple(thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs)
-        return cls(thin, tuple(moving(thin)))
+        thin = []
+        for log in logs:
+            thin.append(thinned(log.theta, log.tau, log.dt, rate, longest))
+        return cls(tuple(thin), tuple(moving(thin)))
 
     @property
     def seconds(self) -> float:
@@ -336,8 +339,8 @@ class _Trials:
         self._free = np.eye(len(COLUMNS))
         turns: Sequence[float] = _QUARTERS
         if not gravity:
-            self._names = tuple(name for name in ZEROED if not PARAMETERS[name].weighs)
             weighs = np.array([PARAMETERS[name].weighs for name in COLUMNS])
+            self._names = outside(ZEROED, np.array(COLUMNS)[weighs].tolist())
             self._free = np.delete(self._free, weighs, axis=1)
             turns = (0.0,)
         self._turns = turns
@@ -437,7 +440,11 @@ class _Trials:
     ) -> Iterator[Candidate]:
         """The zeros that fit best, where they leave far less than the discrete ones."""
         free = self.zeroed(family)
-        if free.score < min(one.score for one in discrete if one.family == family) - self.apart:
+        least = inf
+        for one in discrete:
+            if one.family == family:
+                least = min(least, one.score)
+        if free.score < least - self.apart:
             yield free
 
     def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
@@ -453,7 +460,7 @@ class _Trials:
         sums = self._sums(AS_READ, self._fine)
         free, left, _ = self._solved(sums, [AS_READ], self._free[None])
         c = self._free @ free[0]
-        places = np.array([COLUMNS.index(name) for name in MOMENTS])
+        places = np.array(list(map(COLUMNS.index, MOMENTS)))
         cosine, sine = c[places], c[places + 1]  # both 0 of a moment without a column
         if np.any(np.arctan2(np.abs(sine), cosine) > LARGEST_PHASE):
             return None
@@ -574,7 +581,7 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
     """What physics demands of the coefficients, in standard deviations on its right side."""
 
     def distance(value: float, slopes: dict[str, float]) -> float:
-        slope = np.array([slopes.get(name, 0.0) for name in k])
+        slope = vector(k, slopes, otherwise=0.0)
         return value / max(float(slope @ covariance @ slope), 1e-300) ** 0.5
 
     k1, m22, k5 = k[K1], k[K3] + k[J2], k[K5]

@@ -26,6 +26,7 @@ from algid.criteria import AT_REST
 from algid.estimators.conventions import Convention
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.model import SINE_OF, SINES, Model
+from algid.names import outside
 from algid.physics.motion import Motion
 from algid.physics.terms.coulomb import COULOMB
 from algid.physics.terms.offset import OFFSET
@@ -34,14 +35,14 @@ from algid.physics.terms.rotor import ROTOR
 from algid.signals.filters import correlate, differentiator, half_length
 
 MODEL = Model((COULOMB.name, OFFSET.name, ROTOR.name, PHASES.name), coulomb_speed=0.1)
-ZEROED = tuple(name for name in MODEL.names if name not in SINES)
+ZEROED = outside(MODEL.names, SINES)
 COLUMNS: list[str] = []
 """The columns of `MODEL`, each sine part behind the one whose it is."""
 for _name in ZEROED:
     COLUMNS.append(_name)
     if _name in SINE_OF:
         COLUMNS.append(SINE_OF[_name])
-_PLACES = [MODEL.names.index(name) for name in COLUMNS]
+_PLACES = list(map(MODEL.names.index, COLUMNS))
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
 _REWEIGHTINGS = 4

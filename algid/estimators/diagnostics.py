@@ -25,6 +25,7 @@ from algid.estimators.combine import (
     Prior,
     combine,
     likelihood,
+    of_kind,
     sandwich,
     scaled_pinv,
 )
@@ -33,8 +34,6 @@ from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
 from algid.model import (
-    CHOICES,
-    EVERY_TERM,
     K1,
     K2,
     K3,
@@ -45,7 +44,9 @@ from algid.model import (
     inertia,
     phasor,
 )
+from algid.names import within
 from algid.notices import Notice
+from algid.physics.terms import OPTIONAL
 from algid.significance import sigmas
 
 _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
@@ -113,10 +114,12 @@ def broken_bounds(fit: Fit) -> list[BrokenBound]:
     what the model lacks.
     """
     size = sizes(fit.names, fit.values)
-    unknown = {fit.names[place] for place in np.flatnonzero(np.isinf(fit.std))}
-    unknown |= set(fit.absent)
+    unknown = list(fit.absent)
+    for name, deviation in zip(fit.names, fit.std, strict=True):
+        if np.isinf(deviation):
+            unknown.append(name)
     if fit.shrinkage is not None:
-        unknown |= set(fit.shrinkage.names)
+        unknown += fit.shrinkage.names
     open_ones = {f"{name} >= 0" for name in unknown}
     if {K1, K2} & set(fit.absent):
         open_ones.add("k1 k2 >= 0")
@@ -206,9 +209,9 @@ def constrained(fit: Fit) -> Fit:
     x, disobeyed = np.zeros(scale.size), enforced
     options = {"maxiter": 500, "ftol": 1e-12}
     for inside in _INSIDE:
-        demands = [
-            {"type": "ineq", "fun": partial(margin, bound, slope, inside)} for bound, slope in held
-        ]
+        demands = []
+        for bound, slope in held:
+            demands.append({"type": "ineq", "fun": partial(margin, bound, slope, inside)})
         unit = 1 + abs(cost(x, 1.0)[0])  # the solver's tolerances are absolute
         solution = minimize(
             partial(cost, unit=unit),
@@ -302,9 +305,6 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     return JointsApart(model.names[both[worst]], float(first[worst]), float(second[worst]))
 
 
-_OPTIONAL = {term: EVERY_TERM[term].names for term in CHOICES}
-
-
 @dataclass(frozen=True)
 class TermWorth:
     """An optional term and the BIC with it less that without it: negative if it earns its place."""
@@ -321,19 +321,19 @@ class TermWorth:
 def term_worths(fit: Fit) -> list[TermWorth]:
     """ΔBIC of each optional term: n log N − W, Schwarz 1978, W the Wald statistic of n values."""
     worths = []
-    for term, names in _OPTIONAL.items():
-        places = [fit.names.index(name) for name in names if name in fit.names]
+    for term in OPTIONAL:
+        places = list(map(fit.names.index, within(term.names, fit.names)))
         if not places:
             continue
         values = fit.values[places]
         wald = float(values @ scaled_pinv(fit.covariance[np.ix_(places, places)]) @ values)
-        worths.append(TermWorth(term, len(places) * float(np.log(max(2, fit.freedom))) - wald))
+        worths.append(TermWorth(term.name, len(places) * float(np.log(max(2, fit.freedom))) - wald))
     return worths
 
 
 def bent(fit: Fit) -> bool:
     """Whether the moments' sine parts are together more than chance makes one time in twenty."""
-    places = [fit.names.index(name) for name in SINES if name in fit.names]
+    places = list(map(fit.names.index, within(SINES, fit.names)))
     known = [place for place in places if fit.covariance[place, place] > 0]
     if not known:
         return False
@@ -360,8 +360,7 @@ def payload_distance(fit: Fit) -> float | None:
     best. Where they agree it is χ² with as many degrees of freedom as constants less those of the
     payload.
     """
-    unloaded = [log for log in fit.logs if not log.loaded]
-    loaded = [log for log in fit.logs if log.loaded]
+    unloaded, loaded = of_kind(fit.logs, False), of_kind(fit.logs, True)
     if not (fit.shared.payload and unloaded and loaded):
         return None
     c, covariance, determined = by_themselves(fit.shared, unloaded)
@@ -408,7 +407,7 @@ def repeatability(fit: Fit) -> MassScatter | None:
     interval is that of the standard deviation of normal numbers, by χ² of n − 1: wide where there
     are few runs.
     """
-    loaded = [log for log in fit.logs if log.loaded]
+    loaded = of_kind(fit.logs, True)
     if "m_p" not in fit.names or len(loaded) < 2:
         return None
     place = fit.names.index("m_p")

@@ -88,8 +88,12 @@ def _long_enough(
     sources: Sequence[Source], settings: WeakSettings, c: FloatArray | None = None
 ) -> list[Normal]:
     """Normal equations of the logs that are long enough for a window."""
-    every = [weak.normal_equations(source, settings, c) for source in sources]
-    return [normal for normal in every if normal is not None]
+    normals = []
+    for source in sources:
+        normal = weak.normal_equations(source, settings, c)
+        if normal is not None:
+            normals.append(normal)
+    return normals
 
 
 def _delayed(fit: Fit, settings: WeakSettings) -> WeakSettings:

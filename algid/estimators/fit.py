@@ -29,7 +29,8 @@ from algid.estimators.innovations import ResidualSums
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import DELAYS
-from algid.notices import Notice
+from algid.names import outside, places_outside
+from algid.notices import Notice, has_code
 from algid.significance import NORMAL
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
@@ -140,12 +141,12 @@ class Fit:
     @property
     def refuted(self) -> bool:
         """Whether the refined estimator rejected its likelihood and returned another estimate."""
-        return any(note.code == "REFUTED" for note in self.notes)
+        return has_code(self.notes, "REFUTED")
 
     @property
     def beyond_errors(self) -> bool:
         """Whether bounds of physics are broken by what the error bars leave out: see `doubt`."""
-        return any(note.code == "BOUNDS_DOUBTED" for note in self.notes)
+        return has_code(self.notes, "BOUNDS_DOUBTED")
 
     def noted(self, note: Notice) -> Fit:
         """The fit with one more thing to say of it."""
@@ -290,8 +291,8 @@ def examined(
     """What logs determine where the parameters `absent` are nothing, which is known."""
     if not absent:
         return examine(names, beta, S, moved)
-    free = [place for place, name in enumerate(names) if name not in absent]
-    of_free = examine([names[place] for place in free], beta[free], S[np.ix_(free, free)], moved)
+    free = places_outside(names, absent)
+    of_free = examine(outside(names, absent), beta[free], S[np.ix_(free, free)], moved)
     covariance = np.zeros_like(S)
     covariance[np.ix_(free, free)] = of_free.covariance
     determined = np.ones(len(names), dtype=bool)

@@ -227,17 +227,12 @@ class Windows:
             return own, order, product, tuple(getattr(shape, name) for name in _shapes(product))
 
         parts = tuple(enumerate((compiled.f, compiled.p, compiled.s)))
-        wanted = {
-            order: list(dict.fromkeys(p for _, _, entry in entries for p in entry.products if p))
-            for order, entries in parts
-        }
-        missing = {
-            order: [product for product in products if key(order, product) not in known]
-            for order, products in wanted.items()
-        }
-        if any(missing.values()):
+        missing = []
+        for order, products in enumerate(compiled.products):
+            missing.append([one for one in products if key(order, one) not in known])
+        if any(missing):
             values = Values(motion(), shape)
-            for order, products in missing.items():
+            for order, products in enumerate(missing):
                 self._learn(products, order, values, samples, known, key)
         for order, entries in parts:
             for joint, place, entry in entries:
@@ -312,12 +307,9 @@ def _kernels(length: int, dt: float, offset: float) -> FloatArray:
     s = np.clip((np.arange(length) + offset) / length, 0, 1)
     span = length * dt
     window = _WINDOW / _WINDOW_INTEGRAL
-    kernels = np.stack(
-        [
-            window.deriv(order)(s) / span ** (order + 1) if order else window(s) / span
-            for order in range(3)
-        ]
-    )
+    kernels = np.stack([window(s), window.deriv()(s), window.deriv(2)(s)])
+    for order in range(3):
+        kernels[order] /= span ** (order + 1)
     kernels *= dt
     kernels.setflags(write=False)
     return kernels

@@ -55,9 +55,9 @@ def by_instruments(
     better = instruments.fit(unloaded, (), settings, lengths, prior, start)
     if not better.converged:
         return None
-    broken = [one.distance for one in broken_bounds(better)]
-    if any(distance is None or distance > better.quantile for distance in broken):
-        return None
+    for one in broken_bounds(better):
+        if one.distance is None or one.distance > better.quantile:
+            return None
     checked = doubted_without_motor(better, unloaded, (), settings)
     if checked is not better:
         return None

@@ -389,10 +389,8 @@ def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator
     rows = max(round(window / first.dt), 8)
     for batch in _batches(pieces(chain([first], moving), rows)):
         dt = batch[0].dt
-        theta, tau = (
-            np.stack([getattr(window, name) for window in batch], axis=1)
-            for name in ("theta", "tau")
-        )
+        theta = np.stack([window.theta for window in batch], axis=1)
+        tau = np.stack([window.tau for window in batch], axis=1)
         omega = np.stack([window.omega for window in batch if window.omega is not None], axis=1)
         values = stage(theta, omega, tau, dt)
         for index, piece in enumerate(batch):

@@ -21,15 +21,19 @@ import numpy as np
 
 from algid.arm import FloatArray, payload_phasors
 from algid.model import DELAYS, PARAMETERS, SINE_OF, SINES, Model
+from algid.names import names_in, outside
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.physics.terms.rigid import K1, K2
 
-BODY_PARAMETERS = tuple(one.name for one in BODY)
-PAYLOAD_PARAMETERS = tuple(one.name for one in PAYLOAD) + BODY_PARAMETERS
+BODY_PARAMETERS = names_in(BODY)
+PAYLOAD_PARAMETERS = names_in(PAYLOAD) + BODY_PARAMETERS
 # which z adds to which coefficient, and its part: the moments are phasors
-_Z_OF = {name: one.payload for name, one in PARAMETERS.items() if one.payload is not None}
-_LOADED = {name: (z, "real") for name, z in _Z_OF.items()}
-_LOADED |= {sine: (_Z_OF[name], "imag") for sine, name in SINES.items()}
+_LOADED: dict[str, tuple[int, str]] = {}
+for _name, _parameter in PARAMETERS.items():
+    if _parameter.payload is not None:
+        _LOADED[_name] = (_parameter.payload, "real")
+for _sine, _cosine in SINES.items():
+    _LOADED[_sine] = (_LOADED[_cosine][0], "imag")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +71,7 @@ class Shared:
         """Names of the shared parameters."""
         if not self.payload:
             return self.log_names
-        free = tuple(one.name for one in PAYLOAD if one.name not in self.lengths)
+        free = outside(names_in(PAYLOAD), self.lengths)
         return self.log_names + free + self.body
 
     def physical(self, beta: FloatArray) -> tuple[float, float, complex, float]:

@@ -143,9 +143,19 @@ def _looked(
                     limits[joint] = one
         if limits == before:
             break
-    while wrong := [one for one in limits.values() if not _stands(rows, limits, one)]:
-        del limits[wrong[0].joint]
+    wrong = _first_wrong(rows, limits)
+    while wrong is not None:
+        del limits[wrong.joint]
+        wrong = _first_wrong(rows, limits)
     return limits
+
+
+def _first_wrong(rows: _Rows, limits: Mapping[int, Limit]) -> Limit | None:
+    """The first of the limits that does not stand beside the other; None where both do."""
+    for one in limits.values():
+        if not _stands(rows, limits, one):
+            return one
+    return None
 
 
 def _with(rows: _Rows, limits: Mapping[int, Limit], but: int | None) -> _Rows:
@@ -277,15 +287,14 @@ class _Rows:
     @classmethod
     def of(cls, pieces: Sequence[Segment], settings: WeakSettings) -> _Rows | None:
         """None where no piece is as long as a window."""
-        parts = tuple(
-            (windows, piece, X)
-            for piece, windows, _ in overlapping(pieces, settings)
-            if (X := windows.equations(settings.model, piece, True)).shape[2]
-        )
-        places = tuple(settings.model.names.index(name) for name in _INERTIAS)
+        parts = []
+        for piece, windows, _ in overlapping(pieces, settings):
+            X = windows.equations(settings.model, piece, True)
+            if X.shape[2]:
+                parts.append((windows, piece, X))
         if not parts:
             return None
-        return cls(parts, places)
+        return cls(tuple(parts), tuple(map(settings.model.names.index, _INERTIAS)))
 
     def torque(self, joint: int) -> FloatArray:
         """The joint's torque (N,), the samples that windows share twice."""

@@ -146,18 +146,15 @@ def shrink(
     known : Prior, optional
         What an earlier result knows of other parameters.
     """
-    places = [shared.names.index(name) for name in expected.names]
+    places = list(map(shared.names.index, expected.names))
     terms = np.array(expected.terms)
     for _ in range(_STEPS):
         beta, H, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
         variance = np.diag(scaled_pinv(H))[places]
         square = ((beta[places] - expected.mean) ** 2 + variance) / expected.spread**2
-        better = np.array(
-            [
-                _share(square[terms == term], usual)
-                for term, usual in zip(terms, expected.usual, strict=True)
-            ]
-        )
+        better = np.empty(len(terms))
+        for place, (term, usual) in enumerate(zip(terms, expected.usual, strict=True)):
+            better[place] = _share(square[terms == term], usual)
         change = float(np.max(np.abs(np.log(better / np.maximum(share, _LEAST))), initial=0.0))
         share = better
         if change < _SETTLED:
@@ -212,7 +209,7 @@ def spread(
     """
     size = len(shared.names)
     precision = np.zeros((size, size))
-    places = [shared.names.index(name) for name in prior.names]
+    places = prior.places(shared.names)
     precision[np.ix_(places, places)] = prior.precision
     meat, long_run, S = (np.zeros((size, size)) for _ in range(3))
     stretches = 0

@@ -25,6 +25,7 @@ from algid.estimators.shrinkage import Expected, dispersion, divided, joined, sh
 from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Normal, Source, WeakSettings
 from algid.model import EVERY_TERM, K3, SINES, TERMS
+from algid.names import within
 
 _DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _ROUNDS = 3
@@ -113,7 +114,7 @@ class _Logs:
         places = [place for place, _, _ in self._placed(settings, {})]
         groups = []
         for group in grouped(self.unloaded, self.loaded):
-            long_enough = tuple(places.index(one) for one in group if one in places)
+            long_enough = tuple(map(places.index, within(group, places)))
             if long_enough:
                 groups.append(long_enough)
         return tuple(groups)
@@ -121,9 +122,8 @@ class _Logs:
     def _placed(
         self, settings: WeakSettings, at: Mapping[bool, FloatArray]
     ) -> Iterator[tuple[int, bool, Normal]]:
-        every = [(False, source) for source in self.unloaded]
-        every += [(True, source) for source in self.loaded]
-        for place, (kind, source) in enumerate(every):
+        for place, source in enumerate(self.unloaded + self.loaded):
+            kind = place >= len(self.unloaded)
             normal = weak.normal_equations(source, settings, at.get(kind))
             if normal is not None:
                 yield place, kind, normal
@@ -147,7 +147,9 @@ def _estimated(
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
         if number:
-            at = {kind: shared.coefficients(beta, kind)[:columns] for kind, _ in normals}
+            at = {}
+            for kind, _ in normals:
+                at[kind] = shared.coefficients(beta, kind)[:columns]
             if shared.delay:
                 base = float(beta[columns])
                 settings = settings.delayed(base)
@@ -156,7 +158,9 @@ def _estimated(
         if number == 0:
             share = np.ones(len(expected.names))
         for _ in range(_REWEIGHTINGS):
-            likelihoods = [_weighed(shared, normal, kind, beta, base) for kind, normal in normals]
+            likelihoods = []
+            for kind, normal in normals:
+                likelihoods.append(_weighed(shared, normal, kind, beta, base))
             likelihoods = shared_out(likelihoods, groups)
             phi = dispersion(shared, merged(likelihoods, groups), beta)
             scaled = divided(likelihoods, phi)

@@ -13,6 +13,7 @@ from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
 from algid.estimators.shrinkage import spread
+from algid.names import outside, places_outside
 from algid.notices import Notice
 
 QUANTILE = 2.3
@@ -88,9 +89,9 @@ def _judged(
 
     A term is never open, since physics bounds it.
     """
-    free = [place for place, name in enumerate(names) if name not in bounded]
+    free = places_outside(names, bounded)
     own = scaled_pinv(scaled_pinv(H)[np.ix_(free, free)])
-    judged = examine([names[place] for place in free], beta[free], own, moved)
+    judged = examine(outside(names, bounded), beta[free], own, moved)
     statuses: list[Status] = ["OK"] * len(names)
     for place, determined in zip(free, judged.determined, strict=True):
         if not determined:

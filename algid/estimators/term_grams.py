@@ -29,7 +29,8 @@ from algid.estimators.hold import Lateness
 from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
-from algid.model import DELAYS, EVERY_TERM, loads_of, names_of, without_delay
+from algid.model import DELAYS, loads_of, names_of, terms_named, without_delay
+from algid.names import vector
 from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
 
@@ -114,7 +115,7 @@ class Grams:
         self._rigid = np.flatnonzero(np.isin(self.names, loads_of(settings.model)))
         normals, periods = [], []
         for log in logs:
-            here = np.array([at[log.loaded].get(name, 0.0) for name in columns])
+            here = vector(columns, at[log.loaded], otherwise=0.0)
             normal = normal_equations(log.segments, settings, here, log.known)
             if normal is not None:
                 normals.append((log.loaded, normal))
@@ -140,7 +141,9 @@ class Grams:
             parts = _FOLDS
         folds = []
         for gram in self._logs:
-            folds += [part.sum(axis=0) for part in np.array_split(gram, parts) if len(part)]
+            for part in np.array_split(gram, parts):
+                if len(part):
+                    folds.append(part.sum(axis=0))
         self._folds = np.array(folds)
         self._total = self._folds.sum(axis=0)
         self._squares: dict[tuple[int, ...], float] = {}
@@ -189,7 +192,7 @@ class Grams:
 
     def _columns(self, terms: Iterable[str], *others: str) -> IntArray:
         """Places in p of eq. (1), of `terms`, and of `others` by name."""
-        own = names_of(EVERY_TERM[term] for term in terms)
+        own = names_of(terms_named(terms))
         return self._named(names_of(ALWAYS) + own + others)
 
     def coefficients(self, terms: Iterable[str]) -> dict[bool, dict[str, float]]:
@@ -198,9 +201,10 @@ class Grams:
         A kind of which there is no log has those of the other.
         """
         p = _solved(self._total, self._columns(terms))
+        unloaded, loaded = p[self._places(False)].tolist(), p[self._places(True)].tolist()
         return {
-            kind: dict(zip(self.names, p[self._places(kind)].tolist(), strict=True))
-            for kind in (False, True)
+            False: dict(zip(self.names, unloaded, strict=True)),
+            True: dict(zip(self.names, loaded, strict=True)),
         }
 
     def held_out_squares(self, terms: Iterable[str]) -> float:
@@ -232,7 +236,7 @@ class Grams:
         if key not in self._spreads:
             self._spreads[key] = self._spread(columns)
         value, covariances, stretches = self._spreads[key]
-        names = names_of(EVERY_TERM[term] for term in terms)
+        names = names_of(terms_named(terms))
         own = np.flatnonzero(np.isin(columns, self._named(names)))
         statistics = []
         for S in covariances:
@@ -263,7 +267,7 @@ class Grams:
 
     def _named(self, names: Sequence[str]) -> IntArray:
         """Places in p of coefficients by name, the loaded arm's with them."""
-        wanted = np.array([name in names for name in self.names])
+        wanted = np.isin(self.names, names)
         if self._both:
             wanted = np.append(wanted, wanted[self._rigid])
         return np.flatnonzero(wanted)

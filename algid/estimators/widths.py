@@ -55,6 +55,9 @@ def likeliest_width(profile: Profile, start: float) -> Width:
     def log_width(place: int) -> float:
         return first + place * _HALF_OCTAVE
 
+    def allowed(place: int) -> bool:
+        return bool(low <= log_width(place) <= high)
+
     def deviance(place: int) -> float:
         if place not in seen:
             seen[place] = profile(float(np.exp(log_width(place))))
@@ -63,8 +66,7 @@ def likeliest_width(profile: Profile, start: float) -> Width:
     place = 0
     for step in (2, 1):
         while True:
-            beside = [one for one in (place - step, place + step) if low <= log_width(one) <= high]
-            best = min(beside, key=deviance)
+            best = min(filter(allowed, (place - step, place + step)), key=deviance)
             if not deviance(best) < deviance(place):  # so a deviance that is no number ends it too
                 break
             place = best

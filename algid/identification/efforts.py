@@ -17,9 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import by_themselves
 from algid.estimators.fit import Fit
-from algid.model import EVERY_TERM, K3, K4, K5, K6, K7, MOMENTS, SINE_OF, names_of
+from algid.model import K3, K4, K5, K6, K7, MOMENTS, SINE_OF, names_of, terms_named
 from algid.notices import Notice, Remedy
 from algid.physics.effort import FRICTION
 from algid.settings import Settings
@@ -107,7 +108,7 @@ def _external(fit: Fit) -> bool:
 
 
 def _without_friction(fit: Fit) -> bool:
-    dry = names_of(term for name, term in EVERY_TERM.items() if name in FRICTION[1:])
+    dry = names_of(terms_named(FRICTION[1:]))
     if fit.absent or (fit.shrinkage is None and set(dry) & set(fit.names)):
         return False
     known = _of_fit(fit)
@@ -146,7 +147,7 @@ def _own(fit: Fit, loaded: bool) -> Known:
 
     Empty without such a log.
     """
-    logs = [log for log in fit.logs if log.loaded is loaded]
+    logs = of_kind(fit.logs, loaded)
     if not logs:
         return {}
     values, covariance, _ = by_themselves(fit.shared, logs)

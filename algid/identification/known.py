@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from algid.model import (
     phasor_of,
     without_delay,
 )
+from algid.names import outside, vector, within
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
@@ -74,8 +75,8 @@ def prior_of(result: Result, model: Model, file: str | None = None) -> Prior:
         )
     known = set(result.fit.covariance_names) & set(result.parameters)
     gone = absent(Settings.of(result.settings).effort, model.names)
-    names = tuple(name for name in model.names if name not in gone)
-    missing = [name for name in names if name not in known]
+    names = outside(model.names, gone)
+    missing = outside(names, known)
     if missing:
         raise ResultError(
             f"{file}: the result has no {', '.join(missing)}; use the flags it was made with"
@@ -93,10 +94,10 @@ def noise_of(result: Result) -> NoiseLevels | None:
     """Noise of the logs behind a result; None unless all four levels are known and above zero."""
     if result.fit is None:
         return None
-    levels = [result.fit.noise.get(name, 0.0) for name in ("theta1", "theta2", "tau1", "tau2")]
-    if min(levels) <= 0:
+    levels = vector(("theta1", "theta2", "tau1", "tau2"), result.fit.noise, otherwise=0.0)
+    if levels.min() <= 0:
         return None
-    return NoiseLevels(np.array(levels[:2]), np.array(levels[2:]))
+    return NoiseLevels(levels[:2], levels[2:])
 
 
 def torque_constants(result: Result, model: Model, role: Role, file: str) -> FloatArray:
@@ -114,14 +115,14 @@ def torque_constants(result: Result, model: Model, role: Role, file: str) -> Flo
     known |= dict.fromkeys(absent(Settings.of(result.settings).effort, model.names), 0.0)
     known |= given_lengths(result)
     loaded = role == "loaded"
-    body = tuple(name for name in BODY_PARAMETERS if name in known)
+    body = within(BODY_PARAMETERS, known)
     shared = Shared(model, payload=loaded, body=body)
     for name in shared.names:
         if name not in known:
             raise ResultError(
                 f"{file}: the result has no {name}; identify it from logs that determine it"
             )
-    return shared.coefficients(np.array([known[name] for name in shared.names]), loaded)
+    return shared.coefficients(vector(shared.names, known), loaded)
 
 
 def given_lengths(result: Result) -> dict[str, float]:
@@ -150,12 +151,17 @@ def has_error_bar(result: Result, name: str) -> bool:
     return ok and result.fit is not None and name in result.fit.covariance_names
 
 
+def with_error_bar(result: Result, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the names whose estimate `has_error_bar`, in order."""
+    return tuple(name for name in names if has_error_bar(result, name))
+
+
 def covariance_of(result: Result, names: Sequence[str], uncertain: Collection[str]) -> FloatArray:
     """Covariance (n, n) of the parameters `names`: zero for those that are not `uncertain`."""
     covariance = np.zeros((len(names), len(names)))
-    rows = np.flatnonzero(np.isin(names, list(uncertain))).tolist()
-    if rows and result.fit is not None:
-        covariance[np.ix_(rows, rows)] = result.fit.covariance_of([names[row] for row in rows])
+    rows = np.flatnonzero(np.isin(names, list(uncertain)))
+    if rows.size and result.fit is not None:
+        covariance[np.ix_(rows, rows)] = result.fit.covariance_of(within(names, uncertain))
     return covariance
 
 
@@ -168,7 +174,7 @@ def by_constants(result: Result) -> tuple[float, dict[str, float]] | None:
     k1 / k2, so that a wrong one shows.
     """
     gravity = Settings.of(result.settings).gravity
-    names = [name for name in (K1, K2, SINE_OF[K1], SINE_OF[K2]) if has_error_bar(result, name)]
+    names = with_error_bar(result, (K1, K2, SINE_OF[K1], SINE_OF[K2]))
     if not gravity or not {K1, K2} <= set(names):
         return None
     value = {name: result.parameters[name].estimate or 0.0 for name in names}

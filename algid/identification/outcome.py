@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
@@ -22,6 +22,7 @@ from algid.identification.remarks import fit_notes, fit_warnings
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
 from algid.model import DELAYS, K3, K5, UNITS
+from algid.names import outside, places_outside, within
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
@@ -156,10 +157,10 @@ def _estimates(
     """
     if not statuses:
         statuses = np.where(np.isfinite(stds), "OK", "NOT_IDENTIFIABLE").tolist()
-    return {
-        name: estimate(value, std, quantile * std, UNITS[name], status)
-        for name, value, std, status in zip(names, values, stds, statuses, strict=True)
-    }
+    estimates = {}
+    for name, value, std, status in zip(names, values, stds, statuses, strict=True):
+        estimates[name] = estimate(value, std, quantile * std, UNITS[name], status)
+    return estimates
 
 
 def estimate(value: float, std: float, half: float, unit: str, status: str) -> Estimate:
@@ -199,13 +200,13 @@ def unknown(unit: str) -> Estimate:
     )
 
 
-def _constants_in(row: str) -> list[str]:
+def _constants_in(row: str) -> tuple[str, ...]:
     """The constants of whose sum a row of Table 4 is; a loaded one holds the payload's share."""
-    return [name for name in row.split("+") if name in CONSTANT_NAMES]
+    return within(row.split("+"), CONSTANT_NAMES)
 
 
-_ROWS = {row: _constants_in(row) for row in UNLOADED_ROWS}
-_LOADED = {row: _constants_in(row) for row in LOADED_ROWS}
+_ROWS = dict(zip(UNLOADED_ROWS, map(_constants_in, UNLOADED_ROWS), strict=True))
+_LOADED = dict(zip(LOADED_ROWS, map(_constants_in, LOADED_ROWS), strict=True))
 
 
 def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
@@ -218,8 +219,7 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
     kinds = [(False, _ROWS)]
     if fit.shared.payload:
         kinds.append((True, _LOADED))
-    lost = [place for place, status in enumerate(fit.status) if status == "NOT_IDENTIFIABLE"]
-    unusable = {fit.names[place] for place in lost}
+    unusable = set(np.array(fit.names)[np.array(fit.status) == "NOT_IDENTIFIABLE"].tolist())
     for loaded, constants_of in kinds:
         jacobian = fit.shared.jacobian(fit.values, loaded)
         coefficients = fit.shared.coefficients(fit.values, loaded)
@@ -264,19 +264,22 @@ def fit_summary(
             held_out=chosen.held_out,
             shrunk=_expected(fit, chosen),
         ),
-        terms=_terms(fit, chosen),
+        terms=list(_terms(fit, chosen)),
         torque_hold=_torque_hold(chosen),
         broken_bounds=_bounds(fit),
         endogeneity=_endogeneity(fit),
-        by_log=[
-            _estimates(fit.shared.log_names, own.values, own.std, fit.quantile)
-            for own in own_estimates(fit)
-        ],
+        by_log=list(_by_log(fit)),
         residual=prediction(residual),
         cross_validation=cross_validation,
         repeatability=_repeatability(fit),
         torque_gain=_torque_gain(fit, settings.payload_mass),
     )
+
+
+def _by_log(fit: Fit) -> Iterator[dict[str, Estimate]]:
+    """Each log's own estimates."""
+    for own in own_estimates(fit):
+        yield _estimates(fit.shared.log_names, own.values, own.std, fit.quantile)
 
 
 def _noise(fit: Fit) -> dict[str, float]:
@@ -290,11 +293,11 @@ def _noise(fit: Fit) -> dict[str, float]:
 
 def _covariance(fit: Fit) -> tuple[list[str], list[list[float | None]]]:
     """Names of the parameters that the torque holds, and their covariance."""
-    there = [place for place, name in enumerate(fit.names) if name not in fit.absent]
+    there = places_outside(fit.names, fit.absent)
     lost = np.isinf(fit.std)
     covariance = np.where(lost | lost[:, None], np.inf, fit.covariance)[np.ix_(there, there)]
     known = [[finite(value) for value in row] for row in covariance]
-    return [fit.names[place] for place in there], known
+    return list(outside(fit.names, fit.absent)), known
 
 
 def _whiteness(fit: Fit) -> dict[str, results.WhitenessTest]:
@@ -372,7 +375,7 @@ def _expected(fit: Fit, chosen: Selection) -> list[str]:
         return list(fit.shrinkage.names)
     if chosen.undecided is None:
         return []
-    return [name for name in DELAYS if name in fit.names]
+    return list(within(DELAYS, fit.names))
 
 
 def _torque_hold(chosen: Selection) -> results.TorqueHold:
@@ -395,15 +398,13 @@ def _torque_hold(chosen: Selection) -> results.TorqueHold:
     )
 
 
-def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
+def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
     """Worth of each term that the logs chose from, or of those that were given."""
     if not chosen.trials:
-        return [
-            results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned)
-            for w in term_worths(fit)
-        ]
-    return [
-        results.TermCriterion(
+        for w in term_worths(fit):
+            yield results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned)
+    for trial in chosen.trials:
+        yield results.TermCriterion(
             term=trial.term,
             kept=trial.kept,
             gain_heldout=finite(trial.prediction),
@@ -411,8 +412,6 @@ def _terms(fit: Fit, chosen: Selection) -> list[results.TermCriterion]:
             evidence=finite(0.5 * trial.evidence),
             why=trial.reason,
         )
-        for trial in chosen.trials
-    ]
 
 
 def _torque_gain(fit: Fit, known: float | None) -> Estimate | None:

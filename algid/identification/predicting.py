@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 import polars as pl
 
 from algid.arm import FloatArray
@@ -25,8 +24,6 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
     source = open_source(log, role, reused(profile, result), known.model.gravity)
     coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
     blocks = list(torque_blocks(Survey([source]), known.model, coefficients, known.shift))
-    names = []
-    if blocks:
-        names = [name for name in blocks[0] if name != "log"]
-    columns = {name: np.concatenate([block[name] for block in blocks]) for name in names}
-    return pl.DataFrame(columns)
+    if not blocks:
+        return pl.DataFrame()
+    return pl.concat(map(pl.DataFrame, blocks), rechunk=True).drop("log")

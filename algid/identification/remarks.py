@@ -12,7 +12,7 @@ from algid.estimators.fit import Fit
 from algid.identification.phases import phase_note
 from algid.methods import estimator_of
 from algid.model import K4
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, has_code
 from algid.significance import CERTAIN, LEVEL, ONE_SIDED, chance, sigmas
 
 STEEL = 8000.0  # kg/m³
@@ -22,16 +22,16 @@ FAR_APART = sigmas(CERTAIN)  # past which two logs are not of one arm
 
 def exchanged(fit: Fit) -> bool:
     """Whether the unloaded arm carries more than the loaded one, and by far."""
-    return any(
-        b.bound == "m_p >= 0" and b.distance is not None and b.distance > FAR_APART
-        for b in broken_bounds(fit)
-    )
+    for broken in broken_bounds(fit):
+        if broken.bound == "m_p >= 0" and broken.distance is not None:
+            return broken.distance > FAR_APART
+    return False
 
 
 def fit_warnings(fit: Fit) -> Iterator[Notice]:
     """What a user should know about a fit."""
     yield from fit.notes
-    if not fit.converged and not any(note.code == "NOT_FEASIBLE" for note in fit.notes):
+    if not fit.converged and not has_code(fit.notes, "NOT_FEASIBLE"):
         yield Notice("REFINED_FAILED")
     yield from fit.unidentifiable
     if fit.shared.model.gravity == 0:

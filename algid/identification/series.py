@@ -169,11 +169,13 @@ def series_blocks(
     a window's values are (s, n).
     """
     gathered: list[PaperSeries] = []
+    rows = 0
     for window in series:
         gathered.append(window)
-        if sum(part.t.size for part in gathered) >= ROWS:
+        rows += window.t.size
+        if rows >= ROWS:
             yield _columns(gathered, names)
-            gathered = []
+            gathered, rows = [], 0
     if gathered:
         yield _columns(gathered, names)
 
@@ -256,8 +258,11 @@ def write_fit_series(
     `running.parquet` (not of a fit that was held within
     bounds or did not converge) and, where there is a residual, `innovations.parquet`.
     """
-    summaries = [survey.summary(log) for log in survey.logs]
-    starts = [summary.start_ns for summary in summaries]
+    starts, durations = [], []
+    for log in survey.logs:
+        summary = survey.summary(log)
+        starts.append(summary.start_ns)
+        durations.append(summary.duration)
     coefficients: dict[str, FloatArray] = {}
     for log in survey.logs:
         coefficients[log.role] = torque_coefficients(fit, log.role)
@@ -267,9 +272,8 @@ def write_fit_series(
     write_columns(
         folder / "scored.parquet", scored_blocks(survey, model, coefficients, shift), starts
     )
-    durations = [summary.duration for summary in summaries]
     # a log too short for a window is in no fit, and which it is nobody knows
-    every = len(fit.logs) == len(summaries)
+    every = len(fit.logs) == len(durations)
     if every:
         write_columns(folder / "information.parquet", information_blocks(fit, durations), starts)
     if every and has_running(fit):

@@ -216,10 +216,12 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
 
     A loaded one that is also given as unloaded has a notice of it: its payload is zero.
     """
-    lengths = {source.promised for source in unloaded if source.digest}
-    if not any(source.digest and source.promised in lengths for source in loaded):
+    if _hashed_lengths(unloaded).isdisjoint(_hashed_lengths(loaded)):
         return unloaded + loaded
-    names = {source.digest(): source.name for source in unloaded if source.digest}
+    names = {}
+    for source in unloaded:
+        if source.digest:
+            names[source.digest()] = source.name
     sources = list(unloaded)
     for source in loaded:
         if source.digest is not None and source.digest() in names:
@@ -227,6 +229,11 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
             source = source.noted(Notice("SAME_LOG_LOADED", numbers=numbers))
         sources.append(source)
     return sources
+
+
+def _hashed_lengths(sources: Iterable[LogSource]) -> set[int]:
+    """How many samples those sources promise that can be hashed."""
+    return {source.promised for source in sources if source.digest}
 
 
 def refuse_shared_torques(sources: Sequence[LogSource]) -> None:

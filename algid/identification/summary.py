@@ -8,7 +8,7 @@ from algid import __version__
 from algid.identification.outcome import Identified
 from algid.identification.survey import Survey
 from algid.log import Truth
-from algid.notices import Notice, merged
+from algid.notices import Notice, has_code, merged
 from algid.results import Result
 from algid.settings import Settings
 from algid.table4 import paper_errors, table4, true_parameters, true_rows
@@ -23,7 +23,7 @@ A time base that is too short by the samples it lacks falsifies accelerations by
 def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
     """Codes of checks of single logs that the fit of all of them makes more precisely."""
     codes = []
-    if any(one.code in ("PHASES", "PHASE") for one in outcome.notices):
+    if has_code(outcome.notices, "PHASES", "PHASE"):
         codes.append("ZERO_OFFSET")
     if settings.effort is not None:
         codes.append("GRAVITY_COMPENSATED")

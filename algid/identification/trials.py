@@ -13,7 +13,7 @@ from algid.identification.outcome import Identified, is_implausible
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.log import Log
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, has_code, warnings_of
 from algid.results.verdict import CAUSES
 from algid.settings import Settings
 from algid.units import TORQUE
@@ -70,7 +70,7 @@ def _stands(outcome: Identified, contradictions: tuple[str, ...]) -> bool:
     if summary is None or not summary.converged or is_implausible(summary):
         return False
     wrong = CAUSES + contradictions
-    return not any(one.code in wrong for one in outcome.notices if not one.note)
+    return not has_code(warnings_of(outcome.notices), *wrong)
 
 
 def _ratio(logs: Sequence[LogSource], unit: str) -> float | None:

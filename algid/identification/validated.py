@@ -83,10 +83,10 @@ class Validated:
 
     def _called(self) -> dict[str, str]:
         """What tables call the logs: their files' names where those differ."""
-        called = {name: file_name(name) for name in self.logs}
-        if len(set(called.values())) < len(called):
-            called = {name: visible(name) for name in self.logs}
-        return called | {EVERY: EVERY}
+        called = list(map(file_name, self.logs))
+        if len(set(called)) < len(called):
+            called = list(map(visible, self.logs))
+        return dict(zip(self.logs, called, strict=True)) | {EVERY: EVERY}
 
     def _predicted(self) -> Table:
         rows: list[tuple[str, ...]] = []
@@ -130,7 +130,8 @@ def _table(
     title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]], note: str = ""
 ) -> Table:
     columns = [Column(headings[0], "name")]
-    columns += [Column(one, "number") for one in headings[1:]]
+    for one in headings[1:]:
+        columns.append(Column(one, "number"))
     return Table(title, tuple(columns), tuple(rows), note)
 
 
@@ -149,8 +150,8 @@ def _rows(one: RolloutScore) -> list[dict[str, Any]]:
             {
                 "horizon": horizon,
                 "starts": int(one.count[place]),
-                "rmse": [_finite(value) for value in rmse[place]],
-                "moved": [_finite(value) for value in moved[place]],
+                "rmse": list(map(_finite, rmse[place])),
+                "moved": list(map(_finite, moved[place])),
             }
         )
     return rows

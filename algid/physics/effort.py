@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
+from algid.names import outside, within
 from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.physics.terms.viscous import VISCOUS
 
@@ -27,7 +28,7 @@ _EVERY = ALWAYS + OPTIONAL
 def without_terms(effort: Effort | None, terms: Iterable[str]) -> tuple[str, ...]:
     """Those of the optional `terms` that a torque so logged may have."""
     gone = {"friction-compensated": FRICTION, "external": _OF_DRIVES}.get(effort or "", ())
-    return tuple(term for term in terms if term not in gone)
+    return outside(terms, gone)
 
 
 def absent(effort: Effort | None, names: Iterable[str]) -> tuple[str, ...]:
@@ -36,9 +37,11 @@ def absent(effort: Effort | None, names: Iterable[str]) -> tuple[str, ...]:
     for term in _EVERY:
         of_drive = term.name in _OF_DRIVES
         if effort == "gravity-compensated":
-            gone |= {parameter.name for parameter in term.parameters if parameter.weighs}
+            for parameter in term.parameters:
+                if parameter.weighs:
+                    gone.add(parameter.name)
         if effort == "friction-compensated" and term.name in FRICTION:
             gone |= set(term.names)
         if effort == "external" and (term.inertial or of_drive):
             gone |= set(term.names)
-    return tuple(name for name in names if name in gone)
+    return within(names, gone)

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.names import names_in
 
 if TYPE_CHECKING:
     from algid.physics.motion import Motion, Widths
@@ -125,7 +126,7 @@ class Expression:
         text = ""
         for product, factor in self.products.items():
             size = abs(factor)
-            parts = [atom.name for atom in product]
+            parts = list(names_in(product))
             if size != 1 or not parts:
                 parts.insert(0, f"{size:g}")
             joined = " * ".join(parts)

@@ -118,10 +118,10 @@ ACCELERATIONS = (_channel("alpha1", "alpha", 0), _channel("alpha2", "alpha", 1))
 
 Q1, Q2 = (expression(_channel(f"q{joint + 1}", "theta", joint)) for joint in range(2))
 W1, W2 = (expression(_channel(f"w{joint + 1}", "omega", joint)) for joint in range(2))
-A1, A2 = (expression(atom) for atom in ACCELERATIONS)
-S1, C1, S2, C2, S12, C12 = (expression(atom) for atom in _TRIGONOMETRIC.values())
-T1, T2 = (expression(atom) for atom in _SIGNS)
-H1, H2 = (expression(atom) for atom in _FADINGS)
+A1, A2 = map(expression, ACCELERATIONS)
+S1, C1, S2, C2, S12, C12 = map(expression, _TRIGONOMETRIC.values())
+T1, T2 = map(expression, _SIGNS)
+H1, H2 = map(expression, _FADINGS)
 
 RATES = {"theta1": W1, "theta2": W2, "omega1": A1, "omega2": A2}
 """What each signal's derivative by time is."""
@@ -129,4 +129,7 @@ RATES = {"theta1": W1, "theta2": W2, "omega1": A1, "omega2": A2}
 
 def rate(e: Expression) -> Expression:
     """The derivative by time of an expression without accelerations."""
-    return sum((e.by(signal) * speed for signal, speed in RATES.items()), Expression({}))
+    total = Expression({})
+    for signal, speed in RATES.items():
+        total = total + e.by(signal) * speed
+    return total

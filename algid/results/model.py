@@ -22,7 +22,7 @@ from algid.files import first_misfit, read_text, whole_file
 from algid.limits import LIMITS
 from algid.log import Reading
 from algid.model import DELAYS
-from algid.notices import Notice, from_flags
+from algid.notices import Notice, from_flags, notes_of, warnings_of
 from algid.text import visible
 from algid.verdict import Verdict
 from algid.words import counted
@@ -219,8 +219,11 @@ class TorquePrediction(_Model):
     def unexplained(self, least: float) -> tuple[int, ...]:
         """Joints, 1 or 2, with R² below `least` and a residual above `TRIFLE` of their torque."""
         of_load = self.of_load or self.nrmse
-        pairs = zip((1, 2), self.r2, of_load, strict=True)
-        return tuple(joint for joint, r2, of in pairs if r2 < least and of > TRIFLE)
+        joints = []
+        for joint, r2, of in zip((1, 2), self.r2, of_load, strict=True):
+            if r2 < least and of > TRIFLE:
+                joints.append(joint)
+        return tuple(joints)
 
 
 class Repeatability(_Model):
@@ -263,7 +266,7 @@ class FitSummary(_Model):
     @model_validator(mode="after")
     def _covariance_is_square(self) -> FitSummary:
         size = len(self.covariance_names)
-        if [len(row) for row in self.covariance] != [size] * size:
+        if list(map(len, self.covariance)) != [size] * size:
             raise ValueError(
                 f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}"
             )
@@ -284,7 +287,7 @@ class FitSummary(_Model):
         size = len(self.covariance_names)
         padded = np.full((size + 1, size + 1), np.nan)
         padded[:size, :size] = np.array(self.covariance, dtype=np.float64).reshape(size, size)
-        place_of = {name: place for place, name in enumerate(self.covariance_names)}
+        place_of = dict(zip(self.covariance_names, range(size), strict=True))
         places = [place_of.get(name, size) for name in names]
         return padded[np.ix_(places, places)]
 
@@ -355,12 +358,12 @@ class Result(_Model):
     @property
     def warnings(self) -> list[str]:
         """What makes the result doubtful, of logs and fit: codes and words."""
-        return [f"{one.code}: {one.sentence}" for one in self.notices if not one.note]
+        return list(map(_line, warnings_of(self.notices)))
 
     @property
     def notes(self) -> list[str]:
         """How things were read and done: codes and words."""
-        return [f"{one.code}: {one.sentence}" for one in self.notices if one.note]
+        return list(map(_line, notes_of(self.notices)))
 
     @property
     def logs(self) -> list[LogSummary]:
@@ -370,7 +373,10 @@ class Result(_Model):
     @property
     def delay(self) -> Estimate | None:
         """The estimate of the torque's delay, where there is one."""
-        return next((self.parameters[name] for name in DELAYS if name in self.parameters), None)
+        for name in DELAYS:
+            if name in self.parameters:
+                return self.parameters[name]
+        return None
 
     @property
     def torque_model(self) -> TorqueModel | None:
@@ -426,8 +432,8 @@ class Result(_Model):
         own = set(type(self).model_fields)
         for kind in type(self).__mro__:
             if issubclass(kind, Result):
-                own |= {name for name in vars(kind) if not name.startswith(("_", "model_"))}
-        return sorted(own)
+                own |= vars(kind).keys()
+        return sorted(name for name in own if not name.startswith(("_", "model_")))
 
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same, whatever else either can do."""
@@ -468,6 +474,11 @@ class Result(_Model):
             if one.std is not None:
                 std = f"{one.std:.2g}"
             yield name, value, std, one.unit, one.status.value
+
+
+def _line(notice: Notice) -> str:
+    """Code and words of a notice."""
+    return f"{notice.code}: {notice.sentence}"
 
 
 def result_schema() -> dict[str, Any]:
@@ -554,9 +565,11 @@ def misfit_of_numbers(content: Any) -> str | None:
     while left:
         place, value = left.pop()
         if isinstance(value, dict):
-            left += [(f"{place}.{key}"[-200:], inner) for key, inner in value.items()]
+            for key, inner in value.items():
+                left.append((f"{place}.{key}"[-200:], inner))
         elif isinstance(value, list):
-            left += [(f"{place}.{number}"[-200:], inner) for number, inner in enumerate(value)]
+            for number, inner in enumerate(value):
+                left.append((f"{place}.{number}"[-200:], inner))
         elif (
             isinstance(value, int | float) and not -largest <= value <= largest
         ):  # also where it is no number
@@ -665,5 +678,6 @@ def _current(content: dict[str, Any]) -> dict[str, Any]:
         notices.append(Notice("EARLIER_CAUSE", one["cause"], remedies=tuple(remedies)))
     for key in ("warnings", "notes"):
         is_note = key == "notes"
-        notices += [Notice("EARLIER", text, note=is_note) for text in current.pop(key, [])]
+        for text in current.pop(key, []):
+            notices.append(Notice("EARLIER", text, note=is_note))
     return current | {"schema_version": SCHEMA_VERSION, "notices": notices}

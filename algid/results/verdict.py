@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from algid.model import CHOICES, EVERY_TERM
-from algid.notices import Notice, Remedy
+from algid.names import outside
+from algid.notices import Notice, Remedy, notes_of, warnings_of
 from algid.options import flag
 from algid.significance import SURE
 from algid.text import joined, significant, visible
@@ -61,12 +62,17 @@ def judge(result: Result) -> Verdict:
     """The verdict on `result`."""
     failure = _failure(result)
     reasons = list(_reasons(result, failed=failure is not None))
-    notes = [one for one in result.notices if one.note]
     if reasons:
         headline = _identified(result)
     else:
         headline = "; ".join(_praise(result))
-    return graded(headline, reasons, notes, failure=failure, command=_command(result, reasons))
+    return graded(
+        headline,
+        reasons,
+        notes_of(result.notices),
+        failure=failure,
+        command=_command(result, reasons),
+    )
 
 
 def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
@@ -96,10 +102,13 @@ def _call(result: Result) -> list[str]:
 
     asked = Settings.of(result.settings)
     words = ["algid", "identify"]
-    words += [log.path for log in result.logs if log.role == "unloaded"]
+    loaded = []
     for log in result.logs:
         if log.role == "loaded":
-            words += [flag("loaded"), log.path]
+            loaded += [flag("loaded"), log.path]
+        else:
+            words.append(log.path)
+    words += loaded
     for name, value in vars(asked).items():
         default = getattr(Settings, name)
         if name == "poles" or value == default or (name == "gravity" and name in result.profile):
@@ -115,7 +124,8 @@ def _flat(profile: Mapping[str, Any]) -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in profile.items():
         if isinstance(value, Mapping):
-            flat |= {f"{name}.{inner}": setting for inner, setting in value.items()}
+            for inner, setting in value.items():
+                flat[f"{name}.{inner}"] = setting
         elif value is not None:
             flat[name] = value
     return flat
@@ -165,7 +175,9 @@ def _failure(result: Result) -> str | None:
         return f"no parameter could be identified ({joined(sorted(words))})"
     if usable < LEAST_USABLE * count:
         return f"only {usable} of {counted(count, 'parameter')} could be identified"
-    return next((one.text for one in _worse_than_constant(result.fit)), None)
+    for one in _worse_than_constant(result.fit):
+        return one.text
+    return None
 
 
 def _tells(found: Estimate) -> bool:
@@ -202,10 +214,10 @@ def replaced_estimator(result: Result) -> str | None:
 def _praise(result: Result) -> Iterator[str]:
     """What speaks for a result: certainty, explained torque, error against the truth."""
     praise = f"all {counted(len(result.estimates), 'parameter')} are identified"
-    with_bars = [name for name, one in result.estimates.items() if one.std is not None]
-    if with_bars:
-        worst = max(with_bars, key=lambda name: _spread(result.estimates[name]))
-        half = significant(196 * _spread(result.estimates[worst]), 2)
+    spreads = {name: _spread(one) for name, one in result.estimates.items() if one.std is not None}
+    if spreads:
+        worst = max(spreads, key=spreads.__getitem__)
+        half = significant(196 * spreads[worst], 2)
         yield f"{praise}, the least certain, {visible(worst)}, to ±{half} % (95 %)"
     else:
         estimator = visible(result.estimator)
@@ -255,8 +267,8 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     """Reasons for doubt in a result, the weightiest first: causes, statuses, fit, notices."""
-    warnings = [one for one in result.notices if not one.note]
-    causes = [one for one in warnings if one.code in CAUSES]
+    doubts = warnings_of(result.notices)
+    causes = [one for one in doubts if one.code in CAUSES]
     causes.sort(key=lambda one: CAUSES.index(one.code))
     poor = any(_worse_than_constant(result.fit))
     if failed and not causes and (is_implausible(result) or poor):
@@ -266,7 +278,7 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     if result.fit is not None:
         yield from _of_fit(result.fit, failed=failed)
     yield from _far_from_truth(result)
-    yield from (one for one in warnings if one.code not in CAUSES)
+    yield from outside(doubts, causes)
 
 
 def _asked_for(result: Result) -> dict[str, Estimate]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from algid.names import names_in
 from algid.physics.expressions import NOTHING, Expression
 from algid.physics.parameters import Parameter
 
@@ -103,7 +104,7 @@ class Term:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of its parameters."""
-        return tuple(parameter.name for parameter in self.parameters)
+        return names_in(self.parameters)
 
     @property
     def unit(self) -> str:

@@ -1,0 +1,64 @@
+"""Names in their order: which of them are there, and what stands under them."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Mapping
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from algid.arm import FloatArray
+
+Item = TypeVar("Item")
+
+
+class Named(Protocol):
+    """What has a name."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+
+OneNamed = TypeVar("OneNamed", bound=Named)
+
+
+def names_in(items: Iterable[Named]) -> tuple[str, ...]:
+    """The names of what has one, in order."""
+    return tuple(one.name for one in items)
+
+
+def by_name(items: Iterable[OneNamed]) -> dict[str, OneNamed]:
+    """What has a name, by it, in order."""
+    return {one.name: one for one in items}
+
+
+def within(items: Iterable[Item], kept: Container[Item]) -> tuple[Item, ...]:
+    """Those of the items that are among `kept`, in order."""
+    return tuple(item for item in items if item in kept)
+
+
+def outside(items: Iterable[Item], gone: Container[Item]) -> tuple[Item, ...]:
+    """Those of the items that are not among `gone`, in order."""
+    return tuple(item for item in items if item not in gone)
+
+
+def places_outside(items: Iterable[Item], gone: Container[Item]) -> list[int]:
+    """Where those of the items stand that are not among `gone`."""
+    return [place for place, item in enumerate(items) if item not in gone]
+
+
+def vector(
+    names: Iterable[str], value_of: Mapping[str, float], otherwise: float | None = None
+) -> FloatArray:
+    """Values by name as an array (n,) in the order of the names.
+
+    Raises
+    ------
+    KeyError
+        If a name has no value and there is no value `otherwise`.
+    """
+    if otherwise is not None:
+        return np.array([value_of.get(name, otherwise) for name in names], dtype=np.float64)
+    return np.array([value_of[name] for name in names], dtype=np.float64)
