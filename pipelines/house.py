@@ -27,6 +27,7 @@ from algid.cli import main
 from algid.options import OPTIONS, flag
 from algid.physics.terms import ALWAYS, OPTIONAL
 from pipelines import bench_logs
+from pipelines.house_tests import reach
 from tests.test_layers import TABLE
 
 _SAMPLES = 4000  # of the traced log, at 1 kHz
@@ -46,6 +47,12 @@ def figures() -> Iterator[tuple[str, str]]:
     yield from _literals()
     functions = [name for text in tests for name in _functions(text) if name.startswith("test_")]
     yield "tests", f"{len(functions):,}"
+    reached = reach()
+    for name, part in (
+        ("tests of private names", reached.private),
+        ("tests that reach inside rooms", reached.inside),
+    ):
+        yield name, f"{part:,}, {100 * part / reached.tests:.1f} %"
     yield "lines of tests", f"{of_tests:,}"
     yield "lines, docstrings among them", f"{lines:,}"
     yield "lines of docstrings", f"{sum(map(_docstring_lines, code)):,}"

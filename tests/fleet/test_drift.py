@@ -17,8 +17,6 @@ import pytest
 from scipy import stats
 
 from algid.errors import ResultError
-from algid.fleet.drift import windows
-from algid.fleet.findings import mislabelled, outliers
 from algid.fleet.history import history_of, read_jobs, write_history
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -48,6 +46,18 @@ def table(
 def read(jobs: pl.DataFrame, folder: Path) -> pl.DataFrame:
     jobs.write_parquet(folder / "jobs.parquet")
     return read_jobs(folder / "jobs.parquet")
+
+
+def followed(jobs: pl.DataFrame, folder: Path) -> pl.DataFrame:
+    """k1's windows."""
+    jobs.write_parquet(folder / "jobs.parquet")
+    return history_of(folder / "jobs.parquet").windows.filter(parameter="k1")
+
+
+def standing_out(jobs: pl.DataFrame, folder: Path, kind: str) -> pl.DataFrame:
+    """What is found of one kind."""
+    jobs.write_parquet(folder / "jobs.parquet")
+    return history_of(folder / "jobs.parquet").findings.filter(kind=kind)
 
 
 def weighted_line(t: np.ndarray, y: np.ndarray, std: np.ndarray) -> dict[str, float]:
@@ -85,7 +95,7 @@ def test_every_window_is_weighted_least_squares_with_students_test(
     std = draw.uniform(0.005, 0.02, days.size)
     values = 3 + growth * days / MONTH + scatter * std * draw.standard_normal(days.size)
     when = pl.Series([START + timedelta(days=int(day)) for day in days], dtype=STAMP)
-    found = windows(read(table(values.tolist(), std.tolist(), time=when), tmp_path), "k1")
+    found = followed(table(values.tolist(), std.tolist(), time=when), tmp_path)
     month = np.floor(days / MONTH).astype(int)
     assert found["month"].to_list() == sorted(set(month.tolist()))
     for row in found.rows(named=True):
@@ -103,9 +113,7 @@ def test_every_window_is_weighted_least_squares_with_students_test(
 
 @pytest.mark.parametrize(("logs", "tested"), [(7, False), (8, True)])
 def test_eight_logs_are_tested(logs: int, tested: bool, tmp_path: Path) -> None:
-    (row,) = windows(read(table([1.0 + 0.5 * day for day in range(logs)]), tmp_path), "k1").rows(
-        named=True
-    )
+    (row,) = followed(table([1.0 + 0.5 * day for day in range(logs)]), tmp_path).rows(named=True)
     assert row["drift"] == tested
     assert math.isnan(row["p"]) != tested
     assert math.isnan(row["slope"]) != tested
@@ -118,9 +126,7 @@ def test_the_alarm_is_at_one_in_a_thousand(factor: float, alarm: bool, tmp_path:
     """On a line without scatter the intervals alone count: t is slope × √Σ(t - t̄)² / std."""
     t = np.arange(20) / MONTH
     critical = stats.t.isf(0.0005, 18) * 0.01 / math.sqrt(np.sum((t - t.mean()) ** 2))
-    (row,) = windows(read(table((2 - factor * critical * t).tolist()), tmp_path), "k1").rows(
-        named=True
-    )
+    (row,) = followed(table((2 - factor * critical * t).tolist()), tmp_path).rows(named=True)
     assert row["p"] == pytest.approx(2 * stats.t.sf(factor * stats.t.isf(0.0005, 18), 18), rel=1e-6)
     assert row["drift"] == alarm
     assert row["slope"] == pytest.approx(-factor * critical, rel=1e-8)
@@ -130,7 +136,7 @@ def test_a_window_forgets_what_is_three_months_old(tmp_path: Path) -> None:
     """Months count from a robot's own first log, and one without logs has no row of its own."""
     days = [0, 1, 45, 100, 101, 200]
     when = pl.Series([START + timedelta(days=day) for day in days], dtype=STAMP)
-    found = windows(read(table([1, 2, 3, 4, 5, 6], time=when), tmp_path), "k1")
+    found = followed(table([1, 2, 3, 4, 5, 6], time=when), tmp_path)
     assert found.select("month", "logs").rows() == [(0, 2), (1, 3), (3, 3), (6, 1)]
     assert found["mean"].to_numpy() == pytest.approx([1.5, 2.0, 4.0, 6.0], rel=1e-12)
     # alone in its window it has the error that its interval says
@@ -140,8 +146,8 @@ def test_a_window_forgets_what_is_three_months_old(tmp_path: Path) -> None:
 def test_robots_do_not_see_each_other(tmp_path: Path) -> None:
     one = table([1.0 + 0.01 * day for day in range(20)])
     other = table([5.0 - 0.01 * day for day in range(20)], robot=["s"] * 20)
-    both = windows(read(pl.concat([one, other]), tmp_path), "k1")
-    alone = [windows(read(jobs, tmp_path), "k1") for jobs in (one, other)]
+    both = followed(pl.concat([one, other]), tmp_path)
+    alone = [followed(jobs, tmp_path) for jobs in (one, other)]
     for robot, expected in zip(("r", "s"), alone, strict=True):
         mine = both.filter(robot=robot)
         for name in ("mean", "mean_std", "slope", "slope_std", "p"):
@@ -156,7 +162,7 @@ def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> Non
         k1_std=pl.when(pl.col("job") == "j10").then(None).otherwise(pl.col("k1_std"))
     )
     for one in (jobs.head(10), nothing):
-        found = windows(read(one, tmp_path), "k1").rows(named=True)[-1]
+        found = followed(one, tmp_path).rows(named=True)[-1]
         assert found["logs"] == 8
         assert found["mean"] == pytest.approx(np.mean(good), rel=1e-12)
 
@@ -172,15 +178,15 @@ def test_what_is_not_finished_is_not_read(status: str, tmp_path: Path) -> None:
 
 def test_a_job_without_a_date_has_no_month(tmp_path: Path) -> None:
     when = pl.Series([START, None, START + timedelta(days=31)], dtype=STAMP)
-    found = read(table([1.0, 2.0, 3.0], time=when), tmp_path)
-    assert found["month"].to_list() == [0, None, 1]
-    assert windows(found, "k1")["logs"].sum() == 1 + 2
+    jobs = table([1.0, 2.0, 3.0], time=when)
+    assert read(jobs, tmp_path)["month"].to_list() == [0, None, 1]
+    assert followed(jobs, tmp_path)["logs"].sum() == 1 + 2
 
 
 @pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True), (-6.01, True)])
 def test_an_outlier_is_six_deviations_away(away: float, told: bool, tmp_path: Path) -> None:
     """Where half the logs are the median itself the scatter is the intervals' own, never less."""
-    found = outliers(read(table([1.0] * 7 + [1.0 + 0.01 * away]), tmp_path), "k1")
+    found = standing_out(table([1.0] * 7 + [1.0 + 0.01 * away]), tmp_path, "outlier")
     assert found.height == told
     if told:
         expected = ("outlier", "r", "j7", "k1", 1.0 + 0.01 * away, 1.0)
@@ -201,9 +207,9 @@ def test_logs_that_scatter_are_judged_by_their_scatter(
     # scipy has more digits of 1.4826
     robust = stats.median_abs_deviation([-3, 3, -3, 3, 0], scale="normal")
     values = [1 + 0.01 * one for one in (-3, 3, -3, 3, 0, -3, 3, -3, 3, away * robust)]
-    jobs = read(table([*values, 1.0]), tmp_path)
+    jobs = table([*values, 1.0])
     assert jobs["k1"].median() == pytest.approx(1.0, abs=1e-12)
-    found = outliers(jobs, "k1")
+    found = standing_out(jobs, tmp_path, "outlier")
     assert found["job"].to_list() == (["j9"] if told else [])
 
 
@@ -212,7 +218,7 @@ def test_a_label_is_wrong_once_in_a_million(payload: float, told: bool, tmp_path
     jobs = table(
         [1.0] * 5, m_p=[0.5, 0.5, payload, 0.5, 0.5], m_p_std=[0.001] * 5, label_payload=[0.5] * 5
     )
-    found = mislabelled(read(jobs, tmp_path))
+    found = standing_out(jobs, tmp_path, "payload")
     assert found["job"].to_list() == (["j2"] if told else [])
     if told:
         assert found.select("kind", "parameter", "value", "expected").row(0) == (
@@ -234,18 +240,18 @@ def test_labels_are_judged_robot_by_robot_and_only_where_there_are_any(tmp_path:
         m_p_std=[0.001] * 6,
         label_payload=[0.5] * 6,
     )
-    found = mislabelled(read(pl.concat([wild, calm]), tmp_path))
+    found = standing_out(pl.concat([wild, calm]), tmp_path, "payload")
     # 10 of its own are; 60 where one is 14.8 are not
     assert found.select("robot", "job").rows() == [("s", "j5")]
     some = wild.with_columns(label_payload=pl.when(pl.col("job") == "j5").then(0.5).otherwise(None))
-    assert mislabelled(read(some, tmp_path))["job"].to_list() == ["j5"]
+    assert standing_out(some, tmp_path, "payload")["job"].to_list() == ["j5"]
     without = (
         wild.drop("label_payload"),
         wild.drop("m_p", "m_p_std"),
         wild.with_columns(label_payload=pl.lit("heavy")),
     )
     for jobs in without:
-        nothing = mislabelled(read(jobs, tmp_path))
+        nothing = standing_out(jobs, tmp_path, "payload")
         assert nothing.height == 0
         assert nothing.columns == found.columns
         assert nothing.schema == found.schema
@@ -378,4 +384,4 @@ def test_of_three_logs_one_can_stand_out(logs: int, told: bool, tmp_path: Path) 
 
 def test_of_two_payloads_the_one_that_agrees_with_its_label_tells_how_well(tmp_path: Path) -> None:
     pair = table([1.0, 1.0], m_p=[0.5, 0.9], m_p_std=[0.001, 0.001], label_payload=[0.5, 0.5])
-    assert mislabelled(read(pair, tmp_path))["job"].to_list() == ["j1"]
+    assert standing_out(pair, tmp_path, "payload")["job"].to_list() == ["j1"]

@@ -35,7 +35,6 @@ from algid.report.document import (
 )
 from algid.report.figures.base import Figure, Legend, Missing, Panel, packed
 from algid.report.frame import drawing, page
-from algid.report.html import banner, contents, section_html, table_html, unbroken
 from algid.report.markdown import markdown, markdown_table
 from algid.report.terminal import print_document
 from algid.verdict import Verdict, graded
@@ -78,6 +77,28 @@ def terminal(shown: Document, **options: object) -> str:
 def main_of(text: str) -> str:
     """What stands between the page's contents and its footer."""
     return text.partition('<main id="numbers">')[2].partition("</main>")[0]
+
+
+def part(text: str, tag: str) -> str:
+    """What stands within the page's first element of a tag."""
+    return text.partition(f"<{tag}")[2].partition(f"</{tag}>")[0]
+
+
+def section_html(section: Section) -> str:
+    return main_of(page(document(section), shared_library=True)).strip("\n")
+
+
+def table_html(shown: Table) -> str:
+    return section_html(Section((shown,)))
+
+
+def banner(verdict: Verdict) -> str:
+    return part(page(document(verdict=verdict), shared_library=True), "header")
+
+
+def unbroken(text: str) -> str:
+    shown = section_html(Section((table("T"),), "key", text))
+    return shown.partition('<h2 id="key">')[2].partition("</h2>")[0]
 
 
 def positions(text: str, words: list[str]) -> list[int]:
@@ -131,7 +152,8 @@ def test_the_contents_lead_to_sections_and_to_the_figures_of_those_without_a_hea
         Section((), "empty", "Empty"),
         Section((table("Last"),), "paper", "The paper's", fold="open"),
     )
-    links = re.findall(r'<a href="#(\w+)">(.*?)</a>', contents(shown))
+    contents = part(page(shown, shared_library=True), "nav")
+    links = re.findall(r'<a href="#(\w+)">(.*?)</a>', contents)
     assert [(key, html.unescape(title)) for key, title in links] == [
         ("numbers", "Numbers"),
         ("one", "Figure one"),

@@ -21,12 +21,11 @@ import pytest
 from algid.arm import FloatArray
 from algid.errors import ResultError
 from algid.notices import Notice
-from algid.report.document import Depth
+from algid.report.document import Depth, Document
 from algid.report.figures.base import Figure, Missing
 from algid.report.figures.timeline import views
-from algid.report.frame import library
+from algid.report.frame import library, page
 from algid.report.gallery import gallery
-from algid.report.html import banner
 from algid.report.page import page_html, result_document, write_report
 from algid.report.series import LogRange, read_torque
 from algid.report.text import escaped, script_json
@@ -370,9 +369,9 @@ def test_what_was_tried_stands_second_with_what_it_gains(folder: Path, result: R
 
 def test_a_page_shows_three_reasons_and_folds_the_rest_and_the_notes() -> None:
     reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
-    shown = banner(
-        Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),))
-    )
+    notes = (Notice("B", "a note", note=True),)
+    verdict = Verdict("reservations", "k1 is known", reasons, notes)
+    shown = page(Document("Title", verdict, (), "kicker", "name", "facts", "made"))
     first, _, rest = shown.partition("<details>")
     assert [place for place in range(5) if f"reason {place}" in first] == [0, 1, 2]
     assert "2 more reasons" in rest

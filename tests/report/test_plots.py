@@ -4,10 +4,10 @@ and ranges.
 
 from __future__ import annotations
 
-import io
 import shutil
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ from algid.report.figures.base import (
     upright,
 )
 from algid.report.gallery import gallery
-from algid.report.plots import _save, save_plots
+from algid.report.plots import save_plots
 from algid.results import Result
 from tests.cli.commands import app
 
@@ -98,9 +98,9 @@ def test_without_matplotlib_the_flag_says_what_to_install(
 def sheet_of(figure: Figure) -> Sheet:
     """What matplotlib is handed, unsaved."""
     sheets: list[Sheet] = []
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, TemporaryDirectory() as folder:
         patch.setattr(Sheet, "savefig", lambda self, *_, **__: sheets.append(self))
-        _save(figure, io.BytesIO(), "png")
+        save_plots([figure], Path(folder), "log", "png")
     return sheets[0]
 
 
