@@ -719,6 +719,18 @@ def merged(notices: Iterable[Notice]) -> list[Notice]:
     return list(together.values())
 
 
+def flat(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by their names with dots, as a `Remedy` has them; without those that are None."""
+    by_name: dict[str, Any] = {}
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            for key, inner in value.items():
+                by_name[f"{name}.{key}"] = inner
+        elif value is not None:
+            by_name[name] = value
+    return by_name
+
+
 def has_code(notices: Iterable[Notice], *codes: str) -> bool:
     """Whether a notice has one of the codes."""
     return any(one.code in codes for one in notices)

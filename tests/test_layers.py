@@ -82,13 +82,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm criteria errors estimators files identification model notices options profile "
+        "arm criteria errors estimators files identification model names notices options profile "
         "report results runtime signals significance text verdict words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled criteria errors estimators files identification log model notices "
-        "options progress report results signals significance synth text verdict words writers",
+        "arm compiled criteria errors estimators files identification log model names "
+        "notices options progress report results signals significance synth text verdict words "
+        "writers",
         "numpy polars pydantic scipy",
     ),
     "exports": room(

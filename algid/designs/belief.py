@@ -188,4 +188,4 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
                 f"{belief.std[place]:.2g}), so that no error is large or small beside it; leave it "
                 "out"
             )
-    return Asked(size, known, np.array([name in names for name in every]))
+    return Asked(size, known, np.isin(every, list(names)))

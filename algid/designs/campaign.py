@@ -168,7 +168,7 @@ def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Des
     _driven_joints(campaign.limits)
     kept = campaign.limits.within(campaign.margin)
     experiment, belief = campaign.experiment, campaign.belief
-    loads = [belief.load(loaded) for loaded in experiment.kinds]
+    loads = list(map(belief.load, experiment.kinds))
     rest = resting(kept, experiment.shared.model, loads)
     problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
     optimum = optimise(problem, experiment.rate, campaign.seed, progress)
@@ -226,7 +226,8 @@ def _judged(
     for arm in belief.draws(ARMS, campaign.seed):
         drawn = informations(experiment, recorded, arm, every, experiment.rate)
         worst = np.maximum(worst, np.diag(_covariance(campaign, drawn)))
-    parts = np.sum([one.parts(round(SECOND * experiment.rate)) for one in whole], axis=0)
+    samples = round(SECOND * experiment.rate)
+    parts = np.sum([one.parts(samples) for one in whole], axis=0)
     return Design(
         campaign=campaign,
         t=t,

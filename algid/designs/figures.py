@@ -56,17 +56,15 @@ def _panel(
 ) -> Panel:
     every = max(1, design.t.size // POINTS)
     t = design.t[::every]
-    traces: list[Trace] = [
-        line(t, values[joint, ::every], COLOURS[joint], f"joint {joint + 1}", f"joint {joint + 1}")
-        for joint in range(2)
-    ]
+    traces: list[Trace] = []
+    for joint, name in enumerate(("joint 1", "joint 2")):
+        traces.append(line(t, values[joint, ::every], COLOURS[joint], name, name))
     size = float(np.abs(values).max())
-    levels = [
-        level(float(side[joint]), f"{COLOURS[joint]}/0.6", width=1)
-        for side in limits
-        for joint in range(2)
-        if np.isfinite(side[joint]) and abs(side[joint]) < 3 * size
-    ]
+    levels = []
+    for side in limits:
+        for value, colour in zip(side.tolist(), COLOURS, strict=False):
+            if abs(value) < 3 * size:
+                levels.append(level(value, f"{colour}/0.6", width=1))
     layout: dict[str, Any] = {
         "xaxis": axis("time, s"),
         "yaxis": axis(title),

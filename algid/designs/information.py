@@ -88,16 +88,21 @@ class Slopes:
 
     def _differences(self, function: Callable[[Motion], FloatArray]) -> FloatArray:
         """Central differences (6, ...) of a function of the motion by each of its components."""
-        return np.stack(
-            [(function(ahead) - function(behind)) / (2 * _STEP) for ahead, behind in self._beside]
-        )
+        slopes = []
+        for ahead, behind in self._beside:
+            slopes.append((function(ahead) - function(behind)) / (2 * _STEP))
+        return np.stack(slopes)
 
     @cached_property
-    def _beside(self) -> list[list[Motion]]:
+    def _beside(self) -> list[tuple[Motion, Motion]]:
         """The motion with each of its six components a step ahead, and a step behind."""
         moves = np.eye(COMPONENTS).reshape(COMPONENTS, 3, 2, 1)
         signals = np.stack([self.motion.theta, self.motion.omega, self.motion.alpha])
-        return [[Motion(*(signals + step * move)) for step in (_STEP, -_STEP)] for move in moves]
+        beside = []
+        for move in moves:
+            ahead, behind = Motion(*(signals + _STEP * move)), Motion(*(signals - _STEP * move))
+            beside.append((ahead, behind))
+        return beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +167,10 @@ class Information:
     @cached_property
     def S(self) -> FloatArray:
         """Information (Q, Q) of all runs."""
-        return np.sum(
-            [log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T for log in self._logs], axis=0
-        )
+        total = []
+        for log in self._logs:
+            total.append(log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T)
+        return np.sum(total, axis=0)
 
     def parts(self, samples: int) -> FloatArray:
         """Information (B, Q, Q) of each `samples` samples of the motion.

@@ -99,10 +99,10 @@ def optimise(problem: Problem, rate: float, seed: int, progress: Progress | None
     try:
         rng = np.random.default_rng(seed)
         room = 0.5 * (1 + max(_EASY, problem.excess(problem.rest, FIRST.rate)))
-        starts = [
-            search.run(kept(problem, problem.random(rng), FIRST.rate, room), FIRST)
-            for _ in range(STARTS)
-        ]
+        starts = []
+        for _ in range(STARTS):
+            start = kept(problem, problem.random(rng), FIRST.rate, room)
+            starts.append(search.run(start, FIRST))
         for x in sorted(starts, key=search.judged)[:KEPT]:
             better = x
             for stage in LATER:

@@ -129,7 +129,7 @@ class PositionProblem:
             limits,
             asked,
         )
-        self._loads = [belief.load(loaded) for loaded in experiment.kinds]
+        self._loads = list(map(belief.load, experiment.kinds))
         self.family = Fourier(duration)
         self.rest = np.concatenate([rest, np.zeros(self.family.size - 2)])
         self._basis = cache(lambda rate: self.family.basis(middles(duration, rate)))
@@ -172,9 +172,10 @@ class PositionProblem:
         """The largest relative bound of the worst arm of the belief."""
         slopes = self.slopes(x, JUDGED_RATE)
         arms = [self._belief.mean, *self._belief.draws(JUDGED_ARMS, seed=0)]
-        return max(
-            self._asked.largest(Information(self._experiment, arm, slopes).S) for arm in arms
-        )
+        bounds = []
+        for arm in arms:
+            bounds.append(self._asked.largest(Information(self._experiment, arm, slopes).S))
+        return max(bounds)
 
 
 def middles(duration: float, rate: float) -> FloatArray:

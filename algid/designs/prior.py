@@ -17,12 +17,13 @@ from algid.identification.known import (
     contradictions,
     covariance_of,
     given_lengths,
-    has_error_bar,
     model_of,
     noise_of,
+    with_error_bar,
     wrong_inertia,
 )
 from algid.model import DELAYS, SINES, TERMS, Model
+from algid.names import outside, vector
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result, read_result
@@ -146,8 +147,9 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
         (arm, more * mass),
     ]
     mean = _parameters(shared, case, arm, mass)
-    others = [_parameters(shared, case, other, its_mass) for other, its_mass in wrong]
-    spread = np.stack(others, axis=1) - mean[:, None]
+    spread = np.empty((len(mean), len(wrong)))
+    for place, (other, its_mass) in enumerate(wrong):
+        spread[:, place] = _parameters(shared, case, other, its_mass) - mean
     belief = Belief(shared, mean, spread, box=True)
     return BelievedArm(source, belief, np.array([arm.l1, arm.l2]), None)
 
@@ -183,7 +185,7 @@ def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray
     value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
     value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
     value |= {"m_p": mass, "l1": arm.l1, "l2": x, "y_p": y, "J_p": inertia}
-    return np.array([value[name] for name in shared.names])
+    return vector(shared.names, value)
 
 
 def _of_result(
@@ -192,17 +194,17 @@ def _of_result(
     model, left_out = _planned(model_of(result))
     lengths = given_lengths(result) | knowns.lengths
     value = _estimates(result, knowns.payload) | lengths
-    body = tuple(name for name in BODY_PARAMETERS if has_error_bar(result, name))
+    body = with_error_bar(result, BODY_PARAMETERS)
     shared = _shared(model, value.get("m_p"), loaded, source, replace(knowns, **lengths), body)
     # what is estimated with the constants takes of their precision
-    shared = replace(shared, delay=all(has_error_bar(result, name) for name in DELAYS))
+    shared = replace(shared, delay=with_error_bar(result, DELAYS) == DELAYS)
     for name in shared.names:
         if name not in value:
             remedy = "identify it from logs that determine it"
             if name in ("l1", "l2"):
                 remedy = f"give {flag(name)}"
             raise ResultError(f"{source}: the result has no {name}; {remedy}")
-    mean = np.array([value[name] for name in shared.names])
+    mean = vector(shared.names, value)
     exact = set()
     if knowns.payload is not None:
         exact.add("m_p")
@@ -231,10 +233,10 @@ def _estimates(result: Result, payload: float | None) -> dict[str, float]:
 
 def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
     """The model less the terms that no regressor holds, and a notice of them."""
-    planned = tuple(term for term in model.terms if term not in _UNPLANNED)
+    planned = outside(model.terms, _UNPLANNED)
     if planned == model.terms:
         return model, ()
-    titles = [TERMS[term].title for term in model.terms if term in _UNPLANNED]
+    titles = [TERMS[term].title for term in outside(model.terms, planned)]
     left = Notice("TERMS_LEFT_OUT", numbers={"terms": titles})
     return replace(model, terms=planned), (left,)
 
@@ -256,10 +258,10 @@ def _spread(
     ResultError
         Where a constant has no error bar and no `error` is given.
     """
-    known = [name for name in names if name not in given and has_error_bar(result, name)]
+    known = with_error_bar(result, outside(names, given))
     covariance = covariance_of(result, names, known)
-    bare = [name for name in names if name not in known]
-    without = [name for name in bare if name not in given]
+    bare = outside(names, known)
+    without = outside(bare, given)
     if without and error is None:
         why = f"the result leaves {', '.join(without)} without error bars"
         if result.fit is None:

@@ -40,7 +40,9 @@ class Swings:
     def motion(self, column: int) -> Motion:
         """The motion of one arm."""
         return Motion(
-            *(signal[:, :, column].T.copy() for signal in (self.theta, self.omega, self.alpha))
+            self.theta[:, :, column].T.copy(),
+            self.omega[:, :, column].T.copy(),
+            self.alpha[:, :, column].T.copy(),
         )
 
 

@@ -12,7 +12,7 @@ and is swung along.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,7 +111,11 @@ class TorqueProblem:
     def _coefficients(self, arms: FloatArray, kinds: list[bool]) -> FloatArray:
         """C (q, arms × kinds), the kinds of an arm side by side."""
         shared = self._experiment.shared
-        return np.array([shared.coefficients(arm, loaded) for arm in arms for loaded in kinds]).T
+        columns = []
+        for arm in arms:
+            for loaded in kinds:
+                columns.append(shared.coefficients(arm, loaded))
+        return np.array(columns).T
 
     def torques(self, x: FloatArray, t: FloatArray) -> FloatArray:
         """Torques (2, N) of a pattern at the times `t` (N,) in s."""
@@ -154,9 +158,8 @@ class TorqueProblem:
         rows = []
         for place, x in enumerate(patterns):
             columns = range(place * width, (place + 1) * width)
-            motions = [swings.motion(column) for column in columns]
-            most = max(float(row.u.max()) for row in self._used(x, swings.t, motions))
-            beyond = max(0.0, most - 1.0)
+            motions = list(map(swings.motion, columns))
+            beyond = max(0.0, _most(self._used(x, swings.t, motions)) - 1.0)
             bound = 1.0
             if beyond < _LOST:
                 bound = self._bound(dict(zip(kinds, motions, strict=False)))
@@ -181,17 +184,15 @@ class TorqueProblem:
     def _used(self, x: FloatArray, t: FloatArray, motions: list[Motion]) -> list[Usage]:
         """Constraint use of motions: kinematics, torque, the believed arm's rest at the end."""
         model = self._experiment.shared.model
-        uses = [
-            usage(self._limits, Slopes(model, motion, 1.0), (), derivatives=False)
-            for motion in motions
-        ]
+        uses = []
+        for motion in motions:
+            slopes = Slopes(model, motion, 1.0)
+            uses.append(usage(self._limits, slopes, (), derivatives=False))
         share = np.abs(self.torques(x, t)[self._driven]) / self._limits.torque[self._driven, None]
-        uses.append(Usage(tuple(Row("torque", joint) for joint in self._driven.tolist()), share))
+        uses.append(Usage(_rows("torque", self._driven.tolist()), share))
         believed = np.abs([motion.omega for motion in motions[: len(self._experiment.kinds)]])
         left = believed[:, :, -1] / (END * np.maximum(believed.max(axis=2), 1e-9))
-        uses.append(
-            Usage(tuple(Row("rest", joint) for joint in range(2)), left.max(axis=0)[:, None])
-        )
+        uses.append(Usage(_rows("rest", range(2)), left.max(axis=0)[:, None]))
         return uses
 
     def checked(self, x: FloatArray) -> Swung:
@@ -205,9 +206,9 @@ class TorqueProblem:
 
         for shrunk in x * np.linspace(1.0, 0.0, 41)[:, None]:
             swings = self._swings(shrunk[None], self._checked, broken)
-            motions = [swings.motion(column) for column in range(swings.theta.shape[2])]
+            motions = list(map(swings.motion, range(swings.theta.shape[2])))
             used = self._used(shrunk, swings.t, motions)
-            if max(float(one.u.max()) for one in used) <= 1.0 or not shrunk.any():
+            if _most(used) <= 1.0 or not shrunk.any():
                 break
         most: dict[Row, float] = {}
         for one in used:
@@ -215,6 +216,16 @@ class TorqueProblem:
                 most[row] = max(most.get(row, 0.0), value)
         worst = Usage(tuple(most), np.array(list(most.values()))[:, None])
         return Swung(shrunk, swings.t, dict(zip(kinds, motions, strict=False)), worst)
+
+
+def _rows(limit: str, joints: Iterable[int]) -> tuple[Row, ...]:
+    """A row of a limit for each of the joints."""
+    return tuple(Row(limit, joint) for joint in joints)
+
+
+def _most(uses: Sequence[Usage]) -> float:
+    """The largest share of any limit that is used."""
+    return max(float(one.u.max()) for one in uses)
 
 
 def search(

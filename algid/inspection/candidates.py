@@ -24,15 +24,22 @@ def torques_beside(log: Log, channel: str) -> list[Remedy]:
     except LogError:  # a log in memory, or a file that is gone
         return []
     used = set(log.origin.mapping.values())
-    return [remedy for source, remedy in _candidates(entries, channel) if source not in used][
-        :_MOST
-    ]
+    remedies = []
+    for source, remedy in _candidates(entries, channel):
+        if source not in used:
+            remedies.append(remedy)
+    return remedies[:_MOST]
 
 
 def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str, Remedy]]:
     """Name and remedy of each channel that may be a torque: torques first, then currents."""
-    places = [(entry.name, field) for entry in entries for field in entry.fields]
-    places += [("", entry.name) for entry in entries if not entry.fields]
+    places, bare = [], []
+    for entry in entries:
+        for field in entry.fields:
+            places.append((entry.name, field))
+        if not entry.fields:
+            bare.append(("", entry.name))
+    places += bare
     amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
     for pattern, unit in ((_TORQUE, {}), (_CURRENT, amperes)):
         for topic, field in places:

@@ -53,11 +53,11 @@ class Counted:
 
     def notices(self, origin: Origin) -> list[Notice]:
         """What there is to say of each limit that lies within the samples counted."""
-        return [
-            _notice(origin, limit, beyond, self._rows)
-            for limit, beyond in zip(self.limits, self._beyond, strict=True)
-            if beyond
-        ]
+        notices = []
+        for limit, beyond in zip(self.limits, self._beyond, strict=True):
+            if beyond:
+                notices.append(_notice(origin, limit, beyond, self._rows))
+        return notices
 
 
 def clipped(log: Log, limits: Sequence[Limit]) -> list[Notice]:

@@ -7,8 +7,9 @@ that change the reading.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import degrees, isclose, pi, remainder
 from typing import Any, Protocol
 
@@ -25,7 +26,7 @@ from algid.estimators.convention_search import (
 from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.dynamics import Suspicion
 from algid.log import ZEROS, Log, Origin, Reading
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, flat
 from algid.signals.segments import Segment, append, segments
 from algid.words import counted
 
@@ -73,18 +74,7 @@ class Mend:
     @property
     def remedy(self) -> Remedy:
         """The same settings by dotted names."""
-        return Remedy(_flat(self.settings))
-
-
-def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by dotted names."""
-    flat: dict[str, Any] = {}
-    for name, value in settings.items():
-        if isinstance(value, Mapping):
-            flat |= {f"{name}.{key}": inner for key, inner in value.items()}
-        else:
-            flat[name] = value
-    return flat
+        return Remedy(flat(self.settings))
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
@@ -203,16 +193,23 @@ def _tried(log: Log, suspicion: Suspicion, recording: Recorded) -> Iterator[Reme
         if weightless is not None and weightless.convincing:
             yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
             yield Remedy({"gravity": 0}, "for a horizontal plane")
-    real = _real(tried_together([recording], guess) for guess in suspicion.guesses)
+    real = _real(suspicion.guesses, partial(tried_together, [recording]))
     if suspicion.free_zero and not real:
-        real = _real(zeroed_together([recording], guess) for guess in suspicion.guesses)
+        real = _real(suspicion.guesses, partial(zeroed_together, [recording]))
     for one in real:
-        yield Remedy(_flat(_settings(one.convention, log)))
+        yield Remedy(flat(_settings(one.convention, log)))
 
 
-def _real(candidates: Iterable[Candidate | None]) -> list[Candidate]:
-    """Those under which the log shows a real arm."""
-    return [one for one in candidates if one is not None and one.convincing]
+def _real(
+    guesses: Iterable[Convention], tried: Callable[[Convention], Candidate | None]
+) -> list[Candidate]:
+    """Those of the guesses, as they are `tried`, under which the log shows a real arm."""
+    real = []
+    for guess in guesses:
+        one = tried(guess)
+        if one is not None and one.convincing:
+            real.append(one)
+    return real
 
 
 def _clauses(convention: Convention) -> Iterator[str]:

@@ -138,5 +138,8 @@ def clock_figures(log: Log) -> ClockFigures:
 
 def _without_pauses(gaps: FloatArray, pause: float, notices: Iterable[Notice]) -> FloatArray:
     """The gaps (N,), in s, less as many of a pause's length as runs were joined."""
-    joined = sum(one.numbers.get("joined", 0) for one in notices if one.code == "RESTARTS")
+    joined = 0
+    for one in notices:
+        if one.code == "RESTARTS":
+            joined += one.numbers.get("joined", 0)
     return np.delete(gaps, np.argsort(np.abs(gaps - pause))[:joined])

@@ -21,7 +21,7 @@ from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
 from algid.inspection.findings import CONTRADICTIONS
 from algid.log import Log
-from algid.notices import Notice
+from algid.notices import Notice, has_code, lossy
 from algid.readers import read_log
 from algid.readers.formats import Entry, format_of, in_memory
 from algid.readers.memory import NAME
@@ -111,12 +111,12 @@ class Inspection:
     @property
     def lossy(self) -> bool:
         """Whether samples are missing."""
-        return any(notice.lossy for notice in self.notices)
+        return lossy(self.notices)
 
     @property
     def contradicted(self) -> bool:
         """Whether physics contradicts how the log was read."""
-        return any(finding.code in CONTRADICTIONS for finding in self.findings)
+        return has_code(self.findings, *CONTRADICTIONS)
 
     def as_dict(self) -> dict[str, Any]:
         """As plain data for JSON; what is not finite becomes None."""
@@ -183,7 +183,7 @@ def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(inner) for inner in value]
+        return list(map(_finite, value))
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

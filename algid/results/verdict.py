@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from algid.model import CHOICES, EVERY_TERM
 from algid.names import outside
-from algid.notices import Notice, Remedy, notes_of, warnings_of
+from algid.notices import Notice, Remedy, flat, notes_of, warnings_of
 from algid.options import flag
 from algid.significance import SURE
 from algid.text import joined, significant, visible
@@ -116,19 +116,7 @@ def _call(result: Result) -> list[str]:
         words.append(flag(name))
         if value is not True:
             words.append(str(value))
-    return words + list(Remedy(_flat(result.profile)).flags)
-
-
-def _flat(profile: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of a profile by their names with dots."""
-    flat: dict[str, Any] = {}
-    for name, value in profile.items():
-        if isinstance(value, Mapping):
-            for inner, setting in value.items():
-                flat[f"{name}.{inner}"] = setting
-        elif value is not None:
-            flat[name] = value
-    return flat
+    return words + list(Remedy(flat(result.profile)).flags)
 
 
 def is_implausible(result: Result) -> bool:

@@ -42,7 +42,7 @@ def observer_gain(poles: tuple[complex, ...]) -> FloatArray:
         If there are not six poles, one does not decay, or the three of a joint are not real or
         conjugate.
     """
-    if len(poles) != 6 or any(np.real(pole) >= 0 for pole in poles):
+    if len(poles) != 6 or np.any(np.real(poles) >= 0):
         raise ValueError(f"poles must be six with negative real part, got {poles}")
     gain = np.zeros((6, 2))
     for joint in range(2):
@@ -72,9 +72,9 @@ class LuenbergerObserver:
     def __init__(self, dt: float, poles: tuple[complex, ...] = PAPER_POLES) -> None:
         gain = observer_gain(poles)
         joints = (slice(0, 3), slice(3, 6))
-        self._filters = [
-            _differentiator(gain[own, joint], poles[own], dt) for joint, own in enumerate(joints)
-        ]
+        self._filters = []
+        for joint, own in enumerate(joints):
+            self._filters.append(_differentiator(gain[own, joint], poles[own], dt))
         self.reset()
 
     def reset(self) -> None:

@@ -125,10 +125,9 @@ def _late(cluster: Log, period: float) -> bool:
     if round(times[-1] / period) != len(cluster) - 1:
         return False
     even = np.arange(times.size) / (times.size - 1)
-    off = [
-        float(np.sum((theta - theta[:, -1:] * place) ** 2)) for place in (even, times / times[-1])
-    ]
-    return off[0] <= off[1]
+    off_even = np.sum((theta - theta[:, -1:] * even) ** 2)
+    off_timed = np.sum((theta - theta[:, -1:] * (times / times[-1])) ** 2)
+    return bool(off_even <= off_timed)
 
 
 def _merged(log: Log, starts: IntArray) -> Log:

@@ -28,13 +28,11 @@ class MultiSine:
 
     def __call__(self, t: FloatArray) -> FloatArray:
         """Torque (2, M) in N m at the times `t` (M,) in s."""
-        joints = zip(self.amplitude, self.frequency, self.phase, strict=True)
-        return np.stack(
-            [
-                np.sin(2 * np.pi * np.multiply.outer(t, f) + np.array(p)) @ np.array(a)
-                for a, f, p in joints
-            ]
-        )
+        torques = []
+        for a, f, p in zip(self.amplitude, self.frequency, self.phase, strict=True):
+            angle = 2 * np.pi * np.multiply.outer(t, f) + np.array(p)
+            torques.append(np.sin(angle) @ np.array(a))
+        return np.stack(torques)
 
 
 def wide_multi_sine(arm: Arm, seed: int = 0) -> MultiSine:
@@ -50,7 +48,7 @@ def wide_multi_sine(arm: Arm, seed: int = 0) -> MultiSine:
     return MultiSine(
         amplitude=tuple((0.6 * float(force),) * 6 for force in need),
         frequency=(frequency, frequency),
-        phase=tuple(tuple(row.tolist()) for row in phases),
+        phase=tuple(map(tuple, phases.tolist())),
     )
 
 

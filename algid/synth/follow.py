@@ -65,7 +65,7 @@ def read_plan(path: Path) -> Reference:
     try:
         rows = csv.reader(read_text(file).splitlines())
         names = next(rows, [])
-        values = np.array([[float(text) for text in row] for row in rows], dtype=np.float64).T
+        values = np.array([list(map(float, row)) for row in rows], dtype=np.float64).T
     except (OSError, ValueError) as error:
         raise SettingError(
             f"{file}: not the trajectory of a design ({error}); expected what algid design wrote"

@@ -41,8 +41,10 @@ from algid.identification.known import (
     payload_length,
     prior_of,
     shift_of,
+    with_error_bar,
 )
 from algid.model import K3, K6, K7, SINES, TERMS, Model
+from algid.names import names_in, outside, within
 from algid.options import flag
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil
@@ -82,7 +84,7 @@ class IdentifiedArm:
     @property
     def friction(self) -> list[int]:
         """Which coefficients are viscous or Coulomb friction's."""
-        return [self.model.names.index(name) for name in FRICTION if name in self.model.names]
+        return list(map(self.model.names.index, within(FRICTION, self.model.names)))
 
     @property
     def tip_equivalent(self) -> float:
@@ -93,7 +95,7 @@ class IdentifiedArm:
     def by_shape(self) -> FloatArray:
         """Derivatives (2 + b, q) of `unit` by l1, l2 and the uncertain parts of payload `body`."""
         shared, beta = self._loaded
-        places = [shared.names.index(name) for name in ("l1", "l2") + self.body]
+        places = list(map(shared.names.index, ("l1", "l2") + self.body))
         return shared.jacobian(beta, True).T[places]
 
     @property
@@ -173,7 +175,7 @@ class Cells:
         return np.asarray(self.E - 2 * mass * self.B + mass**2 * self.A)
 
 
-SUMS = tuple(one.name for one in fields(Cells) if one.name != "friction")
+SUMS = outside(names_in(fields(Cells)), ("friction",))
 
 
 def joined(parts: Sequence[Cells]) -> Cells:
@@ -260,7 +262,7 @@ def arm_of(
     y, gyration = _body(result)
     body: tuple[str, ...] = ()
     if _of_payload(result, "m_p"):
-        body = tuple(name for name in BODY_PARAMETERS if has_error_bar(result, name))
+        body = with_error_bar(result, BODY_PARAMETERS)
     uncertain = prior.names + body
     for name, given in (("l1", l1), ("l2", l2)):
         if given is None and has_error_bar(result, name):
@@ -336,7 +338,7 @@ def with_friction(arm: IdentifiedArm, covariance: FloatArray) -> tuple[Identifie
     if COULOMB.name in arm.model.terms:
         return arm, covariance
     model = replace(arm.model, terms=arm.model.terms + (COULOMB.name,))
-    places = np.array([model.names.index(name) for name in arm.model.names])
+    places = np.array(list(map(model.names.index, arm.model.names)))
     k = np.zeros(len(model.names))
     k[places] = arm.k
     others = covariance.shape[0] - len(places)  # lengths, and what the payload's body adds

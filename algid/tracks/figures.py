@@ -46,9 +46,11 @@ def _payload(result: TrackResult) -> Figure:
     t, m_p = _curve(track, track.m_p)
     traces = [_band(track)]
     traces.append(line(t, m_p, "@blue", "m_p(t)", "curve", width=1.2, hover=hover))
-    ends = np.ravel([(one.start, one.end) for one in track.stretches])
-    masses = np.repeat([one.m_p for one in track.stretches], 2)
-    traces.append(_steps(ends, masses, "@green", "stretch", "solid", 2.6))
+    ends, masses = [], []
+    for one in track.stretches:
+        ends += [one.start, one.end]
+        masses += [one.m_p, one.m_p]
+    traces.append(_steps(np.array(ends), np.array(masses), "@green", "stretch", "solid", 2.6))
     legend = [
         Legend("curve", f"m_p(t) from ± {HALF_BAND:g} s around, within its stretch", "@blue"),
         Legend("band", "its 95 % band", "@blue/0.25", "area"),
@@ -70,7 +72,7 @@ def _payload(result: TrackResult) -> Figure:
         "Read: blue should run level, green within its band; orange is where it may step. "
         "A band that opens wide shows that the arm moved too little; double-click shows all of it."
     )
-    words = joined([mass_text(one) for one in track.stretches[:6]])
+    words = joined(list(map(mass_text, track.stretches[:6])))
     panel = Panel(
         traces, layout, f"Payload over time; stretches of {words} kg", height=380, sync=SYNC
     )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby, pairwise
+from itertools import groupby, pairwise, starmap
 from operator import itemgetter
 
 import numpy as np
@@ -133,7 +133,7 @@ def _masses(parts: Sequence[Cells], drift: Drift | None) -> list[float]:
 
 def _cut(cells: Cells, places: Sequence[int]) -> list[Cells]:
     """The cells between each two neighbouring places."""
-    return [cells.part(first, last) for first, last in pairwise(places)]
+    return list(starmap(cells.part, pairwise(places)))
 
 
 def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, rough: Edges) -> list[Place]:
@@ -158,7 +158,7 @@ def _weigh(
     covariance: FloatArray,
 ) -> Track:
     """The track of a log with payload changes at `changes`, each stretch from its `inner` cells."""
-    counts = [len(part) for part in inner]
+    counts = list(map(len, inner))
     places = np.append(0, np.cumsum(counts))
     starts = places[:-1]
     whole = joined(inner)
@@ -191,11 +191,14 @@ def _weigh(
     if signal > 0:
         share = float(1 - left / signal)
     wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
-    times = [float(cells.start[0])] + [one.time for one in changes] + [float(cells.end[-1])]
+    times, brackets = [float(cells.start[0])], []
+    for change in changes:
+        times.append(change.time)
+        brackets.append((change.time, *change.bracket))
+    times.append(float(cells.end[-1]))
     stretches = []
     for (start, end), mass, one in zip(pairwise(times), weights, stds, strict=True):
         stretches.append(Stretch(start, end, float(mass), float(one)))
-    brackets = [(one.time, one.bracket[0], one.bracket[1]) for one in changes]
     return Track(
         stretches=stretches,
         t=t,

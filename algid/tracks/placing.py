@@ -33,6 +33,7 @@ from algid.estimators.whitening import (
     triangular,
 )
 from algid.model import Model, Motion, partials, sensitivity, torque
+from algid.names import outside
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, append
@@ -379,7 +380,7 @@ def windows(
         end = held.start + len(held) * held.dt
         whole = [at for at in todo if spans[at][1] + POINTS * held.dt + abs(shift) < end]
         yield from _cut(held, spans, whole, shift)
-        todo = [at for at in todo if at not in whole]
+        todo = list(outside(todo, whole))
         if not todo:
             return
         spare = round((spans[todo[0]][0] - held.start - abs(shift)) / held.dt) - POINTS

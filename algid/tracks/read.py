@@ -56,7 +56,9 @@ def read_track(folder: Path) -> TrackResult:
     curve = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
     if not curve:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
-    columns = {name: np.concatenate([part[name] for part in curve]) for name in COLUMNS}
+    columns = {}
+    for name in COLUMNS:
+        columns[name] = np.concatenate([part[name] for part in curve])
     wrong = _misfit_of_curve(columns, len(file.stretches))
     if wrong is not None:
         raise ResultError(f"{folder / CURVE}: {wrong}; {again}")
@@ -113,13 +115,17 @@ class _File(BaseModel):
 
 
 def _result(file: _File, curve: Block) -> TrackResult:
-    changes = [(one.t, one.before, one.to) for one in file.changes]
+    changes, stretches = [], []
+    for change in file.changes:
+        changes.append((change.t, change.before, change.to))
+    for one in file.stretches:
+        stretches.append(Stretch(one.start, one.end, one.m_p, one.std))
     schedule = None
     if file.schedule is not None:
         schedule = tuple(file.schedule)
     return TrackResult(
         track=Track(
-            stretches=[Stretch(one.start, one.end, one.m_p, one.std) for one in file.stretches],
+            stretches=stretches,
             t=curve["t"],
             m_p=curve["m_p"],
             std=(curve["high"] - curve["m_p"]) / NORMAL,

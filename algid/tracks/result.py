@@ -55,14 +55,17 @@ class TrackResult:
     @property
     def complete(self) -> bool:
         """Whether every stretch has status OK."""
-        return all(status is StretchStatus.OK for status in self.statuses)
+        return set(self.statuses) <= {StretchStatus.OK}
 
     def truth(self, stretch: Stretch) -> float | None:
         """True payload in kg amid a stretch, where the log states it."""
         if self.schedule is None:
             return None
         middle = (stretch.start + stretch.end) / 2
-        return next((mass for time, mass in reversed(self.schedule) if time <= middle), 0.0)
+        for time, mass in reversed(self.schedule):
+            if time <= middle:
+                return mass
+        return 0.0
 
 
 def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
@@ -75,27 +78,28 @@ def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
 
 def track_json(result: TrackResult) -> str:
     """The text of `track.json`: times in s since the log's first sample, masses in kg."""
-    stretches = [
-        {
-            "start": stretch.start,
-            "end": stretch.end,
-            "m_p": stretch.m_p,
-            "std": stretch.std,
-            "ci95": list(stretch.ci95),
-            "unit": "kg",
-            "status": status.value,
-            "truth": result.truth(stretch),
-        }
-        for stretch, status in zip(result.track.stretches, result.statuses, strict=True)
-    ]
+    stretches: list[dict[str, Any]] = []
+    for stretch, status in zip(result.track.stretches, result.statuses, strict=True):
+        stretches.append(
+            {
+                "start": stretch.start,
+                "end": stretch.end,
+                "m_p": stretch.m_p,
+                "std": stretch.std,
+                "ci95": list(stretch.ci95),
+                "unit": "kg",
+                "status": status.value,
+                "truth": result.truth(stretch),
+            }
+        )
+    changes: list[dict[str, float]] = []
+    for time, before, after in result.track.changes.tolist():
+        changes.append({"t": time, "from": before, "to": after})
     content = {
         "schema_version": SCHEMA_VERSION,
         "version": result.version,
         "stretches": stretches,
-        "changes": [
-            dict(zip(("t", "from", "to"), row, strict=True))
-            for row in result.track.changes.tolist()
-        ],
+        "changes": changes,
         "explained": result.track.explained,
         "excess": result.track.colour,
         "bare": result.track.tip_equivalent,
@@ -105,6 +109,6 @@ def track_json(result: TrackResult) -> str:
         "settings": dict(result.settings),
         "log": result.log.model_dump(mode="json"),
         "data_lost": result.data_lost,
-        "notices": [asdict(notice) for notice in result.notices],
+        "notices": list(map(asdict, result.notices)),
     }
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

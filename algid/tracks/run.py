@@ -15,7 +15,7 @@ from algid.files import read_whole
 from algid.identification.identify import reused
 from algid.identification.source import LogLike, open_source, read_otherwise
 from algid.identification.survey import Survey
-from algid.notices import Notice, merged
+from algid.notices import Notice, lossy, merged
 from algid.results import Result, read_result, result_json
 from algid.runtime import one_blas_thread
 from algid.tracks.bins import arm_of
@@ -92,7 +92,7 @@ def track_log(
         version=__version__,
         schedule=schedule,
         notices=tuple(notices),
-        data_lost=any(notice.lossy for notice in of_log),
+        data_lost=lossy(of_log),
     )
 
 

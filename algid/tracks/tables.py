@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from algid.notices import Notice
+from algid.notices import Notice, lossy, notes_of, warnings_of
 from algid.report.document import Column, Depth, Table, filled
 from algid.report.tables import log_tables, provenance_table
 from algid.results.verdict import LEAST_R2, WORST_R2, share_text
@@ -100,7 +100,9 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
         ),
     )
     log, channels = log_tables([result.log])
-    holes = tuple((f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist())
+    holes = []
+    for start, end in result.track.holes.tolist():
+        holes.append((f"{start:.3f}", f"{end:.3f}"))
     ends = (Column("From, s", "name"), Column("To, s", "number"))
     return (
         Table(
@@ -108,7 +110,7 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
         ),
         log.without(["Arm"]),
         channels.without(["Log"]),
-        *filled(Table("Times without samples", ends, holes, depth=Depth.PAGE)),
+        *filled(Table("Times without samples", ends, tuple(holes), depth=Depth.PAGE)),
     )
 
 
@@ -171,9 +173,12 @@ STATUS_CODES = {
 
 def verdict(result: TrackResult) -> Verdict:
     """Judge a track by its stretches, what it explains of the torque, and the arm's own result."""
-    notes = [one for one in result.notices if one.note]
     return graded(
-        _weighed(result), list(_reasons(result)), notes, failure=_failure(result), things="masses"
+        _weighed(result),
+        list(_reasons(result)),
+        notes_of(result.notices),
+        failure=_failure(result),
+        things="masses",
     )
 
 
@@ -188,8 +193,8 @@ def _weighed(result: TrackResult) -> str:
     count = len(changes)
     how_often = {1: "once", 2: "twice"}.get(count, counted(count, "time"))
     if count <= MOST_NAMED:
-        when = f" at {joined([f'{moment:.2f}' for moment in changes[:, 0]])} s"
-        what = f"weighing {joined([mass_text(stretch) for stretch in stretches])} kg"
+        when = f" at {joined(list(map('{:.2f}'.format, changes[:, 0])))} s"
+        what = f"weighing {joined(list(map(mass_text, stretches)))} kg"
     else:
         when, what = "", f"in {counted(len(stretches), 'stretch', 'stretches')}"
     return (
@@ -211,22 +216,23 @@ def _failure(result: TrackResult) -> str | None:
             "in these units?"
         )
     statuses = result.statuses
-    negative = sum(status is StretchStatus.NEGATIVE_MASS for status in statuses)
+    negative = statuses.count(StretchStatus.NEGATIVE_MASS)
     if 2 * negative >= len(statuses):
         share = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')} weigh"
         if len(statuses) == 1:
             share = "the payload weighs"
         return f"{share} less than nothing: the arm's constants do not fit this log"
-    if all(status is StretchStatus.WEAK_EXCITATION for status in statuses):
+    if set(statuses) == {StretchStatus.WEAK_EXCITATION}:
         return "the arm moves too little to weigh anything"
     return None
 
 
 def _reasons(result: TrackResult) -> Iterator[Notice]:
     for status, code in STATUS_CODES.items():
-        numbers = [
-            str(place) for place, given in enumerate(result.statuses, start=1) if given is status
-        ]
+        numbers = []
+        for place, given in enumerate(result.statuses, start=1):
+            if given is status:
+                numbers.append(str(place))
         if numbers:
             yield Notice(code, numbers={"numbers": numbers})
     if result.track.explained < LEAST_R2:
@@ -237,8 +243,6 @@ def _reasons(result: TrackResult) -> Iterator[Notice]:
         yield Notice(
             "TORQUE_ERRORS", numbers={"times": significant(float(result.track.colour) ** 0.5, 2)}
         )
-    if result.data_lost and not any(one.lossy for one in result.notices):
+    if result.data_lost and not lossy(result.notices):
         yield Notice("DATA_LOST")
-    for one in result.notices:
-        if not one.note:
-            yield one
+    yield from warnings_of(result.notices)
