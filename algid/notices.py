@@ -218,6 +218,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "white noise does not hold, and the {kept} estimate with robust intervals stands in its "
         "place"
     ),
+    "MISFIT": (
+        "what the likelihood leaves of the torque depends on the motion (unmodelled dynamics): its "
+        "error bars do not hold, and the {kept} estimate with robust intervals stands in its place"
+    ),
     "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is "
     "chosen",
     "INTEGRATION": (

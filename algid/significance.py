@@ -19,6 +19,7 @@ TESTS = (
     "the bounds of physics",
     "the whiteness of the residual, joint 1",
     "the whiteness of the residual, joint 2",
+    "the residual against the motion",
     "least squares against instruments",
     "an answer of the torque to the motion",
     "the constants of joint 1 against those of joint 2",

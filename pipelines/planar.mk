@@ -12,3 +12,8 @@ efforts: setup ## what drivers call effort: named by the logs, and the payload's
 
 passive: setup ## acrobots and pendubots with friction and cables: coverage of intervals; into build/passive
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.passive -o build/passive
+
+.PHONY: misfit
+
+misfit: setup ## errors of drives that no term is: said, or silent; into build/misfit
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.misfit -o build/misfit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -31,10 +31,42 @@ from algid.estimators.whitening import NoiseLevels
 from algid.model import DELAYS
 from algid.names import outside, places_outside
 from algid.notices import Notice, has_code
-from algid.significance import NORMAL
+from algid.significance import LEVEL, NORMAL
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]
+
+
+@dataclass(frozen=True)
+class Overlooked:
+    """A term that the model is without: p value of its score, and what its coefficients would be.
+
+    `values` are by the name of the parameter, in `algid.model.UNITS`.
+    """
+
+    term: str
+    p_value: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """The score test of a likelihood's residual against the motion: see `algid.estimators.misfit`.
+
+    Parameters
+    ----------
+    p_value : float
+        Of all torques beside the model's together, and of the most evident kind (Bonferroni).
+    overlooked : the terms that the model is without, in the order of `algid.model.CHOICES`
+    """
+
+    p_value: float
+    overlooked: tuple[Overlooked, ...]
+
+    @property
+    def significant(self) -> bool:
+        """Whether the residual depends on the motion."""
+        return self.p_value < LEVEL
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +101,7 @@ class Fit:
     moved : (2,), rad, how far each joint travelled
     shrinkage : the prior's part on the torque's terms; None where none is shrunk
     repeats : places of logs that repeat each other, where that was looked at
+    misfit : whether the residual of the likelihood depends on the motion, where that was looked at
     """
 
     estimator: str
@@ -93,6 +126,7 @@ class Fit:
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
     shrinkage: Prior | None = None
     repeats: tuple[tuple[int, ...], ...] = ()
+    misfit: Misfit | None = None
 
     def __post_init__(self) -> None:
         keep_arrays(self)
@@ -141,7 +175,7 @@ class Fit:
     @property
     def refuted(self) -> bool:
         """Whether the refined estimator rejected its likelihood and returned another estimate."""
-        return has_code(self.notes, "REFUTED")
+        return has_code(self.notes, "REFUTED") or has_code(self.notes, "MISFIT")
 
     @property
     def beyond_errors(self) -> bool:

@@ -31,7 +31,7 @@ D       change of the estimates with a deviation       (Q, m)           paramete
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from algid.arm import FloatArray
 from algid.compiled import chi2_tail
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.fit import Fit
+from algid.estimators.imprint import Imprint, summed
 from algid.model import PARAMETERS, RIGID, SINES, Model, Motion, partials, torque
 from algid.notices import Notice
 from algid.physics.parameters import VISCOUS
@@ -87,20 +88,6 @@ def deviations(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatA
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Imprint:
-    """Products of a log's whitened columns: derivatives by c, the residual, the deviations.
-
-    Parameters
-    ----------
-    loaded : bool
-    gram : (q + 1 + m, q + 1 + m)
-    """
-
-    loaded: bool
-    gram: FloatArray
-
-
 def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Fit:
     """The fit with what integration and sampling may have moved in its covariance.
 
@@ -121,11 +108,11 @@ def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior |
     A deviation that the parameters take up whole, as a rotor's inertia does that of its joint's
     friction, counts as large as the largest that the logs tell.
     """
-    S, X, GG, Ye, Ge = _summed(fit, imprints, prior)
-    D = scaled_pinv(S) @ X
-    beside, right = GG - X.T @ D, Ge - D.T @ Ye
-    made = np.diag(GG) > 0
-    told = np.diag(beside) > _TOLD * np.diag(GG)
+    sums = summed(fit, imprints, prior)
+    D = scaled_pinv(sums.S) @ sums.X
+    beside, right = sums.GG - sums.X.T @ D, sums.Ge - D.T @ sums.Ye
+    made = np.diag(sums.GG) > 0
+    told = np.diag(beside) > _TOLD * np.diag(sums.GG)
     told[told] = np.sqrt(np.diag(scaled_pinv(beside[np.ix_(told, told)]))) < _SURE
     if not told.any():
         return fit
@@ -147,24 +134,6 @@ def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior |
         return fit
     numbers = {"samples": largest, "factor": factor}
     return fit.noted(Notice("INTEGRATION", numbers=numbers, note=True))
-
-
-def _summed(
-    fit: Fit, imprints: Sequence[Imprint], prior: Prior | None
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """YᵀV⁻¹Y with the prior, YᵀV⁻¹G, GᵀV⁻¹G, YᵀV⁻¹e and GᵀV⁻¹e by the fit's parameters."""
-    size, count = len(fit.names), len(DEVIATIONS)
-    whole = np.zeros((size + 1 + count, size + 1 + count))
-    for one in imprints:
-        T = fit.shared.jacobian(fit.values, one.loaded)
-        by_shared = np.eye(T.shape[0] + 1 + count, size + 1 + count, size - T.shape[0])
-        by_shared[: T.shape[0], :size] = T
-        whole += by_shared.T @ one.gram @ by_shared
-    S, G = whole[:size, :size], slice(size + 1, None)
-    if prior is not None:
-        places = [fit.names.index(name) for name in prior.names]
-        S[np.ix_(places, places)] += prior.precision
-    return S, whole[:size, G], whole[G, G], whole[:size, size], whole[G, size]
 
 
 def _shifted(fit: Fit) -> bool:

@@ -17,8 +17,8 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.combine import BlockSums, LogInformation
 from algid.estimators.identifiability import Correlations, correlations
+from algid.estimators.imprint import Imprint
 from algid.estimators.innovations import ResidualSums, residual_sums
-from algid.estimators.integration import Imprint, deviations
 from algid.estimators.noise import (
     VarianceScore,
     first_guess,
@@ -32,12 +32,15 @@ from algid.estimators.noise import (
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
-from algid.model import Motion
+from algid.model import Model, Motion
 from algid.quantiles import medians
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces
 
+Beside = Callable[[Model, FloatArray, Motion, float], FloatArray]
+"""Torques (m, 2, n) in N m beside those of a model at coefficients (q,), of a motion sampled every
+so many s."""
 PIECE_SAMPLES = 16384
 _TRAINED = 4  # whole pieces of a log in the training set, up to twice as many
 SHORTEST = 8 * POINTS  # samples: shorter pieces do not inform
@@ -216,14 +219,14 @@ class LogEvidence:
         """Whether the torque's error is nothing that anybody need worry about."""
         return bool(np.all(self.noise.tau <= self._least))
 
-    def imprint(self, c: FloatArray) -> Imprint:
-        """What integration and sampling leave in the training set at `c`; trajectories stay."""
+    def imprint(self, c: FloatArray, torques: Beside) -> Imprint:
+        """What `torques` beside the model's leave in the training set at `c`; trajectories stay."""
         gram = np.zeros(())
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
             linear = self._linearise(c, theta, piece)
             motion = Motion(*self._stencil(piece.dt, c).differences(theta))
             model = self._shared.model
-            made = deviations(model, c[: len(model.names)], motion, piece.dt)
+            made = torques(model, c[: len(model.names)], motion, piece.dt)
             rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
             rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
             whitened = np.concatenate([linear.columns, linear.solve_in_place(rows)])

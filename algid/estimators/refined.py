@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
+from math import ceil
 from operator import add
 from typing import Literal
 
@@ -23,8 +24,10 @@ from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
-from algid.estimators.integration import widened_by_integration
-from algid.estimators.log_likelihood import SHORTEST, LogEvidence, Outcome
+from algid.estimators.imprint import Imprint
+from algid.estimators.integration import deviations, widened_by_integration
+from algid.estimators.log_likelihood import SHORTEST, Beside, LogEvidence, Outcome
+from algid.estimators.misfit import columns, misfit
 from algid.estimators.parametrisation import Shared
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
@@ -40,6 +43,7 @@ _NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _NOISE_SURE = 0.1  # the same of one of many logs, after which its noise levels stay
 _MOST_SCORED = 32  # logs; of more, those whose noise levels have settled are not scored again
+_MOST_TESTED = 32  # logs whose residual is held against the motion, evenly spread
 _CLOSE = 0.1  # standard deviations of the last step: friction's step at noisy speeds may keep it up
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
@@ -140,8 +144,12 @@ def fit(
     if width is not None:
         fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
     if all(log.noiseless for log in logs):
-        imprints = [log.imprint(shared.coefficients(beta, log.loaded)) for log in logs]
-        fitted = widened_by_integration(fitted, imprints, prior)
+        fitted = widened_by_integration(fitted, _imprints(fitted, logs, deviations), prior)
+    elif noise is None:
+        lacking = misfit(fitted, _imprints(fitted, _some(logs), columns), prior)
+        if lacking.significant:
+            note = Notice("MISFIT", numbers={"kept": start.estimator})
+            return replace(start.noted(note), misfit=lacking, iterations=iterations)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)
     for place, before in enumerate(start.status):
@@ -158,6 +166,17 @@ def fit(
             iterations=iterations,
         )
     )
+
+
+def _imprints(fitted: Fit, logs: Sequence[LogEvidence], torques: Beside) -> list[Imprint]:
+    """What `torques` beside those of the fit leave in the training sets of logs."""
+    shared, beta = fitted.shared, fitted.values
+    return [log.imprint(shared.coefficients(beta, log.loaded), torques) for log in logs]
+
+
+def _some(logs: Sequence[LogEvidence]) -> Sequence[LogEvidence]:
+    """The logs; of more than `_MOST_TESTED` some, evenly spread."""
+    return logs[:: max(1, ceil(len(logs) / _MOST_TESTED))]
 
 
 def _anchored(start: Fit) -> Prior | None:

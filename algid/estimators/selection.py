@@ -121,6 +121,16 @@ class Selection:
                 trials[place] = replace(trial, kept=False, reason=reason)
         return replace(self, trials=tuple(trials))
 
+    def with_term(self, term: str, reason: str) -> Selection:
+        """The same with one more term, whose trial ends in its being kept for this `reason`."""
+        trials = list(self.trials)
+        for place, trial in enumerate(trials):
+            if trial.term == term:
+                trials[place] = replace(trial, kept=True, reason=reason)
+        model = replace(self.model, terms=self.model.terms + without_delay((term,)))
+        delay = self.delay or EVERY_TERM[term].delays
+        return replace(self, model=model, delay=delay, trials=tuple(trials))
+
     @property
     def undecided(self) -> Lateness | None:
         """The torque's lateness, if the logs were to choose its hold and do not determine it."""
@@ -306,6 +316,15 @@ def _as_lag(start: _Look, look: _Look, terms: Sequence[str], chosen: Selection) 
     return replace(chosen, model=model, delay=False, trials=tuple(trials))
 
 
+def plausible(values: Mapping[str, float]) -> bool:
+    """Whether coefficients, by name, are of a plausible size and sign."""
+    for name, value in values.items():
+        low, high = PARAMETERS[name].plausible
+        if not low <= value <= high:
+            return False
+    return True
+
+
 @dataclass(frozen=True, eq=False)
 class _Search:
     """Forward by single terms, then by pairs, then backward."""
@@ -347,15 +366,11 @@ class _Search:
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are plausible."""
         value = self.grams.coefficients(list(among) + list(terms))[False]
-        for name in names_of(EVERY_TERM[term] for term in terms):
-            if name in self.absent or name not in value:
-                continue
-            low, high = PARAMETERS[name].plausible
-            if not low <= value[name] <= high:
+        own = set(names_of(EVERY_TERM[term] for term in terms)).difference(self.absent)
+        for name in own.intersection(SINES, value):
+            if np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
                 return False
-            if name in SINES and np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
-                return False
-        return True
+        return plausible({name: value[name] for name in own.intersection(value)})
 
     def run(self) -> list[str]:
         """The terms that stay."""

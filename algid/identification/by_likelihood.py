@@ -15,7 +15,7 @@ from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.doubt import doubted, doubted_without_motor
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, Misfit
 from algid.estimators.hold import Hold
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionScore, PredictionSums, score
@@ -26,6 +26,7 @@ from algid.estimators.selection import (
     TermTrial,
     lateness,
     needs_shape,
+    plausible,
     select,
 )
 from algid.estimators.shrinkage import joined
@@ -55,6 +56,7 @@ from algid.runtime import beside
 from algid.settings import Settings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
+from algid.significance import LEVEL
 
 NOTHING = 2.0
 """Standard deviations: a coefficient nearer to zero is not distinguished from it."""
@@ -198,6 +200,7 @@ def run_fit(
     estimator = estimator_of(settings.estimator)
     if estimator.fit is None:
         raise ValueError(f"{estimator.name} gives time series, not a fit")
+    estimate = estimator.fit
     sums: dict[LogSource, PredictionSums] = {}
     ours = _weak_settings(settings, chosen)
     watched = None
@@ -209,7 +212,17 @@ def run_fit(
         known = without(prior, nothing)
         if chosen.undecided is not None and chosen.delay:
             known = joined(known, chosen.undecided.prior)
-        fit = estimator.fit(unloaded, loaded, ours, settings.lengths, known, survey.progress)
+        fit = estimate(unloaded, loaded, ours, settings.lengths, known, survey.progress)
+        if fit.misfit is not None and settings.chooses:
+
+            def refit(richer: Selection) -> Fit:
+                windows = _weak_settings(settings, richer)
+                return estimate(unloaded, loaded, windows, settings.lengths, known, survey.progress)
+
+            fit, chosen = _completed(fit, chosen, refit)
+            ours = _weak_settings(settings, chosen)
+            sums.clear()
+        picked = chosen
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
@@ -219,7 +232,7 @@ def run_fit(
             # the fit has estimated the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
             sums.clear()
-        better = _of_motorless(fit, survey, settings, chosen, prior)
+        better = _of_motorless(fit, survey, settings, picked, prior)
         if better is not None:
             fit, chosen = better
             ours = _weak_settings(settings, chosen)
@@ -236,6 +249,45 @@ def run_fit(
     return fit, sums, chosen
 
 
+_OVERLOOKED = 2  # terms at most that the likelihood adds
+_BY_LIKELIHOOD = "kept: what the likelihood leaves of the torque depends on it"
+
+
+def _completed(
+    fit: Fit, chosen: Selection, refit: Callable[[Selection], Fit]
+) -> tuple[Fit, Selection]:
+    """The fit with terms that the weak form's noise hid, where the likelihood holds with them.
+
+    Unchanged where it does not: what the arm has is no term then, or several.
+    """
+    richer, better = chosen, fit
+    for _ in range(_OVERLOOKED):
+        added = _most_evident(better.misfit, richer)
+        if added is None:
+            break
+        richer = richer.with_term(added, _BY_LIKELIHOOD)
+        better = refit(richer)
+        if better.converged and not better.refuted:
+            return better, richer
+    return fit, chosen
+
+
+def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
+    """The left-out term that the likelihood's residual shows most, if its value is plausible."""
+    if misfit is None:
+        return None
+    left = {trial.term for trial in chosen.trials if not trial.kept}
+    level = LEVEL / max(1, len(misfit.overlooked))
+    seen = []
+    for one in misfit.overlooked:
+        possible = one.term in left and EVERY_TERM[one.term].needs in (None, *chosen.model.terms)
+        if possible and one.p_value < level and plausible(one.values):
+            seen.append((one.p_value, one.term))
+    if not seen:
+        return None
+    return min(seen)[1]
+
+
 def _unsure_of_load(
     fit: Fit,
     unloaded: Sequence[Pass],
@@ -244,8 +296,9 @@ def _unsure_of_load(
     settings: Settings,
     known: Prior | None,
 ) -> Fit:
-    """The fit, where its residual is not white, with what friction by load leaves open."""
-    if fit.whiteness is None or fit.whiteness.white:
+    """The fit, where its model does not hold, with what friction by load leaves open."""
+    holds = fit.whiteness is None or fit.whiteness.white
+    if holds and fit.misfit is None:
         return fit
 
     def refit(model: Model) -> Fit:
