@@ -20,7 +20,7 @@ import os
 import resource
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from functools import cache
@@ -199,20 +199,31 @@ def ahead(source: Iterator[T]) -> Iterator[T]:
             yield item[0]
 
 
-def beside(source: Iterable[T], work: Callable[[T], None]) -> Iterator[T]:
-    """The same items, each worked on in a thread of its own while it is used.
+class Worker(Generic[T]):
+    """Work on items in a thread of its own, in order and one at a time, while they are used.
 
-    In order, one at a time.
-
-    Once the items are at their end, so is the work; its exception is raised here.
+    Its ``with`` block ends once the work does. The work's exception is raised where the next item
+    is handed over, or at the end of the block.
     """
-    with executor(1) as pool:
-        before = pool.submit(lambda: None)
-        for item in source:
-            before.result()
-            before = pool.submit(work, item)
-            yield item
-        before.result()
+
+    def __init__(self, work: Callable[[T], None]) -> None:
+        self._work = work
+        self._pool = executor(1)
+        self._before: Future[None] | None = None
+
+    def __enter__(self) -> Worker[T]:
+        return self
+
+    def push(self, item: T) -> None:
+        """Hand over an item, once the work on the one before is done."""
+        if self._before is not None:
+            self._before.result()
+        self._before = self._pool.submit(self._work, item)
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._pool.shutdown()
+        if kind is None and self._before is not None:
+            self._before.result()
 
 
 class Beside(Generic[T]):

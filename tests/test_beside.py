@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from algid.runtime import Beside, ahead, beside, executor, keep_to_one_core
+from algid.runtime import Beside, Worker, ahead, executor, keep_to_one_core
 
 
 def test_items_read_ahead_keep_their_order() -> None:
@@ -36,17 +36,40 @@ def test_no_thread_is_left_when_the_consumer_leaves() -> None:
 
 def test_items_are_worked_on_in_order_and_to_the_last_one() -> None:
     seen: list[int] = []
-    assert list(beside(range(100), seen.append)) == list(range(100))
+    with Worker(seen.append) as worker:
+        for item in range(100):
+            worker.push(item)
     assert seen == list(range(100))
 
 
-def test_an_error_of_the_work_beside_reaches_the_consumer() -> None:
+@pytest.mark.parametrize("damaged", [1, 2])  # while items come, and behind the last one
+def test_an_error_of_the_work_reaches_whoever_hands_items_over(damaged: int) -> None:
     def work(item: int) -> None:
-        if item == 2:
+        if item == damaged:
             raise ValueError("damaged")
 
+    def hand_over() -> None:
+        with Worker(work) as worker:
+            for item in range(3):
+                worker.push(item)
+
     with pytest.raises(ValueError, match="damaged"):
-        list(beside(range(3), work))
+        hand_over()
+
+
+def test_an_error_beside_the_work_is_not_hidden_by_the_works_own() -> None:
+    def work(item: int) -> None:
+        raise ValueError(item)
+
+    def hand_over() -> None:
+        with Worker(work) as worker:
+            worker.push(0)
+            raise KeyError
+
+    before = threading.active_count()
+    with pytest.raises(KeyError):
+        hand_over()
+    assert threading.active_count() == before
 
 
 def test_work_beside_gives_its_result_or_its_error() -> None:
@@ -65,8 +88,10 @@ def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_process_that_keeps_to_one_core_starts_no_thread() -> None:
     before = threading.active_count()
     seen: list[int] = []
-    for item in ahead(beside(range(5), seen.append)):
-        assert threading.active_count() == before, item
+    with Worker(seen.append) as worker:
+        for item in ahead(iter(range(5))):
+            worker.push(item)
+            assert threading.active_count() == before, item
     assert seen == [0, 1, 2, 3, 4]
     assert Beside(threading.current_thread).result() is threading.current_thread()
     with pytest.raises(ZeroDivisionError):

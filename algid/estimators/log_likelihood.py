@@ -129,8 +129,8 @@ class LogEvidence:
         self._shared = shared
         self._stencil = stencil
         self._known = known
-        usable = (replace(piece, omega=None) for piece in self._pieces())
-        self.kept, self.whole = spread_pieces(usable, _TRAINED, PIECE_SAMPLES)
+        kept, self.whole = spread_pieces(self._pieces(), _TRAINED, PIECE_SAMPLES)
+        self.kept = [replace(piece, omega=None) for piece in kept]
         if not self.kept:
             return
         self._trajectories = [_first_trajectory(piece) for piece in self.kept]
@@ -153,7 +153,7 @@ class LogEvidence:
         return self._known is not None
 
     def _pieces(self) -> Iterator[Segment]:
-        return (piece for piece in pieces(self._source(), PIECE_SAMPLES) if len(piece) >= SHORTEST)
+        return pieces(self._source(), PIECE_SAMPLES, SHORTEST)
 
     @property
     def trained(self) -> int:

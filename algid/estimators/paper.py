@@ -28,7 +28,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +35,7 @@ from numpy.typing import NDArray
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.model import K1, K2, K3, K4, K5, K6
 from algid.signals.differences import integral, nested_integral
-from algid.signals.segments import Segment, pieces
+from algid.signals.segments import Segment, pieces_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,12 +381,7 @@ def stage2_series(
 
 
 def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[PaperSeries]:
-    moving = iter(source)
-    first = next(moving, None)
-    if first is None:
-        return
-    rows = max(round(window / first.dt), 8)
-    for batch in _batches(pieces(chain([first], moving), rows)):
+    for batch in _batches(pieces_of(source, window, least=8)):
         dt = batch[0].dt
         theta = np.stack([window.theta for window in batch], axis=1)
         tau = np.stack([window.tau for window in batch], axis=1)

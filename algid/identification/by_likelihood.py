@@ -52,7 +52,7 @@ from algid.model import (
 from algid.notices import Notice
 from algid.physics.effort import absent, without_terms
 from algid.results import Result
-from algid.runtime import beside
+from algid.runtime import Worker
 from algid.settings import Settings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
@@ -542,6 +542,9 @@ def _scored(
         yield from moving()
         return
     gathered = PredictionSums(model, settings.torque_shift())
-    yield from beside(moving(), gathered.push)
+    with Worker(gathered.push) as worker:
+        for piece in moving():
+            worker.push(piece)
+            yield piece
     gathered.finish()
     sums[log] = gathered

@@ -206,20 +206,24 @@ def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]
     return weights
 
 
-def pieces(source: Iterable[Segment], rows: int) -> Iterator[Segment]:
-    """Cut each stretch into pieces of `rows` samples: see `Cutter`."""
+def pieces(source: Iterable[Segment], rows: int, shortest: int = 1) -> Iterator[Segment]:
+    """Cut each stretch into pieces of `rows` samples, less those below `shortest`: see `Cutter`."""
     cutter = Cutter(rows)
     for segment in source:
-        yield from cutter.push(segment)
-    yield from cutter.finish()
+        for piece in cutter.push(segment):
+            if len(piece) >= shortest:
+                yield piece
+    for piece in cutter.finish():
+        if len(piece) >= shortest:
+            yield piece
 
 
-def pieces_of(source: Iterable[Segment], seconds: float) -> Iterator[Segment]:
-    """Cut each stretch of a log into pieces of `seconds`: see `Cutter`."""
+def pieces_of(source: Iterable[Segment], seconds: float, least: int = 1) -> Iterator[Segment]:
+    """Cut each stretch of a log into pieces of `seconds` and `least` samples: see `Cutter`."""
     cutter: Cutter | None = None
     for segment in source:
         if cutter is None:
-            cutter = Cutter(max(1, round(seconds / segment.dt)))
+            cutter = Cutter(max(least, round(seconds / segment.dt)))
         yield from cutter.push(segment)
     if cutter is not None:
         yield from cutter.finish()
