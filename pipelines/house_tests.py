@@ -62,10 +62,11 @@ def _imports(tree: ast.AST, modules: Mapping[str, Path]) -> Iterator[tuple[str, 
             for one in node.names:
                 if one.name in modules:
                     yield one.name, "", one.asname or one.name.partition(".")[0]
-        elif isinstance(node, ast.ImportFrom) and node.module in modules:
+        elif isinstance(node, ast.ImportFrom) and (node.module or "") in modules:
             for one in node.names:
-                inner = f"{node.module}.{one.name}"
-                module, name = (inner, "") if inner in modules else (node.module, one.name)
+                module, name = f"{node.module}.{one.name}", ""
+                if module not in modules:
+                    module, name = str(node.module), one.name
                 yield module, name, one.asname or one.name
 
 

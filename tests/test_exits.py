@@ -8,9 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.api.guide import text_of
-from algid.cli.app import COMMANDS
 from algid.exits import MEANINGS, OF_COMMAND, WHAT_TO_DO, Exit, epilog, exit_of, table
-from tests.cli.commands import app
+from tests.cli.commands import NAMES, app
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -23,7 +22,7 @@ def test_a_failure_counts_more_than_lost_data() -> None:
 
 def test_every_code_has_a_meaning_and_every_command_its_codes() -> None:
     assert set(MEANINGS) == set(WHAT_TO_DO) == set(Exit)
-    assert set(OF_COMMAND) <= set(COMMANDS)
+    assert set(OF_COMMAND) <= set(NAMES)
 
 
 def test_readme_and_guide_hold_the_table() -> None:
@@ -31,7 +30,7 @@ def test_readme_and_guide_hold_the_table() -> None:
     assert table() in README.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", NAMES)
 def test_help_ends_with_the_codes_of_the_command(command: str) -> None:
     shown = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "200"}).output
     words = " ".join(shown.split())

@@ -10,11 +10,10 @@ import pytest
 from typer.main import get_command
 
 import algid
-from algid.cli.app import COMMANDS
 from algid.notices import Remedy
 from algid.options import FLAGS, OPTIONS, PROFILE, SETTINGS, flag, options_of, range_of
 from algid.profile import Profile
-from tests.cli.commands import app
+from tests.cli.commands import NAMES, app
 
 ROOT = Path(algid.__file__).parent
 WRITES_FLAGS = {ROOT / "options.py", *(ROOT / "cli").rglob("*.py")}
@@ -30,7 +29,7 @@ def shown_by(command: str) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", NAMES)
 def test_every_option_of_a_command_is_an_entry_that_it_takes(command: str) -> None:
     everywhere = {one.name for one in options_of("all")}
     own = {one.name for one in options_of(command)}
@@ -46,7 +45,7 @@ def test_every_option_of_a_command_is_an_entry_that_it_takes(command: str) -> No
 
 
 def test_every_taker_is_one() -> None:
-    assert {taker for one in OPTIONS for taker in one.of} <= {*COMMANDS, SETTINGS, PROFILE, "all"}
+    assert {taker for one in OPTIONS for taker in one.of} <= {*NAMES, SETTINGS, PROFILE, "all"}
 
 
 def _texts(tree: ast.AST) -> list[str]:

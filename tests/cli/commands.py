@@ -18,6 +18,9 @@ from algid.errors import AlgidError
 from algid.exits import Exit
 
 app = gathered(COMMANDS)
+_COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
+NAMES = [name for name, one in _COMMANDS.items() if not hasattr(one, "commands")]
+"""What the application calls its commands, without the group of those about profiles."""
 
 
 @dataclass(frozen=True)

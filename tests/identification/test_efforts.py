@@ -13,11 +13,10 @@ from typer.testing import CliRunner
 
 from algid.api.identify import identify
 from algid.arm import FloatArray, inverse_dynamics, passive_torque
-from algid.errors import SettingError
+from algid.errors import LogError, SettingError
 from algid.identification.known import prior_of
 from algid.identification.validate import predictor_of
 from algid.log import Log, Origin
-from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
 from algid.synth.cases import load_case
@@ -25,6 +24,7 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.efforts import judged
 from tests.cli.commands import app
+from tests.readers.headers import opened
 
 RATE, DURATION = 250.0, 5.0
 SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
@@ -193,12 +193,8 @@ def test_the_command_line_refuses_gravity_of_external_torque(tmp_path: Path) -> 
 
 
 def test_a_current_is_in_amperes() -> None:
-    from algid.errors import LogError
-    from algid.readers.convert import channel_readings
-
-    profile = Profile(effort="current")
     with pytest.raises(LogError, match="torque_constant"):
-        channel_readings("log.csv", {"tau1": "effort"}, profile, {})
+        opened(["t", "q1", "q2", "tau1", "tau2"], {"effort": "current"})
     assert replace(Settings(), effort="command").effort == "command"
 
 

@@ -4,7 +4,6 @@ motors and units.
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import pytest
@@ -12,20 +11,30 @@ import pytest
 from algid.errors import LogError
 from algid.notices import Notice
 from algid.profile import Profile, with_settings
-from algid.readers.columns import Columns, assign
-from algid.readers.names import Name, choose, on_motor_side, other_joints, take_apart
+from algid.readers.columns import assign
+from algid.readers.names import Name, on_motor_side, other_joints, take_apart
+from tests.readers.headers import TableReader, opened
 
 PLAIN = "t q1 q2 tau1 tau2"
+CONSTANTS = {"tau1": {"torque_constant": 1.0}, "tau2": {"torque_constant": 1.0}}
 
 
-def assigned(header: str, settings: dict[str, Any] | None = None, **stated: str) -> Columns:
-    return assign("log.csv", header.split(), with_settings(Profile(), settings or {}), stated)
+def assigned(header: str, settings: dict[str, Any] | None = None, **stated: str) -> TableReader:
+    return opened(header.split(), settings, stated)
+
+
+def chosen(columns: list[str], **settings: Any) -> dict[str, str]:
+    return dict(opened(columns, settings).origin.mapping)
 
 
 def refusal(header: str, settings: dict[str, Any] | None = None, **stated: str) -> str:
-    with pytest.raises(LogError) as refused:
-        assigned(header, settings, **stated)
-    return str(refused.value).removeprefix("log.csv: ")
+    return refused(header.split(), settings, stated)
+
+
+def refused(columns: list[str], *more: Any) -> str:
+    with pytest.raises(LogError) as error:
+        opened(columns, *more)
+    return str(error.value).removeprefix("log: ")
 
 
 def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> None:
@@ -61,8 +70,8 @@ def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
     driven = 3 - passive
     for torque in (f"tau{driven}", "torque"):
         found = assigned(f"t q1 q2 {torque}", {"passive": passive})
-        assert found.sources[f"tau{driven}"] == torque
-        assert found.sources[f"tau{passive}"] == torque
+        assert found.origin.mapping[f"tau{driven}"] == torque
+        assert found.origin.mapping[f"tau{passive}"] == torque
     assert "no column for tau1, tau2" in refusal(f"t q1 q2 tau{driven}")
     assert "no column for tau" in refusal(
         "t q1 q2 tau7 tau8 tau9".replace("tau8 tau9", ""), {"passive": passive}
@@ -71,11 +80,11 @@ def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
 
 def test_velocities_are_taken_in_pairs_and_if_wanted() -> None:
     both = f"{PLAIN} dq1 dq2"
-    assert assigned(both).sources["omega2"] == "dq2"
-    assert not {"omega1", "omega2"} & assigned(both, {"velocity": False}).sources.keys()
-    assert not {"omega1", "omega2"} & assigned(f"{PLAIN} dq1").sources.keys()
+    assert assigned(both).origin.mapping["omega2"] == "dq2"
+    assert not {"omega1", "omega2"} & assigned(both, {"velocity": False}).origin.mapping.keys()
+    assert not {"omega1", "omega2"} & assigned(f"{PLAIN} dq1").origin.mapping.keys()
     named = assigned(f"{PLAIN} speed_a dq2", {"omega1": {"source": "speed_a"}})
-    assert "omega1" not in named.sources
+    assert "omega1" not in named.origin.mapping
 
 
 def test_who_said_which_joint_is_the_first() -> None:
@@ -85,17 +94,16 @@ def test_who_said_which_joint_is_the_first() -> None:
     }
     named = "t wrist_pos elbow_pos wrist_torque elbow_torque"
     found = assigned(named)
-    assert (found.reading.joints, found.reading.joints_told) == (("elbow", "wrist"), "names")
+    reading = found.origin.reading
+    assert (reading.joints, reading.joints_told) == (("elbow", "wrist"), "names")
     assert [notice.code for notice in found.notices] == ["JOINT_ORDER"]
-    assert assigned(PLAIN).reading.joints_told == "names"
-    assert assigned(PLAIN, sources).reading.joints_told == "profile"
+    assert assigned(PLAIN).origin.reading.joints_told == "names"
+    assert assigned(PLAIN, sources).origin.reading.joints_told == "profile"
     told = assigned(named, {"joints": ["wrist", "elbow"]})
-    assert (told.reading.joints, told.reading.joints_told, told.notices) == (
-        ("wrist", "elbow"),
-        "flag",
-        (),
-    )
-    assert told.sources["tau1"] == "wrist_torque"
+    reading = told.origin.reading
+    assert (reading.joints, reading.joints_told) == (("wrist", "elbow"), "flag")
+    assert told.notices == ()
+    assert told.origin.mapping["tau1"] == "wrist_torque"
 
 
 @pytest.mark.parametrize(
@@ -112,12 +120,12 @@ def test_the_unit_of_time(
     header: str, settings: dict[str, Any], unit: str | None, stated: bool
 ) -> None:
     """algid's own names mean seconds, and still are only taken to."""
-    found = assigned(header, settings)
+    found = assign("log.csv", header.split(), with_settings(Profile(), settings), {})
     assert (found.time_unit, found.time_stated) == (unit, stated)
     assert (found.dated().time_unit, found.dated().time_stated) == ("ns", True)
 
 
-def said(found: Columns) -> list[tuple[str, str]]:
+def said(found: TableReader) -> list[tuple[str, str]]:
     return [(notice.code, notice.text) for notice in found.notices]
 
 
@@ -125,16 +133,22 @@ def test_commanded_torques_are_told_and_taken_last() -> None:
     commanded = assigned("t q1 q2 tau_cmd1 tau_cmd2")
     columns = {"columns": "tau_cmd1, tau_cmd2"}
     assert commanded.notices == (Notice("COMMANDED_TORQUE", numbers=columns),)
-    assert assigned("t q1 q2 tau_cmd1 tau_cmd2 tau_meas1 tau_meas2").sources["tau1"] == "tau_meas1"
-    assert assigned("t q1 q2 tau_cmd1 tau_cmd2 i_q1 i_q2").sources["tau1"] == "tau_cmd1"
+    header = "t q1 q2 tau_cmd1 tau_cmd2"
+    assert assigned(f"{header} tau_meas1 tau_meas2").origin.mapping["tau1"] == "tau_meas1"
+    assert assigned(f"{header} i_q1 i_q2").origin.mapping["tau1"] == "tau_cmd1"
 
 
 def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
     header = "t q1 q2 current_1 current_2"
-    assert assigned(header).units == {"tau1": "A", "tau2": "A"}
-    assert assigned(header, None, current_2="mA").units == {"tau1": "A", "tau2": "mA"}
-    assert assigned(header, None, current_2="Nm").units == {"tau1": "A", "tau2": "A"}
-    told = assigned(header, {"tau1": {"unit": "N m"}})
+
+    def units(**stated: str) -> list[str]:
+        channels = assigned(header, CONSTANTS, **stated).origin.reading.channels
+        return [channels[name].unit for name in ("tau1", "tau2")]
+
+    assert units() == ["A", "A"]
+    assert units(current_2="mA") == ["A", "mA"]
+    assert units(current_2="Nm") == ["A", "A"]
+    told = assigned(header, {"tau1": {"unit": "N m"}, "tau2": CONSTANTS["tau2"]})
     text = "'current_1' for tau1 is a current by its name, and is taken for a torque in N m as told"
     assert said(told) == [("CURRENT_AS_TORQUE", text)]
 
@@ -194,7 +208,7 @@ def test_motors_beside_joints_need_a_gear() -> None:
     motors = assigned("t motor1_pos motor2_pos motor1_torque motor2_torque")
     assert [code for code, _ in said(motors)] == ["MOTOR_SIDE"]
     # a current's constant tells of its gear
-    assert said(assigned("t q1 q2 motor1_current motor2_current")) == []
+    assert said(assigned("t q1 q2 motor1_current motor2_current", CONSTANTS)) == []
 
 
 @pytest.mark.parametrize(
@@ -239,38 +253,35 @@ def test_a_name_that_holds_a_topic() -> None:
     ],
 )
 def test_the_pair_chosen(columns: str, joints: tuple[str, str] | None, chosen: str) -> None:
-    found = choose(["t", *columns.split()], joints)
-    assert found.columns["theta1"] == chosen
-    assert {"theta2", "tau1", "tau2"} < found.columns.keys()
+    settings = {"joints": list(joints)} if joints else {}
+    found = opened(["t", *columns.split()], settings).origin.mapping
+    assert found["theta1"] == chosen
+    assert {"theta2", "tau1", "tau2"} < found.keys()
 
 
 def test_joints_told_that_stand_there_twice_or_not_at_all() -> None:
     columns = ["t", "/a/x/position", "/b/x/position", "/a/y/position", "/a/x/effort", "/a/y/effort"]
-    with pytest.raises(
-        LookupError, match=r"no columns of the joints x, y; joints there are: x, y$"
-    ):
-        choose(columns, ("x", "y"))
-    assert choose(columns, ("/a/x", "y")).columns["theta1"] == "/a/x/position"
-    with pytest.raises(LookupError, match="joints there are: none that their names show"):
-        choose(["t", "alpha", "beta"], ("1", "2"))
-    with pytest.raises(
-        LookupError, match=re.escape("'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8")
-    ):
-        choose([f"pos{joint}" for joint in range(1, 10)])
+    told = refused(columns, {"joints": ["x", "y"]})
+    assert told.startswith("no columns of the joints x, y; joints there are: x, y; choose two")
+    assert chosen(columns, joints=["/a/x", "y"])["theta1"] == "/a/x/position"
+    told = refused(["t", "alpha", "beta"], {"joints": ["1", "2"]})
+    assert "joints there are: none that their names show" in told
+    told = refused([f"pos{joint}" for joint in range(1, 10)])
+    assert "'pos' stands there for 9 joints: 1, 2, 3, 4, 5, 6, 7, 8;" in told
 
 
 def test_a_name_written_twice_is_refused_but_where_its_column_is_told() -> None:
     columns = ["t", "q1", "q_01 [deg]", "q2", "tau1", "tau2"]
-    with pytest.raises(LookupError, match=r"'q_01 \[deg\]' and 'q1' are both q of joint 1"):
-        choose(columns)
-    assert choose(columns, named=["theta1"]).columns["theta2"] == "q2"
+    assert "'q_01 [deg]' and 'q1' are both q of joint 1" in refused(columns)
+    assert chosen(columns, theta1={"source": "q1"})["theta2"] == "q2"
 
 
 def test_a_time_is_known_by_its_whole_name_first() -> None:
-    assert choose(["time [ms]", "T", *PLAIN.split()[1:]]).columns["t"] == "T"
-    assert choose(["clock", "time [ms]", *PLAIN.split()[1:]]).columns["t"] == "time [ms]"
-    assert choose(["stamp", "time", "stamp_ns", *PLAIN.split()[1:]]).columns["t"] == "stamp_ns"
-    assert "t" not in choose(PLAIN.split()[1:]).columns
+    others = PLAIN.split()[1:]
+    assert chosen(["time [ms]", "T", *others])["t"] == "T"
+    assert chosen(["clock", "time [ms]", *others])["t"] == "time [ms]"
+    assert chosen(["stamp", "time", "stamp_ns", *others])["t"] == "stamp_ns"
+    assert refused(others).startswith("no column for t; found")
 
 
 def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
@@ -290,22 +301,20 @@ def test_columns_that_are_only_numbered_are_no_joints(named: str) -> None:
 
 
 def test_the_first_of_two_clocks_of_one_name_and_the_only_torque() -> None:
-    assert choose(["t", "T", "q1", "q2", "tau1", "tau2"]).columns["t"] == "t"
-    assert choose(["T", "t", "q1", "q2", "tau1", "tau2"]).columns["t"] == "T"
-    assert choose(["t [s]", "T [ms]", "q1", "q2", "tau1", "tau2"]).columns["t"] == "t [s]"
+    assert chosen(["t", "T", "q1", "q2", "tau1", "tau2"])["t"] == "t"
+    assert chosen(["T", "t", "q1", "q2", "tau1", "tau2"])["t"] == "T"
+    assert chosen(["t [s]", "T [ms]", "q1", "q2", "tau1", "tau2"])["t"] == "t [s]"
     # of several torques that of the joint that has the motor
-    columns = ["t", "q1", "q2", "tau1", "tau7"]
-    assert choose(columns, passive=2).columns["tau1"] == "tau1"
-    assert "tau1" not in choose(["t", "q1", "q2", "tau6", "tau7"], passive=2).columns
-    assert choose(["t", "q1", "q2", "effort"], passive=1).columns["tau2"] == "effort"
+    assert chosen(["t", "q1", "q2", "tau1", "tau7"], passive=2)["tau1"] == "tau1"
+    assert "no column for tau1" in refused(["t", "q1", "q2", "tau6", "tau7"], {"passive": 2})
+    assert chosen(["t", "q1", "q2", "effort"], passive=1)["tau2"] == "effort"
 
 
 def test_joint_and_axis_are_no_joints_names() -> None:
     columns = [
         f"{joint}_{signal}" for joint in ("base_axis", "elbow_axis") for signal in ("pos", "torque")
     ]
-    assert choose(["t", *columns]).joints == ("base", "elbow")
-    assert choose(["t", *columns], ("elbow", "base")).columns["theta1"] == "elbow_axis_pos"
-    assert choose(["t", "axis_pos", "joint_pos", "axis_torque", "joint_torque"]).columns == {
-        "t": "t"
-    }
+    assert opened(["t", *columns]).origin.reading.joints == ("base", "elbow")
+    assert chosen(["t", *columns], joints=["elbow", "base"])["theta1"] == "elbow_axis_pos"
+    told = refused(["t", "axis_pos", "joint_pos", "axis_torque", "joint_torque"])
+    assert told.startswith("no column for theta1, theta2, tau1, tau2; found")

@@ -4,7 +4,6 @@ numpy's unwrap.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,14 @@ from hypothesis import strategies as st
 from scipy import constants
 
 from algid.errors import LogError
-from algid.log import ChannelReading
-from algid.profile import Profile
+from algid.log import ChannelReading, Log
+from algid.profile import Profile, with_settings
+from algid.readers import read_log
 from algid.readers.assemble import Unwrapper
-from algid.readers.convert import Conversion, Gatherer, Room, channel_readings
+from algid.readers.convert import Conversion, Gatherer, Room
 from algid.readers.table import CHANNELS, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
+from tests.readers.headers import opened
 
 TURN = 2 * np.pi
 TORQUES = {
@@ -30,13 +31,12 @@ TORQUES = {
 }  # fmt: skip
 ANGLES = {"rad": 1, "mrad": constants.milli, "deg": constants.degree, "rev": TURN}
 VELOCITIES = {**ANGLES, "rpm": TURN / constants.minute}
-MAPPING = {name: f"column of {name}" for name in CHANNELS}
 
 
 def readings(
     settings: dict[str, Any], stated: dict[str, str] | None = None
 ) -> dict[str, ChannelReading]:
-    return channel_readings("log", MAPPING, Profile.model_validate(settings), stated or {})
+    return dict(opened(["t", *CHANNELS], settings, stated).origin.reading.channels)
 
 
 def test_the_units_are_those_known_here() -> None:
@@ -98,7 +98,7 @@ def test_signs_and_offsets_of_channels_and_joints_add_up() -> None:
         (
             {},
             {"tau1": "deg"},
-            r"tau1 \(column of tau1\) is in 'deg' by its name; expected one of N m, .*, A, mA; say",
+            r"tau1 \(tau1\) is in 'deg' by its name; expected one of N m, .*, A, mA; say",
         ),
         (
             {},
@@ -132,22 +132,18 @@ def test_the_torque_of_a_joint_without_motor_needs_no_unit() -> None:
 SIGNALS = np.random.default_rng(7).normal(size=(8, 50))
 
 
-def converted(**settings: Any) -> Room:
-    samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
-    room = Room.empty(50, velocity=True, reference=True)
-    Conversion({name: ChannelReading(name, "") for name in CHANNELS}, **settings).apply(
-        samples, room
-    )
-    return room
+def converted(**settings: Any) -> Log:
+    columns = {"t": np.arange(50) * 1e-3, **dict(zip(CHANNELS, SIGNALS, strict=True))}
+    return read_log(columns, with_settings(Profile(), settings))
 
 
 def test_a_second_motor_at_the_base_does_the_same_work() -> None:
     """τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2), the power of both motors, is that of the joints' torques."""
-    room = converted(base=True)
-    assert room.omega is not None
+    log = converted(drive="base")
+    assert log.omega is not None
     (first, second), (one, two) = SIGNALS[2:4], SIGNALS[4:6]
     assert np.allclose(
-        (room.tau * room.omega).sum(axis=0),
+        (log.tau * log.omega).sum(axis=0),
         first * one + second * (one + two),
         rtol=1e-13,
         atol=1e-13,
@@ -158,7 +154,7 @@ def test_zero_and_reference_of_the_angles() -> None:
     """The tip of an arm of two links of 1 m is where it was, whatever the angles are
     counted from.
     """
-    hanging, absolute = converted(zero=-math.pi / 2), converted(absolute=True)
+    hanging, absolute = converted(zero="hanging"), converted(second_angle="absolute")
     first, second = SIGNALS[:2]
     assert np.allclose(np.exp(1j * hanging.theta[0]) * 1j, np.exp(1j * first), atol=1e-14)
     assert np.allclose(np.exp(1j * absolute.theta.sum(axis=0)), np.exp(1j * second), atol=1e-14)
@@ -169,7 +165,7 @@ def test_zero_and_reference_of_the_angles() -> None:
     assert absolute.reference is not None
     assert np.allclose(absolute.reference.sum(axis=0), SIGNALS[7], atol=1e-14)
     assert np.all(converted(passive=1).tau[0] == 0)
-    assert np.all(converted(passive=1, base=True).tau == SIGNALS[3])
+    assert np.all(converted(passive=1, drive="base").tau == SIGNALS[3])
 
 
 def test_factor_and_offset_of_a_channel() -> None:

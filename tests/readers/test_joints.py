@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from algid.errors import LogError
-from algid.log import Log, Reading
+from algid.log import Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from algid.readers.joints import along_the_arm, moving_joints, reading_of
+from algid.readers.joints import moving_joints
 from algid.readers.table import SampleTable
+from tests.readers.headers import opened
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
 
@@ -65,15 +66,23 @@ UNKNOWN = [
 
 
 @pytest.mark.parametrize("names", IN_ORDER)
-def test_names_tell_the_order(names: tuple[str, str]) -> None:
-    assert along_the_arm(names) == (names, "names")
-    assert along_the_arm(names[::-1]) == (names, "names")
+def test_names_tell_the_order(names: tuple[str, str], tmp_path: Path) -> None:
+    assert ordered(tmp_path, names) == (names, "names")
+    assert ordered(tmp_path, names[::-1]) == (names, "names")
 
 
 @pytest.mark.parametrize("names", UNKNOWN)
-def test_names_that_do_not_tell_leave_the_order_as_it_is(names: tuple[str, str]) -> None:
-    assert along_the_arm(names) == (names, "order")
-    assert along_the_arm(names[::-1]) == (names[::-1], "order")
+def test_names_that_do_not_tell_leave_the_order_as_it_is(
+    names: tuple[str, str], tmp_path: Path
+) -> None:
+    assert ordered(tmp_path, names) == (names, "order")
+    assert ordered(tmp_path, names[::-1]) == (names[::-1], "order")
+
+
+def ordered(folder: Path, names: tuple[str, str]) -> tuple[tuple[str, str] | None, str | None]:
+    """The joints of messages with such names from the base outwards, and who says so."""
+    reading = read_log(states(folder / "log.mcap", names)).origin.reading
+    return reading.joints, reading.joints_told
 
 
 def states(path: Path, names: tuple[str, str]) -> Path:
@@ -200,17 +209,17 @@ def test_flat_json_messages_are_read_by_their_names(
     assert log.origin.reading.clock == "log"
 
 
-def test_a_raised_digit_is_no_number() -> None:
+def test_a_raised_digit_is_no_number(tmp_path: Path) -> None:
     """`str.isdigit` says that ² is one, and `int` does not."""
-    assert along_the_arm(["axis ³", "axis ²"]) == (("axis ³", "axis ²"), "order")
-    assert along_the_arm(["axis 3", "axis 2"]) == (("axis 2", "axis 3"), "names")
+    assert ordered(tmp_path, ("axis ³", "axis ²")) == (("axis ³", "axis ²"), "order")
+    assert ordered(tmp_path, ("axis 3", "axis 2")) == (("axis 2", "axis 3"), "names")
 
 
 @pytest.mark.parametrize(
     "names", [("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")]
 )
-def test_more_words_of_the_field_tell_the_order(names: tuple[str, str]) -> None:
-    assert along_the_arm(names[::-1]) == (names, "names")
+def test_more_words_of_the_field_tell_the_order(names: tuple[str, str], tmp_path: Path) -> None:
+    assert ordered(tmp_path, names[::-1]) == (names, "names")
 
 
 def moving(unit: float = 1.0, rows: int = 3, **travel: float) -> str | None:
@@ -262,15 +271,16 @@ def test_joints_that_cannot_be_read_or_were_not_recorded_tell_nothing() -> None:
 
 
 def test_a_user_who_says_the_joints_is_not_told_of_their_order() -> None:
-    reading, said = reading_of(["elbow", "shoulder"], Profile())
-    assert (reading.joints, reading.joints_told, [notice.code for notice in said]) == (
-        ("shoulder", "elbow"), "names", ["JOINT_ORDER"]
-    )  # fmt: skip
-    assert said[0].note
-    told = with_settings(Profile(), {"joints": ["elbow", "shoulder"]})
-    assert reading_of(["shoulder", "elbow"], told) == (
-        Reading(joints=("elbow", "shoulder"), joints_told="flag"),
-        (),
-    )
-    (unknown,) = reading_of(["left", "right"], Profile())[1]
+    def columns(*names: str) -> list[str]:
+        return ["t", *(f"/js/{name}/{part}" for name in names for part in ("position", "effort"))]
+
+    log = opened(columns("elbow", "shoulder"))
+    reading = log.origin.reading
+    assert (reading.joints, reading.joints_told) == (("shoulder", "elbow"), "names")
+    assert [(notice.code, notice.note) for notice in log.notices] == [("JOINT_ORDER", True)]
+    told = opened(columns("shoulder", "elbow"), {"joints": ["elbow", "shoulder"]})
+    reading = told.origin.reading
+    assert (reading.joints, reading.joints_told) == (("elbow", "shoulder"), "flag")
+    assert told.notices == ()
+    (unknown,) = opened(columns("left", "right")).notices
     assert not unknown.note

@@ -12,9 +12,10 @@ from algid.errors import LogError
 from algid.notices import Notice
 from algid.readers import read_log
 from algid.readers.frames import time_unit, to_nanoseconds
-from algid.readers.names import choose, take_apart
+from algid.readers.names import take_apart
 from algid.readers.table import SampleTable
 from algid.readers.timebase import in_order
+from tests.readers.headers import opened
 
 FIELD = {
     "t,q1,q2,tau1,tau2": "t q1 q2 tau1 tau2",
@@ -40,7 +41,9 @@ FIELD = {
 
 @pytest.mark.parametrize("header", FIELD)
 def test_names_of_the_field_are_recognised(header: str) -> None:
-    chosen = choose(header.split(",")).columns
+    currents = {"torque_constant": 1.0} if "current" in header else {}
+    settings = {"tau1": currents, "tau2": currents}
+    chosen = opened(header.split(","), settings).origin.mapping
     wanted = FIELD[header].split("," if "," in FIELD[header] else " ")
     assert [chosen[name] for name in ("t", "theta1", "theta2", "tau1", "tau2")] == wanted
 
@@ -66,16 +69,16 @@ def test_units_in_names() -> None:
     ],
 )
 def test_units_of_time_in_names(name: str, unit: str | None) -> None:
-    chosen = choose([name, "q1", "q2", "tau1", "tau2"])
-    assert chosen.columns["t"] == name
-    assert chosen.units.get("t") == unit
+    origin = opened([name, "q1", "q2", "tau1", "tau2"]).origin
+    assert origin.mapping["t"] == name
+    assert origin.reading.time_unit == unit
 
 
 def test_more_joints_than_two_need_a_choice() -> None:
     columns = ["t", *(f"{name}{joint}" for name in ("q", "tau") for joint in range(7))]
-    with pytest.raises(LookupError, match="7 joints"):
-        choose(columns)
-    chosen = choose(columns, ("3", "5")).columns
+    with pytest.raises(LogError, match="7 joints"):
+        opened(columns)
+    chosen = opened(columns, {"joints": ["3", "5"]}).origin.mapping
     assert [chosen[name] for name in ("theta1", "theta2", "tau1", "tau2")] == [
         "q3",
         "q5",
@@ -85,8 +88,8 @@ def test_more_joints_than_two_need_a_choice() -> None:
 
 
 def test_torques_of_other_joints_are_not_taken() -> None:
-    chosen = choose(["t", "q1", "q2", "tau2", "tau9"]).columns
-    assert "tau2" not in chosen
+    with pytest.raises(LogError, match="no column for tau2; found"):
+        opened(["t", "q1", "q2", "tau2", "tau9"])
 
 
 @pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
@@ -178,6 +181,6 @@ def test_joints_are_named_by_their_numbers_or_by_what_columns_begin_with(
     joints: tuple[str, str],
 ) -> None:
     columns = [f"Joint_{n}_{what}" for n in (1, 2, 3) for what in ("pos", "torque")]
-    found = choose(["time", *columns], joints).columns
+    found = opened(["time", *columns], {"joints": list(joints)}).origin.mapping
     assert found["theta1"] == "Joint_2_pos"
     assert found["tau2"] == "Joint_3_torque"
