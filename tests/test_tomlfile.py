@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.batches.manifest import read_manifest
+from algid.batches.discover import jobs_of
 from algid.designs.request import request
 from algid.errors import SettingError
 from algid.files import parsed_toml
@@ -42,7 +42,7 @@ def test_more_work_than_any_honest_file_asks_for_is_refused(
     for read in (
         load_profile,
         lambda path: load_case(str(path)),
-        read_manifest,
+        lambda path: jobs_of([str(path)], "out"),
         lambda path: request(path, {}),
     ):
         with pytest.raises(SettingError, match=f"long.toml: .*{said}"):

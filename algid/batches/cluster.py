@@ -105,7 +105,7 @@ def cluster(address: str, out: str, timeout: float | None = None) -> Iterator[tu
         prefix = f"algid-{hashlib.sha256(public(out).encode()).hexdigest()[:16]}-"
         _refuse_misfits(client, misfit, address)
         _wait_for_earlier(client, prefix)
-        made = _Cluster(client, address, threads, prefix, misfit, timeout)
+        made = ClusterExecutor(client, address, threads, prefix, misfit, timeout)
         yield made, 2 * threads * MOST_TOGETHER
     finally:
         if made is not None:
@@ -209,7 +209,7 @@ class _Call:
     alone: bool = False
 
 
-class _Cluster(Executor):
+class ClusterExecutor(Executor):
     """Calls run on the cluster, several in a task where they are short.
 
     They fail as those of `Workers` do.

@@ -20,7 +20,13 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batches.cluster import MOST_TOGETHER, TASK_SECONDS, _Cluster, answered_in_turn, misfit_of
+from algid.batches.cluster import (
+    MOST_TOGETHER,
+    TASK_SECONDS,
+    ClusterExecutor,
+    answered_in_turn,
+    misfit_of,
+)
 from algid.batches.workers import CallFailedError, WorkerDiedError, WorkersGoneError
 from algid.synth.sensors import Sensors
 from tests.batches import calls
@@ -89,18 +95,18 @@ def client() -> Client:
 
 
 @pytest.fixture
-def cluster(client: Client) -> Iterator[_Cluster]:
-    made = _Cluster(client, "tcp://there:1", 2, "algid-", lambda: None, None)
+def cluster(client: Client) -> Iterator[ClusterExecutor]:
+    made = ClusterExecutor(client, "tcp://there:1", 2, "algid-", lambda: None, None)
     yield made
     made.end()
 
 
-def _submit(cluster: _Cluster, count: int) -> list[Future[Any]]:
+def _submit(cluster: ClusterExecutor, count: int) -> list[Future[Any]]:
     return [cluster.submit(calls.add, number, 1) for number in range(count)]
 
 
 def test_short_calls_travel_together_and_the_last_ones_are_shared_out(
-    client: Client, cluster: _Cluster
+    client: Client, cluster: ClusterExecutor
 ) -> None:
     answers = _submit(cluster, 64)
     # how long they take is not known yet
@@ -121,7 +127,7 @@ def test_short_calls_travel_together_and_the_last_ones_are_shared_out(
 
 @pytest.mark.parametrize(("seconds", "most"), [(30 * TASK_SECONDS, 1), (1e-9, MOST_TOGETHER)])
 def test_long_calls_travel_alone_and_short_ones_not_without_bound(
-    client: Client, cluster: _Cluster, seconds: float, most: int
+    client: Client, cluster: ClusterExecutor, seconds: float, most: int
 ) -> None:
     sizes = client.drive(
         _submit(cluster, 400), lambda task: task.end(seconds=len(task.calls) * seconds)
@@ -130,7 +136,7 @@ def test_long_calls_travel_alone_and_short_ones_not_without_bound(
 
 
 def test_of_a_task_that_takes_workers_with_it_the_one_call_that_does_so_fails(
-    client: Client, cluster: _Cluster
+    client: Client, cluster: ClusterExecutor
 ) -> None:
     from distributed.scheduler import KilledWorker
 
@@ -158,7 +164,7 @@ def test_of_a_task_that_takes_workers_with_it_the_one_call_that_does_so_fails(
             assert answer.result() == number + 1
 
 
-def test_what_fails_in_a_task_fails_alone(client: Client, cluster: _Cluster) -> None:
+def test_what_fails_in_a_task_fails_alone(client: Client, cluster: ClusterExecutor) -> None:
     answers = _submit(cluster, 8)
     bad, unpackable = cluster.submit(calls.fail), cluster.submit(lambda: None)
     sizes = client.drive([*answers, bad], lambda task: task.end(seconds=0.0))
@@ -193,7 +199,7 @@ def test_a_fault_of_the_cluster_ends_every_call_and_is_none_of_theirs(
 ) -> None:
     monkeypatch.setattr("algid.batches.cluster.WATCH_EVERY", 0.01)
     monkeypatch.setattr("algid.batches.cluster.PATIENCE", 0.05)
-    cluster = _Cluster(client, "tcp://there:1", 2, "algid-", lambda: None, None)
+    cluster = ClusterExecutor(client, "tcp://there:1", 2, "algid-", lambda: None, None)
     answers = _submit(cluster, 30)
     fault(client)
     for answer in (*answers, cluster.submit(calls.add, 1, 1)):
@@ -203,7 +209,7 @@ def test_a_fault_of_the_cluster_ends_every_call_and_is_none_of_theirs(
 
 
 def test_an_answer_that_was_lost_on_its_way_is_waited_for(
-    client: Client, cluster: _Cluster
+    client: Client, cluster: ClusterExecutor
 ) -> None:
     from distributed import TimeoutError as DaskTimeoutError
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from algid.batches.discover import jobs_of
 from algid.batches.job import kept
 from algid.batches.jobs import Job, checked_name, name_fault
-from algid.batches.manifest import is_manifest, label_of, read_manifest
+from algid.batches.manifest import is_manifest, label_of
 from algid.batches.run import sweep
 from algid.errors import SettingError
 from algid.readers.formats import SUFFIXES
@@ -218,8 +218,8 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         'time=2026-01-31T12:00:00Z\npayload=0.5\nsite="Ulm"\n'
     )
     assert is_manifest(tmp_path / "m.csv")
-    (first,) = read_manifest(tmp_path / "m.csv")
-    (second,) = read_manifest(tmp_path / "m.toml")
+    (first,) = jobs_of([str(tmp_path / "m.csv")], "out")
+    (second,) = jobs_of([str(tmp_path / "m.toml")], "out")
     assert first == second
     assert first.logs == (str(tmp_path / "a.csv"), str(tmp_path / "b.csv"))
     assert first.profile == str(tmp_path / "arm.toml")
@@ -262,7 +262,7 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
 def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "m.csv").write_text(text)
     with pytest.raises(SettingError, match=rf"^{tmp_path}/m\.csv: {told}"):
-        read_manifest(tmp_path / "m.csv")
+        jobs_of([str(tmp_path / "m.csv")], "out")
 
 
 @pytest.mark.parametrize(
@@ -361,7 +361,7 @@ def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
         "[[job]]\nname = 'x'\nlogs = 's3://lab/a.csv'\nrobot = 7\npayload = 0.5\nruns = 3\ngood = "
         "true\nat = 2026-01-31"
     )
-    (job,) = read_manifest(path)
+    (job,) = jobs_of([str(path)], "out")
     assert job.logs == ("s3://lab/a.csv",)
     assert job.robot == "7"
     assert job.labels == {"payload": 0.5, "runs": 3, "good": True, "at": "2026-01-31"}

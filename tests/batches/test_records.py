@@ -15,7 +15,6 @@ import polars as pl
 import pytest
 
 from algid.batches.discover import jobs_of
-from algid.batches.job import failed_record
 from algid.batches.jobs import Job
 from algid.batches.manifest import read_manifest
 from algid.batches.records import (
@@ -47,7 +46,7 @@ class Failing(Executor):
         (task,) = args
         self.ran.append(task.job.name)
         inputs = tuple(replace(stat_of(path), sha256=hash_of(path)) for path in task.job.logs)
-        future.set_result(failed_record(task, "as asked", inputs=inputs))
+        future.set_result(JobRecord(task.job, End.FAILED, "as asked", task.basis, inputs, {}, ""))
         return future
 
 

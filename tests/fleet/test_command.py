@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import json
 import re
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,14 +17,15 @@ import pytest
 from scipy.stats import norm
 from typer.testing import CliRunner
 
-from algid.batches.jobs import Job
-from algid.batches.records import End, JobRecord
-from algid.batches.table import write_jobs
+from algid.batches.discover import jobs_of
+from algid.batches.records import End, JobRecord, stat_of
+from algid.batches.run import Batch, Recipe
 from algid.errors import ResultError
 from algid.fleet.figures import overview, robot_figure
 from algid.fleet.history import history_of
 from algid.fleet.page import fleet_document, verdict
 from algid.fleet.tables import drift_table, finding_table, robot_table
+from algid.settings import Settings
 from algid.stores import open_store
 from tests.cli.commands import app
 from tests.terminals import shown
@@ -30,25 +33,59 @@ from tests.terminals import shown
 TABLES = (robot_table, drift_table, finding_table)
 
 
-def _batch(
-    folder: Path, robots: int = 2, logs: int = 10, start_ns: int = 1_700_000_000 * 10**9
-) -> Path:
+START = 1_700_000_000 * 10**9
+DAY = 86_400 * 10**9
+Known = tuple[str, int, dict[str, tuple[float, float, str]]]
+"""Robot, first stamp in ns and estimates of a job."""
+
+
+class Finished(Executor):
+    """Ends every job at once, with what is known of it."""
+
+    def __init__(self, known: Mapping[str, Known]) -> None:
+        self.known = known
+
+    def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        (task,) = args
+        _, start_ns, estimates = self.known[task.job.name]
+        inputs = tuple(map(stat_of, task.job.logs))
+        future.set_result(
+            JobRecord(
+                task.job, End.OK, "", task.basis, inputs, {}, "", 1.0, start_ns, 10.0, "refined",
+                estimates,
+            )
+        )  # fmt: skip
+        return future
+
+
+def _written(folder: Path, known: Mapping[str, Known]) -> Path:
+    """A batch of such jobs, whose payload is labelled 0.5 kg."""
+    folder.mkdir(exist_ok=True)
+    (folder / "a.csv").write_text("no log")
+    lines = ["name,logs,robot,payload"]
+    for name, (robot, _, _) in known.items():
+        lines.append(f"{name},a.csv,{robot},0.5")
+    (folder / "manifest.csv").write_text("\n".join(lines))
+    jobs = jobs_of([str(folder / "manifest.csv")], str(folder))
+    recipe = Recipe(str(folder), Settings(), lambda _file: None)
+    ended = Batch(open_store(str(folder)), recipe, Finished(known), 1, lambda _: None).run(jobs)
+    assert [record.status for record in ended.records] == [End.OK] * len(known)
+    return folder
+
+
+def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = START) -> Path:
     """A batch whose first robot's k6 doubles within its logs, one a day."""
-    records = [
-        JobRecord(
-            Job(f"r{robot}/{day}", ("a.csv",), robot=f"r{robot}", labels={"payload": 0.5}),
-            End.OK, "", "", (), {}, "", 1.0, start_ns + day * 86_400 * 10**9, 10.0, "refined",
-            {
+    known: dict[str, Known] = {}
+    for robot in range(robots):
+        for day in range(logs):
+            estimates = {
                 "k1": (1.0, 0.01, "OK"),
                 "k6": (1.0 + (day / logs if robot == 0 else 0.0), 0.01, "OK"),
                 "m_p": (0.5 if robot or day else 0.9, 0.001, "OK"),
-            },
-        )
-        for robot in range(robots)
-        for day in range(logs)
-    ]  # fmt: skip
-    write_jobs(open_store(str(folder)), records)
-    return folder
+            }
+            known[f"r{robot}/{day}"] = f"r{robot}", start_ns + day * DAY, estimates
+    return _written(folder, known)
 
 
 def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
@@ -129,17 +166,15 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
 
 
 def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -> None:
-    day, first = 86_400 * 10**9, 1_700_000_000 * 10**9
-    records = [
-        JobRecord(
-            Job(f"r/{number}", ("a.csv",), robot="r"), End.OK, "", "", (), {}, "", 1.0,
-            first + number * day, 10.0, "refined",
-            # k4 grows through zero and is the clearest; its mean is none to be a percentage of
-            {"k1": (1.0 + 0.002 * number, 0.01, "OK"), "k4": (0.1 * (number - 9), 0.01, "OK")},
-        )
-        for number in range(20)
-    ]  # fmt: skip
-    write_jobs(open_store(str(tmp_path)), records)
+    known: dict[str, Known] = {}
+    for number in range(20):
+        # k4 grows through zero and is the clearest; its mean is none to be a percentage of
+        estimates = {
+            "k1": (1.0 + 0.002 * number, 0.01, "OK"),
+            "k4": (0.1 * (number - 9), 0.01, "OK"),
+        }
+        known[f"r/{number}"] = "r", START + number * DAY, estimates
+    _written(tmp_path, known)
     history = history_of(tmp_path / "jobs.parquet")
     zeroed = replace(
         history,
@@ -192,7 +227,7 @@ def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
     assert "no column job, robot, status, time; expected jobs.parquet of algid batch" in str(
         done.exception
     )
-    write_jobs(open_store(str(tmp_path)), [])
+    _written(tmp_path, {})
     with pytest.raises(ResultError, match="no job has given parameters"):
         CliRunner().invoke(app, ["fleet", str(tmp_path)], catch_exceptions=False)
 
@@ -215,17 +250,16 @@ def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> 
 
 
 def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> None:
-    day = 86_400 * 10**9
-    records = [
-        JobRecord(
-            Job(f"r{robot}/{number}", ("a.csv",), robot=f"r{robot}"), End.OK, "", "", (), {}, "",
-            1.0, 1_700_000_000 * 10**9 + number * day, 10.0, "refined",
-            {"k1": (1.0 + 0.001 * ((7 * number) % 5 - 2), 0.01, "OK")},
-        )
-        for robot in range(2)
-        for number in range(20)
-    ]  # fmt: skip
-    write_jobs(open_store(str(tmp_path)), records)
+    known: dict[str, Known] = {}
+    for robot in range(2):
+        for number in range(20):
+            k1 = 1.0 + 0.001 * ((7 * number) % 5 - 2)
+            known[f"r{robot}/{number}"] = (
+                f"r{robot}",
+                START + number * DAY,
+                {"k1": (k1, 0.01, "OK")},
+            )
+    _written(tmp_path, known)
     done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
     told = " ".join(done.stdout.split())
     assert "Good: 2 robots, 40 logs: 0 drifts and 0 findings; the clearest trend is k1 of r" in told
@@ -238,11 +272,7 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
 
 
 def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:
-    record = JobRecord(
-        Job("javascript:alert(1)", ("a.csv",), robot="<b>r</b>"), End.OK, "", "", (), {}, "", 1.0,
-        1_700_000_000 * 10**9, 10.0, "refined", {"k1": (1.0, 0.01, "OK")},
-    )  # fmt: skip
-    write_jobs(open_store(str(tmp_path)), [record])
+    _written(tmp_path, {"javascript:alert(1)": ("<b>r</b>", START, {"k1": (1.0, 0.01, "OK")})})
     (tmp_path / "javascript:alert(1).algid").mkdir()
     (tmp_path / "javascript:alert(1).algid/report.html").write_text("a report")
     assert CliRunner().invoke(app, ["fleet", str(tmp_path)]).exit_code == 0

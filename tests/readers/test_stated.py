@@ -13,8 +13,8 @@ import pytest
 
 from algid.errors import LogError
 from algid.profile import Profile, Torque
-from algid.readers import read_log
-from algid.readers.stated import in_metadata, in_text
+from algid.readers import open_log, read_log
+from algid.readers.stated import in_text
 
 COLUMNS = ("time", "q1", "q2", "tau1", "tau2")
 ROWS = 50
@@ -155,15 +155,13 @@ def test_units_of_a_list_column(tmp_path: Path) -> None:
 
 
 def test_metadata_that_are_no_units_are_left_alone() -> None:
-    assert (
-        in_metadata(
-            {
-                "units": "{" * 9000,
-                "pandas": "{}",
-                "q1.unit": "blue",
-                "unit": "x" * 100_000 + ", y" * 50_000,
-            },
-            COLUMNS,
-        )
-        == {}
-    )
+    metadata = {
+        "units": "{" * 9000,
+        "pandas": "{}",
+        "q1.unit": "blue",
+        "unit": "x" * 100_000 + ", y" * 50_000,
+    }
+    columns = dict.fromkeys(COLUMNS, pa.array([0.0, 1.0]))
+    reading = open_log(pa.table(columns).replace_schema_metadata(metadata)).origin.reading
+    assert reading.time_unit is None
+    assert [one.told for one in reading.channels.values()] == ["assumed"] * 4

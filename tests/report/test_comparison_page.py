@@ -13,7 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.report.comparison import compare
-from algid.report.comparison_page import _distances, _intervals, comparison_document, verdict
+from algid.report.comparison_page import comparison_document, verdict
+from algid.report.figures.base import Figure
 from algid.report.frame import page
 from algid.results import Result, Status, write_result
 from tests.cli.commands import app
@@ -37,10 +38,17 @@ def _values(packed: dict[str, str]) -> list[float]:
     return values
 
 
+def _drawn(key: str, results: list[Result], labels: list[str]) -> Figure:
+    """The figure of that key on the page."""
+    content = comparison_document(compare(results, labels), results).content()
+    (figure,) = [one for one in content if isinstance(one, Figure) and one.key == key]
+    return figure
+
+
 def test_distances_and_their_count_agree(result: Result) -> None:
     results = [result, _moved(result, 1.0), _moved(result, -5.0)]
     found = compare(results, ["a", "b", "c"])
-    figure = _distances(found)
+    figure = _drawn("distances", results, ["a", "b", "c"])
     drawn = [_values(trace["x"]) for trace in figure.panels[0].traces]
     np.testing.assert_allclose(drawn[0][:7], 1.0, rtol=1e-5)  # seven constants, in single precision
     np.testing.assert_allclose(drawn[1][:7], -5.0, rtol=1e-5)
@@ -54,7 +62,7 @@ def test_distances_and_their_count_agree(result: Result) -> None:
 
 def test_intervals_are_those_of_the_results(result: Result) -> None:
     results = [result, _moved(result, 1.0)]
-    figure = _intervals(compare(results, ["a", "b"]), results)
+    figure = _drawn("intervals", results, ["a", "b"])
     first, second = figure.panels[0].traces
     k1 = result.parameters["k1"]
     assert k1.estimate is not None
