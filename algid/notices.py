@@ -735,9 +735,14 @@ def flat(settings: Mapping[str, Any]) -> dict[str, Any]:
     return by_name
 
 
+def of_codes(notices: Iterable[Notice], *codes: str) -> list[Notice]:
+    """Those of the notices that have one of the codes."""
+    return [one for one in notices if one.code in codes]
+
+
 def has_code(notices: Iterable[Notice], *codes: str) -> bool:
     """Whether a notice has one of the codes."""
-    return any(one.code in codes for one in notices)
+    return bool(of_codes(notices, *codes))
 
 
 def lossy(notices: Iterable[Notice]) -> bool:

@@ -59,13 +59,12 @@ def figures() -> Iterator[tuple[str, str]]:
     yield "median module, lines", f"{median(lengths):.0f}"
     yield "private functions with one caller, per 1,000 lines", f"{1000 * helpers / lines:.1f}"
     yield "lines of tests to lines of code", f"{of_tests / lines:.2f}"
-    calls, resumed = _calls()
+    calls, resumed = way()
     rooms = {room for pair in calls for room in pair}
-    floor = {name: number for number, name in enumerate(TABLE)}
     yield "rooms on a log's way", f"{len(rooms)} of {len(TABLE)}"
     for name, pairs in (("climbs on it", calls), ("with resumed generators", calls | resumed)):
-        climbs = sorted(f"{one} to {other}" for one, other in pairs if floor[other] > floor[one])
-        yield name, f"{len(climbs)}" + (f": {', '.join(climbs)}" if climbs else "")
+        up = climbs(pairs)
+        yield name, f"{len(up)}" + (f": {', '.join(up)}" if up else "")
 
 
 def _sizes(code: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -194,7 +193,13 @@ def _with_one_caller(text: str) -> int:
     return sum(not name.startswith("__") and named[name] == 1 for name in private)
 
 
-def _calls() -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
+def climbs(pairs: set[tuple[str, str]]) -> list[str]:
+    """Those of the pairs of rooms whose second one is above the first."""
+    floor = {name: number for number, name in enumerate(TABLE)}
+    return sorted(f"{one} to {other}" for one, other in pairs if floor[other] > floor[one])
+
+
+def way() -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
     """Rooms that call and rooms that are called while a log is identified, its report and series
     written.
 

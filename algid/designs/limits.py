@@ -135,11 +135,14 @@ def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bo
     uses = list(_kinematic(limits, slopes.motion))
     for load in loads:
         uses += _torque(limits.torque, slopes, load, derivatives)
-    rows = tuple(row for row, _, _ in uses)
-    u = np.array([values for _, values, _ in uses])
+    rows, values, slopes_of = [], [], []
+    for row, value, slope in uses:
+        rows.append(row)
+        values.append(value)
+        slopes_of.append(slope)
     if not derivatives:
-        return Usage(rows, u)
-    return Usage(rows, u, np.array([slope for _, _, slope in uses]))
+        return Usage(tuple(rows), np.array(values))
+    return Usage(tuple(rows), np.array(values), np.array(slopes_of))
 
 
 def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:

@@ -11,13 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from algid.arm import FloatArray
 from algid.criteria import STILL
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import joints_apart
 from algid.estimators.fit import Fit
-from algid.estimators.weak import Normal, Source, WeakSettings
+from algid.estimators.weak import Source, WeakSettings
 from algid.model import RIGID, UNITS
 from algid.notices import Notice
 
@@ -71,7 +70,7 @@ def doubted_without_motor(
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
-        normals = _long_enough(sources, settings, c)
+        normals = weak.normals_of(sources, settings, c)
         if not normals:
             continue
         gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
@@ -82,18 +81,6 @@ def doubted_without_motor(
                 note = Notice("MOTORLESS_UNTOLD", numbers={"joint": joint + 1})
                 return fit.marked("WEAK_EXCITATION", RIGID).noted(note)
     return fit
-
-
-def _long_enough(
-    sources: Sequence[Source], settings: WeakSettings, c: FloatArray | None = None
-) -> list[Normal]:
-    """Normal equations of the logs that are long enough for a window."""
-    normals = []
-    for source in sources:
-        normal = weak.normal_equations(source, settings, c)
-        if normal is not None:
-            normals.append(normal)
-    return normals
 
 
 def _delayed(fit: Fit, settings: WeakSettings) -> WeakSettings:
@@ -113,7 +100,7 @@ def _doubt(
         return Notice("JOINT_STILL", numbers={"joints": still})
     settings = _delayed(fit, settings)
     for sources in (unloaded, loaded):
-        normals = _long_enough(sources, settings)
+        normals = weak.normals_of(sources, settings)
         if not normals:
             continue
         apart = joints_apart(normals, settings.model)

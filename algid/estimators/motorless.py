@@ -66,6 +66,6 @@ def by_instruments(
 
 def _equally_weighted(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
     """Coefficients (q,) by least squares with the same weight for the rows of both joints."""
-    normals = [weak.normal_equations(source, settings) for source in sources]
-    total = np.sum([one.gram.sum(axis=(0, 1)) for one in normals if one is not None], axis=0)
+    normals = weak.normals_of(sources, settings)
+    total = np.sum([normal.gram.sum(axis=(0, 1)) for normal in normals], axis=0)
     return np.asarray(scaled_pinv(total[:-1, :-1]) @ total[:-1, -1])

@@ -39,8 +39,10 @@ from algid.model import (
     TERMS,
     Model,
     names_of,
+    terms_named,
     without_delay,
 )
+from algid.names import outside
 from algid.physics.motion import Widths
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
@@ -216,7 +218,7 @@ def select(
     searches: list[_Search] = []
     for _ in range(_ROUNDS):
         grams = look.grams(everything)
-        free = tuple(term for term in candidates if term not in fixed)
+        free = outside(candidates, fixed)
         searches.append(_Search(grams, free, fixed, absent))
         terms = searches[-1].run()
         if terms == before or not (_RELINEARISED | _SHAPED["coulomb_speed"]) & set(terms):
@@ -366,7 +368,7 @@ class _Search:
     def plausible(self, terms: Sequence[str], among: Sequence[str]) -> bool:
         """Whether the coefficients of `terms` beside `among` are plausible."""
         value = self.grams.coefficients(list(among) + list(terms))[False]
-        own = set(names_of(EVERY_TERM[term] for term in terms)).difference(self.absent)
+        own = set(names_of(terms_named(terms))).difference(self.absent)
         for name in own.intersection(SINES, value):
             if np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
                 return False

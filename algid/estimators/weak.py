@@ -122,8 +122,8 @@ def fit(
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
     at: list[FloatArray | None] = [None, None]
     for _ in range(_PASSES):
-        normals = _normals(unloaded, settings, at[0])
-        loaded_normals = _normals(loaded, settings, at[1])
+        normals = normals_of(unloaded, settings, at[0])
+        loaded_normals = normals_of(loaded, settings, at[1])
         beta, logs = first_estimate(shared, normals, loaded_normals, prior)
         base, change = settings.shift.delay, 0.0
         if shared.delay:
@@ -243,11 +243,16 @@ def _linearisation(
     return at
 
 
-def _normals(
-    sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None
+def normals_of(
+    sources: Sequence[Source], settings: WeakSettings, at: FloatArray | None = None
 ) -> list[Normal]:
-    normals = [normal_equations(source, settings, at) for source in sources]
-    return [normal for normal in normals if normal is not None]
+    """Normal equations of the logs that are long enough for a window: see `normal_equations`."""
+    normals = []
+    for source in sources:
+        normal = normal_equations(source, settings, at)
+        if normal is not None:
+            normals.append(normal)
+    return normals
 
 
 def first_estimate(

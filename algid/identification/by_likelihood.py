@@ -49,6 +49,7 @@ from algid.model import (
     Model,
     without_delay,
 )
+from algid.names import outside, within
 from algid.notices import Notice
 from algid.physics.effort import absent, without_terms
 from algid.results import Result
@@ -98,7 +99,7 @@ def _with_model(survey: Survey, settings: Settings, earlier: Result | None) -> S
     if asked == "zoh":
         hold = "zoh"
     if settings.chooses and earlier is not None:
-        terms = tuple(name for name in DELAYS if name in earlier.parameters)
+        terms = within(DELAYS, earlier.parameters)
         chosen = replace(_given(model_of(earlier), terms), chosen_by="parameters")
     else:
         chosen = _modelled(survey, settings, hold)
@@ -326,7 +327,7 @@ def _of_motorless(
         return None
     terms = chosen.model.terms
     if chosen.chosen_by == "logs":
-        terms = tuple(term for term in terms if term in FIRST_TERMS)
+        terms = within(terms, FIRST_TERMS)
     dropped = {trial.term for trial in chosen.trials if trial.kept}.difference(terms)
     model = replace(chosen.model, terms=terms)
     plainer = replace(chosen.left_out(dropped, _BY_NOTHING), model=model, delay=False, late=None)
@@ -469,7 +470,7 @@ def without_nothing(chosen: Selection, fit: Fit, settings: Settings) -> Selectio
     if not nothing:
         return chosen
     chosen = chosen.left_out(nothing, "the fit finds it to be zero within its error")
-    terms = tuple(term for term in chosen.model.terms if term not in nothing)
+    terms = outside(chosen.model.terms, nothing)
     delay = chosen.delay and nothing == set(without_delay(nothing))
     return replace(chosen, model=replace(chosen.model, terms=terms), delay=delay)
 

@@ -12,7 +12,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.criteria import GAP
 from algid.log import Log
-from algid.notices import Notice
+from algid.notices import Notice, of_codes
 from algid.quantiles import distinct, median
 from algid.readers.runs import PAUSE
 from algid.signals.spacing import near_stamps, spaced
@@ -139,7 +139,6 @@ def clock_figures(log: Log) -> ClockFigures:
 def _without_pauses(gaps: FloatArray, pause: float, notices: Iterable[Notice]) -> FloatArray:
     """The gaps (N,), in s, less as many of a pause's length as runs were joined."""
     joined = 0
-    for one in notices:
-        if one.code == "RESTARTS":
-            joined += one.numbers.get("joined", 0)
+    for one in of_codes(notices, "RESTARTS"):
+        joined += one.numbers.get("joined", 0)
     return np.delete(gaps, np.argsort(np.abs(gaps - pause))[:joined])

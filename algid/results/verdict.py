@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from algid.model import CHOICES, EVERY_TERM
 from algid.names import outside
-from algid.notices import Notice, Remedy, flat, notes_of, warnings_of
+from algid.notices import Notice, Remedy, flat, notes_of, of_codes, warnings_of
 from algid.options import flag
 from algid.significance import SURE
 from algid.text import joined, significant, visible
@@ -77,7 +77,7 @@ def judge(result: Result) -> Verdict:
 
 def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
     """The command to run first: the first reason's remedy, or `algid inspect` without a cause."""
-    causes = [one for one in reasons if one.code in CAUSES or one.code == "UNKNOWN_CAUSE"]
+    causes = of_codes(reasons, *CAUSES, "UNKNOWN_CAUSE")
     if not causes:
         return None
     remedy = causes[0].remedy
@@ -256,7 +256,7 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     """Reasons for doubt in a result, the weightiest first: causes, statuses, fit, notices."""
     doubts = warnings_of(result.notices)
-    causes = [one for one in doubts if one.code in CAUSES]
+    causes = of_codes(doubts, *CAUSES)
     causes.sort(key=lambda one: CAUSES.index(one.code))
     poor = any(_worse_than_constant(result.fit))
     if failed and not causes and (is_implausible(result) or poor):
