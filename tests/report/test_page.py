@@ -27,7 +27,7 @@ from algid.report.figures.timeline import views
 from algid.report.frame import library, page
 from algid.report.gallery import gallery
 from algid.report.page import page_html, result_document, write_report
-from algid.report.series import LogRange, read_torque
+from algid.report.series import LogRange
 from algid.report.text import escaped, script_json
 from algid.results import Estimate, Result, Status, TermCriterion, read_result, write_result
 from algid.verdict import Verdict
@@ -167,9 +167,10 @@ def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
 
 
 def test_nothing_is_lost_of_a_torque_log_in_blocks(
-    case_folder: Path, monkeypatch: pytest.MonkeyPatch
+    case_folder: Path, result: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = read_torque(case_folder / "torque.parquet")
+    whole = gallery(case_folder, result).torque
+    assert whole is not None
     rows = pl.read_parquet(case_folder / "torque.parquet")
     residual = (rows["tau1"] - rows["tau1_predicted"]).to_numpy()
     assert whole.residual_rms[0] == pytest.approx(float(np.sqrt(np.mean(residual**2))), rel=1e-12)
@@ -177,7 +178,8 @@ def test_nothing_is_lost_of_a_torque_log_in_blocks(
     largest = rows.filter((pl.col("log") == log) & (pl.col("t") == moment))
     assert abs(largest["tau1"][0] - largest["tau1_predicted"][0]) == np.abs(residual).max()
     monkeypatch.setattr("algid.report.reduce.blocks.__defaults__", (317,))
-    cut = read_torque(case_folder / "torque.parquet")
+    cut = gallery(case_folder, result).torque
+    assert cut is not None
     for log, span in whole.ranges.items():
         assert cut.ranges[log] == replace(span, period=cut.ranges[log].period)
         # a median of other stamps
@@ -188,10 +190,11 @@ def test_nothing_is_lost_of_a_torque_log_in_blocks(
         np.testing.assert_array_equal(cut.series[1][name], series)
 
 
-def test_gaps_are_counted(folder: Path) -> None:
+def test_gaps_are_counted(folder: Path, result: Result) -> None:
     path = folder / "torque.parquet"
     pl.read_parquet(path).filter(~pl.col("t").is_between(1.0, 1.5)).write_parquet(path)
-    found = read_torque(path)
+    found = gallery(folder, result).torque
+    assert found is not None
     assert [span.gaps for span in found.ranges.values()] == [1, 1]
     assert found.ranges[0].largest_gap == pytest.approx(0.502, abs=1e-9)
     assert np.isnan(found.series[0]["tau1"][1]).any()

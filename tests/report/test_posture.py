@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from algid.report.arm import ArmDrawing, arm_html, arm_of
-from algid.report.series import TorqueLog, read_torque
+from algid.report.gallery import gallery
 from algid.results import Estimate, Result
 
 
-def drawn(result: Result, torque: TorqueLog) -> str:
-    """The drawing of the arm of that result."""
-    arm = arm_of(result, torque)
+def drawn(result: Result, folder: Path) -> str:
+    """The drawing of the arm of that result, as it stands in the folder's torques."""
+    arm = arm_of(result, gallery(folder, result).torque)
     assert arm is not None
     return arm_html(arm)
 
@@ -31,16 +31,16 @@ def links(drawing: str) -> tuple[float, float]:
 def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(
     result: Result, case_folder: Path
 ) -> None:
-    torque = read_torque(case_folder / "torque.parquet")
+    torque = gallery(case_folder, result).torque
     known = {name: Estimate(estimate=value, unit="m") for name, value in (("l1", 0.3), ("l2", 0.2))}
-    assert links(drawn(result.model_copy(update={"payload": known}), torque)) == (0.3, 0.2)
+    assert links(drawn(result.model_copy(update={"payload": known}), case_folder)) == (0.3, 0.2)
     k1, k2 = (Estimate(estimate=value, unit="") for value in (0.2, 9.81 * 0.2 / 0.25))
     bare = {
         "payload": {},
         "settings": {"gravity": 9.81},
         "parameters": {**result.parameters, "k1": k1, "k2": k2},
     }
-    drawing = drawn(result.model_copy(update=bare), torque)
+    drawing = drawn(result.model_copy(update=bare), case_folder)
     assert links(drawing)[0] == pytest.approx(0.25)  # l1 = g k1 / k2
     assert "not known" in drawing
     upside_down = k2.model_copy(update={"estimate": -7.0})
@@ -50,11 +50,12 @@ def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(
 
 
 def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> None:
-    torque = read_torque(case_folder / "torque.parquet")
+    torque = gallery(case_folder, result).torque
     known = {name: Estimate(estimate=0.5, unit="m") for name in ("l1", "l2")}
-    drawing = drawn(result.model_copy(update={"payload": known}), torque)
+    drawing = drawn(result.model_copy(update={"payload": known}), case_folder)
     turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
     assert turned is not None
+    assert torque is not None
     first = torque.series[0]["theta1"][1]
     # SVG turns clockwise
     assert float(turned[1]) == pytest.approx(-np.degrees(first[np.isfinite(first)][0]), abs=1e-3)
@@ -79,7 +80,7 @@ def test_a_bent_arm_shows_where_its_loads_lie_and_stands_by_gravity(
     result: Result, case_folder: Path
 ) -> None:
     """K1 at 20°, K2 at 25°, K4 at 15°: θ1's zero is off by 5°, joint 1's load by 10°."""
-    torque = read_torque(case_folder / "torque.parquet")
+    torque = gallery(case_folder, result).torque
     moments = {"k1": (0.2, 20.0), "k2": (7.0, 25.0), "k4": (20.0, 15.0)}
     parameters = dict(result.parameters)
     for name, (size, angle) in moments.items():
@@ -94,7 +95,7 @@ def test_a_bent_arm_shows_where_its_loads_lie_and_stands_by_gravity(
     }
     payload["m_p"] = Estimate(estimate=1.0, unit="kg")
     bent = result.model_copy(update={"parameters": parameters, "payload": payload})
-    drawing = drawn(bent, torque)
+    drawing = drawn(bent, case_folder)
     assert [float(angle) for angle in re.findall(r"joint \d lies ([-\d.]+)° off", drawing)] == [
         10.0,
         20.0,
@@ -102,7 +103,8 @@ def test_a_bent_arm_shows_where_its_loads_lie_and_stands_by_gravity(
     assert 'class="payload" cx="0.4" cy="-0.05"' in drawing  # SVG's y points down
     turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
     assert turned is not None
+    assert torque is not None
     first = torque.series[0]["theta1"][1]
     start = np.degrees(first[np.isfinite(first)][0])
     assert float(turned[1]) == pytest.approx(-start - 5, abs=1e-3)
-    assert 'class="load"' not in drawn(result.model_copy(update={"payload": payload}), torque)
+    assert 'class="load"' not in drawn(result.model_copy(update={"payload": payload}), case_folder)
