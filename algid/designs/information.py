@@ -29,9 +29,8 @@ from functools import cached_property
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.compiled import lapack
 from algid.estimators.parametrisation import Shared
-from algid.estimators.whitening import NoiseLevels, along_stencil, covariance_factor
+from algid.estimators.whitening import NoiseLevels, along_stencil, covariance_factor, triangular
 from algid.model import Model, Motion, partials, regressor
 from algid.signals.differences import POINTS, Stencil
 
@@ -157,12 +156,10 @@ class Information:
         rows = np.ascontiguousarray((Y / self._sigma[:, None, None]).transpose(1, 2, 0)).reshape(
             q, -1
         )
-        Z, failed = lapack.dtbtrs(factor, rows.T, uplo="L", trans="N")
-        W, failed_too = lapack.dtbtrs(factor, Z, uplo="L", trans="T")
-        if failed or failed_too:
-            raise np.linalg.LinAlgError("banded substitution failed")
-        by_joint = np.ascontiguousarray(W.T.reshape(q, n, 2).transpose(0, 2, 1))
-        return _Log(c, T, count, by_joint, H, Z.T)
+        Z = triangular(factor, rows, "N")
+        W = triangular(factor, Z, "T")
+        by_joint = np.ascontiguousarray(W.reshape(q, n, 2).transpose(0, 2, 1))
+        return _Log(c, T, count, by_joint, H, Z)
 
     @cached_property
     def S(self) -> FloatArray:

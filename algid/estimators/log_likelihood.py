@@ -292,7 +292,7 @@ class _Gathered:
     def take(self, linear: Linearised, dt: float, noise: NoiseLevels) -> _Innovations:
         """Add a piece, its samples `dt` s apart, whitened by such noise; gives its innovations."""
         Z, w = linear.columns[:-1], linear.columns[-1]
-        own = w @ w + 2 * np.log(linear.factor[0]).sum() + w.size * np.log(noise.tau).sum()
+        own = w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(noise.tau).sum()
         self._deviance += float(own)
         rows = 2 * _STRETCH
         count = -(-w.size // rows)

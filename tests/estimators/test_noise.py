@@ -93,7 +93,7 @@ def _parts(linear: Linearised) -> tuple[list[FloatArray], FloatArray]:
     parts: list[FloatArray] = [column @ column.T for column in columns]
     parts += [np.kron(weights @ weights.T, np.diag(np.eye(2)[joint])) for joint in range(2)]
     L = np.asarray(
-        sum(np.diag(linear.factor[below, : 2 * n - below], -below) for below in range(2 * POINTS))
+        sum(np.diag(linear.factor[-1 - below, below:], -below) for below in range(2 * POINTS))
     )
     return parts, L @ linear.columns.T
 

@@ -57,7 +57,7 @@ def test_a_covariance_that_is_none_has_no_factor() -> None:
 
 def test_a_factor_without_a_pivot_solves_nothing() -> None:
     factor = covariance_factor(np.zeros((2, 2, POINTS, 12)))
-    factor[0, 5] = 0.0
+    factor[-1, 5] = 0.0
     linear = Linearised(
         np.zeros((1, 24)), factor, np.zeros((2, 2, POINTS, 12)), 0, np.zeros((2, 12))
     )

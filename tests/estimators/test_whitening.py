@@ -38,7 +38,7 @@ def test_products_and_factor_agree_with_dense_algebra() -> None:
     assert np.allclose(forward(H, x, 2).T.ravel(), dense @ x.T.ravel())
     assert np.allclose(adjoint(H, y, 2, 30).T.ravel(), dense.T @ y.T.ravel())
     band = covariance_factor(H)
-    L = _lower(band, 40)
+    L = _lower(band)
     assert np.allclose(L @ L.T, np.eye(40) + dense @ dense.T)
 
 
@@ -53,7 +53,7 @@ def test_a_held_torques_noise_is_that_of_neighbouring_samples() -> None:
     for row in range(20):
         weights[row, row : row + 3] = HELD
     F = np.kron(weights @ weights.T, np.eye(2))
-    L = _lower(covariance_factor(H, held=True), 40)
+    L = _lower(covariance_factor(H, held=True))
     np.testing.assert_allclose(L @ L.T, F + dense @ dense.T, atol=1e-12 * 40 * POINTS)
 
 
@@ -67,7 +67,7 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
     # Dense: angles' changes x (in σ_θ) and dk from [I 0; H Y] [x; dk] = [θ_m − θ0; τ_m − f], all
     # in σ.
     H = _dense(linear.H, linear.first, 120)
-    unwhitened = _lower(linear.factor, H.shape[0]) @ linear.columns.T
+    unwhitened = _lower(linear.factor) @ linear.columns.T
     Y = unwhitened[:, :-1]
     covariance = np.eye(H.shape[0]) + H @ H.T
     reference = Y.T @ np.linalg.solve(covariance, Y)
@@ -90,9 +90,9 @@ def test_information_is_the_schur_complement_of_the_normal_equations(bench: Benc
     assert np.allclose(dense[240:], np.linalg.solve(S, g), rtol=1e-5)
 
 
-def _lower(factor: np.ndarray, size: int) -> np.ndarray:
+def _lower(factor: np.ndarray) -> np.ndarray:
     return np.asarray(
-        sum(np.diag(factor[below, : size - below], -below) for below in range(2 * POINTS))
+        sum(np.diag(factor[-1 - below, below:], -below) for below in range(2 * POINTS))
     )
 
 
