@@ -87,7 +87,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm compiled criteria errors estimators files identification log model names "
+        "arm criteria errors estimators files identification log model names "
         "notices options progress report results signals significance synth text verdict words "
         "writers",
         "numpy polars pydantic scipy",
