@@ -175,7 +175,7 @@ class Fit:
     @property
     def refuted(self) -> bool:
         """Whether the refined estimator rejected its likelihood and returned another estimate."""
-        return has_code(self.notes, "REFUTED") or has_code(self.notes, "MISFIT")
+        return has_code(self.notes, "REFUTED", "MISFIT")
 
     @property
     def beyond_errors(self) -> bool:

@@ -67,6 +67,6 @@ def summed(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Imprin
         whole += by_shared.T @ one.gram @ by_shared
     S, G = whole[:size, :size], slice(size + 1, None)
     if prior is not None:
-        places = [fit.names.index(name) for name in prior.names]
+        places = prior.places(fit.names)
         S[np.ix_(places, places)] += prior.precision
     return Imprints(S, whole[:size, G], whole[G, G], whole[:size, size], whole[G, size])

@@ -279,7 +279,7 @@ def _started(
     if unloaded is not None:
         arm, logs = unloaded
     elif prior is not None:
-        arm[[shared.log_names.index(name) for name in prior.names]] = prior.mean
+        arm[prior.places(shared.log_names)] = prior.mean
     if not shared.payload:
         return arm, logs
     if loaded is None:

@@ -20,7 +20,8 @@ from algid.arm import FloatArray
 from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import by_themselves
 from algid.estimators.fit import Fit
-from algid.model import K3, K4, K5, K6, K7, MOMENTS, SINE_OF, names_of, terms_named
+from algid.model import EVERY_TERM, K3, K4, K5, K6, K7, MOMENTS, SINE_OF, names_of, terms_named
+from algid.names import within
 from algid.notices import Notice, Remedy
 from algid.physics.effort import FRICTION
 from algid.settings import Settings
@@ -108,7 +109,7 @@ def _external(fit: Fit) -> bool:
 
 
 def _without_friction(fit: Fit) -> bool:
-    dry = names_of(terms_named(FRICTION[1:]))
+    dry = names_of(terms_named(within(FRICTION[1:], EVERY_TERM)))
     if fit.absent or (fit.shrinkage is None and set(dry) & set(fit.names)):
         return False
     known = _of_fit(fit)
