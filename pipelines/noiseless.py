@@ -1,6 +1,7 @@
 """Logs without noise of another simulator: `python -m pipelines.noiseless`.
 
-MuJoCo's integrators move random arms, at three pairs of its own step and of the log's. Every log is
+MuJoCo's integrators move random arms, by a PD controller and in open loop, at three pairs of its
+own step and of the log's. Every log is
 identified with no flag. A row gives how many were identified (the verdict is not failed), how many
 of their intervals hold the truth, the largest error of a constant, and the median of the standard
 deviations, both relative. Writes `noiseless.md` into the output folder.
@@ -23,6 +24,7 @@ INTEGRATORS = ("Euler", "implicitfast", "implicit", "RK4")
 STEPS = ((1e-3, 1), (2e-3, 1), (2e-4, 5))  # s, and how many of them from sample to sample
 DURATION = 5.0  # s
 STIFFNESS, DAMPING = 20.0, 2.0  # of the PD controller, in loads of gravity per rad and rad/s
+OPEN = 2.0  # of the loads of gravity per rad, of a torque in open loop
 HANGING = np.array([-np.pi / 2, 0.0])
 
 _MODEL = """
@@ -65,8 +67,13 @@ def arm_of(rng: np.random.Generator) -> Arm:
     )
 
 
-def logged(seed: int, integrator: str, step: float, every: int) -> tuple[algid.Log, FloatArray]:
-    """A log of a PD controller that follows five sines a joint, and the arm's constants."""
+def logged(
+    seed: int, integrator: str, step: float, every: int, *, open_loop: bool = False
+) -> tuple[algid.Log, FloatArray]:
+    """A log of a PD controller that follows five sines a joint, and the arm's constants.
+
+    In `open_loop` the torque is five sines.
+    """
     mujoco: Any = import_module("mujoco")
     rng = np.random.default_rng(seed)
     arm = arm_of(rng)
@@ -90,6 +97,8 @@ def logged(seed: int, integrator: str, step: float, every: int) -> tuple[algid.L
             theta, omega = wanted(count * step)
             error, rate = theta - data.qpos, omega - data.qvel
             data.ctrl[:] = load * (STIFFNESS * error + DAMPING * rate)
+            if open_loop:
+                data.ctrl[:] = OPEN * load * (theta - HANGING)
             angles.append(data.qpos.copy())
             torques.append(data.ctrl.copy())
         mujoco.mj_step(model, data)
@@ -97,12 +106,12 @@ def logged(seed: int, integrator: str, step: float, every: int) -> tuple[algid.L
     return algid.Log.from_arrays(t, np.array(angles).T, np.array(torques).T), constants
 
 
-def row(integrator: str, step: float, every: int, draws: int) -> str:
+def row(integrator: str, step: float, every: int, draws: int, *, open_loop: bool) -> str:
     """What became of the draws."""
     used, held, told = 0, 0, 0
     errors, deviations = [0.0], [np.nan]
     for seed in range(draws):
-        log, constants = logged(seed, integrator, step, every)
+        log, constants = logged(seed, integrator, step, every, open_loop=open_loop)
         result = algid.identify(log)
         if result.verdict.failed:
             continue
@@ -118,19 +127,26 @@ def row(integrator: str, step: float, every: int, draws: int) -> str:
             deviations.append(one.std / true)
     spread = float(np.nanmedian(deviations))
     steps = f"{1e3 * step:g} ms, every {every}"
+    loop = "PD"
+    if open_loop:
+        loop = "open"
     return (
-        f"| {integrator} | {steps} | {used}/{draws} | {held}/{told} | {max(errors):.1e} | "
+        f"| {integrator} | {loop} | {steps} | {used}/{draws} | {held}/{told} | {max(errors):.1e} | "
         f"{spread:.1e} |"
     )
 
 
 def lines(draws: int) -> Iterator[str]:
     """The table, row by row."""
-    yield "| integrator | step, logged | identified | intervals hold | largest error | median σ |"
-    yield "|---|---|---|---|---|---|"
+    yield (
+        "| integrator | loop | step, logged | identified | intervals hold | largest error "
+        "| median σ |"
+    )
+    yield "|---|---|---|---|---|---|---|"
     for integrator in INTEGRATORS:
         for step, every in STEPS:
-            yield row(integrator, step, every, draws)
+            for open_loop in (False, True):
+                yield row(integrator, step, every, draws, open_loop=open_loop)
 
 
 def main() -> None:

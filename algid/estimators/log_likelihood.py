@@ -215,9 +215,14 @@ class LogEvidence:
         return gathered.outcome(self.loaded, c)
 
     @property
+    def relative_error(self) -> float:
+        """The larger torque's error over the least that anybody need worry about."""
+        return float(np.max(self.noise.tau / self._least))
+
+    @property
     def noiseless(self) -> bool:
         """Whether the torque's error is nothing that anybody need worry about."""
-        return bool(np.all(self.noise.tau <= self._least))
+        return self.relative_error <= 1
 
     def imprint(self, c: FloatArray, torques: Beside) -> Imprint:
         """What `torques` beside the model's leave in the training set at `c`; trajectories stay."""

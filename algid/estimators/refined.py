@@ -243,6 +243,7 @@ def _train(
     total = sum(log.trained for log in logs)
     known = any(log.noise_known for log in logs)
     many = len(logs) > _MOST_SCORED
+    share, before = 1.0, np.inf
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
@@ -256,7 +257,10 @@ def _train(
         changes = list(map(LogEvidence.improve_noise, logs, outcomes)) if free else [0.0]
         improved = max(changes)
         moved = _distance(better - beta, S)
-        beta = better
+        if not free and moved > before:  # it steps to and fro
+            share *= 0.5
+        before = moved
+        beta = beta + share * (better - beta)
         if not known and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
         if many and free and iteration > 1:
@@ -264,7 +268,8 @@ def _train(
                 log.sure = change < _NOISE_SURE
         if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
-    if moved < _CLOSE:
+    # steps within what a torque's error that matters would leave, where there is next to none
+    if moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE:
         return beta, outcomes, _STEPS, "settled"
     return beta, outcomes, _STEPS, "unsettled"
 

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 import algid
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
 from algid.results import Result
+from pipelines import noiseless
 
 DT, DURATION = 1e-3, 3.0
 T = np.arange(round(DURATION / DT) + 1) * DT
@@ -131,3 +132,16 @@ def test_noise_that_hides_the_integrator_leaves_the_intervals_as_they_are() -> N
     torques = torques + 2e-2 * rng.standard_normal(torques.shape)
     result = identified(angles, torques)
     assert not [note for note in result.verdict.notes if note.code == "INTEGRATION"]
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_a_log_in_open_loop_ends_in_an_answer(seed: int) -> None:
+    """Its noise is so small that the last steps trembled by their deviations for ever."""
+    log, constants = noiseless.logged(seed, "Euler", 1e-3, 1, open_loop=True)
+    result = algid.identify(log)
+    assert result.estimator == "refined"
+    for name, true in zip(CONSTANT_NAMES, constants, strict=True):
+        low, high = result.parameters[name].ci95 or (None, None)
+        assert low is not None
+        assert high is not None
+        assert low <= true <= high
