@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -72,8 +73,8 @@ class Batched:
         """Jobs by status, those there are."""
         from algid.batches.records import End
 
-        every = {end.value: sum(one.status is end for one in self.records) for end in End}
-        return {name: count for name, count in every.items() if count}
+        counts = Counter(record.status for record in self.records)
+        return {end.value: counts[end] for end in End if end in counts}
 
 
 def batch(

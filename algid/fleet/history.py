@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,9 +23,16 @@ if TYPE_CHECKING:
     import polars as pl
 
 MONTH_DAYS = 30.4375
-PARAMETERS = tuple(
-    name for term in (*ALWAYS, *OPTIONAL) if term in ALWAYS or term.usual for name in term.names
-)
+
+
+def _usual() -> Iterator[str]:
+    """The parameters of the terms that every robot has, and of those that are usual."""
+    for term in (*ALWAYS, *OPTIONAL):
+        if term in ALWAYS or term.usual:
+            yield from term.names
+
+
+PARAMETERS = tuple(_usual())
 """Those that most robots have: others would be tested on few logs."""
 MANY, FEW = 4, 2  # robots with so few logs each, which may be sessions of one
 HISTORY = ("robot", "stint")
