@@ -10,8 +10,8 @@ w       1 / std², what the estimate's interval says   its own
 
 A window is `SPAN` months long and ends with each month, so that a year holds twelve tests a
 parameter. The slope's error is the one that the intervals give, or the larger one that the scatter
-about the line shows; its t test alarms below `ALPHA`. With seven parameters that is 12 × 7 × 0.001
-= 0.084 false alarms a robot-year where estimates scatter independently. Sums of a month's moments
+about the line shows; its t test alarms below `ALPHA`. With seven parameters that is 12 × 7 × 0.0009
+= 0.076 false alarms a robot-year where estimates scatter independently. Sums of a month's moments
 add up to a window's: the cost is O(N).
 """
 

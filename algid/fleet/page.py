@@ -259,7 +259,7 @@ def verdict(history: History) -> Verdict:
         )
         statement += f" (p = {p})"
         if not row["drift"]:
-            statement += f", which does not pass p < {ALPHA:g}"
+            statement += f", which does not pass p < {significant(ALPHA, 1)}"
     reasons = []
     if drifts:
         reasons.append(_drifting(history))

@@ -208,7 +208,7 @@ def drift_table(history: History) -> Table:
         )
     note = (
         f"{history.drifts.height} found. A slope over {SPAN} months is significant at p < "
-        f"{ALPHA:g}."
+        f"{significant(ALPHA, 1)}."
     )
     return Table("Drift", columns, tuple(rows), note)
 

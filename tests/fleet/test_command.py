@@ -143,9 +143,7 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
     assert first == ("r0", "10", "2023-11-14", "2023-11-23", "k6", "1")
     (drift,) = drift_table(history).rows
     assert drift[:4] == ("r0", "k6", "2023-11-23", "10")
-    assert (
-        drift_table(history).note == "1 found. A slope over 3 months is significant at p < 0.001."
-    )
+    assert drift_table(history).note == "1 found. A slope over 3 months is significant at p < 9e-4."
     (finding,) = finding_table(history).rows
     assert finding == (
         "r0/0",
@@ -263,7 +261,7 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
     done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
     told = " ".join(done.stdout.split())
     assert "Good: 2 robots, 40 logs: 0 drifts and 0 findings; the clearest trend is k1 of r" in told
-    assert "which does not pass p < 0.001" in told
+    assert "which does not pass p < 9e-4" in told
     history = history_of(tmp_path / "jobs.parquet")
     figure = overview(history, {})
     assert figure is not None
