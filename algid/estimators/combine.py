@@ -151,7 +151,10 @@ def combine(
     logs, offset = _by_kind(logs)
     value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
-        step = scaled_pinv(S + damping * np.diag(np.diag(S))) @ gradient
+        damped = S
+        if damping:
+            damped = S + damping * np.diag(np.diag(S))
+        step = scaled_pinv(damped) @ gradient
         trial = _value(shared, logs, beta + step, prior)
         if not np.isfinite(trial) or trial < value - 1e-9 * (1 + abs(value)):
             damping = max(10 * damping, 1e-3)
@@ -164,7 +167,7 @@ def combine(
             damping /= 10
         else:
             damping = 0.0
-        value, gradient, S = likelihood(shared, logs, beta, prior)
+        value, (gradient, S) = trial, _slope(shared, logs, beta, prior)
         if gain < _DONE and damping == 0.0:
             break
     return beta, S, value + offset
@@ -205,6 +208,13 @@ def likelihood(
     Its value less that at the logs' own coefficients c0, its gradient Tᵀ (g − S (c − c0)) of shape
     (Q,), and its information Tᵀ S T of shape (Q, Q), T = dc/dβ; the prior's with them.
     """
+    return _value(shared, logs, beta, prior), *_slope(shared, logs, beta, prior)
+
+
+def _slope(
+    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None
+) -> tuple[FloatArray, FloatArray]:
+    """Gradient and information alone: a step that is taken has the value already."""
     size = len(shared.names)
     gradient, S = np.zeros(size), np.zeros((size, size))
     for log in logs:
@@ -218,7 +228,7 @@ def likelihood(
         weight = prior.precision
         gradient[places] -= weight @ (beta[places] - prior.mean)
         S[np.ix_(places, places)] += weight
-    return _value(shared, logs, beta, prior), gradient, S
+    return gradient, S
 
 
 def _value(

@@ -88,17 +88,24 @@ class Shared:
         """Correction to add to θ1, arg K2 - arg K1 in rad; its derivative (q,) by coefficients."""
         slope = np.zeros(len(self.log_names))
         turn = 0.0
-        place = self.model.compiled.place
+        for cosine, sine, sign in self._phasors:
+            K = complex(beta[cosine], beta[sine])
+            turn += sign * float(np.angle(K))
+            size = max(abs(K) ** 2, 1e-300)
+            slope[cosine] -= sign * K.imag / size
+            slope[sine] += sign * K.real / size
+        return turn, slope
+
+    @cached_property
+    def _phasors(self) -> tuple[tuple[int, int, float], ...]:
+        """Places of both parts of K2 and K1 and their signs in the turn; () where one has none."""
+        place, places = self.model.compiled.place, []
         for name, sign in ((K2, 1.0), (K1, -1.0)):
             sine = SINE_OF.get(name, "")
             if sine not in place or name not in place:
-                return 0.0, np.zeros(len(self.log_names))
-            K = complex(beta[place[name]], beta[place[sine]])
-            turn += sign * float(np.angle(K))
-            size = max(abs(K) ** 2, 1e-300)
-            slope[place[name]] -= sign * K.imag / size
-            slope[place[sine]] += sign * K.real / size
-        return turn, slope
+                return ()
+            places.append((place[name], place[sine], sign))
+        return tuple(places)
 
     def coefficients(self, beta: FloatArray, loaded: bool) -> FloatArray:
         """Coefficients c (q,) of a log."""
@@ -106,7 +113,7 @@ class Shared:
         if loaded:
             turn, _ = self.turn(beta)
             z = payload_phasors(*self.physical(beta), self.model.gravity, turn)
-            for row, (part, side) in self._rows():
+            for row, (part, side) in self._rows:
                 c[row] += getattr(z[part], side)
         return c
 
@@ -126,11 +133,12 @@ class Shared:
                 "J_p": (0.0, 1.0, 0.0, 0.0, 0.0),
             }
             turned = (0.0, 0.0, 0.0, 1j * m_p * up * l1, 1j * m_p * up * r)
-            for row, (part, side) in self._rows():
+            for row, (part, side) in self._rows:
                 T[row, : len(slope)] += getattr(complex(turned[part]), side) * slope
                 for column in range(len(self.log_names), len(self.names)):
                     T[row, column] = getattr(complex(by[self.names[column]][part]), side)
         return T
 
+    @cached_property
     def _rows(self) -> list[tuple[int, tuple[int, str]]]:
         return [(row, _LOADED[name]) for row, name in enumerate(self.log_names) if name in _LOADED]

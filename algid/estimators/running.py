@@ -25,7 +25,7 @@ from algid.estimators.fit import Fit, examined
 
 _NEAR = 0.5
 """Standard deviations from the largest likelihood within which a running estimate is drawn."""
-MOMENTS = 96
+MOMENTS = 48
 """About how many moments the logs are looked at together."""
 
 
