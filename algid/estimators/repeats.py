@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation
@@ -56,17 +57,26 @@ def alike(one: FloatArray, other: FloatArray) -> bool:
     count = min(one.shape[1], other.shape[1])
     if count < _LENGTHS * max(one.shape[1], other.shape[1]) or count < 2:
         return False
+    one, other = one[:, :count], other[:, :count]
     reach = min(round(_SHIFT * _RATE), count // 4)
-    return any(_like(one[:, :count], other[:, :count], shift) for shift in range(-reach, reach + 1))
+    shifts = np.arange(-reach, reach + 1)  # steps that the second comes later
+    padded = np.pad(other, ((0, 0), (reach, reach)))
+    products = np.zeros(shifts.size)
+    for own, others in zip(one, padded, strict=True):
+        products += np.correlate(others, own, "valid")
+    power = np.sqrt(_overlapping(one, shifts) * _overlapping(other, -shifts))
+    return bool(np.any((power > 0) & (products > ALIKE * power)))
 
 
-def _like(one: FloatArray, other: FloatArray, shift: int) -> bool:
-    """Whether velocities (2, N) are alike where the second comes `shift` steps later."""
-    if shift < 0:
-        one, other, shift = other, one, -shift
-    first, second = one[:, : one.shape[1] - shift], other[:, shift:]
-    power = float(np.sqrt(np.sum(first**2) * np.sum(second**2)))
-    return power > 0 and float(np.sum(first * second)) > ALIKE * power
+def _overlapping(velocities: FloatArray, shifts: NDArray[np.int64]) -> FloatArray:
+    """Sums of squares of the part of velocities (2, N) that the other log's overlap.
+
+    For shifts (L,) by which those come later.
+    """
+    squares = np.sum(velocities**2, axis=0)
+    places = squares.size - 1 - np.abs(shifts)
+    at_start, at_end = np.cumsum(squares)[places], np.cumsum(squares[::-1])[places]
+    return np.where(shifts >= 0, at_start, at_end)
 
 
 def _velocities(source: Source) -> FloatArray:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from algid.estimators.convention_search import Recorded
     from algid.estimators.saturation import Limit
 
-EXAMINED = 1 << 16
+EXAMINED = 1 << 15
 """Samples at the start of a long log that the named checks look at."""
 MOST_KEPT = 1 << 20
 """Samples of all logs together that stay in memory, 48 bytes each, so that they are read once."""
