@@ -34,6 +34,7 @@ from algid.estimators.too_short import TooShortError
 from algid.estimators.window_scatter import scattered
 from algid.identification.known import model_of
 from algid.identification.predicted import prediction
+from algid.identification.remarks import exchanged
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
@@ -417,12 +418,12 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
 
     Of an arm with a joint that has no motor, whether its equation determines them: see
     `doubted_without_motor`. One that physics contradicts stays as sure as it is, so that the
-    contradiction is reported.
+    contradiction is reported, as logs in each other's place are.
     """
     if any(log.origin.reading.passive for log in survey.logs):
         unloaded, loaded = _passes(survey, settings)
         fit = doubted_without_motor(fit, unloaded, loaded, _weak_settings(settings, chosen))
-    if not (fit.refuted and settings.chooses):
+    if not (fit.refuted and settings.chooses) or exchanged(fit):
         return fit
     far = []
     for broken in broken_bounds(fit):

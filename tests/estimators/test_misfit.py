@@ -17,8 +17,8 @@ from algid.identification.identify import identify
 from algid.model import TERMS, Model, Motion, regressor, torque
 from algid.results import Result
 from algid.settings import Settings
+from pipelines import conventions, planar
 from pipelines import misfit as scenes
-from pipelines import planar
 from pipelines.accuracy_scenes import case_of
 
 K = np.array([8e-4, 0.05, 2e-3, 0.42, 5.5e-3, 0.136, 0.31])
@@ -126,3 +126,12 @@ def test_the_likelihood_adds_a_term_that_the_weak_form_s_noise_hid() -> None:
         assert one.estimate is not None
         assert one.std is not None
         assert abs(one.estimate - true[name]) < 4 * one.std
+
+
+@pytest.mark.slow
+def test_exchanged_logs_fail_where_the_likelihood_is_refuted_too() -> None:
+    """Friction grows with the motion's torque, so that the likelihood of both logs is refuted."""
+    k, _ = conventions.motion_of("case2")
+    line, passed = conventions.exchanged("case2", k, friction=True)
+    assert passed, line
+    assert "Failed" in line
