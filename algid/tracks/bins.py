@@ -144,19 +144,6 @@ class Cells:
         """Cells `first` to `last` - 1."""
         return replace(self, **{name: getattr(self, name)[first:last] for name in SUMS})
 
-    def weighted(self, weights: FloatArray) -> Cells:
-        """The cells with the sums of each times its weight (C,), rows and torques aside."""
-        by_column, by_matrix = weights[:, None], weights[:, None, None]
-        return replace(
-            self,
-            A=weights * self.A,
-            B=weights * self.B,
-            S=by_column * self.S,
-            E=weights * self.E,
-            N=by_matrix * self.N,
-            D=by_column * self.D,
-        )
-
     @property
     def mass(self) -> float:
         """The payload in kg that fits all cells best."""

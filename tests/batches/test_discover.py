@@ -98,6 +98,8 @@ def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(
     odd, good = sorted(jobs_of([str(tmp_path)], "out"), key=lambda job: job.trouble is None)
     assert (good.name, good.trouble) == ("good", None)
     assert name_fault(odd.name) is None
+    readable = "".join(filter(str.isalnum, name[:40]))
+    assert odd.name.replace("%", "").startswith(readable)
     assert odd.trouble is not None
     assert (
         "a log's name becomes a folder's: expected parts of 1 to 200 printable characters"

@@ -65,6 +65,26 @@ def test_the_spread_is_a_fixed_point_of_expectation_and_maximisation() -> None:
     assert share[0] == share[1] < 0.5  # one spread a term
 
 
+def test_what_is_expected_of_a_term_has_the_scale_of_the_arm() -> None:
+    """Of torques of 2 and 3 N m (RMS): shares of a joint's torque, of k3, of a moment, or of 1."""
+    shared = Shared(Model(tuple(name for name, term in TERMS.items() if term.spread)))
+    gram = np.zeros((1, 2, 1, 1))
+    gram[0, :, 0, 0] = 10 * np.array([2.0, 3.0]) ** 2
+    normal = weak.Normal(gram, 1e-3, 1000, np.array([10.0, 10.0]), np.ones(2))
+    beta = np.zeros(len(shared.names))
+    for name, value in (("k1", 0.1), ("k2", 0.5), ("k3", 0.02), ("k4", 4.0)):
+        beta[shared.names.index(name)] = value
+    expected = shrunk.expectation(shared, [normal], WeakSettings(shared.model), beta)
+    spreads = dict(zip(expected.names, expected.spread.tolist(), strict=True))
+    assert spreads["f1"] == pytest.approx(0.3 * 2)
+    assert spreads["f2"] == pytest.approx(0.3 * 3)
+    assert spreads["o2"] == pytest.approx(0.02 * 3)
+    assert spreads["j2"] == pytest.approx(0.02)
+    assert spreads["e1"] == spreads["e2"] == spreads["gain2"] == pytest.approx(0.03)
+    assert spreads["k2s"] == pytest.approx(0.5 * 0.5)
+    assert spreads["k4s"] == pytest.approx(0.5 * 4)
+
+
 def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
     rng = np.random.default_rng(3)
     logs = []
