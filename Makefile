@@ -30,9 +30,10 @@ test test-slow test-processor test-pythons: export OPENBLAS_NUM_THREADS = 1
 test: setup
 	$(BIN)/python -m pytest
 
-# Many of them wait for other processes, hence one worker more than the two cores of CI.
+# Many of them wait for other processes, hence one worker more than the two cores of CI. The longest, an installation, starts
+# among the first.
 test-slow: setup
-	$(BIN)/python -m pytest -n 3 -m slow $$(grep -rl mark.slow tests --include='test_*.py')
+	$(BIN)/python -m pytest -n 3 -m slow tests/test_docs.py $$(grep -rl mark.slow tests --include='test_*.py')
 
 # Sums in another order, as other processors take them: two of OpenBLAS's kernels that are not the default here, and
 # NumPy without AVX2 and AVX-512.

@@ -92,6 +92,7 @@ def gears(share: float) -> Result:
     return identify(log, report=False)
 
 
+@pytest.mark.slow
 def test_gears_that_rub_by_all_torque_leave_no_good_result_whose_intervals_fail() -> None:
     """The noise's level took a tenfold error for noise: k1 … k5 were 20 σ off, and Good."""
     result = gears(0.03)
@@ -105,6 +106,7 @@ def test_gears_that_rub_by_all_torque_leave_no_good_result_whose_intervals_fail(
         assert abs(one.estimate - true[number]) < 4 * one.std
 
 
+@pytest.mark.slow
 def test_a_model_that_was_asked_for_and_does_not_hold_says_so() -> None:
     log = scenes.log_of("case1", "drag by the square of speed", 0.03, 1)
     result = identify(log, settings=Settings(model="coulomb"), report=False)
