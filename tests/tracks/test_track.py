@@ -67,7 +67,7 @@ def test_masses_lie_within_their_intervals() -> None:
     )
     rng = np.random.default_rng(0)
     stretches, instants = [], []
-    for _ in range(180):
+    for _ in range(240):
         found = _track(noisy(log, rng))
         assert len(found.stretches) == 3
         stretches += [
