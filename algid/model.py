@@ -401,7 +401,7 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
         values.into(Y[joint, place], entry)
     for name, joint in attributes(model, "by_load"):
         load = Y[joint, list(compiled.loads)].T @ c[list(compiled.loads)]
-        Y[joint, compiled.place[name]] = np.abs(load) * _sign(model, motion.omega[joint])
+        Y[joint, compiled.place[name]] = np.abs(load) * smooth_sign(model, motion.omega[joint])
     return _amplified(model, c, Y)
 
 
@@ -506,7 +506,8 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
         J[joint, place[name]] = J[joint].T @ c / factor[joint]
     for name, joint in attributes(model, "by_load"):
         load = J[joint, loads].T @ c[loads]  # a gain scales it, which leaves its sign
-        J[joint, loads] *= 1 + c[place[name]] * _sign(model, motion.omega[joint]) * np.sign(load)
+        sign = smooth_sign(model, motion.omega[joint])
+        J[joint, loads] *= 1 + c[place[name]] * sign * np.sign(load)
     return J
 
 
@@ -531,7 +532,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     for where, weighted in compiled.partials.items():
         P[where] = summed(weighted, c, values)
     for name, joint in attributes(model, "by_load"):
-        share, sign = c[compiled.place[name]], _sign(model, motion.omega[joint])
+        share, sign = c[compiled.place[name]], smooth_sign(model, motion.omega[joint])
         load, loads = np.zeros(P.shape[-1]), compiled.loads
         for row, place, entry in compiled.regressor:
             if row == joint and place in loads:
@@ -550,7 +551,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     return P
 
 
-def _sign(model: Model, omega: FloatArray) -> FloatArray:
+def smooth_sign(model: Model, omega: FloatArray) -> FloatArray:
     """The smooth sign tanh(ω / ω_s) of velocities."""
     return np.tanh(omega / model.coulomb_speed)
 
@@ -626,7 +627,7 @@ def acceleration(
         n[joint] = summed(rest_of_load[joint], c, values)
     share = np.zeros_like(left)
     for name, joint in by_load:
-        share[joint] = c[compiled.place[name]] * _sign(model, omega[joint])
+        share[joint] = c[compiled.place[name]] * smooth_sign(model, omega[joint])
     signs = np.sign(left)
     for _ in range(_SIGN_TRIALS):
         D = 1 + share * signs

@@ -1,8 +1,9 @@
-"""Names in their order: which of them are there, and what stands under them."""
+"""Names and other items in their order: which are there, some of them, what stands under them."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
+from math import ceil
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -47,6 +48,11 @@ def outside(items: Iterable[Item], gone: Container[Item]) -> tuple[Item, ...]:
 def places_outside(items: Iterable[Item], gone: Container[Item]) -> list[int]:
     """Where those of the items stand that are not among `gone`."""
     return [place for place, item in enumerate(items) if item not in gone]
+
+
+def evenly_spread(items: Sequence[Item], most: int) -> Sequence[Item]:
+    """At most `most` of the items, each as far from the next, the first among them."""
+    return items[:: max(1, ceil(len(items) / most))]
 
 
 def vector(

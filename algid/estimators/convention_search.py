@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import ceil, copysign, inf, pi, remainder
+from math import copysign, inf, pi, remainder
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ from algid.estimators.convention_sums import (
 )
 from algid.estimators.conventions import AS_READ, Convention
 from algid.model import F1, F2, J2, K1, K2, K3, K4, K5, K6, K7, LARGEST_PHASE, MOMENTS, PARAMETERS
-from algid.names import outside, vector
+from algid.names import evenly_spread, outside, vector
 from algid.significance import SURE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
@@ -219,10 +219,10 @@ def zeroed_together(
 
 def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
     """Fits under any convention of those of the logs that are usable, and of one arm."""
-    usable = [log for log in logs if log.usable]
+    usable: Sequence[Recorded] = [log for log in logs if log.usable]
     if not usable:
         return None
-    usable = usable[:: ceil(len(usable) / MOST_LOGS)]
+    usable = evenly_spread(usable, MOST_LOGS)
     passive = usable[0].passive
     driven = np.zeros(2, dtype=bool)
     if passive is not None:

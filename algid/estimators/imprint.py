@@ -14,11 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.combine import Prior
+from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.fit import Fit
 
 
@@ -45,6 +46,19 @@ class Imprints:
     GG: FloatArray
     Ye: FloatArray
     Ge: FloatArray
+
+    def beside(self) -> Leftover:
+        """What is left of the torques beside where the parameters take up what they can."""
+        D = scaled_pinv(self.S) @ self.X
+        return Leftover(D, self.GG - self.X.T @ D, self.Ge - D.T @ self.Ye)
+
+
+class Leftover(NamedTuple):
+    """D = S⁻¹X, their information GᵀV⁻¹G − XᵀD and their score GᵀV⁻¹e − DᵀYᵀV⁻¹e."""
+
+    D: FloatArray
+    information: FloatArray
+    score: FloatArray
 
 
 def summed(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Imprints:

@@ -31,7 +31,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
-from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +50,7 @@ from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.references import Following, followed
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, acceleration, inertia
+from algid.names import evenly_spread
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
@@ -504,7 +504,7 @@ def endogeneity(
         if not sources:
             continue
         c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-        looked_at = sources[:: ceil(len(sources) / _MOST_EXAMINED)]
+        looked_at = evenly_spread(sources, _MOST_EXAMINED)
         following = followed(looked_at, settings)
         gathered = moments(looked_at, settings, c, _EXAMINED, following)
         sums = [one for one in gathered if one is not None and one.rows and not gone_astray(one)]

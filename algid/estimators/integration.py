@@ -109,8 +109,7 @@ def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior |
     friction, counts as large as the largest that the logs tell.
     """
     sums = summed(fit, imprints, prior)
-    D = scaled_pinv(sums.S) @ sums.X
-    beside, right = sums.GG - sums.X.T @ D, sums.Ge - D.T @ sums.Ye
+    D, beside, right = sums.beside()
     made = np.diag(sums.GG) > 0
     told = np.diag(beside) > _TOLD * np.diag(sums.GG)
     told[told] = np.sqrt(np.diag(scaled_pinv(beside[np.ix_(told, told)]))) < _SURE

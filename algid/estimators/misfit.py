@@ -43,8 +43,10 @@ from algid.model import (
     attributes,
     regressor,
     sensitivity,
+    smooth_sign,
     torque,
 )
+from algid.names import vector
 
 _SHAPES = (
     "gears",
@@ -89,7 +91,7 @@ def columns(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArra
     """
     whole, modelled = _whole(model), _acting(model, c, motion)
     known = dict(zip(model.names, c.tolist(), strict=True))
-    wide = np.array([known.get(name, 0.0) for name in whole.names])
+    wide = vector(whole.names, known, otherwise=0.0)
     J = sensitivity(whole, wide, motion)
     for name, joint in attributes(whole, "gains"):
         J[joint, whole.names.index(name)] = modelled[joint]
@@ -129,7 +131,7 @@ def _shapes(model: Model, modelled: FloatArray, motion: Motion) -> list[FloatArr
     made = []
     for joint in range(2):
         theta, omega, T = motion.theta[joint], motion.omega[joint], modelled[joint]
-        sign = np.tanh(omega / model.coulomb_speed)
+        sign = smooth_sign(model, omega)
         other = motion.omega[1 - joint], motion.alpha[1 - joint]
         for shape in (
             np.abs(T) * sign,
@@ -141,7 +143,7 @@ def _shapes(model: Model, modelled: FloatArray, motion: Motion) -> list[FloatArr
             np.cos(2 * theta),
             np.sin(theta) * sign,
             np.cos(theta) * sign,
-            np.tanh(other[0] / model.coulomb_speed),
+            smooth_sign(model, other[0]),
             *other,
         ):
             row = np.zeros((2, shape.size))
@@ -177,8 +179,7 @@ def misfit(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Misfit
         What held the fit beside its logs.
     """
     sums = summed(fit, imprints, prior)
-    D = scaled_pinv(sums.S) @ sums.X
-    M, b = sums.GG - sums.X.T @ D, sums.Ge - D.T @ sums.Ye
+    _, M, b = sums.beside()
     size = np.diag(sums.GG)
     count = len(_widths(fit.shared.model))
     if count:  # widths are estimated too

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
-from math import ceil
 from operator import add
 from typing import Literal
 
@@ -34,6 +33,7 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.estimators.widths import Width, has_width, likeliest_width
+from algid.names import evenly_spread
 from algid.notices import Notice
 from algid.progress import Progress
 from algid.signals.differences import Stencil
@@ -146,7 +146,8 @@ def fit(
     if all(log.noiseless for log in logs):
         fitted = widened_by_integration(fitted, _imprints(fitted, logs, deviations), prior)
     elif noise is None:
-        lacking = misfit(fitted, _imprints(fitted, _some(logs), columns), prior)
+        some = evenly_spread(logs, _MOST_TESTED)
+        lacking = misfit(fitted, _imprints(fitted, some, columns), prior)
         if lacking.significant:
             note = Notice("MISFIT", numbers={"kept": start.estimator})
             return replace(start.noted(note), misfit=lacking, iterations=iterations)
@@ -172,11 +173,6 @@ def _imprints(fitted: Fit, logs: Sequence[LogEvidence], torques: Beside) -> list
     """What `torques` beside those of the fit leave in the training sets of logs."""
     shared, beta = fitted.shared, fitted.values
     return [log.imprint(shared.coefficients(beta, log.loaded), torques) for log in logs]
-
-
-def _some(logs: Sequence[LogEvidence]) -> Sequence[LogEvidence]:
-    """The logs; of more than `_MOST_TESTED` some, evenly spread."""
-    return logs[:: max(1, ceil(len(logs) / _MOST_TESTED))]
 
 
 def _anchored(start: Fit) -> Prior | None:

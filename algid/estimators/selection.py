@@ -21,7 +21,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
-from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -42,7 +41,7 @@ from algid.model import (
     terms_named,
     without_delay,
 )
-from algid.names import outside
+from algid.names import evenly_spread, outside
 from algid.physics.motion import Widths
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
@@ -117,21 +116,14 @@ class Selection:
 
     def left_out(self, terms: Collection[str], reason: str) -> Selection:
         """The same with the trials of `terms` ending in their being left out for this `reason`."""
-        trials = list(self.trials)
-        for place, trial in enumerate(trials):
-            if trial.term in terms:
-                trials[place] = replace(trial, kept=False, reason=reason)
-        return replace(self, trials=tuple(trials))
+        return replace(self, trials=_ended(self.trials, terms, kept=False, reason=reason))
 
     def with_term(self, term: str, reason: str) -> Selection:
         """The same with one more term, whose trial ends in its being kept for this `reason`."""
-        trials = list(self.trials)
-        for place, trial in enumerate(trials):
-            if trial.term == term:
-                trials[place] = replace(trial, kept=True, reason=reason)
         model = replace(self.model, terms=self.model.terms + without_delay((term,)))
         delay = self.delay or EVERY_TERM[term].delays
-        return replace(self, model=model, delay=delay, trials=tuple(trials))
+        trials = _ended(self.trials, (term,), kept=True, reason=reason)
+        return replace(self, model=model, delay=delay, trials=trials)
 
     @property
     def undecided(self) -> Lateness | None:
@@ -139,6 +131,18 @@ class Selection:
         if self.hold_by != "logs" or self.late is None or self.late.decided:
             return None
         return self.late
+
+
+def _ended(
+    trials: Sequence[TermTrial], terms: Collection[str], *, kept: bool, reason: str
+) -> tuple[TermTrial, ...]:
+    """The trials, those of `terms` with another end."""
+    ended = []
+    for trial in trials:
+        if trial.term in terms:
+            trial = replace(trial, kept=kept, reason=reason)
+        ended.append(trial)
+    return tuple(ended)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,8 +287,8 @@ def _training(unloaded: Sequence[Source], loaded: Sequence[Source]) -> list[Trai
     """Some logs of each kind, at most `MOST_LOGS` and evenly spread, ready for the choice."""
     logs = []
     for is_loaded, sources in ((False, unloaded), (True, loaded)):
-        step = max(1, ceil(len(sources) / MOST_LOGS))
-        logs += [Training.of(source, is_loaded) for source in sources[::step]]
+        for source in evenly_spread(sources, MOST_LOGS):
+            logs.append(Training.of(source, is_loaded))
     return logs
 
 
@@ -384,7 +388,7 @@ class _Search:
         return kept
 
     def _addition(self, kept: list[str]) -> list[str]:
-        left = [term for term in self.candidates if term not in kept and _has_need(term, kept)]
+        left = [term for term in self.candidates if term not in kept and has_need(term, kept)]
         for count in range(1, _TOGETHER + 1):
             better = []
             for terms in combinations(left, count):
@@ -412,7 +416,7 @@ class _Search:
     def trial(self, term: str, kept: Sequence[str], asked: Sequence[str]) -> TermTrial:
         """What became of a term, beside those that were kept."""
         beside = [other for other in kept if other != term and EVERY_TERM[other].needs != term]
-        if term not in asked and not _has_need(term, beside):
+        if term not in asked and not has_need(term, beside):
             reason = f"left out: no meaning without {EVERY_TERM[term].needs}"
             return TermTrial(term, False, 0.0, 0.0, reason)
         gain, evidence = self.gain([term], beside), self.evidence([term], beside)
@@ -433,7 +437,7 @@ class _Search:
         return TermTrial(term, term in kept or term in asked, gain, evidence, reason)
 
 
-def _has_need(term: str, terms: Collection[str]) -> bool:
+def has_need(term: str, terms: Collection[str]) -> bool:
     """Whether the term without which `term` has no meaning, if there is one, is among `terms`."""
     needed = EVERY_TERM[term].needs
     return needed is None or needed in terms

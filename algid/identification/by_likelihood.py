@@ -24,6 +24,7 @@ from algid.estimators.selection import (
     FIRST_TERMS,
     Selection,
     TermTrial,
+    has_need,
     lateness,
     needs_shape,
     plausible,
@@ -214,14 +215,14 @@ def run_fit(
         known = without(prior, nothing)
         if chosen.undecided is not None and chosen.delay:
             known = joined(known, chosen.undecided.prior)
-        fit = estimate(unloaded, loaded, ours, settings.lengths, known, survey.progress)
+
+        def fitted(selection: Selection) -> Fit:
+            windows = _weak_settings(settings, selection)
+            return estimate(unloaded, loaded, windows, settings.lengths, known, survey.progress)
+
+        fit = fitted(chosen)
         if fit.misfit is not None and settings.chooses:
-
-            def refit(richer: Selection) -> Fit:
-                windows = _weak_settings(settings, richer)
-                return estimate(unloaded, loaded, windows, settings.lengths, known, survey.progress)
-
-            fit, chosen = _completed(fit, chosen, refit)
+            fit, chosen = _completed(fit, chosen, fitted)
             ours = _weak_settings(settings, chosen)
             sums.clear()
         picked = chosen
@@ -282,7 +283,7 @@ def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
     level = LEVEL / max(1, len(misfit.overlooked))
     seen = []
     for one in misfit.overlooked:
-        possible = one.term in left and EVERY_TERM[one.term].needs in (None, *chosen.model.terms)
+        possible = one.term in left and has_need(one.term, chosen.model.terms)
         if possible and one.p_value < level and plausible(one.values):
             seen.append((one.p_value, one.term))
     if not seen:

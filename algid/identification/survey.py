@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
-from math import ceil
 from typing import TYPE_CHECKING
 
 from algid.identification.source import LogSource, refuse_shared_torques
 from algid.log import Log
+from algid.names import evenly_spread
 from algid.notices import Notice
 from algid.progress import Progress
 from algid.results import LogSummary
@@ -179,7 +179,7 @@ class Survey:
                 self._limits[log] = ()  # of an arm that is not this one
             return notices
         kept = None
-        if log.effort != "external" and log in alike[:: ceil(len(alike) / MOST_LOGS)]:
+        if log.effort != "external" and log in evenly_spread(alike, MOST_LOGS):
             kept = recorded(begin, seconds_of_each(len(alike)))
         if kept is not None:
             self._recorded[log] = kept
