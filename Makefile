@@ -16,9 +16,10 @@ help:
 
 setup: $(READY)
 
+# Python compiles a module when it first imports it: of most packages that is a small part, and two cores share it.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(BIN)/python -m pip install -q --no-compile --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@touch $@
 
 # Tests start some hundred processes: each would compile algid's modules anew.

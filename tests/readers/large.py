@@ -219,8 +219,6 @@ def write_db3(path: Path, rows: int) -> None:
 WRITERS = {"mcap": write_mcap, "bag": write_bag, "db3": write_db3}
 
 
-MOST_BYTES = 600e6
-"""What reading 1e7 samples may take."""
 _PEAK = """
 import re, sys
 from pathlib import Path

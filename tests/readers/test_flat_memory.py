@@ -15,7 +15,10 @@ from scipy.io import savemat
 
 from algid.arm import FloatArray
 from algid.readers import open_log
-from tests.readers.large import MOST_BYTES, peak_of_reading
+from tests.readers.large import peak_of_reading
+
+MOST_BYTES = 600e6
+"""What reading 1e7 samples may take."""
 
 Columns = dict[str, FloatArray]
 

@@ -165,15 +165,13 @@ def test_frames_of_zstd_behind_one_another_are_one_table(tmp_path: Path) -> None
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 def test_empty_lines_without_end_take_no_memory(end: bytes, tmp_path: Path) -> None:
     text = TABLE.replace(b"\n", end)
-    packed = zstandard.compress(
-        b"# a log" + end * 3 + text + end * 2_000_000 + b"9999,1,1,1,1" + end
-    )
+    packed = zstandard.compress(b"# a log" + end * 3 + text + end * 500_000 + b"9999,1,1,1,1" + end)
     (tmp_path / "log.csv.zst").write_bytes(packed)
     (tmp_path / "small.csv").write_bytes(TABLE)
     read_log(tmp_path / "small.csv")  # what is loaded once is not counted, nor traced
     tracemalloc.start()
     assert len(read_log(tmp_path / "log.csv.zst")) == 3001
-    assert tracemalloc.get_traced_memory()[1] < 1 << 26
+    assert tracemalloc.get_traced_memory()[1] < 1 << 24
     tracemalloc.stop()
 
 
