@@ -48,9 +48,9 @@ _STRETCH = 64  # samples over which scores are summed
 _SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _EXCESS = 10.0  # torque error beyond the sensor's noise and jumps that means unmodelled dynamics
-# Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its
-# angles' noise.
-_SURE = 0.9
+SURE = 0.9
+"""Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its
+angles' noise."""
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
 
@@ -133,19 +133,32 @@ class LogEvidence:
         self.kept = [replace(piece, omega=None) for piece in kept]
         if not self.kept:
             return
-        self._trajectories = [_first_trajectory(piece) for piece in self.kept]
+        self._trajectories = [self._first_trajectory(piece) for piece in self.kept]
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
         theta = medians(np.transpose([level.theta for level in guesses]))
         tau = medians(np.transpose([level.tau for level in guesses]))
-        self._guess = guess = floored(NoiseLevels(theta, tau), floor)
-        self.noise = known or guess
+        guess = floored(NoiseLevels(theta, tau), floor)
         squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)
         self._rough = np.maximum(guess.tau, np.sqrt(squares))
-        self._floor = replace(floor, tau=np.maximum(floor.tau, _SURE * guess.tau))
+        self._floor = self._least_noise(floor, guess)
+        self._guess = self._first_noise(guess)
+        self.noise = known or self._guess
         rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
         # A joint without a motor carries a load of the size of the other's.
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
+
+    def _first_trajectory(self, piece: Segment) -> FloatArray:
+        """The angles (2, N) at which a piece is first linearised."""
+        return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+
+    def _first_noise(self, guess: NoiseLevels) -> NoiseLevels:
+        """The levels that training starts from, where differences of samples show `guess`."""
+        return guess
+
+    def _least_noise(self, floor: NoiseLevels, guess: NoiseLevels) -> NoiseLevels:
+        """The least levels, where digitisation has those of `floor`."""
+        return replace(floor, tau=np.maximum(floor.tau, SURE * guess.tau))
 
     @property
     def noise_known(self) -> bool:
@@ -207,7 +220,7 @@ class LogEvidence:
         """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""
         gathered = _Gathered()
         for piece in self._pieces():
-            start = _first_trajectory(piece)
+            start = self._first_trajectory(piece)
             first = self._linearise(c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
@@ -229,9 +242,8 @@ class LogEvidence:
         gram = np.zeros(())
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
             linear = self._linearise(c, theta, piece)
-            motion = Motion(*self._stencil(piece.dt, c).differences(theta))
             model = self._shared.model
-            made = torques(model, c[: len(model.names)], motion, piece.dt)
+            made = torques(model, c[: len(model.names)], linear.motion, piece.dt)
             rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
             rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
             whitened = np.concatenate([linear.columns, linear.solve_in_place(rows)])
@@ -271,10 +283,6 @@ class LogEvidence:
             shared.delay,
             residual_only=residual_only,
         )
-
-
-def _first_trajectory(piece: Segment) -> FloatArray:
-    return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
 
 
 def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:

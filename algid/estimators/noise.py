@@ -30,7 +30,6 @@ from algid.arm import FloatArray
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
 from algid.quantiles import medians
-from algid.signals.differences import POINTS
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
 _FED_BACK = 0.9
@@ -144,6 +143,15 @@ def _white_noise(signal: FloatArray, difference: FloatArray | None = None) -> Fl
     return np.maximum(spread / np.sqrt(comb(2 * _DIFFERENCE, _DIFFERENCE)), _SMALLEST * size)
 
 
+def differences_noise(signal: FloatArray, order: int) -> FloatArray:
+    """White noise (2,) with the same median size of differences of some order as a signal (2, N).
+
+    The higher the order, the less a motion leaves in them.
+    """
+    median = medians(np.abs(np.diff(signal, order, axis=1))) / 0.6745
+    return np.asarray(median / np.sqrt(comb(2 * order, order)))
+
+
 def quantum(signal: FloatArray) -> FloatArray:
     """Step of the encoder behind each row of a signal.
 
@@ -191,21 +199,20 @@ def variance_score(
     rows = linear.columns.shape[1]
     residual = _by_joint(multipliers[-1])
     back = adjoint(H, residual, first, length)
-    smeared = linear.smeared(residual)
+    smeared = linear.smeared_back(residual)
     power = np.concatenate([np.sum(back**2, axis=1), np.sum(smeared**2, axis=1)])
-    torques = linear.smeared(smeared)
     directions = np.stack(
         [
             forward(H, _only(back, 0), first),
             forward(H, _only(back, 1), first),
-            _only(torques, 0),
-            _only(torques, 1),
+            linear.smeared(_only(smeared, 0)),
+            linear.smeared(_only(smeared, 1)),
         ]
     )
     whitened = linear.solve_in_place(_by_row(directions))
     joints = np.stack([_by_joint(row) for row in multipliers[:-1]])
     backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
-    smears = linear.smeared(joints)
+    smears = linear.smeared_back(joints)
     absorbed = [backs[:, 0] @ backs[:, 0].T, backs[:, 1] @ backs[:, 1].T]
     absorbed += [smears[:, 0] @ smears[:, 0].T, smears[:, 1] @ smears[:, 1].T]
     return VarianceScore(
@@ -218,18 +225,18 @@ def variance_score(
 
 def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray:
     H, first, n = linear.H, linear.first, rows // 2
-    on_torques, on_angles = _signs(seed, n, length)
+    on_torques, on_angles = _signs(seed, linear.torques, length)
     probes = np.zeros((_PROBES, 4, 2, n))
     products = np.empty((2, n))
     for probe, angles in zip(probes, on_angles.astype(np.float64), strict=True):
         for joint in range(2):
-            for point in range(POINTS):  # as `forward` of the one joint's signs
+            for point in range(H.shape[2]):  # as `forward` of the one joint's signs
                 touched = angles[joint, first + point : first + point + n]
                 np.multiply(H[:, joint, point], touched, out=products)
                 probe[joint] += products
-    torques = linear.smeared(on_torques.astype(np.float64))
+    signs = on_torques.astype(np.float64)
     for joint in range(2):
-        probes[:, 2 + joint, joint] = torques[:, joint]
+        probes[:, 2 + joint] = linear.smeared(_only(signs, joint))
     whitened = linear.solve_in_place(_by_row(probes.reshape(-1, 2, n)))
     powers = np.sum(np.square(whitened, out=whitened), axis=1)
     return np.asarray(powers.reshape(_PROBES, 4).mean(axis=0))
@@ -257,8 +264,9 @@ def _by_row(joints: FloatArray) -> FloatArray:
 
 
 def _only(signal: FloatArray, joint: int) -> FloatArray:
+    """A signal (..., 2, n) of one joint, that of the other nothing."""
     kept = np.zeros_like(signal)
-    kept[joint] = signal[joint]
+    kept[..., joint, :] = signal[..., joint, :]
     return kept
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.criteria import SETTLED
 from algid.estimators.body import with_body
+from algid.estimators.coarse_likelihood import CoarseEvidence, turns_far
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
@@ -66,6 +67,8 @@ def fit(
     prior: Prior | None = None,
     progress: Progress | None = None,
     noise: NoiseLevels | None = None,
+    *,
+    coarse: bool = False,
 ) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
@@ -84,6 +87,9 @@ def fit(
         Called with each step of the training and how many samples of how many it has gone over.
     noise : NoiseLevels
         Known noise levels; None estimates them log by log.
+    coarse : bool
+        Whether logs whose arm turns far from sample to sample are integrated between samples. The
+        torque has no low-pass then.
 
     Returns
     -------
@@ -104,8 +110,8 @@ def fit(
         )
     start = weak_fit(unloaded, loaded, settings, lengths, prior)
     shared, anchored = start.shared, _anchored(start)
-    logs = _opened(unloaded, False, shared, settings, noise)
-    logs += _opened(loaded, True, shared, settings, noise)
+    logs = _opened(unloaded, False, shared, settings, noise, coarse=coarse)
+    logs += _opened(loaded, True, shared, settings, noise, coarse=coarse)
     refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
     try:
         if len(logs) >= _MANY:
@@ -127,6 +133,7 @@ def fit(
         settled, iterations = False, 0
     if not settled:
         return replace(start.marked("NOT_CONVERGED"), converged=False, iterations=iterations)
+    deviance = sum(outcome.deviance for outcome in outcomes)
     whiteness = judge(reduce(add, [outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
     samples = int(_count(outcomes))
@@ -150,7 +157,8 @@ def fit(
         lacking = misfit(fitted, _imprints(fitted, some, columns), prior)
         if lacking.significant:
             note = Notice("MISFIT", numbers={"kept": start.estimator})
-            return replace(start.noted(note), misfit=lacking, iterations=iterations)
+            refuted = start.noted(note)
+            return replace(refuted, misfit=lacking, iterations=iterations, deviance=deviance)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)
     for place, before in enumerate(start.status):
@@ -165,6 +173,7 @@ def fit(
             whiteness=whiteness,
             residual=tuple(outcome.residual for outcome in outcomes),
             iterations=iterations,
+            deviance=deviance,
         )
     )
 
@@ -200,6 +209,8 @@ def _opened(
     shared: Shared,
     settings: WeakSettings,
     noise: NoiseLevels | None,
+    *,
+    coarse: bool,
 ) -> list[LogEvidence]:
     """The logs of a kind that are long enough.
 
@@ -215,7 +226,12 @@ def _opened(
             shift = replace(shift, delay=float(c[-1]))
         return Stencil(dt, shift.at(dt) - shared.model.lag(c), held=shift.held)
 
-    every = [LogEvidence(source, loaded, shared, stencil, noise) for source in sources]
+    every = []
+    for source in sources:
+        log = LogEvidence(source, loaded, shared, stencil, noise)
+        if coarse and turns_far(log.kept):
+            log = CoarseEvidence(source, loaded, shared, stencil, noise)
+        every.append(log)
     kept = [log for log in every if log.kept]
     if every and not kept:
         which = "unloaded"

@@ -56,7 +56,8 @@ class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
     `factor` holds Lᵀ as LAPACK's upper band; `first` is the angle sample of the first stencil's
-    first point; `held` says whether F is `held_torque`.
+    first point; `motion` is the trajectory's where the residual stands; `held` says whether F is
+    `held_torque`.
     """
 
     columns: FloatArray
@@ -64,7 +65,13 @@ class Linearised:
     H: FloatArray
     first: int
     residual: FloatArray
+    motion: Motion
     held: bool = False
+
+    @property
+    def torques(self) -> int:
+        """Torque samples, of which there is noise."""
+        return int(self.H.shape[-1])
 
     def solve(self, columns: FloatArray) -> FloatArray:
         """L⁻¹ of columns (m, 2 n)."""
@@ -85,6 +92,10 @@ class Linearised:
         padded = np.zeros((*torques.shape[:-1], torques.shape[-1] + 2))
         padded[..., 1:-1] = torques
         return held_torque(padded)[..., 1:-1]
+
+    def smeared_back(self, rows: FloatArray) -> FloatArray:
+        """Fᵀ of rows (..., n); F is symmetric."""
+        return self.smeared(rows)
 
 
 def triangular(
@@ -176,7 +187,7 @@ def linearise(
     rows = np.concatenate(parts)
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N", in_place=True)
-    return Linearised(columns, factor, H, first, error, stencil.held)
+    return Linearised(columns, factor, H, first, error, motion, stencil.held)
 
 
 def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
@@ -256,7 +267,7 @@ def forward(G: FloatArray, x: FloatArray, first: int) -> FloatArray:
     """
     n = G.shape[-1]
     result = np.zeros((2, n))
-    for point in range(POINTS):
+    for point in range(G.shape[2]):
         result += np.einsum("abn,bn->an", G[:, :, point], x[:, first + point : first + point + n])
     return result
 
@@ -265,7 +276,7 @@ def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray
     """Gᵀ y (2, N) of torques y (2, n), N = `length`: the transpose of `forward`."""
     n = G.shape[-1]
     result = np.zeros((2, length))
-    for point in range(POINTS):
+    for point in range(G.shape[2]):
         result[:, first + point : first + point + n] += np.einsum("abn,an->bn", G[:, :, point], y)
     return result
 
@@ -288,28 +299,47 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
     numpy.linalg.LinAlgError
         If V is not positive definite in floating point.
     """
-    n = H.shape[-1]
-    band = np.zeros((n, 2, 2 * POINTS))
-    for lag in range(POINTS):
-        block, products = np.zeros((2, 2, n - lag)), np.empty((2, 2, n - lag))
-        for point in range(POINTS - lag):
-            early, late = H[:, :, lag + point, : n - lag], H[:, :, point, lag:]
-            for b in range(2):
-                # New memory for each product would take longer than the products.
-                np.multiply(early[:, None, b], late[None, :, b], out=products)
-                block += products
-        for a in range(2):
-            for other in range(2):
-                above = 2 * lag + other - a
-                if above >= 0:
-                    band[lag:, other, -1 - above] = block[a, other]
+    band = products(H)
     correlation = np.ones(1)
     if held:
         correlation = np.convolve(HELD, HELD)[2:]
     for lag, value in enumerate(correlation):
         band[:, :, -1 - 2 * lag] += value
+    return factored(band)
+
+
+def products(H: FloatArray, lags: int | None = None) -> FloatArray:
+    """Upper band (n, 2, 2 `lags`) of H Hᵀ, H (2, 2, points, n), by default with `points` lags."""
+    points, n = H.shape[2:]
+    lags = lags or points
+    band = np.zeros((n, 2, 2 * lags))
+    for lag in range(points):
+        block, scratch = np.zeros((2, 2, n - lag)), np.empty((2, 2, n - lag))
+        for point in range(points - lag):
+            early, late = H[:, :, lag + point, : n - lag], H[:, :, point, lag:]
+            for b in range(2):
+                # New memory for each product would take longer than the products.
+                np.multiply(early[:, None, b], late[None, :, b], out=scratch)
+                block += scratch
+        for a in range(2):
+            for other in range(2):
+                above = 2 * lag + other - a
+                if above >= 0:
+                    band[lag:, other, -1 - above] = block[a, other]
+    return band
+
+
+def factored(band: FloatArray) -> FloatArray:
+    """Cholesky factor of a matrix by its upper band (n, 2, width), which is gone then.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the matrix is not positive definite in floating point.
+    """
+    n, _, width = band.shape
     diagonal = band[:, :, -1].ravel().copy()
-    factor, info = lapack.dpbtrf(band.reshape(2 * n, -1).T, lower=0, overwrite_ab=1)
+    factor, info = lapack.dpbtrf(band.reshape(2 * n, width).T, lower=0, overwrite_ab=1)
     if info == 0:
         # Whether a pivot of nothing but rounding comes out below zero depends on the processor's
         # kernels.

@@ -116,8 +116,8 @@ def _with_hold(survey: Survey, settings: Settings) -> Selection:
         return chosen
     late = chosen.late
     if late is None:
-        unloaded, loaded = _passes(survey, settings)
-        late = lateness(unloaded, loaded, _weak_settings(settings, chosen))
+        unloaded, loaded = passes(survey, settings)
+        late = lateness(unloaded, loaded, weak_settings(settings, chosen))
     if late.hold == "zoh":
         chosen = _modelled(survey, settings, "zoh")
     elif not late.decided and not chosen.delay:
@@ -138,11 +138,11 @@ def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
         candidates = CHOICE
     elif settings.chooses:
         candidates = without_delay(CHOICE)
-    unloaded, loaded = _passes(survey, settings)
+    unloaded, loaded = passes(survey, settings)
     chosen = select(
         unloaded,
         loaded,
-        _weak_settings(settings, replace(_given(plain, ()), hold=hold)),
+        weak_settings(settings, replace(_given(plain, ()), hold=hold)),
         without_terms(settings.effort, candidates),
         settings.terms,
         absent(settings.effort, COLUMN_NAMES),
@@ -205,11 +205,11 @@ def run_fit(
         raise ValueError(f"{estimator.name} gives time series, not a fit")
     estimate = estimator.fit
     sums: dict[LogSource, PredictionSums] = {}
-    ours = _weak_settings(settings, chosen)
+    ours = weak_settings(settings, chosen)
     watched = None
     if chosen.model.linear and not chosen.delay and chosen.model.lag_name is None:
         watched = partial(_scored, chosen.model, settings, sums)  # which depends on no estimate
-    unloaded, loaded = _passes(survey, settings, watched)
+    unloaded, loaded = passes(survey, settings, watched)
     nothing = absent(settings.effort, chosen.model.names)
     try:
         known = without(prior, nothing)
@@ -217,13 +217,13 @@ def run_fit(
             known = joined(known, chosen.undecided.prior)
 
         def fitted(selection: Selection) -> Fit:
-            windows = _weak_settings(settings, selection)
+            windows = weak_settings(settings, selection)
             return estimate(unloaded, loaded, windows, settings.lengths, known, survey.progress)
 
         fit = fitted(chosen)
         if fit.misfit is not None and settings.chooses:
-            fit, chosen = _completed(fit, chosen, fitted)
-            ours = _weak_settings(settings, chosen)
+            fit, chosen = completed(fit, chosen, fitted)
+            ours = weak_settings(settings, chosen)
             sums.clear()
         picked = chosen
         if fit.refuted and settings.chooses:
@@ -238,7 +238,7 @@ def run_fit(
         better = _of_motorless(fit, survey, settings, picked, prior)
         if better is not None:
             fit, chosen = better
-            ours = _weak_settings(settings, chosen)
+            ours = weak_settings(settings, chosen)
             sums.clear()
         if fit.estimator == "instruments" and not chosen.shrunk:
             fit = exogeneity.watched(fit, unloaded, loaded, ours)
@@ -246,25 +246,32 @@ def run_fit(
         raise LogError(
             f"{', '.join(log.name for log in survey.logs)}: {error}; record longer"
         ) from error
+    return finished(fit, settings), sums, chosen
+
+
+def finished(fit: Fit, settings: Settings) -> Fit:
+    """The fit with the payload's body, within physics' bounds where the settings ask for it."""
     fit = averaged_over_bodies(with_body(fit))
     if settings.constrain:
         fit = constrained(fit)
-    return fit, sums, chosen
+    return fit
 
 
-_OVERLOOKED = 2  # terms at most that the likelihood adds
+OVERLOOKED = 2
+"""Terms at most that the likelihood adds."""
 _BY_LIKELIHOOD = "kept: what the likelihood leaves of the torque depends on it"
 
 
-def _completed(
-    fit: Fit, chosen: Selection, refit: Callable[[Selection], Fit]
+def completed(
+    fit: Fit, chosen: Selection, refit: Callable[[Selection], Fit], most: int = OVERLOOKED
 ) -> tuple[Fit, Selection]:
-    """The fit with terms that the weak form's noise hid, where the likelihood holds with them.
+    """The fit with `most` more terms at most, where the likelihood holds with them.
 
-    Unchanged where it does not: what the arm has is no term then, or several.
+    They are those that the weak form's noise hid. Unchanged where it does not: what the arm has is
+    no term then, or several.
     """
     richer, better = chosen, fit
-    for _ in range(_OVERLOOKED):
+    for _ in range(most):
         added = _most_evident(better.misfit, richer)
         if added is None:
             break
@@ -321,11 +328,11 @@ def _of_motorless(
     It has the most common of the chosen terms: the others, and the hold, were judged beside
     constants near nothing. None where least squares determines them, or instruments do not either.
     """
-    unloaded, loaded = _passes(survey, settings)
+    unloaded, loaded = passes(survey, settings)
     passive = any(log.origin.reading.passive for log in survey.logs)
     if settings.estimator != "refined" or loaded or not passive:
         return None
-    if doubted_without_motor(fit, unloaded, loaded, _weak_settings(settings, chosen)) is fit:
+    if doubted_without_motor(fit, unloaded, loaded, weak_settings(settings, chosen)) is fit:
         return None
     terms = chosen.model.terms
     if chosen.chosen_by == "logs":
@@ -335,7 +342,7 @@ def _of_motorless(
     plainer = replace(chosen.left_out(dropped, _BY_NOTHING), model=model, delay=False, late=None)
     if plainer.hold_by == "logs":
         plainer = replace(plainer, hold="foh")
-    ours = _weak_settings(settings, plainer)
+    ours = weak_settings(settings, plainer)
     known = without(prior, absent(settings.effort, model.names))
     better = motorless.by_instruments(unloaded, ours, settings.lengths, known)
     if better is None:
@@ -400,15 +407,15 @@ def residual_of(
     """
     if fit.residual:
         return pooled(fit.residual)
-    weak_settings = _weak_settings(settings, chosen)
+    windows = weak_settings(settings, chosen)
     if fit.delay is not None:
-        weak_settings = replace(weak_settings.delayed(fit.delay), estimate_delay=False)
-    unloaded, loaded = _passes(survey, settings)
+        windows = replace(windows.delayed(fit.delay), estimate_delay=False)
+    unloaded, loaded = passes(survey, settings)
     sums = []
-    for role, passes in (("unloaded", unloaded), ("loaded", loaded)):
-        for moving in passes:
+    for role, of_role in (("unloaded", unloaded), ("loaded", loaded)):
+        for moving in of_role:
             c = torque_coefficients(fit, role)
-            of_log = weak.residuals(moving, weak_settings, c)
+            of_log = weak.residuals(moving, windows, c)
             if of_log is not None:
                 sums.append(of_log)
     return pooled(sums)
@@ -422,8 +429,8 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
     contradiction is reported, as logs in each other's place are.
     """
     if any(log.origin.reading.passive for log in survey.logs):
-        unloaded, loaded = _passes(survey, settings)
-        fit = doubted_without_motor(fit, unloaded, loaded, _weak_settings(settings, chosen))
+        unloaded, loaded = passes(survey, settings)
+        fit = doubted_without_motor(fit, unloaded, loaded, weak_settings(settings, chosen))
     if not (fit.refuted and settings.chooses) or exchanged(fit):
         return fit
     far = []
@@ -436,9 +443,9 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
             return fit
         doubt = Notice("BOUNDS_DOUBTED", numbers={"bounds": far})
         return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
-    unloaded, loaded = _passes(survey, settings)
+    unloaded, loaded = passes(survey, settings)
     common = replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
-    return doubted(fit, unloaded, loaded, _weak_settings(settings, common))
+    return doubted(fit, unloaded, loaded, weak_settings(settings, common))
 
 
 def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
@@ -455,8 +462,8 @@ def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selec
     """The fit with the distance of instruments from least squares on its logs, if not yet known."""
     if fit.endogeneity is not None:
         return fit
-    unloaded, loaded = _passes(survey, settings)
-    ours = _weak_settings(settings, chosen)
+    unloaded, loaded = passes(survey, settings)
+    ours = weak_settings(settings, chosen)
     return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, ours, fit))
 
 
@@ -494,7 +501,7 @@ def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
     return terms
 
 
-def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
+def weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     """The settings of estimators for the chosen model."""
     ours = weak.WeakSettings(
         model=chosen.model,
@@ -509,7 +516,7 @@ def _weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
     return ours
 
 
-def _passes(
+def passes(
     survey: Survey,
     settings: Settings,
     watched: Callable[[LogSource, Pass], Iterator[Segment]] | None = None,

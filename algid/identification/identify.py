@@ -295,6 +295,7 @@ def _fitted(
         with_hold_of_fit,
         without_nothing,
     )
+    from algid.identification.coarse import fit_coarse
     from algid.identification.known import prior_of
 
     survey.begin("choosing terms")
@@ -304,6 +305,10 @@ def _fitted(
         chosen = choose_model(survey, settings, earlier.result)
         prior = prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
+    coarse = fit_coarse(survey, settings, chosen, prior)
+    if coarse is not None:
+        fit, chosen = coarse
+        return fit, {}, chosen
     settings = replace(settings, torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
     better = without_nothing(with_hold_of_fit(fit, chosen), fit, settings)

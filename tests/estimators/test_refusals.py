@@ -12,6 +12,7 @@ import pytest
 from algid.estimators import refined, weak
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, covariance_factor, low_passed
+from algid.model import Motion
 from algid.signals.differences import POINTS
 from algid.signals.segments import Segment
 
@@ -58,9 +59,8 @@ def test_a_covariance_that_is_none_has_no_factor() -> None:
 def test_a_factor_without_a_pivot_solves_nothing() -> None:
     factor = covariance_factor(np.zeros((2, 2, POINTS, 12)))
     factor[-1, 5] = 0.0
-    linear = Linearised(
-        np.zeros((1, 24)), factor, np.zeros((2, 2, POINTS, 12)), 0, np.zeros((2, 12))
-    )
+    none, H = np.zeros((2, 12)), np.zeros((2, 2, POINTS, 12))
+    linear = Linearised(np.zeros((1, 24)), factor, H, 0, none, Motion(none, none, none))
     for solve in (linear.solve, linear.solve_transposed):
         with pytest.raises(np.linalg.LinAlgError, match="substitution failed with info 6"):
             solve(np.ones((1, 24)))

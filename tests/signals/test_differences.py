@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from algid.estimators.whitening import Linearised, covariance_factor
+from algid.model import Motion
 from algid.signals.differences import POINTS, Stencil, held_torque
 
 
@@ -48,9 +49,10 @@ def test_noise_behind_a_held_torque_is_whitened() -> None:
     rng = np.random.default_rng(0)
     noise = rng.standard_normal((2, 20002))
     H = np.zeros((2, 2, POINTS, 20000))
-    linear = Linearised(
-        np.empty((0, 40000)), covariance_factor(H, held=True), H, 0, np.empty(0), held=True
-    )
+    none = np.empty((2, 0))
+    motion = Motion(none, none, none)
+    factor = covariance_factor(H, held=True)
+    linear = Linearised(np.empty((0, 40000)), factor, H, 0, none, motion, held=True)
     white = linear.solve(held_torque(noise)[:, 1:-1].T.reshape(1, -1)).reshape(-1, 2)
     assert abs(white.var() - 1) < 0.03  # four standard errors of 40,000 squares
     for joint in white.T:
