@@ -101,7 +101,7 @@ def test_a_drive_far_stronger_than_its_arm_is_planned_for_as_well() -> None:
     limits = replace(
         asked.limits, low=low, high=high, speed=np.full(2, 9.0), torque=np.array([190.0, 95.0])
     )
-    strong = plan(replace(asked, duration=5.0, limits=limits))
+    strong = plan(replace(asked, duration=3.0, limits=limits))
     assert strong.open_parameters == []
     # in percent: 100,000 with amplitudes in shares of the drive's limit
     assert 100 * strong.largest < 5

@@ -10,7 +10,9 @@ from algid.estimators import shrunk
 from algid.estimators.repeats import grouped
 from algid.estimators.weak import Source, WeakSettings
 from algid.signals.segments import Segment
-from pipelines import real_arms
+from algid.synth.excitation import wide_multi_sine
+from algid.synth.simulator import simulate
+from pipelines.accuracy_scenes import random_arm
 
 
 def run(seed: int, shift: float = 0.0, dt: float = 2e-3, seconds: float = 6.0) -> Segment:
@@ -42,12 +44,20 @@ def fitted(logs: list[Segment]) -> tuple[FloatArray, FloatArray]:
     return found.values[:7], found.std[:7]
 
 
-@pytest.mark.slow
 def test_six_repeats_tell_what_one_run_tells() -> None:
     """Cogging is the same in each: without grouping the error bars would shrink by √6."""
-    made = real_arms.campaigns(real_arms.ROWS["torque ripple 3 %"], [81], 1)[81]
+    arm, _ = random_arm(81)
+    t = np.arange(5000) * 2e-3
+    motion = simulate(arm.constants(), wide_multi_sine(arm, 81), t)
+    cogging = 0.03 * np.sqrt(2) * motion.tau.std(axis=1, keepdims=True) * np.sin(12 * motion.theta)
     rng = np.random.default_rng(5)
-    alone, once = fitted([made[0].log(rng)])
-    together, six = fitted([made[0].log(rng) for _ in range(6)])
+
+    def repeat() -> Segment:
+        theta = motion.theta + 3e-4 * rng.standard_normal(motion.theta.shape)
+        tau = motion.tau + cogging + 1e-2 * rng.standard_normal(motion.tau.shape)
+        return Segment(0.0, 2e-3, theta, tau)
+
+    alone, once = fitted([repeat()])
+    together, six = fitted([repeat() for _ in range(6)])
     assert together == pytest.approx(alone, rel=0.05)
     assert np.all(six > 0.7 * once)

@@ -62,7 +62,7 @@ def test_masses_lie_within_their_intervals() -> None:
     log = with_schedule(
         CASE,
         excitation(CASE, "wide"),
-        Recording(rate=500.0, duration=4.5),
+        Recording(rate=250.0, duration=4.5),
         [(1.5, 0.05), (3.0, 0.0)],
     )
     rng = np.random.default_rng(0)
