@@ -7,7 +7,7 @@ The joints' coupling has parts three times as fast as the joints turn.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +17,10 @@ from algid.estimators import shooting
 from algid.estimators.log_likelihood import SURE, LogEvidence, Outcome
 from algid.estimators.noise import differences_noise
 from algid.estimators.parametrisation import Shared
+from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels
 from algid.quantiles import medians
+from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
 
 FAR = 0.35
@@ -46,7 +48,17 @@ def turns_far(pieces: Iterable[Segment]) -> bool:
 class CoarseEvidence(LogEvidence):
     """One log of which the arm turns far between samples: see `LogEvidence`."""
 
-    _falling = np.ones(2, dtype=bool)
+    def __init__(
+        self,
+        source: Source,
+        loaded: bool,
+        shared: Shared,
+        stencil: Callable[[float, FloatArray], Stencil],
+        known: NoiseLevels | None,
+    ) -> None:
+        super().__init__(source, loaded, shared, stencil, known)
+        self._falling = np.ones(2, dtype=bool)
+        self._beginnings: dict[Segment, FloatArray] = {}
 
     def _first_trajectory(self, piece: Segment) -> FloatArray:
         return np.array(piece.theta)
@@ -92,7 +104,7 @@ class CoarseEvidence(LogEvidence):
         residual_only: bool = False,
     ) -> Linearised:
         shared = self._shared if shared is None else shared
-        return shooting.linearise(
+        found = shooting.linearise(
             shared.model,
             c[: len(shared.model.names)],
             theta,
@@ -101,4 +113,8 @@ class CoarseEvidence(LogEvidence):
             self.noise,
             shared.delay,
             residual_only=residual_only,
+            beginning=self._beginnings.get(piece),
         )
+        if piece in self.kept:
+            self._beginnings[piece] = found.beginning
+        return found

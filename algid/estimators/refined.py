@@ -266,7 +266,7 @@ def _train(
                 progress(f"fitting, step {iteration}", done, total)
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
         free = not known and iteration <= _NOISE_STEPS
-        changes = list(map(LogEvidence.improve_noise, logs, outcomes)) if free else [0.0]
+        changes = _better_noise(logs, outcomes) if free else [0.0]
         improved = max(changes)
         moved = _distance(better - beta, S)
         if not free and moved > before:  # it steps to and fro
@@ -284,6 +284,11 @@ def _train(
     if moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE:
         return beta, outcomes, _STEPS, "settled"
     return beta, outcomes, _STEPS, "unsettled"
+
+
+def _better_noise(logs: Sequence[LogEvidence], outcomes: Sequence[Outcome]) -> list[float]:
+    """The largest change of each log's noise levels, which are improved."""
+    return [log.improve_noise(outcome) for log, outcome in zip(logs, outcomes, strict=True)]
 
 
 def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Prior | None) -> int:
@@ -325,7 +330,10 @@ def _settled_width(
 
     def profile(width: float) -> tuple[float, FloatArray]:
         other = replace(shared, model=replace(shared.model, coulomb_speed=width))
-        seen = [log.shaped(other, other.coefficients(beta, log.loaded)) for log in logs]
+        try:
+            seen = [log.shaped(other, other.coefficients(beta, log.loaded)) for log in logs]
+        except np.linalg.LinAlgError:  # so narrow a step does not go with the trajectories
+            return np.inf, beta
         informations = [outcome.information for outcome in seen]
         better, _, value = combine(other, informations, beta, prior)
         return sum(outcome.deviance for outcome in seen) - 2 * value, better

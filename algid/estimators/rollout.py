@@ -109,15 +109,20 @@ def time_step(model: Model, c: FloatArray) -> float:
 
     It divides the horizons.
     """
-    around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
-    (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
-    slope = np.abs(damping(model, c))
-    least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
-    rate = float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
+    rate = stiffness(model, c)
     step = _LONGEST
     while step * rate > 1 and step > _SHORTEST:
         step /= 2
     return step
+
+
+def stiffness(model: Model, c: FloatArray) -> float:
+    """The rate in 1/s at which friction stops either joint near rest, in its worst pose."""
+    around = np.linspace(0, 2 * np.pi, _POSES, endpoint=False)
+    (outer, coupling), (_, inner) = inertia(model, c, np.stack([np.zeros_like(around), around]))
+    slope = np.abs(damping(model, c))
+    least = np.maximum(outer * inner - coupling**2, 1e-3 * outer * inner)
+    return float(np.max(np.maximum(slope[0] * inner, slope[1] * outer) / least))
 
 
 def _starts(

@@ -28,12 +28,15 @@ F       share of each sample's torque in e                           (2, 2, k, n
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.estimators.rollout import stiffness
 from algid.estimators.whitening import (
     Linearised,
     NoiseLevels,
@@ -50,9 +53,15 @@ from algid.signals.segments import Segment
 
 _TURN = 0.2  # rad of a step, whose error then is 1e-6 of it
 _FEWEST_STEPS = 3
+_MOST_STEPS = 48
 _FEWEST_INTERVALS = 8
-_ITERATIONS = 12
-_JOINED = 1e-10  # rad
+_ITERATIONS = 40
+_JOINED = 1e-9  # rad, from which one more iteration has led on
+_VARIED = 1e-4  # rad/s, by which a velocity is varied
+_STABLE = 2.0  # product of a step and friction's rate; Runge and Kutta's limit is 2.78
+_BENT = 0.25  # of a velocity's change in an interval, by which it may be nearer to rest within
+_WIDTHS = 5.0  # of friction's step, in which it is no constant
+_CLOSER = 0.2  # of the distance that was left before
 _DELAYED = 1e-3  # samples by which a delay is varied
 _STATE = 4
 
@@ -68,11 +77,14 @@ class Shot(Linearised):
         Torque sample that the first residual begins with.
     length : int
         Samples of the piece.
+    beginning : (2, m), rad/s
+        Velocities with which the intervals begin.
     """
 
     F: FloatArray
     first_torque: int
     length: int
+    beginning: FloatArray
 
     @property
     def torques(self) -> int:
@@ -120,6 +132,7 @@ def linearise(
     delay: bool = False,
     *,
     residual_only: bool = False,
+    beginning: FloatArray | None = None,
 ) -> Shot:
     """Linearise a piece of log from sample to sample, and whiten it.
 
@@ -137,6 +150,8 @@ def linearise(
         Whether the last column but the residual is the derivative of the torque by its delay.
     residual_only : bool
         Whether the residual is the only column.
+    beginning : (2, m), rad/s
+        Of an earlier `Shot` of the piece, from where Newton's method starts.
 
     Raises
     ------
@@ -148,7 +163,7 @@ def linearise(
         late -= 0.5  # which is its mean effect, not when it acts
     with np.errstate(all="ignore"):  # coefficients far off run away, which is found out
         return _whitened(
-            *_residual(model, c, theta0, piece, late, stencil.held, delay),
+            *_residual(model, c, theta0, piece, late, stencil.held, delay, beginning),
             piece,
             theta0,
             noise,
@@ -166,6 +181,7 @@ class _Residual:
     Y: FloatArray
     first: int
     first_torque: int
+    beginning: FloatArray
 
 
 def _residual(
@@ -176,6 +192,7 @@ def _residual(
     late: float,
     held: bool,
     delay: bool,
+    guess: FloatArray | None,
 ) -> tuple[_Residual, Motion]:
     """The residual of a piece and its derivatives, and the motion (2, n) where it stands."""
     N, dt = theta0.shape[1], piece.dt
@@ -185,18 +202,18 @@ def _residual(
     if n < _FEWEST_INTERVALS:
         raise np.linalg.LinAlgError("the piece is shorter than what its torque rests on")
     theta = theta0[:, low : low + n + 1]
-    steps = max(_FEWEST_STEPS, ceil(float(np.abs(np.diff(theta, axis=1)).max()) / _TURN))
-    smooth = between(late, steps, held=held)
-    straight = between(late, steps, held=held, points=2)
-    u = smooth.at_stages(piece.tau, low, n)
-    beside = np.empty((steps, 3, 2, 0, n))
-    if delay:
-        sooner = between(late - _DELAYED, steps, held=held).at_stages(piece.tau, low, n)
-        later = between(late + _DELAYED, steps, held=held).at_stages(piece.tau, low, n)
-        beside = ((later - sooner) / (2 * _DELAYED * dt))[:, :, :, None]
-    omega = _beginning(model, c, theta, u, dt)
-    begin = np.concatenate([theta[:, :-1], omega])
-    end, X = integrate(model, c, begin, Driving(u, straight, beside), dt)
+    if guess is None or guess.shape != (2, n):
+        guess = np.gradient(theta, dt, axis=1)[:, :-1]
+    omega, end, torque = np.empty((2, n)), np.empty((4, n)), np.empty((2, n))
+    k = between(late, 1, held=held, points=2).count
+    X = np.empty((4, _STATE + 2 * k + c.size + delay, n))
+    for own, steps in _by_steps(model, c, theta, dt):
+        drive = _driving(piece, low, n, own, late, steps, held=held, delay=delay)
+        ends = theta[:, own], theta[:, own + 1]
+        omega[:, own] = _beginning(model, c, ends, guess[:, own], drive.u, dt)
+        begin = np.concatenate([ends[0], omega[:, own]])
+        end[:, own], X[:, :, own] = integrate(model, c, begin, drive, dt)
+        torque[:, own] = drive.u[0, 0]
     if not np.all(np.isfinite(X)):
         raise np.linalg.LinAlgError("the motion runs away between two samples")
     # velocities at the ends of an interval by the angles there and by the rest
@@ -207,12 +224,11 @@ def _residual(
     minus_rest = X[2:, 4:] + times(along, plus_rest)
     middle = plus_theta[..., 1:] - minus_next[..., :-1]
     r_theta = np.stack([-minus_theta[..., :-1], middle, by_next[..., 1:]], axis=2)
-    k = straight.count
     r_u = np.zeros((2, 2, k + 1, n - 1))
     for sample in range(k):
-        own = slice(2 * sample, 2 * sample + 2)
-        r_u[:, :, sample] -= minus_rest[:, own, :-1]
-        r_u[:, :, sample + 1] += plus_rest[:, own, 1:]
+        pair = slice(2 * sample, 2 * sample + 2)
+        r_u[:, :, sample] -= minus_rest[:, pair, :-1]
+        r_u[:, :, sample + 1] += plus_rest[:, pair, 1:]
     r_c = plus_rest[:, 2 * k :, 1:] - minus_rest[:, 2 * k :, :-1]
     W = inverted(r_u.sum(axis=2))
     e = times(W, (omega[:, 1:] - end[2:, :-1])[:, None])[:, 0]
@@ -221,9 +237,59 @@ def _residual(
     at = Motion(
         theta[:, 1:-1],
         omega[:, 1:],
-        acceleration(model, c, theta[:, 1:-1], omega[:, 1:], u[0, 0, :, 1:]),
+        acceleration(model, c, theta[:, 1:-1], omega[:, 1:], torque[:, 1:]),
     )
-    return _Residual(e, F, G, -times(W, r_c), low, low + straight.first), at
+    first_torque = low + between(late, 1, held=held, points=2).first
+    return _Residual(e, F, G, -times(W, r_c), low, first_torque, omega), at
+
+
+def _by_steps(
+    model: Model, c: FloatArray, theta: FloatArray, dt: float
+) -> Iterator[tuple[NDArray[np.int64], int]]:
+    """Intervals (m,) between angles (2, n + 1), and how many steps each of them is given.
+
+    In a step the arm turns little; where a joint may stand, friction at rest is stable too.
+    """
+    speed = np.diff(theta, axis=1) / dt
+    turned = float(np.abs(speed).max()) * dt / _TURN
+    stiff = dt * stiffness(model, c) / _STABLE
+    every = np.arange(speed.shape[1])
+    usual = max(_FEWEST_STEPS, ceil(min(turned, _MOST_STEPS)))
+    if stiff < usual:
+        yield every, usual
+        return
+    omega = np.gradient(theta, dt, axis=1)
+    first, last = omega[:, :-1], omega[:, 1:]
+    nearest = np.where(first * last > 0, np.minimum(np.abs(first), np.abs(last)), 0.0)
+    reach = _BENT * np.abs(last - first) + _WIDTHS * model.coulomb_speed
+    stands = np.any(nearest < reach, axis=0)
+    if not np.all(stands):
+        yield every[~stands], usual
+    if np.any(stands):
+        yield every[stands], ceil(min(stiff, _MOST_STEPS)) if np.isfinite(stiff) else _MOST_STEPS
+
+
+def _driving(
+    piece: Segment,
+    low: int,
+    n: int,
+    own: NDArray[np.int64],
+    late: float,
+    steps: int,
+    *,
+    held: bool,
+    delay: bool,
+) -> Driving:
+    """What drives the intervals `own` of the n from sample `low` on, in so many steps."""
+
+    def stages(late: float) -> FloatArray:
+        return between(late, steps, held=held).at_stages(piece.tau, low, n)[..., own]
+
+    beside = np.empty((steps, 3, 2, 0, own.size))
+    if delay:
+        change = stages(late + _DELAYED) - stages(late - _DELAYED)
+        beside = (change / (2 * _DELAYED * piece.dt))[:, :, :, None]
+    return Driving(stages(late), between(late, steps, held=held, points=2), beside)
 
 
 def _whitened(
@@ -256,25 +322,73 @@ def _whitened(
         F=F,
         first_torque=raw.first_torque,
         length=theta0.shape[1],
+        beginning=raw.beginning,
     )
 
 
 def _beginning(
-    model: Model, c: FloatArray, theta: FloatArray, u: FloatArray, dt: float
+    model: Model,
+    c: FloatArray,
+    ends: tuple[FloatArray, FloatArray],
+    omega: FloatArray,
+    u: FloatArray,
+    dt: float,
 ) -> FloatArray:
-    """Velocities ω⁺ (2, n) with which the motion between angles (2, n + 1) begins."""
-    omega = np.gradient(theta, dt, axis=1)[:, :-1]
+    """Velocities ω⁺ (2, n) of the motions between angles at both `ends`, from a guess `omega`."""
+    nearest = np.full(omega.shape[1], np.inf)
+    best, step, share = omega, np.zeros_like(omega), np.ones_like(nearest)
+    inverse, before, quick = None, np.inf, True
     for _ in range(_ITERATIONS):
-        end, X = integrate(model, c, np.concatenate([theta[:, :-1], omega]), u, dt)
-        miss = theta[:, 1:] - end[:2]
-        omega = omega + times(inverted(X[:2]), miss[:, None])[:, 0]
-        if np.abs(miss).max() < _JOINED:
+        if inverse is None or not quick:
+            reached, slope = _reached(model, c, ends[0], omega, u, dt)
+            inverse = inverted(slope)
+        else:
+            reached = advanced(model, c, np.concatenate([ends[0], omega]), u, dt)[:2]
+        miss = ends[1] - reached
+        distance = np.abs(miss).max(axis=0)
+        better = distance < nearest
+        nearest = np.where(better, distance, nearest)
+        best = np.where(better, omega, best)
+        step = np.where(better, times(inverse, miss[:, None])[:, 0], step)
+        share = np.where(better, 1.0, 0.5 * share)  # friction's step may lead too far
+        omega = best + share * step
+        largest = float(nearest.max())
+        if largest < _JOINED:
             return omega
+        # the first derivatives lead there, or else new ones each time
+        quick, before = quick and largest < _CLOSER * before, largest
     raise np.linalg.LinAlgError("no motion was found that joins the angles")
 
 
+def _reached(
+    model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray, u: FloatArray, dt: float
+) -> tuple[FloatArray, FloatArray]:
+    """Angles (2, n) after an interval, and their derivatives (2, 2, n) by ω⁺, by differences."""
+    n = omega.shape[1]
+    begin = np.concatenate([np.tile(theta, 3), np.tile(omega, 3)])
+    begin[2, n : 2 * n] += _VARIED
+    begin[3, 2 * n :] += _VARIED
+    end = advanced(model, c, begin, np.tile(u, 3), dt)[:2].reshape(2, 3, n)
+    return end[:, 0], (end[:, 1:] - end[:, :1]) / _VARIED
+
+
+def advanced(model: Model, c: FloatArray, x: FloatArray, u: FloatArray, dt: float) -> FloatArray:
+    """The states (4, n) after an interval of `dt` s, without derivatives: see `integrate`."""
+
+    def slope(x: FloatArray, tau: FloatArray) -> FloatArray:
+        return np.concatenate([x[2:], acceleration(model, c, x[:2], x[2:], tau)])
+
+    h = dt / u.shape[0]
+    for begin, middle, end in u:
+        a = slope(x, begin)
+        b = slope(x + 0.5 * h * a, middle)
+        d = slope(x + 0.5 * h * b, middle)
+        x = x + h / 6 * (a + 2 * (b + d) + slope(x + h * d, end))
+    return x
+
+
 def integrate(
-    model: Model, c: FloatArray, x: FloatArray, drive: Driving | FloatArray, dt: float
+    model: Model, c: FloatArray, x: FloatArray, driving: Driving, dt: float
 ) -> tuple[FloatArray, FloatArray]:
     """The states (4, n) after an interval, and their derivatives X (4, K, n).
 
@@ -284,21 +398,17 @@ def integrate(
     c : (q,), in `algid.model.UNITS`
     x : (4, n)
         States at the interval's beginning.
-    drive : Driving, or its torques u
+    driving : Driving
         X's columns are by the state, by the torques of the noise's samples, joint after joint, by
-        the coefficients and by the torques beside; of torques alone, by the two velocities.
+        the coefficients, and by the torques beside.
     dt : float, s
         The interval's length.
     """
-    whole = isinstance(drive, Driving)
-    u = drive.u if isinstance(drive, Driving) else drive
-    first = _STATE if whole else 2
-    by_noise = by_c = beside = 0
-    if isinstance(drive, Driving):
-        by_noise, by_c, beside = 2 * drive.noise.count, c.size, drive.beside.shape[3]
-    X = np.zeros((4, first + by_noise + by_c + beside, x.shape[1]))
-    for column in range(first):
-        X[_STATE - first + column, column] = 1.0
+    u, noise = driving.u, driving.noise
+    by_c = _STATE + 2 * noise.count
+    beside = by_c + c.size
+    X = np.zeros((_STATE, beside + driving.beside.shape[3], x.shape[1]))
+    X[range(_STATE), range(_STATE)] = 1.0
 
     def slope(x: FloatArray, X: FloatArray, step: int, stage: int) -> tuple[FloatArray, FloatArray]:
         theta, omega = x[:2], x[2:]
@@ -307,13 +417,11 @@ def integrate(
         P = partials(model, c, motion)
         force = -times(P[0], X[:2])
         force -= times(P[1], X[2:])
-        if isinstance(drive, Driving):
-            for place, weight in enumerate(drive.noise.weights[step, stage]):
-                for joint in range(2):
-                    force[joint, first + 2 * place + joint] += weight
-            at = first + by_noise
-            force[:, at : at + by_c] -= sensitivity(model, c, motion)
-            force[:, at + by_c :] += drive.beside[step, stage]
+        for place, weight in enumerate(noise.weights[step, stage]):
+            for joint in range(2):
+                force[joint, _STATE + 2 * place + joint] += weight
+        force[:, by_c:beside] -= sensitivity(model, c, motion)
+        force[:, beside:] += driving.beside[step, stage]
         change = np.concatenate([X[2:], times(inverted(P[2]), force)])
         return np.concatenate([omega, alpha]), change
 

@@ -86,7 +86,10 @@ def _any_coarse(survey: Survey) -> bool:
 
 
 def _starts(chosen: Selection, settings: Settings) -> Iterator[Selection]:
-    """The model that was given; else a rigid arm's, and where that is refuted the most common."""
+    """The model that was given; else a rigid arm's, the most common, and what the weak form chose.
+
+    Each but the first is for logs that refute the one before.
+    """
     if chosen.chosen_by != "logs":
         yield chosen
         return
@@ -102,6 +105,7 @@ def _starts(chosen: Selection, settings: Settings) -> Iterator[Selection]:
             trials.append(replace(trial, kept=kept, reason=_MOST_COMMON if kept else _NOT_EVIDENT))
         delay = len(model.terms) < len(own)
         yield replace(chosen, model=model, delay=delay, trials=tuple(trials))
+    yield chosen
 
 
 def _by_hold(
@@ -146,13 +150,13 @@ def _with_terms(
     fit, chosen = found.fit, found.chosen
     if fit.misfit is not None and settings.chooses:
         fit, chosen = completed(fit, chosen, refit, _TERMS)
+    if fit.refuted or not fit.converged:
+        return None
+    # friction's step has the width that the fit has estimated
+    chosen = replace(chosen, model=fit.shared.model)
     plainer = without_nothing(chosen, fit, settings)
     if (plainer.model, plainer.delay) != (chosen.model, chosen.delay):
         again = refit(plainer)
         if again.converged and not again.refuted:
-            fit, chosen = again, plainer
-    if fit.refuted or not fit.converged:
-        return None
-    if fit.shared.model != chosen.model:  # the fit has estimated the width of friction's step
-        chosen = replace(chosen, model=fit.shared.model)
+            fit, chosen = again, replace(plainer, model=again.shared.model)
     return finished(fit, settings), chosen

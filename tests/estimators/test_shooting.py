@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from algid.arm import Arm, FloatArray, forward_dynamics
-from algid.estimators.shooting import Driving, Shot, integrate, linearise
+from algid.estimators.shooting import Driving, Shot, advanced, integrate, linearise
 from algid.estimators.whitening import NoiseLevels, forward
 from algid.model import Model
 from algid.signals.between import between
@@ -87,7 +87,7 @@ def test_intervals_end_where_another_integrator_does() -> None:
     ends = []
     for steps in (4, 8, 16):
         u = np.broadcast_to(tau, (steps, 3, 2, 2))
-        ends.append(integrate(Model(), K, x, u, dt)[0])
+        ends.append(advanced(Model(), K, x, u, dt))
     for place in range(2):
 
         def rate(_: float, y: FloatArray, place: int = place) -> FloatArray:
