@@ -217,13 +217,28 @@ class TorquePrediction(_Model):
         return f" below {self.bandwidth:g} Hz"
 
     def unexplained(self, least: float) -> tuple[int, ...]:
-        """Joints, 1 or 2, with R² below `least` and a residual above `TRIFLE` of their torque."""
+        """Joints, 1 or 2, with R² below `least` and a residual above `TRIFLE` of their torque.
+
+        So is the R² of a joint's residual while it moves: at rest friction is any torque up to ± f,
+        which contradicts no model.
+        """
         of_load = self.of_load or self.nrmse
         joints = []
-        for joint, r2, of in zip((1, 2), self.r2, of_load, strict=True):
-            if r2 < least and of > TRIFLE:
+        for joint, r2, moving, of in zip((1, 2), self.r2, self._r2_moving(), of_load, strict=True):
+            if max(r2, moving) < least and of > TRIFLE:
                 joints.append(joint)
         return tuple(joints)
+
+    def _r2_moving(self) -> list[float]:
+        """The share of the torque's variance beyond the residual's square while a joint moves.
+
+        That of all samples where it never moves, or that was not looked at.
+        """
+        shares = list(self.r2)
+        for place, moving in enumerate(self.rmse_moving or ()):
+            if moving is not None and self.rmse[place] > 0:
+                shares[place] = 1 - (1 - self.r2[place]) * (moving / self.rmse[place]) ** 2
+        return shares
 
 
 class Repeatability(_Model):

@@ -142,6 +142,23 @@ def test_a_model_that_is_worse_than_a_constant_failed_and_one_that_explains_litt
     assert "explains only 14 % of the torque of joint 1" in found.sentence
 
 
+def test_a_joint_that_a_constant_beats_only_at_rest_is_no_failure(result: Result) -> None:
+    """Friction is any torque up to ± f there.
+
+    A torque of RMS 1 whose residual is 1.2 in all is explained where 0.6 is left while it moves,
+    and not where 1.1 is.
+    """
+    sticking = TorquePrediction(
+        rmse=(1.2, 0.1), nrmse=(1.2, 0.1), r2=(-0.44, 0.99), filter="none", rmse_moving=(0.6, 0.1)
+    )
+    found = with_fit(result, residual=sticking).verdict
+    assert found.grade == "reservations"
+    assert "the torque of joint 1 worse than its mean does" in found.sentence
+    for moving in (1.1, None):
+        poor = sticking.model_copy(update={"rmse_moving": (moving, 0.1)})
+        assert with_fit(result, residual=poor).verdict.grade == "failed"
+
+
 def test_a_joint_that_is_hardly_driven_is_no_failure(result: Result) -> None:
     """Its torque is the little that inertia, weight and friction leave of one another."""
     hardly = TorquePrediction(
