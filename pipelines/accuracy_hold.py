@@ -7,7 +7,8 @@ and identified without a flag. Asked: intervals of k1 … k7 that hold the truth
 errors within 1.5 times the bound of a known hold, and at most 1 % of the even torques taken for
 held ones.
 
-"slow" and "joint2" move under a PD controller (`pipelines.controlled`), the others in open loop.
+"slow" and "joint2" move under a PD controller (`pipelines.controlled`), the others in open loop. Of
+what a controller holds for a millisecond and a log has every tenth time, nothing is held.
 """
 
 from __future__ import annotations
@@ -36,12 +37,13 @@ STIFFNESS = 2 * np.pi * 4.0  # rad/s, the controller's bandwidth
 
 @dataclass(frozen=True)
 class Row:
-    """A motion: its rate in Hz, its seconds, and what drives it."""
+    """A motion: its rate in Hz, its seconds, its drive, and of how many samples one is logged."""
 
     name: str
     rate: float
     duration: float
     drive: str
+    every: int = 1
 
 
 ROWS = {
@@ -52,6 +54,8 @@ ROWS = {
     "prbs": Row("PRBS, 50 ms", 1000.0, 10.0, "prbs"),
     "slow": Row("slow, PD", 1000.0, 10.0, "slow"),
     "joint2": Row("joint 2 alone, PD", 1000.0, 10.0, "joint2"),
+    "slow100": Row("slow, PD of 1 kHz, logged at 100 Hz", 1000.0, 10.0, "slow", 10),
+    "slow50": Row("slow, PD of 1 kHz, logged at 50 Hz", 1000.0, 10.0, "slow", 20),
 }
 
 
@@ -83,7 +87,9 @@ def scene(key: str, held: bool, seed: int) -> Scene:
     arm, _ = random_arm(seed)
     t = np.arange(round(row.duration * row.rate) + 1) / row.rate
     moved = _pd if row.drive in ("slow", "joint2") else _open
-    return Scene(arm, moved(row, arm, t, held, seed))
+    whole, every = moved(row, arm, t, held, seed), row.every
+    signals = (signal[:, ::every] for signal in (whole.theta, whole.omega, whole.tau))
+    return Scene(arm, Truth(t[::every], *signals))
 
 
 def _bound(truth: Truth, arm: Arm) -> FloatArray:
