@@ -65,3 +65,12 @@ def test_half_a_sample_that_moves_nothing_is_left_alone() -> None:
     assert abs(late.odds) < SURE
     assert late.decided
     assert late.hold == "foh"
+
+
+@pytest.mark.parametrize("odds", [-2000.0, -3.0, 3.0, 2000.0])
+def test_odds_that_are_known_by_themselves_are_the_odds(odds: float) -> None:
+    late = Lateness.by_odds(odds, HALF)
+    assert late.odds == pytest.approx(odds)
+    assert late.hold == ("zoh" if odds > SURE else "foh")
+    assert late.decided == (abs(odds) > SURE)
+    assert not late.another

@@ -228,3 +228,20 @@ def test_a_piece_shorter_than_its_torque_needs_is_refused() -> None:
     short = Segment(0.0, piece.dt, piece.theta[:, :13], piece.tau[:, :13])
     with pytest.raises(np.linalg.LinAlgError, match="shorter than"):
         shot(short, short.theta)
+
+
+def test_narrow_dry_friction_is_followed_through_rest() -> None:
+    """Its rate of 2,000 / s would make steps of a few milliseconds unstable."""
+    model, c, dt = Model(("coulomb",), coulomb_speed=0.03), np.append(K, [0.6, 0.1]), 0.01
+    tau = wide_multi_sine(ARM, 3)(np.arange(101) * dt)
+    x, states = np.array([[-1.5], [0.0], [0.0], [0.0]]), []
+    for sample in range(101):
+        states.append(x[:, 0])
+        u = np.broadcast_to(tau[:, sample, None], (400, 3, 2, 1))
+        x = advanced(model, c, x, u, dt)
+    theta = np.array(states).T[:2]
+    assert np.sum(np.diff(np.sign(np.array(states)[:, 2:]), axis=0) != 0) > 10
+    piece = Segment(0.0, dt, theta, tau)
+    found = shot(piece, theta, c, model=model)
+    # where a joint passes rest within a step, the step's error is a share of friction
+    assert np.sqrt(np.mean(found.residual**2)) < 5e-3 * np.sqrt(np.mean(tau**2))
