@@ -262,6 +262,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "them is hardly "
         "driven, or a term is missing; give a log that drives both"
     ),
+    "HARDLY_DRIVEN": (
+        "joint {joint} has less than {percent:.3g} % of the other's torque in every log: bearings "
+        "and cables pull as hard as its motor; give a log that drives both"
+    ),
     "BOUNDS_DOUBTED": (
         "the estimates break {bounds}, though an arm that obeys physics explains the torques as "
         "well: a joint is hardly "

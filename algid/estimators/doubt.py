@@ -1,4 +1,4 @@
-"""When k1 … k5 get no error bar: a joint stood still, or the joints' equations disagree.
+"""When k1 … k5 get no error bar: a joint stood still or was hardly driven, or they disagree.
 
 Where a likelihood is refuted and there are few logs, what differs from run to run does not show by
 itself.
@@ -16,7 +16,8 @@ from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import joints_apart
 from algid.estimators.fit import Fit
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.modulating_functions import MOTORLESS
+from algid.estimators.weak import Normal, Source, WeakSettings
 from algid.model import RIGID, UNITS
 from algid.notices import Notice
 
@@ -112,4 +113,19 @@ def _doubt(
                 "unit": UNITS[apart.name],
             }
             return Notice("JOINTS_CONTRADICT", numbers=numbers)
+        hardly = _hardly_driven(normals)
+        if hardly is not None:
+            return Notice("HARDLY_DRIVEN", numbers={"joint": hardly, "percent": 100 * MOTORLESS})
+    return None
+
+
+def _hardly_driven(normals: Sequence[Normal]) -> int | None:
+    """The joint, 1 or 2, whose torque is nowhere more than bearings and cables make, if any.
+
+    One without a torque has no motor: see `doubted_without_motor`.
+    """
+    torques = np.max([normal.gram[:, :, -1, -1].sum(axis=0) / normal.rows for normal in normals], 0)
+    for joint in range(2):
+        if 0 < torques[joint] < MOTORLESS**2 * torques[1 - joint]:
+            return joint + 1
     return None

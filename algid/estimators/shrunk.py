@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.criteria import AT_REST
@@ -143,6 +144,7 @@ def _estimated(
     burdened = [normal for loaded, normal in normals if loaded]
     beta, _ = weak.first_estimate(shared, bare, burdened, known)
     first = bare + burdened
+    driven = _driven([normal for _, normal in normals])
     groups = logs.groups(settings)
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
@@ -159,8 +161,8 @@ def _estimated(
             share = np.ones(len(expected.names))
         for _ in range(_REWEIGHTINGS):
             likelihoods = []
-            for kind, normal in normals:
-                likelihoods.append(_weighed(shared, normal, kind, beta, base))
+            for (kind, normal), moved_by in zip(normals, driven, strict=True):
+                likelihoods.append(_weighed(shared, normal, kind, beta, base, moved_by))
             likelihoods = shared_out(likelihoods, groups)
             phi = dispersion(shared, merged(likelihoods, groups), beta)
             scaled = divided(likelihoods, phi)
@@ -169,10 +171,33 @@ def _estimated(
     return concluded(shared, scaled, beta, joined(known, own), own, moved, groups)
 
 
+_HARDLY = 0.2
+"""Share of the most torque that a joint has in any of the logs: with less it is hardly driven."""
+
+
+def _driven(normals: Sequence[Normal]) -> list[NDArray[np.bool_]]:
+    """Which joints (2,) of each log are driven, those without a motor among them.
+
+    What moves a joint that is hardly driven is what the model lacks, and its equation is solved by
+    constants near nothing: the better, the more it would weigh.
+    """
+    torques = []
+    for normal in normals:
+        squares = normal.gram[:, :, -1, -1].sum(axis=0)
+        torques.append(np.sqrt(squares / np.maximum(normal.rows, 1)))
+    most = np.max(torques, axis=0)
+    return [(torque >= _HARDLY * most) for torque in torques]
+
+
 def _weighed(
-    shared: Shared, normal: Normal, loaded: bool, beta: FloatArray, base: float
+    shared: Shared,
+    normal: Normal,
+    loaded: bool,
+    beta: FloatArray,
+    base: float,
+    driven: NDArray[np.bool_],
 ) -> LogInformation:
-    """A log's likelihood with the weights of its residual at `beta` (Q,).
+    """A log's likelihood with the weights of its residual at `beta` (Q,) of the `driven` joints.
 
     The delay's column is that of a change from `base`, in s.
     """
@@ -181,6 +206,7 @@ def _weighed(
     if shared.delay:
         c[-1] -= base
     weights = row_weights(normal.gram.sum(axis=0), np.append(-c, 1.0), normal.rows)
+    weights = np.where(driven, weights, 0.0)
     # Overlapping rows repeat each other: a window's worth of rows counts as two.
     gram = np.einsum("a,baxy->bxy", weights * (2.0 / OVERLAP), normal.gram)
     S = gram[:, :-1, :-1]

@@ -82,7 +82,7 @@ def fit_coarse(
 
 
 def _any_coarse(survey: Survey) -> bool:
-    return any(turns_far(islice(survey.segments(log), _LOOKED_AT)) for log in survey.logs)
+    return any(turns_far(list(islice(survey.segments(log), _LOOKED_AT))) for log in survey.logs)
 
 
 def _starts(chosen: Selection, settings: Settings) -> Iterator[Selection]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from algid.estimators.fit import Fit
     from algid.estimators.selection import Selection
     from algid.identification.by_likelihood import Predictions
+    from algid.notices import Notice
     from algid.profile import Profile
 
 # the paper's convergence series is drawn beside other estimators up to this length of log
@@ -253,12 +254,16 @@ def _by_likelihood(
 
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
-    settings = with_effort(fit, settings)
-    of_driver = of_effort(fit, settings, asked)
+    sure = with_doubt(fit, survey, settings, chosen)
+    of_driver: list[Notice] = []
+    if sure is fit:  # of constants in doubt no weight is missed
+        settings = with_effort(fit, settings)
+        of_driver = of_effort(fit, settings, asked)
     if settings != asked:
         fit, predictions, chosen = _fitted(survey, settings, earlier)
+        sure = with_doubt(fit, survey, settings, chosen)
     settings = replace(settings, torque_hold=chosen.hold)
-    fit = with_endogeneity(with_doubt(fit, survey, settings, chosen), survey, settings, chosen)
+    fit = with_endogeneity(sure, survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
     again = partial(_again, earlier=earlier)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.estimators import weak
+from algid.estimators import doubt, weak
 from algid.estimators.diagnostics import joints_apart
 from algid.estimators.doubt import doubted
 from algid.estimators.fit import Fit
@@ -58,12 +58,25 @@ def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:
     assert _statuses(found) == {
         name: "OK" if name in ("k6", "k7") else "WEAK_EXCITATION" for name in fit.names
     }
-    (doubt,) = (note for note in found.notes if note.code == "JOINTS_CONTRADICT")
+    (contradiction,) = (note for note in found.notes if note.code == "JOINTS_CONTRADICT")
     assert re.match(
         r"joint 1 by itself tells k\d as [\d.]+ \S.* and joint 2 as .*: one of them is hardly",
-        doubt.text,
+        contradiction.text,
     )
     np.testing.assert_array_equal(found.values, fit.values)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.02, True), (0.5, False)])
+def test_a_joint_that_is_driven_in_no_log_is_told_where_the_other_does_not_contradict(
+    bench: Bench, share: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doubt, "joints_apart", lambda *_: None)
+    log = bench.log(sigma=1e-4)
+    idle = replace(log, tau=log.tau * np.array([[1.0], [share]]))
+    fit = replace(weak.fit([lambda: [idle]]), notes=(REFUTED,))
+    notes = doubted(fit, [lambda: [idle]], [], WeakSettings()).notes[1:]
+    assert [note.code for note in notes] == ["HARDLY_DRIVEN"] * told
+    assert all("joint 2 has less than 10 % of the other's torque" in note.text for note in notes)
 
 
 def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
