@@ -81,8 +81,10 @@ def _distance(result: Result, others: Result) -> float:
     """
     far: list[float] = [0.0]
     for name in NAMES:
-        one, other = result.parameters[name], others.parameters[name]
-        if one.estimate is None or other.estimate is None or not (one.usable and other.usable):
+        one, other = result.parameters.get(name), others.parameters.get(name)
+        if one is None or other is None or not (one.usable and other.usable):
+            continue
+        if one.estimate is None or other.estimate is None:
             continue
         far.append(abs(one.estimate - other.estimate) / np.hypot(one.std or 0.0, other.std or 0.0))
     return float(max(far))
