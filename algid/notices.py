@@ -236,6 +236,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "the logs do not tell whether the torque is held from each sample to the next, which makes "
         "it {half:.3g} ms late in the mean: the intervals hold both"
     ),
+    "FASTER_CONTROLLER": (
+        "the logs do not tell how late the torque of a controller that is faster than they are "
+        "acts: the intervals hold none to one millisecond"
+    ),
     "UNLIKE_GAINS": (
         "the gains of the torques differ: torque 2 is {ratio:.3f} ± {half:.2g} times (95 %) what "
         "torque 1 has it; no "
@@ -315,7 +319,10 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "LOGS_APART": "the loaded and the unloaded logs are {distance:.1f} standard deviations from "
     "belonging to one arm",
     "NO_CROSS_VALIDATION": "no cross-validation: a log is too short to be fitted, or to be judged",
-    "ONE_RUN": "what differs from run to run is not in the intervals: give four logs or more",
+    "ONE_RUN": (
+        "what differs from run to run is not in the intervals: give four logs of different "
+        "motions, or more"
+    ),
     "REPEATABILITY": (
         "the loaded runs by themselves weigh {masses} kg: repeatability {std:.2g} kg (95 %: "
         "{low:.2g} to {high:.2g})"

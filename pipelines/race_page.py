@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-_WIDTH, _LEFT, _ROW = 640, 190, 22  # px
-_COLOURS = ("#1c5d99", "#b8500f", "#3d7a3a", "#7a3d78", "#7a6a1f")
+_WIDTH, _LEFT, _ROW, _TOP, _KEY = 640, 190, 22, 30, 110  # px
+_COLOURS = ("#3b82c4", "#d0691f", "#4d9a49", "#a05a9d", "#9a862b")  # seen on white and on black
 
 Series = Mapping[str, Mapping[str, float]]
 """By contender its figures by name."""
@@ -41,13 +41,13 @@ def page(simulated: Sequence[Any], real: Sequence[Any], text: str) -> str:
         return found
 
     plots = [
-        _plot("Median error of k1 … k7, %", error, kinds),
-        _plot("RMS error over the Cramér-Rao bound", bound, ["RMS"]),
+        svg("Median error of k1 … k7, %", error, kinds),
+        svg("RMS error over the Cramér-Rao bound", bound, ["RMS"]),
     ]
     if real:
         plots += [
-            _plot("Repeatability on real runs, %", of_real(lambda r: r["repeatability"]), builds),
-            _plot(
+            svg("Repeatability on real runs, %", of_real(lambda r: r["repeatability"]), builds),
+            svg(
                 "Held-out RMSE of joint 1, N m",
                 of_real(lambda r: None if r["held_out"] is None else r["held_out"][0]),
                 builds,
@@ -76,8 +76,8 @@ def _rms(values: Any) -> float:
     return float(np.sqrt(np.mean(np.square(found)))) if found else np.nan
 
 
-def _plot(title: str, series: Series, names: Sequence[str]) -> str:
-    """Dots on a logarithmic axis, a row a contender, a colour a name."""
+def svg(title: str, series: Series, names: Sequence[str]) -> str:
+    """Dots on a logarithmic axis, a row a contender, a colour a name; nothing without figures."""
     every = [v for row in series.values() for v in row.values() if np.isfinite(v) and v > 0]
     if not every:
         return ""
@@ -87,30 +87,34 @@ def _plot(title: str, series: Series, names: Sequence[str]) -> str:
     def x(value: float) -> float:
         return float(_LEFT + (_WIDTH - _LEFT - 20) * (np.log10(value) - low) / span)
 
-    height = _ROW * (len(series) + 2)
-    parts = [
-        f'<line x1="{x(10.0**n):.1f}" x2="{x(10.0**n):.1f}" y1="5" y2="{height - 30}" '
-        'stroke="#ddd"/>'
-        f'<text x="{x(10.0**n):.1f}" y="{height - 14}" text-anchor="middle">{10.0**n:g}</text>'
-        for n in np.arange(low, low + span + 1)
-    ]
+    height = _TOP + _ROW * (len(series) + 1)
+    parts = [f'<text x="0" y="16" font-weight="bold">{escape(title)}</text>']
+    if len(names) > 1:
+        for place, name in enumerate(names):
+            left = _WIDTH - _KEY * (len(names) - place)
+            parts.append(_dot(left, 12, place, name))
+            parts.append(f'<text x="{left + 10}" y="16">{escape(name)}</text>')
+    for n in np.arange(low, low + span + 1):
+        at = f"{x(10.0**n):.1f}"
+        parts.append(f'<path d="M{at} {_TOP}V{height - 22}" stroke="#888" stroke-opacity="0.4"/>')
+        parts.append(f'<text x="{at}" y="{height - 6}" text-anchor="middle">{10.0**n:g}</text>')
     for place, (peer, row) in enumerate(series.items()):
-        y = _ROW * (place + 1) - 4
+        y = _TOP + _ROW * place + 12
         parts.append(f'<text x="{_LEFT - 12}" y="{y + 4}" text-anchor="end">{escape(peer)}</text>')
         for name, value in row.items():
             if np.isfinite(value) and value > 0:
-                colour = _COLOURS[list(names).index(name) % len(_COLOURS)]
-                tip = escape(f"{peer}, {name}: {value:.3g}")
-                parts.append(
-                    f'<circle cx="{x(value):.1f}" cy="{y}" r="5" fill="{colour}" '
-                    'fill-opacity="0.8">'
-                    f"<title>{tip}</title></circle>"
-                )
-    legend = " ".join(
-        f'<span style="color:{_COLOURS[n % len(_COLOURS)]}">● {escape(name)}</span>'
-        for n, name in enumerate(names)
-    )
+                tip = f"{peer}, {name}: {value:.3g}"
+                parts.append(_dot(x(value), y, list(names).index(name), tip))
     return (
-        f"<h2>{escape(title)}</h2><p>{legend}</p><svg viewBox='0 0 {_WIDTH} {height}' "
-        f"style='width:100%;font-size:12px'>{''.join(parts)}</svg>"
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" '
+        f'font-family="system-ui, sans-serif" font-size="12" fill="#7a7a7a">\n'
+        + "\n".join(parts)
+        + "\n</svg>\n"
+    )
+
+
+def _dot(x: float, y: float, colour: int, tip: str) -> str:
+    return (
+        f'<circle cx="{x:.1f}" cy="{y}" r="5" fill="{_COLOURS[colour % len(_COLOURS)]}" '
+        f'fill-opacity="0.8"><title>{escape(tip)}</title></circle>'
     )

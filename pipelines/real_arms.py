@@ -356,8 +356,14 @@ def _sensed(errors: Errors, case: _Case, theta: FloatArray) -> Scene:
 
 
 def _truth(case: _Case, errors: Errors) -> dict[str, float]:
-    """k1 … k7, m_p, l1, l2 in the units of the first joint's torque sensor."""
+    """k1 … k7, m_p, l1, l2 in the units of the first joint's torque sensor.
+
+    Where the angles' zeros are off, of k1, k2 and k4 the cosine's part over the logged angles,
+    which is what a model with phases has by these names.
+    """
     k = case.arm.constants()
+    first, second = errors.zero
+    k[[0, 1, 3]] *= np.cos([second, first + second, first])
     if errors.elastic:
         k[4] += MOTOR_SHARE * (k[4] + k[2])
     gain = errors.gains[0]

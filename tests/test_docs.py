@@ -27,6 +27,7 @@ import pytest
 import algid
 from algid.api.guide import SUMMARIES
 from pipelines.docs import pages
+from pipelines.race_pictures import pictures
 from pipelines.typed import run
 
 ROOT = Path(__file__).parents[1]
@@ -163,15 +164,30 @@ def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     ]
 
 
+def test_the_short_page_states_what_the_whole_tables_state() -> None:
+    """Every decimal figure of it stands in one of the pages that it names."""
+    decimal = re.compile(r"\d+\.\d+(?:e-?\d+)?")
+    whole = [PAGES[f"measured-{name}"].read_text("utf-8") for name in ("arms", "real", "speed")]
+    short = set(decimal.findall(PAGES["measured"].read_text("utf-8")))
+    assert short - set(decimal.findall(" ".join(whole))) == set()
+
+
+def test_the_pictures_show_the_figures_of_the_page() -> None:
+    """`python -m pipelines.race_pictures data/pictures` draws them anew."""
+    drawn = pictures(PAGES["measured"].read_text("utf-8"))
+    shown = {name: (ROOT / f"data/pictures/{name}.svg").read_text("utf-8") for name in drawn}
+    assert shown == drawn
+    assert "<title>algid, C.1: " in drawn["race-repeats"]
+
+
 def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path) -> None:
     pages(tmp_path / "pages")
     guide = {path.stem for path in (Path(algid.__file__).parent / "guide").glob("*.md")}
-    assert {path.stem for path in (tmp_path / "pages").iterdir()} == guide | {"index", "reference"}
-    named = re.findall(
-        r"^::: algid\.[\w.]+\.(\w+)$", (tmp_path / "pages/reference.md").read_text(), re.MULTILINE
-    )
+    found = {path.stem: path.read_text("utf-8") for path in (tmp_path / "pages").glob("*.md")}
+    assert set(found) == guide | {"index", "reference"}
+    named = re.findall(r"^::: algid\.[\w.]+\.(\w+)$", found["reference"], re.MULTILINE)
     assert sorted(named) == sorted(set(algid.__all__) - {"__version__"})
-    assert "<!--" not in "".join(path.read_text() for path in (tmp_path / "pages").iterdir())
+    assert "<!--" not in "".join(found.values())
 
 
 @pytest.mark.slow
@@ -224,8 +240,8 @@ def test_the_readme_and_the_site_lead_to_every_topic(tmp_path: Path) -> None:
     pages(tmp_path)
     topics = set(PAGES) - {"README"}
     readme = PAGES["README"].read_text("utf-8")
-    assert set(re.findall(r"\(algid/guide/(\w+)\.md\)", readme)) == topics
-    assert set(re.findall(r"\((\w+)\.md\)", (tmp_path / "index.md").read_text())) == {
+    assert set(re.findall(r"\(algid/guide/([\w-]+)\.md\)", readme)) == topics
+    assert set(re.findall(r"\(([\w-]+)\.md\)", (tmp_path / "index.md").read_text())) == {
         *topics,
         "reference",
     }
@@ -250,7 +266,7 @@ def test_the_sites_configuration_names_what_is_there() -> None:
     needed = " ".join(extra["optional-dependencies"]["docs"])
     assert "mkdocs-material" in needed
     assert "mkdocstrings[python]" in needed
-    listed = re.findall(r"^  - (\w+)\.md$", text, re.MULTILINE)
+    listed = re.findall(r"^  - ([\w-]+)\.md$", text, re.MULTILINE)
     assert listed == ["index", *SUMMARIES, "reference"]
 
 

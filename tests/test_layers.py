@@ -82,8 +82,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "distributed mcap polars pyarrow pydantic",
     ),
     "tracks": room(
-        "arm criteria errors estimators files identification model names notices options profile "
-        "report results runtime signals significance text verdict words",
+        "arm compiled criteria errors estimators files identification model names notices options "
+        "profile report results runtime signals significance text verdict words",
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(

@@ -152,6 +152,7 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
             fit.prior,
             coloured=coloured,
             samples=fit.freedom,
+            repeats=fit.repeats,
         )
     status = list(changed.status)
     for name, before in zip(fit.names, fit.status, strict=True):

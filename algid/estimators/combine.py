@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.estimators.parametrisation import Shared
@@ -148,7 +149,7 @@ def combine(
     coefficients c0
     """
     damping = 0.0
-    logs, offset = _by_kind(logs)
+    logs, offset = by_kind(logs)
     value, gradient, S = likelihood(shared, logs, beta, prior)
     for _ in range(_STEPS):
         damped = S
@@ -178,7 +179,7 @@ def of_kind(logs: Iterable[LogInformation], loaded: bool) -> list[LogInformation
     return [log for log in logs if log.loaded is loaded]
 
 
-def _by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
+def by_kind(logs: Sequence[LogInformation]) -> tuple[Sequence[LogInformation], float]:
     """Unloaded and loaded logs in one sum each, and what that adds to their likelihood."""
     sums, offset = [], 0.0
     for loaded in (False, True):
@@ -246,6 +247,14 @@ def _value(
     return value
 
 
+def scores_of(
+    shared: Shared, log: LogInformation, beta: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """T = dc/dβ, and the scores (B, q) of a log's stretches at `beta` (Q,)."""
+    change = shared.coefficients(beta, log.loaded) - log.c0
+    return shared.jacobian(beta, log.loaded), log.g - log.S @ change
+
+
 def sandwich(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> tuple[FloatArray, int]:
@@ -266,8 +275,7 @@ def sandwich(
     meat = np.zeros((len(shared.names), len(shared.names)))
     stretches = 0
     for log in logs:
-        T = shared.jacobian(beta, log.loaded)
-        scores = log.g - log.S @ (shared.coefficients(beta, log.loaded) - log.c0)
+        T, scores = scores_of(shared, log, beta)
         variance, lags = long_run_variance(scores)
         meat += T.T @ variance @ T
         stretches += scores.shape[0] // (lags + 1)
@@ -285,7 +293,7 @@ def left_out(
     estimates = np.empty((len(logs), len(shared.names)))
     loaded = np.array([log.loaded for log in logs])
     for kind in (False, True):
-        others, _ = _by_kind(of_kind(logs, not kind))
+        others, _ = by_kind(of_kind(logs, not kind))
         own = of_kind(logs, kind)
         for place, rest in zip(np.flatnonzero(loaded == kind), _without_each(own), strict=True):
             estimates[place] = combine(shared, list(others) + rest, beta, prior)[0]
@@ -418,16 +426,28 @@ def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:
     Newey & West 1987 with the bandwidth of Andrews 1991, eq. (6.2) and (6.4), from a first-order
     autoregression.
     """
-    count = scores.shape[0]
-    power = np.sum(scores**2, axis=0)
-    usable = scores[:, power > 0] / np.sqrt(power[power > 0])
-    rho = np.clip(np.sum(usable[1:] * usable[:-1], axis=0), -0.97, 0.97)
+    total, lags = long_run_variances(scores[None])
+    return total, int(lags[0])
+
+
+def long_run_variances(scores: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Sum (q, q) of `long_run_variance` of each of n logs' scores (n, B, q), and the lags (n,)."""
+    _, count, q = scores.shape
+    power = np.sum(scores**2, axis=1)
+    size = np.sqrt(power)
+    shares = np.divide(1.0, size, out=np.zeros_like(size), where=power > 0)
+    usable = scores * shares[:, None]
+    rho = np.clip(np.sum(usable[:, 1:] * usable[:, :-1], axis=1), -0.97, 0.97)
     # α(1) with unit weights: each score was scaled to unit power above.
-    numerator = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2))
-    persistence = numerator / max(np.sum(1 / (1 - rho) ** 4), 1e-300)
-    lags = int(min(1.1447 * (persistence * count) ** (1 / 3), count / 4))
-    total = scores.T @ scores
-    for lag in range(1, lags + 1):
-        cross = scores[lag:].T @ scores[:-lag]
-        total += (1 - lag / (lags + 1)) * (cross + cross.T)
+    numerator = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2), axis=1)
+    freedom = np.sum((power > 0) / (1 - rho) ** 4, axis=1)
+    persistence = numerator / np.maximum(freedom, 1e-300)
+    lags = np.minimum(1.1447 * (persistence * count) ** (1 / 3), count / 4).astype(np.int64)
+    flat = scores.reshape(-1, q)
+    total = flat.T @ flat
+    for lag in range(1, int(lags.max(initial=0)) + 1):
+        weights = np.maximum(1 - lag / (lags + 1), 0.0)
+        later = weights[:, None, None] * scores[:, lag:]
+        cross = later.reshape(-1, q).T @ scores[:, : count - lag].reshape(-1, q)
+        total += cross + cross.T
     return total, lags

@@ -402,14 +402,15 @@ class _Trials:
         sums = self._sums(families[0], self._fine)
         plain = self._turns[:2]
         T = np.stack([self._place((turn, 0.0)) for turn in plain])
-        upright = list(dict.fromkeys(map(_upright, families)))
+        uprights = list(map(_upright, families))
+        upright = list(dict.fromkeys(uprights))
         c, left, covariance = self._solved(sums, upright, T)
         scores = _merits(left).tolist()
         signs = self._signs()
         k = c[:, None] * signs
         covariances = signs[:, :, None] * signs[:, None] * covariance[:, None]
-        for family in families:
-            first = len(plain) * upright.index(_upright(family))
+        for family, own in zip(families, uprights, strict=True):
+            first = len(plain) * upright.index(own)
             for half, (number, turn) in product((0, 1), enumerate(self._turns)):
                 fit, turned = first + number % 2, 2 * (number // 2) + half
                 yield Candidate(

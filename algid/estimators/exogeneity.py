@@ -32,7 +32,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.compiled import chi2_tail
 from algid.estimators import instruments, weak
-from algid.estimators.combine import combine, long_run_variance, scaled_pinv
+from algid.estimators.combine import combine, long_run_variance, scaled_pinv, scores_of
 from algid.estimators.fit import Fit
 from algid.estimators.references import Following, followed
 from algid.estimators.repeats import merged, shared_out
@@ -216,9 +216,8 @@ def _influences(fit: Fit) -> list[FloatArray]:
     inverse = scaled_pinv(H)
     influences: list[FloatArray] = []
     for log in fit.logs:
-        change = fit.shared.coefficients(fit.values, log.loaded) - log.c0
-        scores = (log.g - log.S @ change) @ fit.shared.jacobian(fit.values, log.loaded)
-        influences.append(scores @ inverse)
+        T, scores = scores_of(fit.shared, log, fit.values)
+        influences.append(scores @ T @ inverse)
     return influences
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.compiled import student_quantile
+from algid.estimators.agreement import agree
 from algid.estimators.combine import (
     LogInformation,
     Prior,
@@ -27,6 +28,7 @@ from algid.estimators.identifiability import (
 )
 from algid.estimators.innovations import ResidualSums
 from algid.estimators.parametrisation import Shared
+from algid.estimators.repeats import Groups, merged
 from algid.estimators.whitening import NoiseLevels
 from algid.model import DELAYS
 from algid.names import outside, places_outside
@@ -126,7 +128,7 @@ class Fit:
     notes: tuple[Notice, ...] = ()
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
     shrinkage: Prior | None = None
-    repeats: tuple[tuple[int, ...], ...] = ()
+    repeats: Groups = ()
     misfit: Misfit | None = None
     deviance: float | None = None
 
@@ -251,6 +253,7 @@ def conclude(
     coloured: bool,
     samples: int = 1,
     without: FloatArray | None = None,
+    repeats: Groups = (),
 ) -> Fit:
     """Solve for the shared parameters, and attach error bars and statuses.
 
@@ -271,9 +274,14 @@ def conclude(
         Independent samples behind error bars that rest on white noise.
     without : (n, Q), optional
         The estimates without each of the logs, where the estimator has made them itself.
+    repeats : Groups
+        Logs that repeat each other, where that was looked at.
 
     Notes
     -----
+    Repeats count as one log for a sandwich and a jackknife. Where what they leave agrees, error
+    bars rest on those though residuals are white.
+
     Where both a sandwich and a jackknife have a part in the variance, Student's quantile is that
     of the degrees of freedom of Satterthwaite 1946, with the parts' mean share over the
     parameters.
@@ -286,8 +294,11 @@ def conclude(
     covariance, quantile = known.covariance, NORMAL
     intervals: Intervals = "likelihood"
     freedom = samples
-    if coloured:
-        meat, freedom = sandwich(shared, logs, beta, prior)
+    each: Sequence[LogInformation] = logs
+    if 0 < len(repeats) < len(logs):
+        each = merged(logs, repeats)
+    if coloured or agree(shared, logs, beta, S, repeats):
+        meat, freedom = sandwich(shared, each, beta, prior)
         covariance = known.covariance @ meat @ known.covariance
         if estimator == "refined":
             # The long-run variance of a short log errs low: white noise is the least there is.
@@ -295,10 +306,13 @@ def conclude(
         squares, intervals = float(freedom), "sandwich"
         if without is None:
             without = left_out(shared, logs, beta, prior)
-        repeated = jackknife(logs, without)
+        alone = without
+        if len(each) < len(logs):
+            alone = left_out(shared, each, beta, prior)
+        repeated = jackknife(each, alone)
         if repeated is not None:
             within, covariance, intervals = covariance, widened(covariance, repeated), "jackknife"
-            squares = _satterthwaite(within, covariance, freedom, logs)
+            squares = _satterthwaite(within, covariance, freedom, each)
         quantile = student_quantile(squares)  # squares are two at least
     return Fit(
         estimator=estimator,
@@ -314,6 +328,7 @@ def conclude(
         prior=prior,
         without=without,
         moved=moved,
+        repeats=repeats,
     )
 
 

@@ -9,6 +9,10 @@ the log of the odds for a held torque is
 with d what they show. Where neither is likelier by far, the delay stays a parameter, with the two
 as its prior: mean h / 2 and deviation h / 2. The posterior's error is then what it says, whichever
 is true.
+
+A log of fewer samples than 500 a second is slower than most controllers. Where it shows that its
+own samples are not held, a faster controller's may be: where half a millisecond would not show, d
+stays a parameter too, between none and that half millisecond, which is its deviation.
 """
 
 from __future__ import annotations
@@ -27,6 +31,10 @@ SURE = log(100.0)
 """Log of the odds from which one of the two is taken."""
 NEGLIGIBLE = 0.1
 """Standard deviations by which half a sample may move each estimate, and nobody need know."""
+CONTROLLER = 5e-4
+"""Half the period of a controller of 1 kHz, in s."""
+_SLOW = 2 * CONTROLLER
+"""Half a sample of logs, in s, that are as fast as the slowest usual controllers: 500 Hz."""
 _NEAR, _SIGMAS = 0.3, 4.0
 """Of half a sample, and standard deviations: another delay is further from what is taken."""
 
@@ -73,6 +81,21 @@ class Lateness:
         return self.share < NEGLIGIBLE or abs(self.odds) >= SURE
 
     @property
+    def faster(self) -> bool:
+        """Whether a controller that is faster than the log may hold the torque, and it matters.
+
+        Where the log would show half of its period, the delay is a term like others.
+        """
+        matters = NEGLIGIBLE <= CONTROLLER * self.effect < np.inf
+        hidden = _SIGMAS * self.std > CONTROLLER
+        return matters and hidden and self.half > _SLOW and self.odds <= -SURE
+
+    @property
+    def determined(self) -> bool:
+        """Whether the log shows how late the torque acts, or it makes no difference."""
+        return self.decided and not self.faster
+
+    @property
     def hold(self) -> Hold:
         """The hold that the log shows; not held where it shows neither, or another delay."""
         return "zoh" if self.odds >= SURE and not self.another else "foh"
@@ -85,13 +108,20 @@ class Lateness:
 
     @property
     def prior(self) -> Prior:
-        """The delay's prior where the log does not decide."""
-        spread = 0.5 * self.half
-        return Prior(DELAYS, np.array([spread]), np.array([[spread**-2]]))
+        """The delay's prior where the log does not tell it."""
+        mean, spread = self._expected
+        return Prior(DELAYS, np.array([mean]), np.array([[spread**-2]]))
+
+    @property
+    def _expected(self) -> tuple[float, float]:
+        """Mean and standard deviation of that prior, in s."""
+        if self.faster:
+            return 0.5 * CONTROLLER, CONTROLLER
+        return 0.5 * self.half, 0.5 * self.half
 
     def after(self, mean: float, std: float) -> Lateness:
         """The same by a posterior of `mean` and `std`, in s, without the prior."""
-        spread = 0.5 * self.half
+        expected, spread = self._expected
         precision = max(std**-2 - spread**-2, 1e-6 * spread**-2)
-        late = (mean * std**-2 - spread * spread**-2) / precision
+        late = (mean * std**-2 - expected * spread**-2) / precision
         return Lateness(late, precision**-0.5, self.half)

@@ -112,7 +112,8 @@ class LogEvidence:
     known : NoiseLevels or None
         Noise levels that are not to be estimated.
 
-    `kept` is empty where the log has no piece long enough; `sure` says that its noise levels stay.
+    `kept` is empty where the log has no piece long enough; `sure` says that its noise levels stay,
+    `smooth` that derivatives by coefficients are taken at smoothed trajectories.
     """
 
     def __init__(
@@ -124,7 +125,7 @@ class LogEvidence:
         known: NoiseLevels | None,
     ) -> None:
         self.loaded = loaded
-        self.sure = False
+        self.sure = self.smooth = False
         self._source = source
         self._shared = shared
         self._stencil = stencil
@@ -150,7 +151,7 @@ class LogEvidence:
 
     def _first_trajectory(self, piece: Segment) -> FloatArray:
         """The angles (2, N) at which a piece is first linearised."""
-        return smoothed(piece.theta, piece.dt, min(_SMOOTHING, 0.1 / piece.dt))
+        return _smoothed(piece.theta, piece.dt)
 
     def _first_noise(self, guess: NoiseLevels) -> NoiseLevels:
         """The levels that training starts from, where differences of samples show `guess`."""
@@ -167,6 +168,10 @@ class LogEvidence:
 
     def _pieces(self) -> Iterator[Segment]:
         return pieces(self._source(), PIECE_SAMPLES, SHORTEST)
+
+    def training(self) -> list[Segment]:
+        """The pieces that it trains on."""
+        return self.kept
 
     @property
     def trained(self) -> int:
@@ -273,6 +278,9 @@ class LogEvidence:
         residual_only: bool = False,
     ) -> Linearised:
         shared = self._shared if shared is None else shared
+        smooth = None
+        if self.smooth and not residual_only:
+            smooth = _smoothed(theta, piece.dt)
         return linearise(
             shared.model,
             c[: len(shared.model.names)],
@@ -282,7 +290,13 @@ class LogEvidence:
             self.noise,
             shared.delay,
             residual_only=residual_only,
+            smooth=smooth,
         )
+
+
+def _smoothed(theta: FloatArray, dt: float) -> FloatArray:
+    """Angles (2, N), sampled every `dt` s, without what is faster than a motion."""
+    return smoothed(theta, dt, min(_SMOOTHING, 0.1 / dt))
 
 
 def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:

@@ -11,6 +11,10 @@ that the model is without, one of a delay, and shapes that no term has: friction
 torque that passes them, a motor that saturates, drag of the air, cogging and cables' pull by the
 joint's angle, friction that changes along a turn, and what one drive does to the other joint.
 
+A controller makes torque of its encoders' noise, which the residual holds too: that they correlate
+looks like a delay of the torque. Such a torque is fast. Of a delay the test sees only what the slow
+part of the torque shows.
+
 ======  =================================================  ================  =================
 symbol  name                                               shape             unit
 ======  =================================================  ================  =================
@@ -47,6 +51,7 @@ from algid.model import (
     torque,
 )
 from algid.names import vector
+from algid.signals.filters import smoothed
 
 _SHAPES = (
     "gears",
@@ -62,6 +67,8 @@ _OWN = 1e-6
 """Share of a torque beside the parameters' columns: with less it is one of theirs."""
 _CANCELS = 0.02
 """Share of its terms that a torque is where they cancel."""
+_SLOW = 40.0
+"""Hz: a torque changes no faster by what the arm is to do."""
 _STEP = 1e-3
 """Relative change of a width of friction by which its effect is differentiated."""
 _ALIKE = 1e-5
@@ -98,7 +105,7 @@ def columns(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArra
     rows = []
     for _, name in lacking(model):
         if name in DELAYS:
-            rows.append(np.gradient(modelled, dt, axis=1))
+            rows.append(np.gradient(_slow(modelled, dt), dt, axis=1))
         else:
             rows.append(J[:, whole.names.index(name)])
     rows += _shapes(model, modelled, motion)
@@ -108,6 +115,13 @@ def columns(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArra
     if model.lag_name is not None:
         made = low_passed(made, dt, model.lag(c))
     return made
+
+
+def _slow(tau: FloatArray, dt: float) -> FloatArray:
+    """Torques (2, n), sampled every `dt` s, below `_SLOW` Hz; as they are where all of them is."""
+    if _SLOW * dt >= 0.5:
+        return tau
+    return smoothed(tau, dt, _SLOW)
 
 
 def _acting(model: Model, c: FloatArray, motion: Motion) -> FloatArray:

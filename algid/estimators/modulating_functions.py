@@ -253,7 +253,9 @@ class Windows:
         """Add to `known` the moments of `products` of n samples, by the `order`-th kernel."""
         if not products:
             return
-        signals = np.stack([np.broadcast_to(values.of(one), samples) for one in products])
+        signals = np.empty((len(products), samples))
+        for signal, product in zip(signals, products, strict=True):
+            signal[:] = values.of(product)
         for product, moment in zip(
             products, self.moments(signals, self._plain[order]), strict=True
         ):
@@ -322,16 +324,16 @@ MOTORLESS = 0.1
 
 
 def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> FloatArray:
-    """Inverse residual variance (2,) of a row of each joint.
+    """Inverse residual variance (..., 2) of a row of each joint.
 
     Parameters
     ----------
-    gram : (2, m, m)
-        Gram matrices of the columns by joint, the torque last.
+    gram : (..., 2, m, m)
+        Gram matrices of the columns by joint, the torque last; of several logs at once.
     v : (m,)
         What makes a residual of the columns: the coefficients with their sign turned, and 1 for
         the torque.
-    rows : int or (2,)
+    rows : int or (..., 2)
 
     Notes
     -----
@@ -343,14 +345,15 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     other's at least.
     """
     size = np.abs(v)
-    rounding = ROUNDINGS * EPS * np.einsum("x,axy,y->a", size, np.abs(gram), size)
-    squares = np.maximum(np.einsum("x,axy,y->a", v, gram, v), rounding)
-    driven = gram[:, -1, -1] > 0
-    if driven.sum() == 1:
-        each = squares / np.maximum(rows, 1)
-        least = MOTORLESS**2 * float(each[driven][0]) * np.asarray(rows)
-        squares = np.where(driven, squares, np.maximum(squares, least))
-    return np.asarray(rows / np.maximum(squares, 1e-24 * float(gram[:, -1, -1].max()) + 1e-300))
+    rounding = ROUNDINGS * EPS * ((np.abs(gram) @ size) @ size)
+    squares = np.maximum((gram @ v) @ v, rounding)
+    driven = gram[..., -1, -1] > 0
+    alone = np.sum(driven, axis=-1, keepdims=True) == 1
+    each = np.where(driven, squares / np.maximum(rows, 1), 0.0)
+    least = MOTORLESS**2 * each.max(axis=-1, keepdims=True) * rows
+    squares = np.where(alone & ~driven, np.maximum(squares, least), squares)
+    torque = gram[..., -1, -1].max(axis=-1, keepdims=True)
+    return np.asarray(rows / np.maximum(squares, 1e-24 * torque + 1e-300))
 
 
 def _linearise_bilinear(X: FloatArray, model: Model, at: FloatArray) -> None:

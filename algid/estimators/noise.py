@@ -226,18 +226,20 @@ def variance_score(
 def _traces(linear: Linearised, length: int, rows: int, seed: int) -> FloatArray:
     H, first, n = linear.H, linear.first, rows // 2
     on_torques, on_angles = _signs(seed, linear.torques, length)
-    probes = np.zeros((_PROBES, 4, 2, n))
-    products = np.empty((2, n))
+    probes = np.zeros((_PROBES, 4, n, 2))  # in the rows' order from the beginning
+    felt, products = np.empty((2, n)), np.empty((2, n))
     for probe, angles in zip(probes, on_angles.astype(np.float64), strict=True):
         for joint in range(2):
+            felt[:] = 0.0
             for point in range(H.shape[2]):  # as `forward` of the one joint's signs
                 touched = angles[joint, first + point : first + point + n]
                 np.multiply(H[:, joint, point], touched, out=products)
-                probe[joint] += products
-    signs = on_torques.astype(np.float64)
+                felt += products
+            probe[joint] = felt.T
+    signs = linear.smeared(on_torques.astype(np.float64))
     for joint in range(2):
-        probes[:, 2 + joint] = linear.smeared(_only(signs, joint))
-    whitened = linear.solve_in_place(_by_row(probes.reshape(-1, 2, n)))
+        probes[:, 2 + joint, :, joint] = signs[:, joint]
+    whitened = linear.solve_in_place(probes.reshape(-1, rows))
     powers = np.sum(np.square(whitened, out=whitened), axis=1)
     return np.asarray(powers.reshape(_PROBES, 4).mean(axis=0))
 

@@ -29,6 +29,7 @@ from algid.estimators.integration import deviations, widened_by_integration
 from algid.estimators.log_likelihood import SHORTEST, Beside, LogEvidence, Outcome
 from algid.estimators.misfit import columns, misfit
 from algid.estimators.parametrisation import Shared
+from algid.estimators.repeats import Groups, grouped
 from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
@@ -40,15 +41,17 @@ from algid.progress import Progress
 from algid.signals.differences import Stencil
 
 _STEPS = 20
-_NOISE_STEPS = 12  # then the noise levels stay, so that the rest can settle
+_NOISE_STEPS = 12  # then noise levels stay and columns are smooth, so that the rest can settle
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
 _NOISE_SURE = 0.1  # the same of one of many logs, after which its noise levels stay
 _MOST_SCORED = 32  # logs; of more, those whose noise levels have settled are not scored again
 _MOST_TESTED = 32  # logs whose residual is held against the motion, evenly spread
+_MOST_COMPARED = 32  # logs among which repeats of a motion are looked for, pair by pair
 _CLOSE = 0.1  # standard deviations of the last step: friction's step at noisy speeds may keep it up
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
 _MANY = 4  # logs of which one is tried alone before all of them are
+_DRIVEN = 0.5  # standard deviations of a step back over the one before: noise drives it
 _GROWING = 1.5  # factor of a torque's error in a step: a step makes at most e of it
 _WIDTHS = 4  # times that the width of friction's step is looked for
 _WIDTH_SETTLED = 0.05  # change of its logarithm
@@ -147,6 +150,7 @@ def fit(
         prior,
         coloured=coloured,
         samples=samples,
+        repeats=_repeats(logs),
     )
     if width is not None:
         fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
@@ -176,6 +180,14 @@ def fit(
             deviance=deviance,
         )
     )
+
+
+def _repeats(logs: Sequence[LogEvidence]) -> Groups:
+    """Logs that repeat each other, by their training sets; none are looked for among many."""
+    if len(logs) > _MOST_COMPARED:
+        return ()
+    unloaded = [log.training for log in logs if not log.loaded]
+    return grouped(unloaded, [log.training for log in logs if log.loaded])
 
 
 def _imprints(fitted: Fit, logs: Sequence[LogEvidence], torques: Beside) -> list[Imprint]:
@@ -255,7 +267,7 @@ def _train(
     total = sum(log.trained for log in logs)
     known = any(log.noise_known for log in logs)
     many = len(logs) > _MOST_SCORED
-    share, before = 1.0, np.inf
+    share, before = 1.0, np.zeros_like(beta)
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
@@ -268,11 +280,16 @@ def _train(
         free = not known and iteration <= _NOISE_STEPS
         changes = _better_noise(logs, outcomes) if free else [0.0]
         improved = max(changes)
-        moved = _distance(better - beta, S)
-        if not free and moved > before:  # it steps to and fro
+        step = better - beta
+        moved = _distance(step, S)
+        driven = moved > _DRIVEN and _overshot(step, before, S)
+        if driven or iteration > _NOISE_STEPS:
+            for log in logs:
+                log.smooth = True
+        if not free and 0 < _distance(before, S) < moved:  # it steps to and fro
             share *= 0.5
-        before = moved
-        beta = beta + share * (better - beta)
+        before = step
+        beta = beta + share * step
         if not known and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
         if many and free and iteration > 1:
@@ -284,6 +301,15 @@ def _train(
     if moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE:
         return beta, outcomes, _STEPS, "settled"
     return beta, outcomes, _STEPS, "unsettled"
+
+
+def _overshot(step: FloatArray, before: FloatArray, S: FloatArray) -> bool:
+    """Whether a step (Q,) goes back further than the one `before` went.
+
+    Accelerations of trajectories keep noise, which makes columns look more informed than they are:
+    parameters that only such columns tell apart are chased to and fro.
+    """
+    return -float(step @ S @ before) > float(before @ S @ before) > 0
 
 
 def _better_noise(logs: Sequence[LogEvidence], outcomes: Sequence[Outcome]) -> list[float]:

@@ -126,9 +126,9 @@ class Selection:
         return replace(self, model=model, delay=delay, trials=trials)
 
     @property
-    def undecided(self) -> Lateness | None:
-        """The torque's lateness, if the logs were to choose its hold and do not determine it."""
-        if self.hold_by != "logs" or self.late is None or self.late.decided:
+    def undetermined(self) -> Lateness | None:
+        """The torque's lateness, if the logs were to choose its hold and do not tell it."""
+        if self.hold_by != "logs" or self.late is None or self.late.determined:
             return None
         return self.late
 

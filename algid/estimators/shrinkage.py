@@ -33,10 +33,12 @@ from algid.arm import FloatArray, keep_arrays
 from algid.estimators.combine import (
     LogInformation,
     Prior,
+    by_kind,
     combine,
     jackknife,
     long_run_variance,
     scaled_pinv,
+    scores_of,
 )
 from algid.estimators.parametrisation import Shared
 
@@ -84,7 +86,7 @@ def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray)
         for log in logs:
             if log.loaded is not kind:
                 continue
-            T, by_stretch = _scores(shared, log, beta)
+            T, by_stretch = scores_of(shared, log, beta)
             within += T.T @ long_run_variance(by_stretch)[0] @ T
             own += T.T @ log.total[0] @ T
             scores.append(by_stretch.sum(axis=0) @ T)
@@ -96,12 +98,6 @@ def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray)
     if informed.any():
         ratios.append(float(np.sum(scaled_pinv(informed) * among)) / _rank(informed))
     return max(1.0, *ratios)
-
-
-def _scores(shared: Shared, log: LogInformation, beta: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """T = dc/dβ, and the scores (B, q) of a log's stretches."""
-    change = shared.coefficients(beta, log.loaded) - log.c0
-    return shared.jacobian(beta, log.loaded), log.g - log.S @ change
 
 
 def _rank(S: FloatArray) -> int:
@@ -148,6 +144,7 @@ def shrink(
     """
     places = list(map(shared.names.index, expected.names))
     terms = np.array(expected.terms)
+    logs, _ = by_kind(logs)
     for _ in range(_STEPS):
         beta, H, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
         variance = np.diag(scaled_pinv(H))[places]
@@ -218,7 +215,7 @@ def spread(
         for log in logs:
             if log.loaded is not kind:
                 continue
-            T, by_stretch = _scores(shared, log, beta)
+            T, by_stretch = scores_of(shared, log, beta)
             variance, lags = long_run_variance(by_stretch)
             long_run += T.T @ variance @ T
             stretches += len(by_stretch) // (lags + 1)

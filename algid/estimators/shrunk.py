@@ -8,7 +8,7 @@ there: its windows are left out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from algid.criteria import AT_REST
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.fit import Fit
-from algid.estimators.modulating_functions import OVERLAP, row_weights
+from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.shrinkage import Expected, dispersion, divided, joined, shrink
@@ -31,6 +31,7 @@ from algid.names import within
 _DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _ROUNDS = 3
 _REWEIGHTINGS = 4
+_MOST_KEPT = 1 << 20  # samples of all logs whose moments stay in memory, some 40 bytes each
 
 
 def fit(
@@ -65,6 +66,7 @@ def fit(
     if known is not None:
         held = known.names
     first = logs.normals(_with_terms(settings, ()), {})
+    logs = logs.remembering([normal for _, normal in first])
     terms = offered([normal for _, normal in first], held)
     estimates_delay = settings.estimate_delay or settings.shift.delay == 0
     settings = replace(_with_terms(settings, terms), estimate_delay=estimates_delay)
@@ -99,20 +101,28 @@ def _with_terms(settings: WeakSettings, terms: Sequence[str]) -> WeakSettings:
     return replace(settings, model=model, estimate_delay=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Logs:
+    """Logs, and what all passes over each of them have in common, where that is little."""
+
     unloaded: tuple[Source, ...]
     loaded: tuple[Source, ...]
+    known: tuple[dict[Hashable, Known], ...] = ()
+
+    def remembering(self, normals: Sequence[Normal]) -> _Logs:
+        """The logs of `normals`, whose moments are kept unless they have too many samples."""
+        if sum(normal.samples for normal in normals) > _MOST_KEPT:
+            return self
+        return replace(self, known=tuple({} for _ in self.unloaded + self.loaded))
 
     def normals(
         self, settings: WeakSettings, at: Mapping[bool, FloatArray]
     ) -> list[tuple[bool, Normal]]:
         """Normal equations of each log that is long enough, and whether it is loaded."""
-        return [(kind, normal) for _, kind, normal in self._placed(settings, at)]
+        return [(kind, normal) for _, kind, normal in self.placed(settings, at)]
 
-    def groups(self, settings: WeakSettings) -> Groups:
-        """Which of the logs that are long enough repeat each other."""
-        places = [place for place, _, _ in self._placed(settings, {})]
+    def groups(self, places: Sequence[int]) -> Groups:
+        """Which of the logs at `places`, those that are long enough, repeat each other."""
         groups = []
         for group in grouped(self.unloaded, self.loaded):
             long_enough = tuple(map(places.index, within(group, places)))
@@ -120,12 +130,14 @@ class _Logs:
                 groups.append(long_enough)
         return tuple(groups)
 
-    def _placed(
+    def placed(
         self, settings: WeakSettings, at: Mapping[bool, FloatArray]
     ) -> Iterator[tuple[int, bool, Normal]]:
+        """The same with the place of each log."""
         for place, source in enumerate(self.unloaded + self.loaded):
             kind = place >= len(self.unloaded)
-            normal = weak.normal_equations(source, settings, at.get(kind))
+            known = self.known[place] if self.known else None
+            normal = weak.normal_equations(source, settings, at.get(kind), known)
             if normal is not None:
                 yield place, kind, normal
 
@@ -139,13 +151,14 @@ def _estimated(
     moved: FloatArray,
 ) -> Fit:
     base, columns = settings.shift.delay, len(settings.model.names)
-    normals = logs.normals(settings, {})
+    placed = list(logs.placed(settings, {}))
+    normals = [(kind, normal) for _, kind, normal in placed]
     bare = [normal for loaded, normal in normals if not loaded]
     burdened = [normal for loaded, normal in normals if loaded]
     beta, _ = weak.first_estimate(shared, bare, burdened, known)
     first = bare + burdened
     driven = _driven([normal for _, normal in normals])
-    groups = logs.groups(settings)
+    groups = logs.groups([place for place, _, _ in placed])
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
         if number:

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.estimators.combine import long_run_variance, scaled_pinv, scaled_pinvs
+from algid.estimators.combine import long_run_variances, scaled_pinv, scaled_pinvs
 from algid.estimators.hold import Lateness
 from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
-from algid.estimators.too_short import TooShortError
+from algid.estimators.too_short import OF_A_WINDOW, TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
 from algid.model import DELAYS, loads_of, names_of, terms_named, without_delay
 from algid.names import vector
@@ -121,9 +121,7 @@ class Grams:
                 normals.append((log.loaded, normal))
                 periods.append(log.pieces[0].dt)
         if not normals:
-            raise TooShortError(
-                "no log is long enough: expected at least a second of samples without a gap"
-            )
+            raise TooShortError(f"no {OF_A_WINDOW}")
         self._dt = max(normal.dt for _, normal in normals)
         logs_of = Counter(loaded for loaded, _ in normals)
         self.kinds = set(logs_of)
@@ -152,25 +150,34 @@ class Grams:
         ] = {}
 
     def _weigh(self, normals: Sequence[tuple[bool, Normal]]) -> None:
+        whole = np.stack([normal.gram.sum(axis=0) for _, normal in normals])
+        rows = np.stack([normal.rows for _, normal in normals])
+        is_loaded = np.array([loaded for loaded, _ in normals])
+        kinds = [(kind, np.flatnonzero(is_loaded == kind)) for kind in self.kinds]
         weights = np.ones((len(normals), 2))
-        whole = [normal.gram.sum(axis=0) for _, normal in normals]
         for _ in range(_REWEIGHTINGS):
             total = np.zeros((self.size + 1, self.size + 1))
-            for (loaded, normal), w in zip(normals, weights, strict=True):
-                rows = self._rows(loaded)
-                total[rows] += np.einsum("a,baxy->xy", w, normal.gram)
+            for loaded, own in kinds:
+                total[self._rows(loaded)] += np.einsum("na,naxy->xy", weights[own], whole[own])
             p = _solved(total, np.arange(self.size))
-            for place, (loaded, normal) in enumerate(normals):
+            for loaded, own in kinds:
                 signs = np.append(-p[self._places(loaded)], 1.0)
-                weights[place] = row_weights(whole[place], signs, normal.rows)
+                weights[own] = row_weights(whole[own], signs, rows[own])
         # Overlapping rows repeat each other: a window's worth of rows counts as two.
         share = 2.0 / OVERLAP
         self._logs: list[FloatArray] = []
-        self.cost = 0.0
         for (loaded, normal), w in zip(normals, weights, strict=True):
             gram = np.einsum("a,baxy->bxy", share * w, normal.gram)
             self._logs.append(self._wide(loaded, gram))
-            self.cost -= share * float(normal.rows @ np.log(w))
+        self.cost = -share * float(np.sum(rows * np.log(weights)))
+
+    @cached_property
+    def _alike(self) -> list[FloatArray]:
+        """Gram matrices (n, B, P + 1, P + 1) of logs with as many stretches."""
+        by_length: dict[int, list[FloatArray]] = {}
+        for gram in self._logs:
+            by_length.setdefault(len(gram), []).append(gram)
+        return [np.stack(alike) for alike in by_length.values()]
 
     def _places(self, loaded: bool) -> IntArray:
         """Where a log's coefficients stand in p."""
@@ -276,12 +283,14 @@ class Grams:
         """Least squares on `columns`, plain and sandwich covariance, independent stretches."""
         inverse = scaled_pinv(self._total[np.ix_(columns, columns)])
         value = inverse @ self._total[columns, -1]
+        v = np.zeros(self.size + 1)
+        v[columns], v[-1] = -value, 1.0
         meat, stretches = np.zeros_like(inverse), 0
-        for gram in self._logs:
-            scores = gram[:, columns, -1] - gram[:, columns[:, None], columns] @ value
-            variance, lags = long_run_variance(scores)
+        for alike in self._alike:
+            scores = (alike @ v)[:, :, columns]
+            variance, lags = long_run_variances(scores)
             meat += variance
-            stretches += len(gram) // (lags + 1)
+            stretches += int(np.sum(alike.shape[1] // (lags + 1)))
         stretches = max(stretches, len(columns) + 2)
         sandwich = inverse @ meat @ inverse * (stretches / (stretches - len(columns)))
         return value, (inverse, sandwich), stretches

@@ -38,7 +38,7 @@ from algid.estimators.fit import Fit, conclude
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
-from algid.estimators.too_short import TooShortError
+from algid.estimators.too_short import OF_A_WINDOW, TooShortError
 from algid.model import K2, K4, Model
 from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
@@ -271,9 +271,8 @@ def _started(
     shared: Shared, unloaded: Solved | None, loaded: Solved | None, prior: Prior | None
 ) -> tuple[FloatArray, list[LogInformation]]:
     """The same from what logs without and with payload give by themselves."""
-    too_short = "log is long enough: expected at least a second of samples without a gap"
     if unloaded is None and (prior is None or loaded is None):
-        raise TooShortError(f"no unloaded {too_short}")
+        raise TooShortError(f"no unloaded {OF_A_WINDOW}")
     logs: list[LogInformation] = []
     arm: FloatArray = np.zeros(len(shared.log_names))
     if unloaded is not None:
@@ -283,7 +282,7 @@ def _started(
     if not shared.payload:
         return arm, logs
     if loaded is None:
-        raise TooShortError(f"no loaded {too_short}")
+        raise TooShortError(f"no loaded {OF_A_WINDOW}")
     c, under_load = loaded
     S = np.concatenate([log.S for log in under_load])
     g = np.concatenate([log.g for log in under_load])
@@ -495,16 +494,13 @@ def solve(
 
     The rows of a joint weigh by its own residual, log by log.
     """
-    whole = [normal.gram.sum(axis=0) for normal in normals]
-    weights = np.ones((len(normals), 2))
-    c: FloatArray = np.zeros(normals[0].gram.shape[-1] - 1)
+    whole = np.stack([normal.gram.sum(axis=0) for normal in normals])
+    rows = np.stack([normal.rows for normal in normals])
+    weights: FloatArray = np.ones((len(normals), 2))
     for _ in range(_REWEIGHTINGS):
-        total = np.zeros((c.size + 1, c.size + 1))
-        for w, gram in zip(weights, whole, strict=True):
-            total += np.einsum("a,axy->xy", w, gram)
+        total = np.tensordot(weights, whole, 2)
         c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
-        for place, normal in enumerate(normals):
-            weights[place] = row_weights(whole[place], np.append(-c, 1.0), normal.rows)
+        weights = row_weights(whole, np.append(-c, 1.0), rows)
     logs = []
     for normal, w in zip(normals, weights, strict=True):
         # Overlapping rows repeat each other: a window's worth of rows counts as two.

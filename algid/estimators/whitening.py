@@ -131,6 +131,7 @@ def linearise(
     delay: bool = False,
     *,
     residual_only: bool = False,
+    smooth: FloatArray | None = None,
 ) -> Linearised:
     """Linearise a piece of log at a trajectory and at coefficients, and whiten it.
 
@@ -151,6 +152,9 @@ def linearise(
         shift.
     residual_only : bool
         Whether the residual is the only column, which is all that a trajectory needs.
+    smooth : (2, N), rad
+        A trajectory at which the derivatives by c are taken in place of `theta0`, without the
+        noise that is left in that one's accelerations.
 
     Raises
     ------
@@ -159,18 +163,11 @@ def linearise(
     """
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
-    theta, omega, alpha = stencil.differences(theta0)
-    motion = Motion(theta, omega, alpha)
-    if model.linear:
-        J = regressor(model, motion)
-        modelled = np.einsum("aqn,q->an", J, c)
-    else:
-        J = sensitivity(model, c, motion)
-        modelled = torque(model, c, motion)
-    if model.lag_name is not None:
-        lag = model.lag(c)
-        J, modelled = low_passed(J, stencil.dt, lag), low_passed(modelled, stencil.dt, lag)
-        J[:, model.names.index(model.lag_name)] = -np.gradient(modelled, stencil.dt, axis=1)
+    motion = Motion(*stencil.differences(theta0))
+    J, modelled = _modelled(model, c, motion, stencil.dt)
+    rising = modelled
+    if smooth is not None:
+        J, rising = _modelled(model, c, Motion(*stencil.differences(smooth)), stencil.dt)
     G = along_stencil(partials(model, c, motion), stencil.weights)
     measured = piece.tau
     if stencil.held:
@@ -182,12 +179,29 @@ def linearise(
     if not residual_only:
         parts.append(J.swapaxes(0, 1))
         if delay:
-            parts.append(np.gradient(modelled, stencil.dt, axis=1)[None])
+            parts.append(np.gradient(rising, stencil.dt, axis=1)[None])
     parts.append(error[None])
     rows = np.concatenate(parts)
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N", in_place=True)
     return Linearised(columns, factor, H, first, error, motion, stencil.held)
+
+
+def _modelled(
+    model: Model, c: FloatArray, motion: Motion, dt: float
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (2, q, n) of the torque by coefficients c (q,), and the torque (2, n) in N m."""
+    if model.linear:
+        J = regressor(model, motion)
+        modelled = np.einsum("aqn,q->an", J, c)
+    else:
+        J = sensitivity(model, c, motion)
+        modelled = torque(model, c, motion)
+    if model.lag_name is not None:
+        lag = model.lag(c)
+        J, modelled = low_passed(J, dt, lag), low_passed(modelled, dt, lag)
+        J[:, model.names.index(model.lag_name)] = -np.gradient(modelled, dt, axis=1)
+    return J, modelled
 
 
 def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:

@@ -108,6 +108,10 @@ def _with_model(survey: Survey, settings: Settings, earlier: Result | None) -> S
     return replace(chosen, hold=hold, hold_by=hold_by)
 
 
+_OF_HOLD = "kept: the logs leave open whether the torque is held, half a sample late"
+_OF_CONTROLLER = "kept: the logs leave open how late a controller that is faster than they are acts"
+
+
 def _with_hold(survey: Survey, settings: Settings) -> Selection:
     """The model and the hold that the logs show: not held where a delay is set or asked for."""
     chosen = _modelled(survey, settings, "foh")
@@ -120,8 +124,8 @@ def _with_hold(survey: Survey, settings: Settings) -> Selection:
         late = lateness(unloaded, loaded, weak_settings(settings, chosen))
     if late.hold == "zoh":
         chosen = _modelled(survey, settings, "zoh")
-    elif not late.decided and not chosen.delay:
-        why = "kept: the logs leave open whether the torque is held, half a sample late"
+    elif not late.determined and not chosen.delay:
+        why = _OF_CONTROLLER if late.faster else _OF_HOLD
         trials = [trial for trial in chosen.trials if trial.term not in DELAYS]
         trials += [TermTrial(term, True, np.nan, np.nan, why) for term in DELAYS]
         chosen = replace(chosen, delay=True, trials=tuple(trials))
@@ -152,8 +156,10 @@ def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
 
 def with_hold_of_fit(fit: Fit, chosen: Selection) -> Selection:
     """The selection with the hold that the fit determines, if the logs did not; else unchanged."""
-    late = chosen.undecided
-    if late is None or chosen.shrunk or not fit.converged or not set(DELAYS) <= set(fit.names):
+    late = chosen.undetermined
+    if late is None or late.faster or chosen.shrunk:
+        return chosen
+    if not fit.converged or not set(DELAYS) <= set(fit.names):
         return chosen
     place = fit.names.index(DELAYS[0])
     late = late.after(float(fit.values[place]), float(fit.std[place]))
@@ -213,8 +219,8 @@ def run_fit(
     nothing = absent(settings.effort, chosen.model.names)
     try:
         known = without(prior, nothing)
-        if chosen.undecided is not None and chosen.delay:
-            known = joined(known, chosen.undecided.prior)
+        if chosen.undetermined is not None and chosen.delay:
+            known = joined(known, chosen.undetermined.prior)
 
         def fitted(selection: Selection) -> Fit:
             windows = weak_settings(settings, selection)
@@ -492,7 +498,7 @@ def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
         term = EVERY_TERM[name]
         if name not in chosen.model.terms and set(term.names).isdisjoint(fit.names):
             continue
-        if name in DELAYS and chosen.undecided is not None:
+        if name in DELAYS and chosen.undetermined is not None:
             continue
         if term.sines and "y_p" in fit.shared.body:  # the payload's offset shows in them
             continue

@@ -373,7 +373,7 @@ def _expected(fit: Fit, chosen: Selection) -> list[str]:
     """Coefficients of terms that were not chosen: each is what the logs and a prior agree on."""
     if fit.shrinkage is not None:
         return list(fit.shrinkage.names)
-    if chosen.undecided is None:
+    if chosen.undetermined is None:
         return []
     return list(within(DELAYS, fit.names))
 
@@ -389,7 +389,8 @@ def _torque_hold(chosen: Selection) -> results.TorqueHold:
     return results.TorqueHold(
         asked=asked,
         used=chosen.hold,
-        told=late.decided,
+        told=late.determined,
+        faster=late.faster,
         half=late.half,
         late=late.late,
         late_std=finite(late.std),

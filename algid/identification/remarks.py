@@ -132,7 +132,11 @@ def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
     """That logs show a held torque, or leave it open."""
     if hold.told is None or hold.half is None:
         return
-    if not hold.told:
+    if hold.faster:
+        known = Remedy({"delay": None}, "half of the controller's period, in s")
+        even = Remedy({"torque_hold": "foh"}, "for a torque that is not held")
+        yield Notice("FASTER_CONTROLLER", remedies=(known, even), note=True)
+    elif not hold.told:
         held = Remedy({"torque_hold": "zoh"}, "for a digital controller that logs what it sets")
         yield Notice("HOLD_UNTOLD", numbers={"half": 1e3 * hold.half}, remedies=(held,), note=True)
     elif hold.used == "zoh":

@@ -365,7 +365,7 @@ class _PlainGroups:
             self.checked = most is None
         left = self.metadata.num_rows if most is None else most
         try:
-            with pq.ParquetFile(self.path, metadata=self.metadata) as file:
+            with pq.ParquetFile(self.path, metadata=self.metadata, pre_buffer=False) as file:
                 for batch in file.iter_batches(rows, columns=sources, use_threads=False):
                     kept = batch.slice(0, left)
                     left -= kept.num_rows

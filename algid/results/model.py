@@ -161,12 +161,13 @@ class TorqueHold(_Model):
     s of a torque that is not held, `late_std` its standard deviation, `odds` the log of the odds
     for a held torque, and `share` the largest error of any estimate under the wrong hold, in its
     standard deviations. `told` says whether these decided; if not, the delay is a parameter whose
-    prior covers both.
+    prior covers both, or what a controller that is `faster` than the log makes of it.
     """
 
     asked: Literal["auto", "foh", "zoh"]
     used: Literal["foh", "zoh"]
     told: bool | None = None
+    faster: bool | None = None
     half: float | None = None
     late: float | None = None
     late_std: float | None = None

@@ -174,13 +174,13 @@ def joined(parts: Sequence[Cells]) -> Cells:
 
 
 def cells_of(
-    segments: Iterable[Segment], arm: IdentifiedArm, mass: float, settle: int = 1
+    segments: Iterable[Segment], arm: IdentifiedArm, c: FloatArray, settle: int = 1
 ) -> list[Cells]:
-    """Cells of each piece of a log, linearised for a payload of `mass` kg.
+    """Cells of each piece of a log, linearised at the coefficients `c` (q,).
 
     They are linearised `settle` times more, each time at the trajectory of the fit before.
     """
-    c, cells = arm.k + mass * arm.unit, []
+    cells = []
     for piece in pieces(segments, _PIECE_SAMPLES):
         if len(piece) < 3 * POINTS:
             continue
@@ -191,16 +191,16 @@ def cells_of(
             multiplier = linear.solve_transposed(linear.columns[-1:])[0]
             theta = trajectory(piece, linear, multiplier, arm.noise)
             linear = linearise(arm.model, c, theta, piece, stencil, arm.noise)
-        cells.append(_sums(linear, piece, stencil, arm, mass))
+        cells.append(_sums(linear, piece, stencil, arm, c))
     return cells
 
 
 def _sums(
-    linear: Linearised, piece: Segment, stencil: Stencil, arm: IdentifiedArm, mass: float
+    linear: Linearised, piece: Segment, stencil: Stencil, arm: IdentifiedArm, c: FloatArray
 ) -> Cells:
     Y, e = linear.columns[:-1], linear.columns[-1]
     g = arm.unit @ Y
-    e = e + mass * g
+    e = e + (c - arm.k) @ Y
     torque = e + arm.k @ Y
     step = max(1, round(CELL / piece.dt))
     count = e.size // (2 * step)

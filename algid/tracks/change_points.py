@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.compiled import chi2_exceeded, student_quantile
 from algid.tracks.bins import Cells
 from algid.tracks.drift import BLOCK, Drift, drift_of
 
@@ -33,9 +34,8 @@ SPANS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 50)  # cells: 0.02 to 1 s
 LIGHTEST = 1e-6  # information of a block that counts, of the largest
 FEWEST = 8  # pairs of blocks that give a variance
 _MEDIAN = 0.454936  # of a squared standard normal
-_SPREAD = 2.33  # standard deviation of the median of n squares over _MEDIAN, times √n
-_MEAN_SPREAD = 1.73  # of the mean of n squares of neighbouring differences, times √n
-_SURE = 4.0  # of those standard deviations: white rows pass once in 30,000 spans
+CHANCE = 1e-4  # that white rows have an excess over one span
+_ALIKE = 1.5  # neighbouring differences share a block: n of their squares scatter as n / 1.5 do
 
 # cells ahead of a cut and behind it that may hold both masses: whitened rows show a change late
 AHEAD, BEHIND = 8, 5
@@ -163,10 +163,10 @@ def excess(
             white += np.einsum("cx,xy,cy->c", J, covariance, J)
         squares = np.diff(score / information)[neighbours] ** 2 / white[neighbours]
         if robust:
-            ratio, spread = _median(squares), _SPREAD
+            ratio, limit = _median(squares), _median_limit(squares.size)
         else:
-            ratio, spread = float(np.mean(squares)), _MEAN_SPREAD
-        if ratio > 1 + _SURE * spread / np.sqrt(squares.size):
+            ratio, limit = float(np.mean(squares)), _mean_limit(squares.size)
+        if ratio > limit:
             factor = max(factor, ratio)
     return factor
 
@@ -174,6 +174,25 @@ def excess(
 def _median(squares: FloatArray) -> float:
     """Variance of normal numbers from their squares, of which a few may be those of others."""
     return float(np.median(squares)) / _MEDIAN
+
+
+def _median_limit(count: int) -> float:
+    """What the `_median` of `count` squares of white rows passes by `CHANCE`.
+
+    That of ν squares is χ² of one degree of freedom at a share u which is Beta((ν + 1) / 2,
+    (ν + 1) / 2), so that u = ½ + t / 2 √(ν + 1 + t²) with Student's t of ν + 1. Of few squares it
+    is far from normal.
+    """
+    freedom = count / _ALIKE + 1
+    t = student_quantile(freedom, 1 - CHANCE)
+    beyond = 0.5 - 0.5 * t / np.sqrt(freedom + t**2)
+    return float(chi2_exceeded(1, beyond)) / _MEDIAN
+
+
+def _mean_limit(count: int) -> float:
+    """What the mean of `count` squares of white rows passes by `CHANCE`."""
+    freedom = count / _ALIKE
+    return float(chi2_exceeded(freedom, CHANCE)) / freedom
 
 
 def _blocks(x: FloatArray, starts: NDArray[np.int64], span: int) -> FloatArray:

@@ -39,6 +39,7 @@ from algid.tracks.placing import Changes, Place, confirmed, cut_to
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 FEWEST = 4  # cells that weigh a stretch
 CALM = 1  # cells more on both sides of the times at which a payload may be changing
+LASTING = 2.5  # s: for so long friction that drifts counts as constant where rows are linearised
 HALF_BAND = 0.25  # s: m_p(t) rests on so much log on both sides of t
 
 Pass = Callable[[], Iterable[Segment]]
@@ -108,19 +109,19 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
         If the log is too short.
     """
     arm, covariance = with_friction(arm, covariance)
-    parts = cells_of(source(), arm, mass=0.0, settle=0)
+    parts = cells_of(source(), arm, arm.k, settle=0)
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise TooShortError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
     segments = edges(cells)
     for _ in range(ROUNDS):
         rough = _cut(cells, segments.places)
-        cells = joined(_settled(source, arm, rough, _masses(rough, segments.drift)))
+        cells = joined(_settled(source, arm, rough, segments.drift))
         segments = edges(cells)
     changes = _changes(source, arm, cells, segments)
     inner = _inner_parts(cells, changes)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
-    settled = _settled(source, arm, inner, _masses(inner, segments.drift))
+    settled = _settled(source, arm, inner, segments.drift)
     return _weigh(cells, changes, settled, arm, covariance)
 
 
@@ -215,24 +216,51 @@ def _weigh(
 
 
 def _settled(
-    source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], masses: Sequence[float]
+    source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Drift | None
 ) -> list[Cells]:
-    """Each stretch's cells, linearised again at its own mass, in one pass over the log."""
-    settled = list(rough)
-    for place, own in groupby(_by_stretch(source(), arm, rough), key=itemgetter(0)):
-        cells = cells_of((segment for _, segment in own), arm, masses[place])
-        if cells:
-            settled[place] = joined(cells)
-    return settled
+    """Each stretch's cells, linearised again at its own mass and friction, in one pass."""
+    parts, about, counts = [], [], []
+    for cells, mass in zip(rough, _masses(rough, drift), strict=True):
+        own = _short(cells, drift)
+        counts.append(len(own))
+        parts += own
+        about += [_coefficients(arm, mass, part, drift) for part in own]
+    settled = list(parts)
+    for place, segments in groupby(_by_part(source(), arm, parts), key=itemgetter(0)):
+        linearised = cells_of((segment for _, segment in segments), arm, about[place])
+        if linearised:
+            settled[place] = joined(linearised)
+    ends = np.cumsum([0] + counts).tolist()
+    return [joined(settled[first:last]) for first, last in pairwise(ends)]
 
 
-def _by_stretch(
-    log: Iterable[Segment], arm: IdentifiedArm, rough: Sequence[Cells]
+def _short(cells: Cells, drift: Drift | None) -> list[Cells]:
+    """Parts of a stretch so short that friction hardly changes in them."""
+    if drift is None:
+        return [cells]
+    count = max(1, round(len(cells) * CELL / LASTING))
+    return _cut(cells, np.linspace(0, len(cells), count + 1).astype(int).tolist())
+
+
+def _coefficients(arm: IdentifiedArm, mass: float, part: Cells, drift: Drift | None) -> FloatArray:
+    """The arm's coefficients (q,) with a payload of `mass` kg, and with friction as in the part.
+
+    The angles' noise passes through the torque's partial derivatives, friction's among them: where
+    these are of another friction, rows have not the noise that is reckoned with, and masses err.
+    """
+    c = arm.k + mass * arm.unit
+    if drift is not None:
+        c[arm.friction] += drift.at(part.middle).mean(axis=0)
+    return c
+
+
+def _by_part(
+    log: Iterable[Segment], arm: IdentifiedArm, parts: Sequence[Cells]
 ) -> Iterator[tuple[int, Segment]]:
-    """The log's segments cut at the stretches' ends, each with its stretch's number."""
+    """The log's segments cut at the parts' ends, each with its part's number."""
     for segment in log:
         end = segment.start + len(segment) * segment.dt
-        for place, cells in enumerate(rough):
+        for place, cells in enumerate(parts):
             if cells.start[0] < end and cells.end[-1] > segment.start:
                 part = cut_to(segment, float(cells.start[0]), float(cells.end[-1]), arm.shift)
                 if part is not None:

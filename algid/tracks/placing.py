@@ -146,7 +146,12 @@ def _linearised(
     """H, torque residuals (2, n) and g (2, n) over the torques' noise, each row at its own mass."""
     angles, velocities, accelerations = stencil.differences(theta)
     motion = Motion(angles, velocities, accelerations)
-    coefficients = [arm.k + mass * arm.unit for mass in masses]
+    k = arm.k.copy()
+    if friction is not None:
+        usual = friction.mean(axis=1)
+        k[arm.friction] += usual
+        friction = friction - usual[:, None]
+    coefficients = [k + mass * arm.unit for mass in masses]
 
     def each(function: Callable[[Model, FloatArray, Motion], FloatArray]) -> FloatArray:
         columns = function(arm.model, coefficients[0], motion)

@@ -74,3 +74,41 @@ def test_odds_that_are_known_by_themselves_are_the_odds(odds: float) -> None:
     assert late.hold == ("zoh" if odds > SURE else "foh")
     assert late.decided == (abs(odds) > SURE)
     assert not late.another
+
+
+@pytest.mark.parametrize(("late", "least"), [(0.0, 0.95), (5e-4, 0.95), (1e-3, 0.88)])
+def test_where_a_faster_controller_may_hold_the_torque_the_error_is_within_what_is_said(
+    late: float, least: float
+) -> None:
+    """Of no controller, one of 1 kHz and one of 500 Hz, in logs of 100 Hz that tell as much.
+
+    That of 500 Hz is one and a half of the prior's deviations off: 0.9 hold it.
+    """
+    std = 5e-4
+    drawn = late + std * np.random.default_rng(8).standard_normal(20_000)
+    found = [Lateness(float(one), std, 5e-3, effect=1e3) for one in drawn]
+    faster = [one for one in found if one.faster]
+    assert len(faster) > 0.98 * len(found)
+    assert not any(one.determined for one in faster)
+    prior = faster[0].prior
+    weight = float(prior.precision[0, 0])
+    estimates = np.array([one.late for one in faster])
+    mean = (estimates * std**-2 + prior.mean[0] * weight) / (std**-2 + weight)
+    assert np.mean(np.abs(mean - late) * np.sqrt(std**-2 + weight) < 1.96) > least
+
+
+@pytest.mark.parametrize(
+    ("half", "effect"),
+    [(5e-4, 1e3), (5e-3, 1e2), (5e-3, np.inf)],
+    ids=["fast log", "no difference", "not compared"],
+)
+def test_no_faster_controller_is_thought_of_where_it_cannot_matter(
+    half: float, effect: float
+) -> None:
+    assert not Lateness(0.0, 0.1 * half, half, effect).faster
+
+
+def test_a_log_that_holds_its_own_torque_has_no_faster_controller() -> None:
+    late = Lateness(5e-3, 5e-4, 5e-3, effect=1e3)
+    assert late.determined
+    assert late.hold == "zoh"

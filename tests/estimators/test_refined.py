@@ -67,6 +67,8 @@ def test_known_noise_levels_are_kept(bench: Bench) -> None:
     known = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
     fit = refined.fit([lambda: [bench.log(sigma=1e-3)]], noise=known)
     assert fit.noise == (known,)
+    estimated = refined.fit([lambda: [bench.log(sigma=1e-3)]])
+    assert fit.iterations <= estimated.iterations
 
 
 def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
@@ -106,6 +108,25 @@ def test_a_delay_is_recovered_with_its_error_bar(bench: Bench) -> None:
     assert abs(fit.values[-1] - 5e-3) < 1e-4
     assert abs(fit.values[-1] - 5e-3) < 4 * fit.std[-1]
     assert np.allclose(fit.values[5:7], bench.truth[5:7], rtol=1e-3)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_what_noisy_accelerations_alone_tell_apart_settles(seed: int) -> None:
+    k, t = load_case("case1").arm.constants(), 1e-3 * np.arange(10_000)
+    draw = np.random.default_rng(seed)
+    rate = 2 * np.pi * np.array([0.1, 0.5, 0.9, 1.3, 1.9])[:, None, None]
+    size, phase = draw.uniform(0.2, 0.5, (5, 2, 1)), draw.uniform(0, 6, (5, 2, 1))
+    wave = size * np.exp(1j * (rate * t + phase))
+    theta, omega, alpha = (np.sum(wave * (1j * rate) ** n, axis=0).imag for n in range(3))
+    noise = draw.standard_normal((2, *theta.shape))
+    torque = inverse_dynamics(k, theta, omega, alpha) + 1e-2 * noise[1]
+    log = Segment(0.0, 1e-3, theta + 2e-6 * noise[0], torque)  # of a fine encoder
+    settings = WeakSettings(model=Model(terms=("rotor",)), estimate_delay=True)
+    found = refined.fit([lambda: [log]], settings=settings)
+    assert (found.estimator, found.converged) == ("refined", True)
+    assert found.iterations < 12  # a rotor and a delay go to and fro for ever without
+    truth = np.append(k, [0.0, 0.0])
+    assert np.all(np.abs(found.values - truth) < 4 * found.std)
 
 
 def test_a_held_torque_does_not_bias_friction(bench: Bench) -> None:

@@ -100,3 +100,20 @@ def test_a_payload_is_weighed_with_the_hold_of_its_arm() -> None:
     assert again.fit is not None
     assert again.fit.torque_hold is not None
     assert again.fit.torque_hold.used == "zoh"
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["held", "even"])
+def test_a_slow_log_of_a_faster_controller_leaves_open_how_late_it_acts(held: bool) -> None:
+    """A controller of 1 kHz, logged at 100 Hz: k6 would be three deviations off."""
+    here = scene("slow100", held, 302)
+    log = here.log(np.random.default_rng([302, 3, held]))
+    result = identify(log, report=False)
+    assert "FASTER_CONTROLLER" in [one.code for one in result.notices]
+    delay = result.parameters["delay"]
+    assert delay.estimate is not None
+    assert delay.std is not None
+    assert abs(delay.estimate - (5e-4 if held else 0.0)) < FARTHEST * delay.std < 1.5e-3
+    off = distances(result, here.arm.constants())
+    assert abs(off[CONSTANT_NAMES.index("k6")]) < FARTHEST
+    told = identify(log, settings=Settings(torque_hold="foh"), report=False)
+    assert (abs(distances(told, here.arm.constants())[5]) > 2) == held

@@ -100,3 +100,18 @@ def test_long_tables_are_read_in_bounded_memory(kind: str, tmp_path: Path) -> No
     assert rows == samples
     print(f"{kind}: {peak / 1e6:.0f} MB")
     assert peak < most, f"{peak / 1e6:.0f} MB"
+
+
+def test_what_was_read_of_parquet_is_not_kept(tmp_path: Path) -> None:
+    """Numbers that do not pack: Arrow holds some row groups of thirty, and not the file."""
+    path, rows, draw = tmp_path / "log.parquet", 1_500_000, np.random.default_rng(1)
+    columns = {name: draw.standard_normal(rows) for name in ("theta1", "theta2", "tau1", "tau2")}
+    table = pa.table({"t": np.arange(rows) / 1000, **columns})
+    pq.write_table(table, path, row_group_size=50_000)
+    del table
+    pool = pa.default_memory_pool()
+    before, held = pool.bytes_allocated(), 0
+    for block in open_log(path).blocks(50_000):
+        assert len(block)
+        held = max(held, pool.bytes_allocated() - before)
+    assert held < path.stat().st_size / 2

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from algid.log import Log
+from algid.model import Model
 from algid.synth.cases import load_case
 
 CASE = load_case("case1")
@@ -18,3 +19,12 @@ def noisy(log: Log, rng: np.random.Generator) -> Log:
     return replace(
         log, theta=theta, tau=log.tau + 1e-2 * rng.standard_normal(log.tau.shape), omega=None
     )
+
+
+RUBBING = Model(("coulomb",), coulomb_speed=0.1)
+
+
+def rubbing(log: Log, friction: float) -> Log:
+    """The log with Coulomb friction of so many N m in both joints, as `RUBBING` has it."""
+    assert log.omega is not None
+    return replace(log, tau=log.tau + friction * np.tanh(log.omega / RUBBING.coulomb_speed))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.arm import with_payload
+from algid.arm import FloatArray, with_payload
 from algid.criteria import HOLE
 from algid.errors import LogError
 from algid.estimators.whitening import NoiseLevels
@@ -49,6 +49,11 @@ def numbered(count: int) -> Cells:
         n[:, None] * np.ones(2),
         [5, 6],
     )
+
+
+def carrying(mass: float) -> FloatArray:
+    """The arm's constants (7,) with `mass` kg at its tip."""
+    return ARM.k + mass * ARM.unit
 
 
 def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
@@ -111,7 +116,7 @@ def test_scores_shift_with_constants_and_lengths_by_their_derivatives() -> None:
 def test_cells_weigh_the_payload_wherever_they_are_linearised(mass: float, about: float) -> None:
     log = loaded(mass)
     for _ in range(4):  # noisy angles bias a mass that is linearised far from itself
-        cells = joined(cells_of(segments([log]), ARM, about))
+        cells = joined(cells_of(segments([log]), ARM, carrying(about)))
         about = cells.mass
     std = 1 / np.sqrt(cells.A.sum())
     assert abs(cells.mass - mass) < 4.5 * std < 0.01
@@ -125,8 +130,8 @@ def test_cells_weigh_the_payload_wherever_they_are_linearised(mass: float, about
 
 def test_pieces_too_short_for_the_stencil_are_left_out() -> None:
     log = loaded(0.0)
-    assert cells_of(segments([log.part(0, 26)]), ARM, 0.0) == []
-    assert len(cells_of(segments([log.part(0, 27)]), ARM, 0.0)) == 1
+    assert cells_of(segments([log.part(0, 26)]), ARM, ARM.k) == []
+    assert len(cells_of(segments([log.part(0, 27)]), ARM, ARM.k)) == 1
 
 
 def test_a_track_is_the_weighted_mean_over_its_neighbourhood_and_its_band_that_ones_error() -> None:
@@ -156,7 +161,7 @@ def test_an_uncertain_arm_adds_its_share_to_the_variance() -> None:
     sure, wide = (
         track(lambda: segments([log]), ARM, one).stretches[0] for one in (NOTHING, covariance)
     )
-    cells = joined(cells_of(segments([log]), ARM, sure.m_p))
+    cells = joined(cells_of(segments([log]), ARM, carrying(sure.m_p)))
     J = cells.sensitivity(ARM, np.full(len(cells), sure.m_p)).sum(axis=0) / cells.A.sum()
     # cells at both ends are left out
     assert sure.std**2 == pytest.approx(1 / cells.A.sum(), rel=0.1)

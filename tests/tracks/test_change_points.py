@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.stats import binom
 
 from algid.arm import FloatArray
 from algid.tracks.bins import CELL, Cells
 from algid.tracks.change_points import (
     AHEAD,
     BEHIND,
+    CHANCE,
     PENALTY,
     SHORTEST,
     Starts,
@@ -164,6 +166,19 @@ def test_white_rows_have_no_excess_and_slow_errors_have_theirs(robust: bool) -> 
     # more
     slow = 0.5 * np.sign(np.sin(np.arange(4000) * np.pi / 50))
     assert excess(A, B + A * slow, whole, robust=robust) > 10
+
+
+@pytest.mark.parametrize("robust", [True, False])
+@pytest.mark.parametrize("pairs", [8, 15, 60])
+def test_few_blocks_of_white_rows_have_no_excess_by_chance(pairs: int, robust: bool) -> None:
+    """Once in `CHANCE`: the median of few squares is far from normal, and so is their mean."""
+    rng, count = np.random.default_rng(8), 3000
+    A = np.ones(pairs + 1)
+    false = 0
+    for _ in range(count):
+        B = rng.standard_normal(pairs + 1)
+        false += excess(A, B, [(0, pairs + 1)], [1], robust=robust) > 1
+    assert false <= binom.isf(1e-3, count, CHANCE)
 
 
 def test_errors_of_a_few_moments_are_in_the_mean_alone() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from algid.model import Model
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment, segments
 from algid.tracks.bins import IdentifiedArm
+from algid.tracks.drift import Drift
 from algid.tracks.placing import (
     Changes,
     Place,
@@ -22,7 +25,7 @@ from algid.tracks.placing import (
     step_response,
     windows,
 )
-from tests.tracks.folders import CASE, noisy
+from tests.tracks.folders import CASE, RUBBING, noisy, rubbing
 
 ARM = IdentifiedArm(
     Model(),
@@ -119,6 +122,17 @@ def test_the_residual_of_the_arm_and_its_payload_is_white(picking: Log) -> None:
     behind = left[np.repeat((rows.t > 1.45) & (rows.t < 1.7), 2)]
     assert np.mean(behind**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / behind.size))
     assert place(rows, 1.3, 1.7, 1.0).time == pytest.approx(1.5, abs=0.03)
+
+
+def test_the_residual_is_white_too_where_friction_changed(picking: Log) -> None:
+    """The angles' noise passes through the friction that is there, not through the arm's own."""
+    log = noisy(rubbing(picking, 0.1), np.random.default_rng(4))
+    (piece,) = (piece for _, piece in windows(segments([log]), [(0.1, 1.4)], 0.0))
+    k = np.append(ARM.k, [0.0, 0.0])
+    phi = np.tile([0.0, 0.0, 0.1, 0.1], (2, 1))
+    drift = Drift(np.array([0.0, 4.5]), phi, np.zeros((8, 8)))
+    left = rows_of(piece, replace(ARM, model=RUBBING, k=k), drift, [], [0.0]).e
+    assert np.mean(left**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / left.size))
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.004, 0.0125, -0.007])

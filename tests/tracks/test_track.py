@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from scipy.stats import chi2
 from typer.testing import CliRunner
 
 import algid
@@ -28,7 +29,7 @@ from algid.tracks.payload import HALF_BAND, Track, track
 from algid.writers import write_log
 from tests.cli.commands import app
 from tests.intervals import holds_95
-from tests.tracks.folders import CASE, noisy
+from tests.tracks.folders import CASE, RUBBING, noisy, rubbing
 
 MASSES = (0.0, 0.05, 0.0)
 NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
@@ -107,6 +108,25 @@ def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(
     wider = _track(log, covariance=spread.T @ spread)
     found = [a.std**2 - b.std**2 for a, b in zip(wider.stretches, before.stretches, strict=True)]
     np.testing.assert_allclose(found, np.square(moves).sum(axis=0), rtol=0.05)
+
+
+@pytest.mark.parametrize("known", [0.0, 0.12])
+def test_friction_that_changed_biases_no_mass(picking: Log, known: float) -> None:
+    """Friction of 0.1 N m, of an arm identified with less or with more: χ² of the masses' errors.
+
+    Where rows are linearised at the arm's friction instead of that of the log, masses are off by
+    two to three of their own deviations, all to one side.
+    """
+    k = np.append(CASE.arm.constants(), [known, known])
+    arm = IdentifiedArm(RUBBING, k, CASE.arm.l1, CASE.arm.l2, NOISE)
+    log, rng, errors = rubbing(picking, 0.1), np.random.default_rng(0), []
+    for _ in range(6):
+        noise = noisy(log, rng)
+        found = track(lambda log=noise: segments([log]), arm, np.zeros((11, 11)))  # type: ignore[misc]
+        for stretch, mass in zip(found.stretches, MASSES, strict=True):
+            errors.append((stretch.m_p - mass) / stretch.std)
+    low, high = chi2.interval(1 - 1e-3, len(errors))
+    assert low < np.sum(np.square(errors)) < high
 
 
 def test_a_constant_payload_is_one_stretch(picking: Log) -> None:

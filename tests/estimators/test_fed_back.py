@@ -1,0 +1,65 @@
+"""A controller makes torque of its encoders' noise: no delay is seen in that, and others are.
+
+The simulator shares no equation with algid. Noise and torque correlate by the controller's delay,
+which the score test took for one of the arm's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from algid.estimators import refined
+from algid.estimators.fit import Fit
+from algid.estimators.weak import WeakSettings
+from algid.signals.segments import Segment
+from algid.signals.shift import TorqueShift
+from algid.synth.cases import load_case
+from pipelines.controlled import Controller, Plan, controlled
+
+RATE, SECONDS, NOISE = 1000.0, 8.0, 2e-3
+
+
+@cache
+def follower() -> Segment:
+    """Case 1's arm behind a digital PD controller whose encoders are noisy."""
+    arm = load_case("case1").arm
+    k = arm.constants()
+    stiffness = 2 * np.pi * 4.0
+    inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])
+    gains = np.diag(inertia * stiffness**2), np.diag(1.4 * inertia * stiffness)
+    count = round(SECONDS * RATE)
+    t = np.arange(2 * count - 1) / (2 * RATE)
+    turn = 2 * np.pi * np.array([[0.4, 1.1, 1.9], [0.6, 1.3, 2.3]])[:, :, None]
+    theta = 0.4 * np.sin(turn * t).sum(axis=1) - np.array([[np.pi / 2], [0.0]])
+    omega = 0.4 * (turn * np.cos(turn * t)).sum(axis=1)
+    weight = np.stack([k[3] * np.cos(theta[0]), 0 * t]) + k[1] * np.cos(theta.sum(axis=0))
+    rng = np.random.default_rng(3)
+    controller = Controller(*gains, digital=True, seen=np.full(2, NOISE))
+    nothing = np.zeros((count, 1))
+    moved = controlled(arm, Plan(theta, omega, weight), controller, nothing, nothing[0], RATE, rng)
+    tau = moved.tau[:, :, 0] + 1e-2 * rng.standard_normal((2, count))
+    return Segment(0.0, 1 / RATE, moved.seen[:, :, 0], tau)
+
+
+def fitted(log: Segment) -> Fit:
+    return refined.fit([lambda: [log]], (), WeakSettings(shift=TorqueShift(held=True)))
+
+
+def test_noise_that_is_fed_back_is_no_delay() -> None:
+    fit = fitted(follower())
+    assert not fit.refuted
+    truth = load_case("case1").arm.constants()
+    assert np.all(np.abs(fit.values - truth) < 4 * fit.std)
+
+
+def test_a_delay_is_seen_behind_noise_that_is_fed_back() -> None:
+    """The torque is logged two samples before it acts."""
+    log = follower()
+    late = replace(log, theta=log.theta[:, :-2], tau=log.tau[:, 2:])
+    misfit = fitted(late).misfit
+    assert misfit is not None
+    evident = {one.term: one.p_value for one in misfit.overlooked}
+    assert evident["delay"] < 1e-6
