@@ -63,7 +63,6 @@ def run(arguments: Sequence[str]) -> int:
     from algid.faults import TRACEBACK, fault
     from algid.runtime import check_environment
 
-    cause: BaseException
     try:
         try:
             check_environment()
@@ -73,21 +72,37 @@ def run(arguments: Sequence[str]) -> int:
         finally:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
         return 0
-    except AlgidError as error:
-        line, code, cause = str(error), int(Exit.USAGE), error
-    except _StoppedError:
-        complain("stopped; nothing half-written is left")
-        raise
-    except (SystemExit, KeyboardInterrupt):
-        raise
     except BaseException as error:  # whatever a library raises, a panic too
-        (line, code), cause = fault(error), error
+        if (stop := _stop_behind(error)) is not None:
+            complain("stopped; nothing half-written is left")
+            raise stop from None
+        if isinstance(error, SystemExit | KeyboardInterrupt):
+            raise
+        is_told = isinstance(error, AlgidError)
+        line, code = (str(error), int(Exit.USAGE)) if is_told else fault(error)
+        cause = error
     if os.environ.get(TRACEBACK) == "1":
         import traceback
 
         remark("".join(traceback.format_exception(cause)))
     complain(line)
     return code
+
+
+def _stop_behind(error: BaseException) -> _StoppedError | None:
+    """The stop that an exception stands for, or None.
+
+    A signal that comes while a library is imported, or reads, may be wrapped in its exception:
+    Python 3.11 turns what is raised as a class is made into a RuntimeError.
+    """
+    behind: BaseException | None = error
+    seen: set[int] = set()
+    while behind is not None and id(behind) not in seen:
+        if isinstance(behind, _StoppedError):
+            return behind
+        seen.add(id(behind))
+        behind = behind.__cause__ or behind.__context__
+    return None
 
 
 class _Stopping:

@@ -131,6 +131,33 @@ def test_an_end_that_is_meant_keeps_its_meaning(
     assert told in ("", "algid: stopped; nothing half-written is left\n")
 
 
+def in_a_class(_path: object) -> object:
+    """A signal comes as a class is made: Python 3.11 raises a RuntimeError in its place."""
+
+    class Named:
+        def __set_name__(self, _owner: type, _name: str) -> None:
+            raise _StoppedError(14)
+
+    return type("Owner", (), {"field": Named()})
+
+
+def in_a_library(_path: object) -> object:
+    """A signal comes where a library turns every exception into its own."""
+    try:
+        raise _StoppedError(14)
+    except BaseException:
+        raise OSError("cannot read") from None
+
+
+@pytest.mark.parametrize("stopped", [in_a_class, in_a_library])
+def test_a_stop_in_another_exception_is_a_stop(
+    stopped: Callable[[object], object], run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("algid.inspection.report.format_of", stopped)
+    said = "algid: stopped; nothing half-written is left\n"
+    assert run("inspect", "log.csv") == (142, said)
+
+
 def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_path: Path) -> None:
     log = result.parent / "case1-unloaded.mcap"
     calls: tuple[tuple[object, ...], ...] = (
