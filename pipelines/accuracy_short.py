@@ -25,7 +25,7 @@ from algid.estimators import refined, shrunk
 from algid.estimators.fit import Fit
 from algid.estimators.selection import Selection, select
 from algid.estimators.weak import Source, WeakSettings
-from algid.identification.by_likelihood import without_nothing
+from algid.identification.model_choice import without_nothing
 from algid.model import Model
 from algid.settings import Settings
 from algid.signals.segments import Segment

@@ -32,7 +32,8 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import PredictionFilter, motion_of
 from algid.estimators.selection import select
 from algid.estimators.weak import Source, WeakSettings
-from algid.identification.by_likelihood import choose_model, run_fit
+from algid.identification.by_likelihood import run_fit
+from algid.identification.model_choice import choose_model
 from algid.identification.source import LogSource, open_sources
 from algid.identification.survey import Survey
 from algid.log import Log, Origin

@@ -19,13 +19,9 @@ from algid.estimators.fit import Fit
 from algid.estimators.hold import Hold, Lateness
 from algid.estimators.selection import FIRST_TERMS, Selection
 from algid.estimators.too_short import TooShortError
-from algid.identification.by_likelihood import (
-    completed,
-    finished,
-    passes,
-    weak_settings,
-    without_nothing,
-)
+from algid.identification.by_likelihood import completed, finished
+from algid.identification.model_choice import without_nothing
+from algid.identification.passes import passes, weak_settings
 from algid.identification.survey import Survey
 from algid.model import CHOICES, without_delay
 from algid.names import within

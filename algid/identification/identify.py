@@ -247,7 +247,7 @@ def _by_likelihood(
     survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
 ) -> tuple[Identified, Settings]:
     """The outcome of the logs, and the settings with the effort that they show."""
-    from algid.identification.by_likelihood import residual_of, with_doubt, with_endogeneity
+    from algid.identification.doubts import residual_of, with_doubt, with_endogeneity
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
     from algid.identification.trials import advised
@@ -294,14 +294,10 @@ def _fitted(
     survey: Survey, settings: Settings, earlier: Earlier | None
 ) -> tuple[Fit, Predictions, Selection]:
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
-    from algid.identification.by_likelihood import (
-        choose_model,
-        run_fit,
-        with_hold_of_fit,
-        without_nothing,
-    )
+    from algid.identification.by_likelihood import run_fit
     from algid.identification.coarse import fit_coarse
     from algid.identification.known import prior_of
+    from algid.identification.model_choice import choose_model, with_hold_of_fit, without_nothing
 
     survey.begin("choosing terms")
     if earlier is None:

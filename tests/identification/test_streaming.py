@@ -11,8 +11,9 @@ import pytest
 import algid
 from algid.arm import FloatArray
 from algid.identification import survey as surveys
-from algid.identification.by_likelihood import choose_model, run_fit
+from algid.identification.by_likelihood import run_fit
 from algid.identification.by_paper import run_paper
+from algid.identification.model_choice import choose_model
 from algid.identification.outcome import outcome_of
 from algid.identification.source import LogSource, open_source
 from algid.identification.summary import result_of

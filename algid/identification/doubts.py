@@ -1,0 +1,93 @@
+"""What is asked of a fit afterwards: its residual, its instruments, what makes it doubtful."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from algid.estimators import instruments, weak
+from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
+from algid.estimators.doubt import doubted, doubted_without_motor
+from algid.estimators.fit import Fit
+from algid.estimators.innovations import ResidualSums, pooled
+from algid.estimators.prediction import PredictionScore, score
+from algid.estimators.selection import FIRST_TERMS, Selection
+from algid.identification.passes import passes, weak_settings
+from algid.identification.predicted import prediction
+from algid.identification.remarks import exchanged
+from algid.identification.series import torque_coefficients, torque_shift
+from algid.identification.survey import Survey
+from algid.model import RIGID
+from algid.notices import Notice
+from algid.settings import Settings
+
+MOST = 0.5
+"""R² below which most of a torque is not the model's."""
+
+
+def residual_of(
+    survey: Survey, settings: Settings, chosen: Selection, fit: Fit
+) -> ResidualSums | None:
+    """Residual sums of the estimator behind the fit: of its innovations, or of its windows.
+
+    None where no log is long enough.
+    """
+    if fit.residual:
+        return pooled(fit.residual)
+    windows = weak_settings(settings, chosen)
+    if fit.delay is not None:
+        windows = replace(windows.delayed(fit.delay), estimate_delay=False)
+    unloaded, loaded = passes(survey, settings)
+    sums = []
+    for role, of_role in (("unloaded", unloaded), ("loaded", loaded)):
+        for moving in of_role:
+            c = torque_coefficients(fit, role)
+            of_log = weak.residuals(moving, windows, c)
+            if of_log is not None:
+                sums.append(of_log)
+    return pooled(sums)
+
+
+def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
+    """The fit; where its likelihood is refuted, with what makes k1 … k5 doubtful: see `doubted`.
+
+    Of an arm with a joint that has no motor, whether its equation determines them: see
+    `doubted_without_motor`. One that physics contradicts stays as sure as it is, so that the
+    contradiction is reported, as logs in each other's place are.
+    """
+    if any(log.origin.reading.passive for log in survey.logs):
+        unloaded, loaded = passes(survey, settings)
+        fit = doubted_without_motor(fit, unloaded, loaded, weak_settings(settings, chosen))
+    if not (fit.refuted and settings.chooses) or exchanged(fit):
+        return fit
+    far = []
+    for broken in broken_bounds(fit):
+        if broken.distance is not None and broken.distance > FAR_BEYOND:
+            far.append(broken.bound)
+    if far:
+        lawful = constrained(fit)
+        if not lawful.converged or _explains_little(lawful, survey, settings):
+            return fit
+        doubt = Notice("BOUNDS_DOUBTED", numbers={"bounds": far})
+        return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
+    unloaded, loaded = passes(survey, settings)
+    common = replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
+    return doubted(fit, unloaded, loaded, weak_settings(settings, common))
+
+
+def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
+    """Whether most of a joint's torque is not what the fit makes it."""
+    total = PredictionScore()
+    for log in survey.logs:
+        c, shift = torque_coefficients(fit, log.role), torque_shift(settings, fit)
+        total += score(fit.shared.model, c, survey.segments(log), shift)
+    predicted = prediction(total)
+    return predicted is not None and bool(predicted.unexplained(MOST))
+
+
+def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
+    """The fit with the distance of instruments from least squares on its logs, if not yet known."""
+    if fit.endogeneity is not None:
+        return fit
+    unloaded, loaded = passes(survey, settings)
+    ours = weak_settings(settings, chosen)
+    return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, ours, fit))
