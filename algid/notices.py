@@ -259,12 +259,11 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "MOTORLESS_UNTOLD": (
         "joint {joint} has no motor, and what else moves it (friction, cables) pulls as hard as "
         "its load: k1 … k5 are "
-        "not told; move it faster"
+        "not determined; move it faster"
     ),
     "JOINTS_CONTRADICT": (
-        "joint 1 by itself tells {name} as {first:.2g} {unit} and joint 2 as {second:.2g}: one of "
-        "them is hardly "
-        "driven, or a term is missing; give a log that drives both"
+        "{name} is {first:.2g} {unit} from joint 1's equation alone and {second:.2g} from "
+        "joint 2's: one of them is hardly driven, or a term is missing; give a log that drives both"
     ),
     "HARDLY_DRIVEN": (
         "joint {joint} has less than {percent:.3g} % of the other's torque in every log: bearings "

@@ -11,7 +11,7 @@ bends between two samples is not the straight line that it is taken for. Part of
 like another inertia, which no choice of terms can tell from the arm's own: where a log has no
 noise, this is its error.
 
-The log tells each deviation h from what is left of it beside the estimates,
+The log determines each deviation h from what is left of it beside the estimates,
 
     h = (Gᵀ V⁻¹ P G)⁻¹ Gᵀ V⁻¹ P e,   P without what the parameters take up,
 
@@ -49,10 +49,10 @@ DEVIATIONS = ("velocity of friction", "velocity of inertia", "position", "bend",
 """Friction at another velocity, Coriolis' torque at another one, gravity and inertia at another
 position, a torque that bends between samples, and one that acts at another time."""
 _INERTIAL = frozenset({*(n for n in RIGID if PARAMETERS[n].scale is not VISCOUS), *SINES})
-_TOLD = 1e-6
-"""Share of a deviation's torque: with less beside the parameters, the log does not tell it."""
+_DETERMINED = 1e-6
+"""Share of a deviation's torque: with less beside the parameters, the log does not determine it."""
 _SURE = 0.05
-"""Samples: what the log tells no better, it does not tell."""
+"""Samples: what the log determines no better, it does not determine."""
 _LARGEST = 1.5
 """Samples: no integrator is further off; what is, is something else than integration."""
 _FELT = 1.1
@@ -101,30 +101,30 @@ def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior |
     Returns
     -------
     Fit
-        `fit` itself where the logs tell no deviation, or one that no integration makes.
+        `fit` itself where the logs determine no deviation, or one that no integration makes.
 
     Notes
     -----
     A deviation that the parameters take up whole, as a rotor's inertia does that of its joint's
-    friction, counts as large as the largest that the logs tell.
+    friction, counts as large as the largest that the logs determine.
     """
     sums = summed(fit, imprints, prior)
     D, beside, right = sums.beside()
     made = np.diag(sums.GG) > 0
-    told = np.diag(beside) > _TOLD * np.diag(sums.GG)
-    told[told] = np.sqrt(np.diag(scaled_pinv(beside[np.ix_(told, told)]))) < _SURE
-    if not told.any():
+    seen = np.diag(beside) > _DETERMINED * np.diag(sums.GG)
+    seen[seen] = np.sqrt(np.diag(scaled_pinv(beside[np.ix_(seen, seen)]))) < _SURE
+    if not seen.any():
         return fit
-    information = beside[np.ix_(told, told)]
+    information = beside[np.ix_(seen, seen)]
     h = np.zeros(made.size)
-    h[told] = scaled_pinv(information) @ right[told]
+    h[seen] = scaled_pinv(information) @ right[seen]
     largest = float(np.abs(h).max())
-    by_chance = chi2_tail(int(told.sum()), float(h[told] @ information @ h[told])) >= LEVEL
+    by_chance = chi2_tail(int(seen.sum()), float(h[seen] @ information @ h[seen])) >= LEVEL
     if by_chance or largest > _LARGEST:
         return fit
-    untold = made & ~told
-    untold[DEVIATIONS.index("stamps")] &= not _shifted(fit)
-    moved = np.column_stack([D @ h, largest * D[:, untold]])
+    unseen = made & ~seen
+    unseen[DEVIATIONS.index("stamps")] &= not _shifted(fit)
+    moved = np.column_stack([D @ h, largest * D[:, unseen]])
     wider = fit.covariance + moved @ moved.T
     before, after = np.sqrt(np.diag(fit.covariance)), np.sqrt(np.diag(wider))
     factor = float(np.max(np.divide(after, before, out=np.ones_like(after), where=before > 0)))
