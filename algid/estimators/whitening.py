@@ -56,7 +56,7 @@ class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
     `factor` holds Lᵀ as LAPACK's upper band; `first` is the angle sample of the first stencil's
-    first point; `motion` is the trajectory's where the residual stands; `held` says whether F is
+    first point; `motion` is where the columns but the residual stand; `held` says whether F is
     `held_torque`.
     """
 
@@ -165,10 +165,11 @@ def linearise(
     torques, first = stencil.torques(length), stencil.first(length)
     motion = Motion(*stencil.differences(theta0))
     J, modelled = _modelled(model, c, motion, stencil.dt)
+    G = along_stencil(partials(model, c, motion), stencil.weights)
     rising = modelled
     if smooth is not None:
-        J, rising = _modelled(model, c, Motion(*stencil.differences(smooth)), stencil.dt)
-    G = along_stencil(partials(model, c, motion), stencil.weights)
+        motion = Motion(*stencil.differences(smooth))
+        J, rising = _modelled(model, c, motion, stencil.dt)
     measured = piece.tau
     if stencil.held:
         measured = held_torque(measured)

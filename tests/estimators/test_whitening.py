@@ -3,6 +3,7 @@ together.
 """
 
 import numpy as np
+import pytest
 
 from algid.estimators.whitening import (
     NoiseLevels,
@@ -12,7 +13,7 @@ from algid.estimators.whitening import (
     linearise,
     trajectory,
 )
-from algid.model import Model
+from algid.model import Model, regressor
 from algid.signals.differences import HELD, POINTS, Stencil
 from algid.signals.segments import Segment
 
@@ -94,6 +95,19 @@ def _lower(factor: np.ndarray) -> np.ndarray:
     return np.asarray(
         sum(np.diag(factor[-1 - below, below:], -below) for below in range(2 * POINTS))
     )
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_columns_stand_at_the_motion_that_it_names(bench: Bench, smooth: bool) -> None:
+    """So that a torque beside them is held against columns of the same motion."""
+    log = bench.log(sigma=1e-3)
+    piece = Segment(0.0, log.dt, log.theta[:, 1000:1120], log.tau[:, 1000:1120])
+    k, truth = bench.arm.constants(), bench.bare.theta[:, 1000:1120]
+    at = truth if smooth else None
+    linear = linearise(Model(), k, piece.theta, piece, Stencil(log.dt), NOISE, smooth=at)
+    rows = (regressor(Model(), linear.motion) / NOISE.tau[:, None, None]).transpose(1, 2, 0)
+    expected = linear.solve(np.ascontiguousarray(rows).reshape(len(k), -1))
+    np.testing.assert_allclose(linear.columns[:-1], expected, rtol=1e-9)
 
 
 def test_the_trajectory_moves_towards_the_truth(bench: Bench) -> None:
