@@ -70,7 +70,7 @@ def _draw(job: tuple[str, float, bool, int]) -> dict[str, Any]:
     found["paper"] = scenes.paper(bare, burdened, here.arm.g)
     for method, fit in fits.items():
         found[method] = fit.values[:8]
-        found[f"{method} inside"] = np.abs(fit.values - here.truth) <= fit.quantile * fit.std
+        found[f"{method} inside"] = here.held_by(fit)
     found["fell back"] = np.array(
         fits["refined"].estimator != "refined" or not fits["refined"].converged
     )

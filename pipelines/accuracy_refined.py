@@ -32,9 +32,7 @@ def draw(name: str, sigma: float, encoder: bool, seed: int) -> tuple[FloatArray,
         for log in (here.bare, here.burdened)
     )
     fit = accuracy.fit_pair(refined.fit, bare, loaded)
-    return fit.values[:8] - here.truth[:8], np.abs(
-        fit.values - here.truth
-    ) <= fit.quantile * fit.std
+    return fit.values[:8] - here.truth[:8], here.held_by(fit)
 
 
 def line(pool: ProcessPoolExecutor, name: str, sigma: float, encoder: bool, draws: int) -> str:

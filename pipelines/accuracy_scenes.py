@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from algid.arm import Arm, FloatArray, regressor, with_payload
+from algid.arm import CONSTANT_NAMES, Arm, FloatArray, regressor, with_payload
+from algid.estimators.fit import Fit
 from algid.estimators.paper import stage1, stage2
 from algid.signals.observers import LuenbergerObserver
 from algid.signals.segments import Segment
@@ -35,6 +37,14 @@ class Scene:
     def truth(self) -> FloatArray:
         """k1 … k7, m_p, l1, l2: (10,)."""
         return np.concatenate([self.arm.constants(), [self.payload, self.arm.l1, self.arm.l2]])
+
+    def held_by(self, fit: Fit) -> NDArray[np.bool_]:
+        """Which of the fit's intervals hold the truth (10,); it may have more of the payload."""
+        places = [fit.names.index(name) for name in (*CONSTANT_NAMES, "m_p", "l1", "l2")]
+        inside: NDArray[np.bool_] = (
+            np.abs(fit.values[places] - self.truth) <= fit.quantile * fit.std[places]
+        )
+        return inside
 
     @property
     def turns(self) -> FloatArray:
