@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,13 +19,15 @@ from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
 from algid.readers.runs import one_after_another
-from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut
+from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, stack
 from algid.readers.timebase import in_order
 from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
+_Told = tuple[SampleTable, tuple[Notice, ...]]
+"""A table, and what is to be said of it."""
 PASSIVE_TORQUE = 0.01
 """Of the other joint's: more than what a torque's noise makes of a joint without a motor."""
 
@@ -74,11 +77,8 @@ class TableReader:
         """Logs of at most `most` samples, each converted from small tables into its arrays."""
         unwrapper = Unwrapper(self.origin.reading.unwrap)
         gatherer: Gatherer | None = None
-        notices: tuple[Notice, ...] = ()
-        begun = False
-        for table, said in self._samples(min(ROWS, most)):
-            if not begun:
-                notices, begun = self._of_passive(table), True
+        notices, samples = self._of_passive(self._samples(min(ROWS, most)))
+        for table, said in samples:
             if gatherer is not None and len(gatherer) + len(table) > most:
                 yield self._log(gatherer, notices)
                 gatherer, notices = None, ()
@@ -110,10 +110,10 @@ class TableReader:
             room.reference,
         )
 
-    def _samples(self, rows: int) -> Iterator[tuple[SampleTable, tuple[Notice, ...]]]:
+    def _samples(self, rows: int) -> Iterator[_Told]:
         """Checked and sorted tables that are not empty, with what is to be said of each."""
         notices, total = self.notices, 0
-        held: tuple[SampleTable, tuple[Notice, ...]] | None = None
+        held: _Told | None = None
         path, only = self.origin.path, self.origin.reading.segment
         ordered = in_order(path, one_after_another(path, self.tables(rows), only))
         for table in cut(self._finite(self._within(ordered)), rows):
@@ -194,24 +194,34 @@ class TableReader:
         without = (f"tau{self.origin.reading.passive}", *REFERENCES)
         return {name: values for name, values in table.columns.items() if name not in without}
 
-    def _of_passive(self, table: SampleTable) -> tuple[Notice, ...]:
-        """Notice of a torque in the column of a joint that is called passive."""
+    def _of_passive(self, samples: Iterator[_Told]) -> tuple[tuple[Notice, ...], Iterator[_Told]]:
+        """Notice of a torque in the column of a joint that is called passive, and all samples.
+
+        The first `ROWS` samples show it.
+        """
         passive, mapping = self.origin.reading.passive, self.origin.mapping
         names = f"tau{passive}", f"tau{3 - (passive or 1)}"
         if passive is None or not set(names) <= set(mapping):
-            return ()
-        own, other = table.columns.get(names[0]), table.columns.get(names[1])
+            return (), samples
+        looked_at: list[_Told] = []
+        for told in samples:
+            looked_at.append(told)
+            if sum(len(table) for table, _ in looked_at) >= ROWS:
+                break
+        samples = chain(looked_at, samples)
+        begin = stack([table for table, _ in looked_at])
+        own, other = begin.columns.get(names[0]), begin.columns.get(names[1])
         if own is None or other is None or mapping[names[0]] == mapping[names[1]]:
-            return ()
+            return (), samples
         size, driving = _rms(own), _rms(other)
         if not (np.isfinite(size) and size > PASSIVE_TORQUE * driving > 0):
-            return ()
+            return (), samples
         numbers = {
             "column": mapping[names[0]],
             "joint": passive,
             "percent": 100 * size / driving,
         }
-        return (Notice("PASSIVE_TORQUE", numbers=numbers),)
+        return (Notice("PASSIVE_TORQUE", numbers=numbers),), samples
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN
@@ -232,7 +242,8 @@ class TableReader:
 
 
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
+    with np.errstate(over="ignore"):  # without a motor a torque may be anything
+        return float(np.sqrt(np.mean(np.square(values))))
 
 
 def reader_of(

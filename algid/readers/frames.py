@@ -295,8 +295,8 @@ def tables(
         for name in seen:
             seen[name] = add(seen[name], word_sum(frame[name]))
         times = frame["t"]
-        notices = list(cut_off)
-        if columns.rate is not None and any(one.code == "EMPTY_CELLS" for one in notices):
+        notices: list[Notice] = []
+        if columns.rate is not None and any(one.code == "EMPTY_CELLS" for one in cut_off):
             raise LogError(
                 f"{path}: rows lack a value, and without a time the rows behind them have none; "
                 "fill the cells, or add a column of times"
@@ -322,7 +322,7 @@ def tables(
         channels = dict(frame)
         del channels["t"]
         done += times.size
-        yield SampleTable(stamps, channels, tuple(notices))
+        yield SampleTable(stamps, channels, (*notices, *cut_off))
     wrong = [name for name, total in seen.items() if total != expected[name]]
     if wrong:
         raise LogError(

@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _NO_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless")
+_BATCH = 1 << 14
+"""Rows that are decoded at once: few enough for the same warm memory to take them each time."""
 _NO_SUMS = Notice("NO_CHECKSUM", numbers={"case": "values"})
 
 
@@ -355,7 +357,7 @@ class _PlainGroups:
     checked: bool = False
 
     def frames(self, columns: Columns, rows: int, most: int | None) -> Iterator[WholeRows]:
-        """Columns of `rows` rows each, the last of fewer, up to `most` rows in all if given."""
+        """Columns of `rows` rows each at most, up to `most` rows in all if given."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -366,7 +368,8 @@ class _PlainGroups:
         left = self.metadata.num_rows if most is None else most
         try:
             with pq.ParquetFile(self.path, metadata=self.metadata, pre_buffer=False) as file:
-                for batch in file.iter_batches(rows, columns=sources, use_threads=False):
+                few = min(rows, _BATCH)
+                for batch in file.iter_batches(few, columns=sources, use_threads=False):
                     kept = batch.slice(0, left)
                     left -= kept.num_rows
                     if kept.num_rows:
