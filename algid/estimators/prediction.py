@@ -270,13 +270,16 @@ def motion_of(theta: FloatArray, dt: float) -> Motion:
 
     The two samples at each end repeat their neighbour's.
     """
-    inner, n = theta.shape[1] - 4, theta.shape[1]
-    omega, alpha = np.zeros((2, inner)), np.zeros((2, inner))
-    for place, (first, second) in enumerate(zip(_SLOPE / dt, _BEND / dt**2, strict=True)):
-        omega += first * theta[:, place : place + inner]
-        alpha += second * theta[:, place : place + inner]
-    places = np.clip(np.arange(n) - 2, 0, inner - 1)
-    return Motion(theta, omega[:, places], alpha[:, places])
+    return Motion(theta, _by_five(theta, _SLOPE / dt), _by_five(theta, _BEND / dt**2))
+
+
+def _by_five(theta: FloatArray, weights: FloatArray) -> FloatArray:
+    """Sums (2, N) of the five samples around each one of angles (2, N), with `weights` (5,)."""
+    sums = np.empty(theta.shape)
+    for own, angle in zip(sums, theta, strict=True):
+        own[2:-2] = np.correlate(angle, weights)
+    sums[:, :2], sums[:, -2:] = sums[:, 2:3], sums[:, -3:-2]
+    return sums
 
 
 def score(

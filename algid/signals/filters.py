@@ -118,10 +118,11 @@ def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArr
     y = _reflected(x, reach)
     for _ in range(2):  # there, and back again
         start = y[:, :1].copy()
-        y = y - start
+        y -= start
         for numerator, denominator in _sections(cutoff * dt, order):
             y = _passed(numerator, denominator, y)
-        y = (y + start)[:, ::-1]
+        y += start
+        y = y[:, ::-1]
     return np.ascontiguousarray(y[:, reach : reach + x.shape[1]])
 
 
@@ -152,9 +153,9 @@ def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
 
 def _passed(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:
     """Signals x (m, n) after `recursion`, each from rest, in one substitution."""
-    driven = numerator[0] * x
-    for lag, weight in enumerate(numerator[1:], 1):
-        driven[:, lag:] += weight * x[:, :-lag]
+    driven = np.empty(x.shape)
+    for own, signal in zip(driven, x, strict=True):
+        own[:] = np.convolve(signal, numerator)[: signal.size]
     # of an upper band transposed, which LAPACK solves by products of rows: a third faster
     band = np.empty((x.shape[1], denominator.size))
     band[:] = denominator[::-1]
