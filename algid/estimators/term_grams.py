@@ -67,10 +67,13 @@ class Training:
 
     @cached_property
     def half(self) -> Training:
-        """Every second piece, enough for a shape; a log that is short is not halved."""
+        """Every second piece, enough for a shape; a log that is short is not halved.
+
+        The moments of a piece are those of the same piece here.
+        """
         if self.whole:
             return self
-        return Training(self.pieces[::2], self.loaded, self.whole)
+        return replace(self, pieces=self.pieces[::2])
 
     @property
     def driven(self) -> bool:

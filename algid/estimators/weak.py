@@ -340,7 +340,7 @@ def normal_equations(
         samples, rows = 0, np.zeros(2)
         longest = dt = 0.0
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
-        for number, (piece, windows, fresh) in enumerate(overlapping(source(), settings, window)):
+        for piece, windows, fresh in overlapping(source(), settings, window):
             dt = piece.dt
             longest = max(longest, _seconds(piece))
             samples += fresh
@@ -348,7 +348,7 @@ def normal_equations(
             high = np.maximum(high, piece.theta.max(axis=1))
             kept = None
             if known is not None:
-                kept = known.setdefault((number, len(piece)), {})
+                kept = known.setdefault((piece.start, len(piece)), {})
             X = windows.equations(settings.model, piece, settings.estimate_delay, at, kept)
             if not X.shape[2]:
                 continue
