@@ -67,7 +67,7 @@ _OWN = 1e-6
 """Share of a torque beside the parameters' columns: with less it is one of theirs."""
 _CANCELS = 0.02
 """Share of its terms that a torque is where they cancel."""
-_SLOW = 40.0
+_SLOW = 20.0
 """Hz: a torque changes no faster by what the arm is to do."""
 _STEP = 1e-3
 """Relative change of a width of friction by which its effect is differentiated."""
@@ -200,9 +200,11 @@ def misfit(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Misfit
         shares = M[:-count, -count:] @ scaled_pinv(M[-count:, -count:])
         M, b = M[:-count, :-count] - shares @ M[-count:, :-count], b[:-count] - shares @ b[-count:]
         size = size[:-count]
-    beside = np.diag(M) > _OWN * size
-    freedom, statistic, _ = _score(M, b, np.flatnonzero(beside))
     pairs = lacking(fit.shared.model)
+    beside = np.diag(M) > _OWN * size
+    if fit.shared.delay:  # of which the slow part's is one already
+        beside[[place for place, (term, _) in enumerate(pairs) if term in DELAYS]] = False
+    freedom, statistic, _ = _score(M, b, np.flatnonzero(beside))
     places: dict[str, list[int]] = {}
     for place, kind in enumerate([*(term for term, _ in pairs), *_SHAPES, *_SHAPES]):
         if beside[place]:

@@ -29,7 +29,9 @@ def motion_of(count: int = 400) -> Motion:
     return Motion(*(size * rng.standard_normal((2, count)) for size in (1.0, 3.0, 20.0)))
 
 
-def told(model: Model, c: FloatArray, motion: Motion, beside: FloatArray) -> Any:
+def told(
+    model: Model, c: FloatArray, motion: Motion, beside: FloatArray, *, delay: bool = False
+) -> Any:
     """The test of a log with white noise of unit deviation, and with the torque `beside`."""
     rng = np.random.default_rng(6)
     Y = regressor(model, motion, c)
@@ -39,7 +41,9 @@ def told(model: Model, c: FloatArray, motion: Motion, beside: FloatArray) -> Any
     fit = SimpleNamespace(
         names=model.names,
         values=c,
-        shared=SimpleNamespace(model=model, jacobian=lambda _c, _loaded: np.eye(len(c))),
+        shared=SimpleNamespace(
+            model=model, delay=delay, jacobian=lambda _c, _loaded: np.eye(len(c))
+        ),
     )
     return rows, misfit(fit, [Imprint(False, rows @ rows.T)], None)  # type: ignore[arg-type]
 
@@ -68,6 +72,16 @@ def test_the_statistic_of_a_term_is_what_least_squares_with_it_explains(term: st
     (one,) = (each for each in found.overlooked if each.term == term)
     assert one.p_value == pytest.approx(chi2.sf(explained, len(own)), rel=1e-3)
     assert list(one.values) == list(TERMS[term].names)
+
+
+@pytest.mark.parametrize("delay", [False, True])
+def test_a_delay_is_overlooked_where_none_is_estimated(delay: bool) -> None:
+    """The torque acts 5 ms late: beside an estimated delay its slow part shows no other."""
+    c, motion = np.array([*K, 0.1, 0.05]), motion_of()
+    model = Model(("coulomb",))
+    late = np.gradient(torque(model, c, motion), 1e-3, axis=1) * 5e-3
+    _, found = told(model, c, motion, late, delay=delay)
+    assert ("delay" in {one.term for one in found.overlooked}) is not delay
 
 
 def test_white_noise_is_no_misfit_and_a_shape_of_no_term_is() -> None:
