@@ -14,8 +14,9 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators import shooting
-from algid.estimators.log_likelihood import SURE, LogEvidence, Outcome
-from algid.estimators.noise import differences_noise
+from algid.estimators.combine import LogInformation
+from algid.estimators.log_likelihood import SURE, LogEvidence
+from algid.estimators.noise import VarianceScore, differences_noise
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels
@@ -87,12 +88,11 @@ class CoarseEvidence(LogEvidence):
         """Whether the torque's error stays far above what neighbouring samples differ by."""
         return super().refuted and not bool(np.any(self._falling))
 
-    def improve_noise(self, outcome: Outcome) -> float:
-        """Better noise levels from a training pass: see `LogEvidence.improve_noise`."""
+    def _improve_noise(self, score: VarianceScore, information: LogInformation) -> FloatArray:
         before = self.noise.tau
-        change = super().improve_noise(outcome)
+        step = super()._improve_noise(score, information)
         self._falling = self.noise.tau < _FALLING * before
-        return change
+        return step
 
     def _linearise(
         self,

@@ -20,10 +20,12 @@ from algid.estimators.identifiability import Correlations, correlations
 from algid.estimators.imprint import Imprint
 from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.noise import (
+    Components,
     VarianceScore,
     first_guess,
     floored,
     largest_change,
+    log_ratio,
     newton_step,
     quantum,
     roughness,
@@ -51,6 +53,7 @@ _EXCESS = 10.0  # torque error beyond the sensor's noise and jumps that means un
 SURE = 0.9
 """Of what neighbouring torques differ by is noise of the torque: a short log may hide it in its
 angles' noise."""
+_FOLLOWED = 0.5  # change of a log variance, beyond which what follows it is not linear
 _NEGLIGIBLE = 1e-3  # torque error relative to the torque that no one need worry about
 
 
@@ -80,13 +83,14 @@ class _Innovations:
 class Outcome:
     """What one pass over pieces of a log gives.
 
-    `deviance` is minus twice the log-likelihood at the pass's coefficients, but for a constant.
+    `deviance` is minus twice the log-likelihood at the pass's coefficients, but for a constant;
+    `noise_change` the largest change of a log variance in its deviations.
     """
 
     information: LogInformation
-    noise_score: VarianceScore | None
     pieces: tuple[_Innovations, ...]
     deviance: float
+    noise_change: float = 0.0
 
     @cached_property
     def innovations(self) -> Correlations:
@@ -192,22 +196,39 @@ class LogEvidence:
         """Forget what was trained since the log had this `state`."""
         self.noise, self._trajectories, self.sure = state[0], list(state[1]), False
 
-    def train(self, c: FloatArray) -> Outcome:
-        """Linearise the training set at the coefficients `c`; keeps the trajectories found.
+    def train(self, c: FloatArray, *, free: bool = True) -> Outcome:
+        """Linearise the training set at the coefficients `c`.
 
-        Noise levels that are known, or sure, are not scored.
+        Keeps the trajectories found, and, where they are `free`, better noise levels, which the
+        trajectories and the score follow. Levels that are known, or sure, stay.
         """
-        gathered, scores = _Gathered(), []
-        scored = self._known is None and not self.sure
+        gathered = _Gathered()
+        scores: list[VarianceScore] = []
+        responses: list[FloatArray] = []
+        scored = free and self._known is None and not self.sure
         for seed, (piece, theta) in enumerate(zip(self.kept, self._trajectories, strict=True)):
             linear = self._linearise(c, theta, piece)
-            gathered.take(linear, piece.dt, self.noise)
             asked = linear.columns if scored else linear.columns[-1:]
             multipliers = linear.solve_transposed(asked)
             self._trajectories[seed] = trajectory(piece, linear, multipliers[-1], self.noise)
+            by_noise = None
             if scored:
-                scores.append(variance_score(linear, multipliers, len(piece), seed))
-        return gathered.outcome(self.loaded, c, reduce(add, scores) if scores else None)
+                components = Components.of(linear, multipliers[-1], len(piece))
+                scores.append(variance_score(linear, multipliers, components, seed))
+                responses.append(components.response(linear, self.noise))
+                by_noise = components.whitened
+            gathered.take(linear, piece.dt, self.noise, by_noise)
+        outcome = gathered.outcome(self.loaded, c)
+        if not scored:
+            return outcome
+        score = reduce(add, scores)
+        step = self._improve_noise(score, outcome.information)
+        followed = np.where(np.abs(step) < _FOLLOWED, step, 0.0)
+        for place, response in enumerate(responses):
+            moved = np.einsum("i,ian->an", followed, response)
+            self._trajectories[place] = self._trajectories[place] + moved
+        information = gathered.followed(outcome.information, followed, score)
+        return replace(outcome, information=information, noise_change=largest_change(step, score))
 
     def shaped(self, shared: Shared, c: FloatArray) -> Outcome:
         """Pass over the training set at `c` with friction of another shape; trajectories stay."""
@@ -255,18 +276,11 @@ class LogEvidence:
             gram = gram + whitened @ whitened.T
         return Imprint(self.loaded, gram)
 
-    def improve_noise(self, outcome: Outcome) -> float:
-        """Better noise levels from a training pass.
-
-        The largest change of a log variance in its deviations.
-        """
-        if outcome.noise_score is None:
-            return 0.0
-        S, _ = outcome.information.total
-        better = floored(newton_step(self.noise, outcome.noise_score, S), self._floor)
-        change = largest_change(self.noise, better, outcome.noise_score)
-        self.noise = better
-        return change
+    def _improve_noise(self, score: VarianceScore, information: LogInformation) -> FloatArray:
+        """Better noise levels; the change (4,) of each log variance."""
+        before, (S, _) = self.noise, information.total
+        self.noise = floored(newton_step(before, score, S), self._floor)
+        return log_ratio(before, self.noise)
 
     def _linearise(
         self,
@@ -312,27 +326,47 @@ class _Gathered:
     """A log's information and score, by stretches, and its innovations."""
 
     def __init__(self) -> None:
-        self._S, self._g = BlockSums(), BlockSums()
+        self._S, self._g, self._by_noise = BlockSums(), BlockSums(), BlockSums()
         self._pieces: list[_Innovations] = []
         self._deviance = 0.0
 
-    def take(self, linear: Linearised, dt: float, noise: NoiseLevels) -> _Innovations:
-        """Add a piece, its samples `dt` s apart, whitened by such noise; gives its innovations."""
-        Z, w = linear.columns[:-1], linear.columns[-1]
+    def take(
+        self, linear: Linearised, dt: float, noise: NoiseLevels, by_noise: FloatArray | None = None
+    ) -> _Innovations:
+        """Add a piece, its samples `dt` s apart, whitened by such noise; gives its innovations.
+
+        `by_noise` (4, 2 n) is how the innovations fall with each log variance.
+        """
+        columns, w = linear.columns, linear.columns[-1]
         own = w @ w + 2 * np.log(linear.factor[-1]).sum() + w.size * np.log(noise.tau).sum()
         self._deviance += float(own)
-        rows = 2 * _STRETCH
+        q, rows = columns.shape[0] - 1, 2 * _STRETCH
+        if by_noise is not None:
+            columns = np.concatenate([columns, by_noise])
         count = -(-w.size // rows)
-        padded = np.zeros((Z.shape[0] + 1, count * rows))
-        padded[:, : w.size] = linear.columns
+        padded = np.zeros((columns.shape[0], count * rows))
+        padded[:, : w.size] = columns
         parts = padded.reshape(-1, count, rows).swapaxes(0, 1)
-        gram = parts @ parts.swapaxes(1, 2)
-        self._S.add(gram[:, :-1, :-1])
-        self._g.add(gram[:, :-1, -1])
+        gram = parts[:, :q] @ parts.swapaxes(1, 2)
+        self._S.add(gram[:, :, :q])
+        self._g.add(gram[:, :, q])
+        if by_noise is not None:
+            self._by_noise.add(gram[:, :, q + 1 :])
         self._pieces.append(_Innovations(np.ascontiguousarray(w.reshape(-1, 2).T), dt))
         return self._pieces[-1]
 
-    def outcome(self, loaded: bool, c: FloatArray, score: VarianceScore | None = None) -> Outcome:
+    def outcome(self, loaded: bool, c: FloatArray) -> Outcome:
         """What the pass at the coefficients `c` has given."""
         information = LogInformation(loaded, c, self._S.values(), self._g.values())
-        return Outcome(information, score, tuple(self._pieces), self._deviance)
+        return Outcome(information, tuple(self._pieces), self._deviance)
+
+    def followed(
+        self, information: LogInformation, step: FloatArray, score: VarianceScore
+    ) -> LogInformation:
+        """The information after a `step` (4,) of log variances, to first order.
+
+        Every stretch bears as much of its change; scores have changes of their own.
+        """
+        change = np.einsum("i,ixy->xy", step, score.absorbed) / len(information.S)
+        g = information.g - self._by_noise.values() @ step
+        return replace(information, S=information.S - change, g=g)

@@ -63,6 +63,54 @@ class VarianceScore:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Components:
+    """What each component has in the residual of a linearised piece, in its units.
+
+    Parameters
+    ----------
+    back : (2, N)
+        Hᵀλ, of the angles.
+    smeared : (2, n)
+        Fᵀλ, of the torques.
+    whitened : (4, 2 n)
+        L⁻¹V_iλ.
+    """
+
+    back: FloatArray
+    smeared: FloatArray
+    whitened: FloatArray
+
+    @classmethod
+    def of(cls, linear: Linearised, multiplier: FloatArray, length: int) -> Components:
+        """Those of a piece with λ = L⁻ᵀL⁻¹e (2 n,), its angles `length` samples long."""
+        H, first = linear.H, linear.first
+        residual = _by_joint(multiplier)
+        back, smeared = adjoint(H, residual, first, length), linear.smeared_back(residual)
+        directions = np.stack(
+            [
+                forward(H, _only(back, 0), first),
+                forward(H, _only(back, 1), first),
+                linear.smeared(_only(smeared, 0)),
+                linear.smeared(_only(smeared, 1)),
+            ]
+        )
+        return cls(back, smeared, linear.solve_in_place(_by_row(directions)))
+
+    def response(self, linear: Linearised, noise: NoiseLevels) -> FloatArray:
+        """Derivative (4, 2, N) of the most likely angles by each log σ_i², in rad.
+
+        Of Σ_θ Gᵀ V⁻¹e it is −Σ_θ Gᵀ V⁻¹ V_i V⁻¹e, and Gᵀ V⁻¹e for an angle's own variance.
+        """
+        length = self.back.shape[1]
+        rows = linear.solve_transposed(self.whitened)
+        backs = [adjoint(linear.H, _by_joint(row), linear.first, length) for row in rows]
+        change = -np.stack(backs)
+        for joint in range(2):
+            change[joint, joint] += self.back[joint]
+        return change * noise.theta[:, None]
+
+
 def first_guess(theta: FloatArray, tau: FloatArray) -> NoiseLevels:
     """White noise of angles and torques, from their sixth differences.
 
@@ -181,7 +229,7 @@ def _step(values: FloatArray) -> float:
 
 
 def variance_score(
-    linear: Linearised, multipliers: FloatArray, length: int, seed: int
+    linear: Linearised, multipliers: FloatArray, components: Components, seed: int
 ) -> VarianceScore:
     """Contribution of one linearised piece.
 
@@ -190,26 +238,15 @@ def variance_score(
     linear : Linearised
     multipliers : (q + 1, 2 n)
         L⁻ᵀ of its columns.
-    length : int
-        Samples of the piece's angles.
+    components : Components
+        Of the last of them.
     seed : int
         Of the random signs of the traces.
     """
-    H, first = linear.H, linear.first
+    H, first, length = linear.H, linear.first, components.back.shape[1]
     rows = linear.columns.shape[1]
-    residual = _by_joint(multipliers[-1])
-    back = adjoint(H, residual, first, length)
-    smeared = linear.smeared_back(residual)
-    power = np.concatenate([np.sum(back**2, axis=1), np.sum(smeared**2, axis=1)])
-    directions = np.stack(
-        [
-            forward(H, _only(back, 0), first),
-            forward(H, _only(back, 1), first),
-            linear.smeared(_only(smeared, 0)),
-            linear.smeared(_only(smeared, 1)),
-        ]
-    )
-    whitened = linear.solve_in_place(_by_row(directions))
+    parts = components.back, components.smeared
+    power = np.concatenate([np.sum(part**2, axis=1) for part in parts])
     joints = np.stack([_by_joint(row) for row in multipliers[:-1]])
     backs = np.stack([adjoint(H, joint, first, length) for joint in joints])
     smears = linear.smeared_back(joints)
@@ -218,7 +255,7 @@ def variance_score(
     return VarianceScore(
         power,
         _traces(linear, length, rows, seed),
-        0.5 * whitened @ whitened.T,
+        0.5 * components.whitened @ components.whitened.T,
         np.stack(absorbed),
     )
 
@@ -294,10 +331,15 @@ def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> Nois
     return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:])
 
 
-def largest_change(before: NoiseLevels, after: NoiseLevels, score: VarianceScore) -> float:
-    """Largest change of a log variance, in its own standard deviations."""
+def log_ratio(before: NoiseLevels, after: NoiseLevels) -> FloatArray:
+    """Change (4,) of each component's log variance."""
     ratio = np.concatenate([after.theta / before.theta, after.tau / before.tau])
-    return float(np.max(np.abs(2 * np.log(ratio)) * np.sqrt(np.diag(score.average))))
+    return np.asarray(2 * np.log(ratio))
+
+
+def largest_change(step: FloatArray, score: VarianceScore) -> float:
+    """Largest change of log variances, which change by `step` (4,), in its own deviations."""
+    return float(np.max(np.abs(step) * np.sqrt(np.diag(score.average))))
 
 
 def floored(noise: NoiseLevels, floor: NoiseLevels) -> NoiseLevels:

@@ -43,7 +43,7 @@ from algid.signals.differences import Stencil
 _STEPS = 20
 _NOISE_STEPS = 12  # then noise levels stay and columns are smooth, so that the rest can settle
 _NOISE_SETTLED = 0.2  # change of every log variance in its standard deviations
-_NOISE_SURE = 0.1  # the same of one of many logs, after which its noise levels stay
+_REST = 0.01  # standard deviations: sum of the steps that are not taken
 _MOST_SCORED = 32  # logs; of more, those whose noise levels have settled are not scored again
 _MOST_TESTED = 32  # logs whose residual is held against the motion, evenly spread
 _MOST_COMPARED = 32  # logs among which repeats of a motion are looked for, pair by pair
@@ -271,36 +271,46 @@ def _train(
     for iteration in range(1, _STEPS + 1):
         outcomes: list[Outcome] = []
         done = 0
+        free = not known and iteration <= _NOISE_STEPS
         for log in logs:
-            outcomes.append(log.train(shared.coefficients(beta, log.loaded)))
+            outcomes.append(log.train(shared.coefficients(beta, log.loaded), free=free))
             done += log.trained
             if progress is not None:
                 progress(f"fitting, step {iteration}", done, total)
         better, S, _ = combine(shared, [outcome.information for outcome in outcomes], beta, prior)
-        free = not known and iteration <= _NOISE_STEPS
-        changes = _better_noise(logs, outcomes) if free else [0.0]
-        improved = max(changes)
         step = better - beta
-        moved = _distance(step, S)
+        earlier, moved = _distance(before, S), _distance(step, S)
         driven = moved > _DRIVEN and _overshot(step, before, S)
         if driven or iteration > _NOISE_STEPS:
             for log in logs:
                 log.smooth = True
-        if not free and 0 < _distance(before, S) < moved:  # it steps to and fro
+        if not free and 0 < earlier < moved:  # it steps to and fro
             share *= 0.5
         before = step
         beta = beta + share * step
         if not known and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
         if many and free and iteration > 1:
-            for log, change in zip(logs, changes, strict=True):
-                log.sure = change < _NOISE_SURE
-        if iteration > 1 and moved < SETTLED and improved < _NOISE_SETTLED:
+            for log, outcome in zip(logs, outcomes, strict=True):
+                log.sure = outcome.noise_change < _NOISE_SETTLED
+        improved = max(outcome.noise_change for outcome in outcomes)
+        settled = moved < SETTLED or _rest(earlier, moved) < _REST
+        if iteration > 1 and settled and improved < _NOISE_SETTLED:
             return beta, outcomes, iteration, "settled"
     # steps within what a torque's error that matters would leave, where there is next to none
     if moved * min(1.0, max(log.relative_error for log in logs)) < _CLOSE:
         return beta, outcomes, _STEPS, "settled"
     return beta, outcomes, _STEPS, "unsettled"
+
+
+def _rest(earlier: float, moved: float) -> float:
+    """What all further steps add up to, after one `earlier` and one that has `moved` so far.
+
+    Steps that shrink do so in the same ratio: a geometric series.
+    """
+    if moved < earlier:
+        return moved**2 / (earlier - moved)
+    return np.inf
 
 
 def _overshot(step: FloatArray, before: FloatArray, S: FloatArray) -> bool:
@@ -312,11 +322,6 @@ def _overshot(step: FloatArray, before: FloatArray, S: FloatArray) -> bool:
     return -float(step @ S @ before) > float(before @ S @ before) > 0
 
 
-def _better_noise(logs: Sequence[LogEvidence], outcomes: Sequence[Outcome]) -> list[float]:
-    """The largest change of each log's noise levels, which are improved."""
-    return [log.improve_noise(outcome) for log, outcome in zip(logs, outcomes, strict=True)]
-
-
 def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Prior | None) -> int:
     """Steps after which a log by itself refutes the likelihood; 0 where it does not.
 
@@ -326,9 +331,9 @@ def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Pr
     untrained = log.state
     try:
         for step in range(1, _NOISE_STEPS + 1):
-            outcome, before = log.train(shared.coefficients(beta, log.loaded)), log.noise.tau
+            before = log.noise.tau
+            outcome = log.train(shared.coefficients(beta, log.loaded))
             beta, _, _ = combine(shared, [outcome.information], beta, prior)
-            log.improve_noise(outcome)
             if log.refuted:
                 return step
             if float(np.max(log.noise.tau / before)) < _GROWING:

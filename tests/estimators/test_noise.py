@@ -11,16 +11,18 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.noise import (
+    Components,
     VarianceScore,
     first_guess,
     floored,
     largest_change,
+    log_ratio,
     newton_step,
     quantum,
     roughness,
     variance_score,
 )
-from algid.estimators.whitening import Linearised, NoiseLevels, linearise
+from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, linearise
 from algid.model import Model
 from algid.signals.differences import HELD, POINTS, Stencil
 from algid.signals.segments import Segment
@@ -28,6 +30,7 @@ from algid.signals.segments import Segment
 from .conftest import DT, Bench
 
 ANGLES = 60
+LEVELS = NoiseLevels(np.array([1.2e-3, 0.8e-3]), np.array([0.9e-2, 1.3e-2]))
 
 
 def test_sixth_differences_leave_nothing_of_a_quintic_and_all_of_white_noise() -> None:
@@ -102,15 +105,15 @@ def _parts(linear: Linearised) -> tuple[list[FloatArray], FloatArray]:
 def linear(request: pytest.FixtureRequest, bench: Bench) -> Linearised:
     log = bench.log(sigma=1e-3)
     piece = Segment(0.0, DT, log.theta[:, 900 : 900 + ANGLES], log.tau[:, 900 : 900 + ANGLES])
-    levels = NoiseLevels(np.array([1.2e-3, 0.8e-3]), np.array([0.9e-2, 1.3e-2]))
     theta0 = bench.bare.theta[:, 900 : 900 + ANGLES]
     return linearise(
-        Model(), bench.arm.constants(), theta0, piece, Stencil(DT, held=request.param), levels
+        Model(), bench.arm.constants(), theta0, piece, Stencil(DT, held=request.param), LEVELS
     )
 
 
 def _scored(linear: Linearised, seed: int = 0) -> VarianceScore:
-    return variance_score(linear, linear.solve_transposed(linear.columns), ANGLES, seed)
+    multipliers = linear.solve_transposed(linear.columns)
+    return variance_score(linear, multipliers, Components.of(linear, multipliers[-1], ANGLES), seed)
 
 
 def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
@@ -137,6 +140,24 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
         < 4.5 * traces.std(axis=0, ddof=1) / np.sqrt(30) + 1e-9
     )
     assert traces.mean(axis=0).sum() == pytest.approx(len(V), rel=0.03)  # Σ V_i = V
+
+
+def test_the_likeliest_angles_follow_the_noise_levels(linear: Linearised) -> None:
+    """Σ_θ Hᵀ V⁻¹e in dense algebra, by central differences in each log σ²."""
+    parts, columns = _parts(linear)
+
+    def angles(log_sigma2: FloatArray) -> FloatArray:
+        V = np.einsum("i,ixy->xy", np.exp(log_sigma2), np.array(parts))
+        multiplier = np.linalg.solve(V, columns[:, -1]).reshape(-1, 2).T
+        back = adjoint(linear.H, multiplier, linear.first, ANGLES)
+        return LEVELS.theta[:, None] * np.exp(log_sigma2[:2, None]) * back
+
+    h = 1e-4
+    slopes = np.array([(angles(h * axis) - angles(-h * axis)) / (2 * h) for axis in np.eye(4)])
+    multiplier = linear.solve_transposed(linear.columns[-1:])[0]
+    found = Components.of(linear, multiplier, ANGLES).response(linear, LEVELS)
+    # dense algebra of held torques, whose V is the worse conditioned, rounds to 2e-6
+    np.testing.assert_allclose(found, slopes, atol=1e-5 * np.abs(slopes).max())
 
 
 def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(
@@ -188,9 +209,8 @@ def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(
     for place, deviations in enumerate((2.0, 3.0, 4.0, 5.0)):
         level = np.array([1.0, 2.0, 3.0, 4.0])
         level[place] *= np.exp(-0.05)  # the variance by 0.1
-        assert largest_change(before, NoiseLevels(level[:2], level[2:]), score) == pytest.approx(
-            0.1 * deviations
-        )
+        step = log_ratio(before, NoiseLevels(level[:2], level[2:]))
+        assert largest_change(step, score) == pytest.approx(0.1 * deviations)
     held = floored(before, NoiseLevels(np.array([1.5, 1.5]), np.array([3.5, 3.5])))
     assert [*held.theta, *held.tau] == [1.5, 2.0, 3.5, 4.0]
 
