@@ -50,9 +50,9 @@ class Span:
         DamagedError
             If they are not what the format says, or more than in any honest file.
         """
-        inside, index = content[: self.length], content[self.length :]
         if self.loose:
-            return records_in(inside, works=file.works)
+            return records_in(content[: self.length], works=file.works)
+        inside, index = memoryview(content)[: self.length], memoryview(content)[self.length :]
         file.unpacks(claimed(inside))
         return records_in(unpack(inside, torn=self.torn), index, file.works)
 

@@ -259,7 +259,7 @@ def chunk_index(content: bytes) -> ChunkIndex:
         raise DamagedError(f"a ChunkIndex record cannot be read ({error})") from error
 
 
-def claimed(content: bytes) -> int:
+def claimed(content: bytes | memoryview) -> int:
     """The bytes that a chunk record claims to unpack to.
 
     Raises
@@ -277,7 +277,7 @@ def claimed(content: bytes) -> int:
     return int(size)
 
 
-def unpack(content: bytes, *, torn: bool = False) -> bytes:
+def unpack(content: bytes | memoryview, *, torn: bool = False) -> bytes:
     """The records within a chunk record's content.
 
     Of a `torn` one that breaks off the whole records at its start.
@@ -298,7 +298,9 @@ def unpack(content: bytes, *, torn: bool = False) -> bytes:
     packed = memoryview(content)[40 + name_length :]
     if not torn and packed_size != len(packed):
         raise DamagedError(f"a chunk claims {counted(packed_size, 'byte')} and has {len(packed)}")
-    unpacked = _decompressed(content[32 : 32 + name_length], packed[:packed_size], size, torn)
+    unpacked = _decompressed(
+        bytes(content[32 : 32 + name_length]), packed[:packed_size], size, torn
+    )
     if len(unpacked) != size and not torn:
         raise DamagedError(f"a chunk of {counted(size, 'byte')} unpacks to {len(unpacked)}")
     if len(unpacked) == size and crc and zlib.crc32(unpacked) != crc:

@@ -23,6 +23,11 @@ from algid.readers.messages.batch import Messages, beside, gather
 HEAD = 31
 """Bytes of a message record before the payload: code, length, channel, sequence, two times."""
 _LEAST = HEAD - 9
+_HEAD = np.dtype(
+    [("code", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_ns", "<i8")]
+)
+_HEAD_BYTES = f"V{_HEAD.itemsize}"
+"""As bytes they are gathered at once, as numbers one by one."""
 _SMALL = 1 << 13
 """Bytes; NumPy takes as long to look at an index as a walk over so many."""
 _FEW = 256
@@ -32,10 +37,14 @@ _SOME = (1 << 16) - 1
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """Unpacked bytes (N,), offsets of message records (M,), code and content of other records."""
+    """Unpacked bytes (N,), offsets and heads of message records (M,), other records.
+
+    Of those code and content.
+    """
 
     content: NDArray[np.uint8]
     offsets: IntArray
+    heads: NDArray[np.void]
     others: tuple[tuple[int, bytes], ...] = ()
 
     @property
@@ -43,32 +52,22 @@ class Records:
         """The channels that have messages here."""
         if not self.offsets.size:
             return frozenset()
-        channels = self.channels
+        channels = self.heads["channel"]
         return frozenset(
             channels.tolist() if channels.size < _FEW else np.unique(channels).tolist()
         )
 
-    @property
-    def channels(self) -> NDArray[np.generic]:
-        """The channel of each message (M,)."""
-        return gather(self.content, self.offsets + 9, "<u2")
-
     def of(self, wanted: Collection[int]) -> Messages:
-        """The messages of the channels `wanted`, in file order."""
-        offsets = self.offsets
-        if offsets.size == 0:
-            return Messages(self.content, offsets, offsets, offsets)
-        lengths = gather(self.content, offsets + 1, "<u8").astype(np.int64)
-        channels = self.channels
-        ours = (
+        """The messages of the channels `wanted`, in file order, apart from the records."""
+        channels = self.heads["channel"]
+        ours = np.flatnonzero(
             np.isin(channels, list(wanted))
             if len(wanted) > 1
             else channels == next(iter(wanted), -1)
         )
-        if not ours.all():
-            offsets, lengths = offsets[ours], lengths[ours]
-        log_ns = gather(self.content, offsets + 15, "<i8").astype(np.int64, copy=False)
-        return Messages(self.content, offsets + HEAD, lengths - (HEAD - 9), log_ns)
+        sizes = self.heads["length"][ours].astype(np.int64) - (HEAD - 9)
+        log_ns = self.heads["log_ns"][ours].astype(np.int64)
+        return Messages(self.content, self.offsets[ours] + HEAD, sizes, log_ns).apart()
 
 
 def joined(several: Sequence[Records]) -> Records:
@@ -78,16 +77,22 @@ def joined(several: Sequence[Records]) -> Records:
     """
     if len(several) == 1:
         return several[0]
-    contents, offsets, size = [], [], 0
+    contents, offsets, heads, size = [], [], [], 0
     for one in several:
         contents.append(one.content)
         offsets.append(one.offsets + size)
+        heads.append(one.heads)
         size += one.content.size
-    return Records(np.concatenate(contents), np.concatenate(offsets))
+    return Records(np.concatenate(contents), np.concatenate(offsets), np.concatenate(heads))
+
+
+def heads_at(octets: NDArray[np.uint8], offsets: IntArray) -> NDArray[np.void]:
+    """The heads (M,) of the message records at `offsets`, each with `HEAD` bytes at least."""
+    return gather(octets, offsets, _HEAD_BYTES).view(_HEAD)
 
 
 def records_in(
-    content: bytes, index: bytes = b"", works: Callable[[int], bool] = lambda _: True
+    content: bytes, index: bytes | memoryview = b"", works: Callable[[int], bool] = lambda _: True
 ) -> Records:
     """The records within unpacked bytes.
 
@@ -110,7 +115,7 @@ def records_in(
         return _walked(octets, content, works)
     records = _indexed(octets, content, index)
     if records is None and (same := alike(octets)) is not None:
-        records = Records(octets, same)
+        records = Records(octets, same, heads_at(octets, same))
     return records or _walked(octets, content, works)
 
 
@@ -136,11 +141,8 @@ def _walked(octets: NDArray[np.uint8], content: bytes, works: Callable[[int], bo
         if code == framing.MESSAGE and not len(offsets) & _SOME and not works(_SOME // 2):
             raise DamagedError("more small messages than in any honest file of this size")
         place = start + length
-    return Records(
-        octets,
-        np.frombuffer(offsets, np.int64) if offsets else np.empty(0, np.int64),
-        tuple(others),
-    )
+    places = np.frombuffer(offsets, np.int64) if offsets else np.empty(0, np.int64)
+    return Records(octets, places, heads_at(octets, places), tuple(others))
 
 
 def alike(octets: NDArray[np.uint8]) -> IntArray | None:
@@ -155,7 +157,9 @@ def alike(octets: NDArray[np.uint8]) -> IntArray | None:
     return records if bool(np.all(same) and np.all(octets[records] == framing.MESSAGE)) else None
 
 
-def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records | None:
+def _indexed(
+    octets: NDArray[np.uint8], content: bytes, index: bytes | memoryview
+) -> Records | None:
     """The records as a message index tells them; None where it does not fit them."""
     listed = entries(index)
     if not listed:
@@ -165,9 +169,10 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
         records.sort(kind="stable")
     if records.size == 0 or records[0] < 0 or records[-1] > octets.size - HEAD:
         return None
-    lengths = gather(octets, records + 1, "<u8")
+    heads = heads_at(octets, records)
+    lengths = heads["length"]
     if (
-        not np.all(octets[records] == framing.MESSAGE)
+        not np.all(heads["code"] == framing.MESSAGE)
         or lengths.max() > octets.size
         or lengths.min() < _LEAST
     ):
@@ -184,10 +189,10 @@ def _indexed(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Records
                 others.append((record.code, content[record.start : record.end]))
     except DamagedError:
         return None
-    return Records(octets, records, tuple(others))
+    return Records(octets, records, heads, tuple(others))
 
 
-def entries(index: bytes) -> list[tuple[int, IntArray]]:
+def entries(index: bytes | memoryview) -> list[tuple[int, IntArray]]:
     """Channel and offsets of each message index record; nothing where they are damaged."""
     parts = []
     try:

@@ -25,6 +25,24 @@ class Messages:
     def __len__(self) -> int:
         return int(self.starts.size)
 
+    def apart(self) -> Messages:
+        """The same messages in bytes of their own where they are of one size, else these.
+
+        One row of whole words each, so that what they stood in is free to go.
+        """
+        if not len(self) or np.any(self.sizes != self.sizes[0]):
+            return self
+        size = int(self.sizes[0])
+        lead = lead_of(size)
+        rows = gather(self.content, self.starts - lead, f"V{lead + size}").view(np.uint8)
+        starts = lead + (lead + size) * np.arange(len(self), dtype=np.int64)
+        return Messages(rows, starts, self.sizes, self.log_ns)
+
+
+def lead_of(size: int) -> int:
+    """Bytes to take before a payload of `size` bytes: whole words (8 bytes), one at least."""
+    return -size % 8 if size else 8
+
 
 def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
     """The numbers of type `kind` at byte `places` (N,), aligned or not."""

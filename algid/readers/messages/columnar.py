@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from algid.blocks import concatenated, rows_of
 from algid.limits import LIMITS
-from algid.readers.messages.batch import Messages
+from algid.log import IntArray
+from algid.readers.messages.batch import Messages, gather, lead_of
 from algid.words import counted
 
 _WORK_A_WALK, _WORK_A_SIZE = 200, 20
@@ -188,15 +189,16 @@ class Layout:
             elif at.kind == "zero":  # a number that protobuf leaves out because it is zero
                 columns[name] = np.zeros(rows)
             else:
+                # a copy: the messages are not kept for the sake of some numbers of theirs
                 columns[name] = np.ndarray(
                     rows, np.dtype(at.kind), octets.data, start, (octets.strides[0],)
-                )
+                ).copy()
         return columns
 
 
 def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
     """The layout of a message; its fields are None where it lacks one of those `wanted`."""
-    lead = _lead(len(payload))
+    lead = lead_of(len(payload))
     mask = np.zeros(lead + len(payload), np.uint8)
     for start, end in shape.fixed:
         mask[lead + start : lead + end] = 0xFF
@@ -221,11 +223,6 @@ def missing(shape: Shape, wanted: Mapping[str, str]) -> tuple[str, ...]:
     if shape.of_others(wanted.values()):
         return ()
     return tuple(name for name, path in wanted.items() if shape.find(path) is None)
-
-
-def _lead(size: int) -> int:
-    """Bytes to gather before a payload of `size` bytes: whole words, one at least."""
-    return -size % 8 if size else 8
 
 
 @dataclass
@@ -317,10 +314,7 @@ class ColumnDecoder(Decoder):
         Notes in `held` (N,) which do.
         """
         parts: list[tuple[NDArray[np.intp], Fields]] = []
-        order = np.argsort(messages.sizes, kind="stable")
-        for rows in filter(
-            len, np.split(order, np.flatnonzero(np.diff(messages.sizes[order])) + 1)
-        ):
+        for rows in _by_size(messages.sizes):
             size = int(messages.sizes[rows[0]])
             self.spend(_WORK_A_SIZE, _TOO_MANY)
             if size > LIMITS.message_bytes:
@@ -340,14 +334,7 @@ class ColumnDecoder(Decoder):
         self, messages: Messages, size: int, rows: NDArray[np.intp]
     ) -> Iterator[tuple[NDArray[np.intp], Fields]]:
         """Numbers of messages of one size by layout, each with the messages that have it."""
-        lead = _lead(size)
-        window: NDArray[np.void] = np.ndarray(  # every row lies within the records, behind a head
-            messages.content.size - size - lead + 1,
-            np.dtype((np.void, size + lead)),
-            messages.content.data,
-            strides=(1,),
-        )
-        table = window[messages.starts[rows] - lead].view(np.uint64).reshape(rows.size, -1)
+        table = _words(messages.content, messages.starts[rows], size)
         known = self._known.setdefault(size, [])
         left, tried = np.arange(rows.size), 0
         while left.size:
@@ -391,3 +378,23 @@ class ColumnDecoder(Decoder):
             return None
         self.spend(_WORK_A_WALK + shape.parts, _TOO_MANY)
         return layout(payload, shape, self.wanted)
+
+
+def _by_size(sizes: IntArray) -> Iterator[NDArray[np.intp]]:
+    """The places of the messages of each size, in file order."""
+    if sizes.size and not np.any(sizes != sizes[0]):
+        yield np.arange(sizes.size)
+        return
+    order = np.argsort(sizes, kind="stable")
+    yield from filter(len, np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1))
+
+
+def _words(octets: NDArray[np.uint8], starts: IntArray, size: int) -> NDArray[np.uint64]:
+    """Messages of one size as rows (N, words), each behind its lead: see `Messages.apart`."""
+    firsts = starts - lead_of(size)  # every row lies within the records, behind a head
+    width = size + lead_of(size)
+    if np.any(np.diff(firsts) != width):
+        rows = gather(octets, firsts, f"V{width}")
+    else:
+        rows = octets[firsts[0] : firsts[-1] + width]
+    return rows.view(np.uint64).reshape(starts.size, -1)
