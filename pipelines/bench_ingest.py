@@ -4,6 +4,8 @@ Usage: python -m pipelines.bench_ingest [FOLDER]
 
 Prints a Markdown table. Times are medians of rounds in which what is compared takes turns, page
 cache warm, imports excluded: a processor that drifts by a quarter within a run favours neither.
+Processor time (user and system, of all threads) says what reading costs, the wall what it takes
+where other cores are free.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -24,21 +26,29 @@ import zstandard
 from algid.log import Log, Origin
 from algid.readers import open_log, read_log
 from algid.readers.mcap import McapSource, opened
+from algid.runtime import cores
 from pipelines import bench_files
 
 COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2", "omega1", "omega2"]
 
 
-def medians(rounds: int, *works: Callable[[], object]) -> list[float]:
-    """Of each work its median time in s, over rounds in which they take turns."""
-    times = np.empty((rounds, len(works)))
+class Times(NamedTuple):
+    """What a piece of work takes, in s."""
+
+    wall: float
+    processor: float
+
+
+def medians(rounds: int, *works: Callable[[], object]) -> list[Times]:
+    """Of each work its median times, over rounds in which they take turns."""
+    times = np.empty((rounds, len(works), 2))
     for own in times:
         for place, work in enumerate(works):
             gc.collect()
-            start = time.perf_counter()
+            start = np.array([time.perf_counter(), time.process_time()])
             work()
-            own[place] = time.perf_counter() - start
-    return [float(one) for one in np.median(times, axis=0)]
+            own[place] = [time.perf_counter(), time.process_time()] - start
+    return [Times(float(wall), float(spent)) for wall, spent in np.median(times, axis=0)]
 
 
 def decompress(path: Path) -> int:
@@ -107,12 +117,17 @@ def joints(folder: Path) -> None:
     if not path.exists():
         bench_files.joint_and_imu(path)
     limit, ours = medians(11, lambda: decompress(path), lambda: read_log(path))
-    detail = f"{ours:.3f} s, decompression {limit:.3f} s"
     row(
-        "1,000,000 JointState + 200,000 Imu, zstd, to decompression",
-        "≤ 3",
-        f"{ours / limit:.2f}",
-        detail,
+        "1,000,000 JointState + 200,000 Imu, zstd, to decompression, processor time",
+        "≤ 1.9",
+        f"{ours.processor / limit.processor:.2f}",
+        f"{ours.processor:.3f} s, decompression {limit.processor:.3f} s",
+    )
+    row(
+        f"the same, wall on {cores()} cores to decompression on one",
+        "≤ 1.2",
+        f"{ours.wall / limit.wall:.2f}",
+        f"{ours.wall:.3f} s, decompression {limit.wall:.3f} s",
     )
     start = time.perf_counter()
     theirs = peer(path, DecoderFactory(), "/joint_states")
@@ -121,7 +136,7 @@ def joints(folder: Path) -> None:
     row(
         "the same, mcap-ros2-support to algid",
         "≥ 40",
-        f"{slow / ours:.0f}",
+        f"{slow / ours.wall:.0f}",
         f"{slow:.1f} s, {equal}",
     )
     row(
@@ -144,8 +159,9 @@ def protobuf(folder: Path) -> None:
     theirs = peer(path, DecoderFactory(), "/arm")
     slow = time.perf_counter() - start
     equal = "bit-exact" if theirs is not None and same(read_log(path), theirs) else "DIFFERENT"
-    detail = f"{ours:.3f} s against {slow:.2f} s, {equal}"
-    row("100,000 protobuf, mcap-protobuf-support to algid", "≥ 15", f"{slow / ours:.0f}", detail)
+    detail = f"{ours.wall:.3f} s against {slow:.2f} s, {equal}"
+    figure = f"{slow / ours.wall:.0f}"
+    row("100,000 protobuf, mcap-protobuf-support to algid", "≥ 15", figure, detail)
 
 
 def cameras(folder: Path) -> None:
@@ -181,8 +197,9 @@ def flat(folder: Path) -> None:
             lambda path=path: read_log(path),  # type: ignore[misc]
             lambda path=path: list(map(len, open_log(path).blocks())),  # type: ignore[misc]
         )
-        detail = f"{ours:.3f} s against {theirs:.3f} s; in blocks {blocks:.3f} s"
-        row(f"1,000,000 rows of {kind}, to polars", "≤ 1.3", f"{ours / theirs:.2f}", detail)
+        detail = f"{ours.wall:.3f} s against {theirs.wall:.3f} s; in blocks {blocks.wall:.3f} s"
+        figure = f"{ours.wall / theirs.wall:.2f}"
+        row(f"1,000,000 rows of {kind}, to polars", "≤ 1.3", figure, detail)
 
 
 def main() -> None:
