@@ -133,8 +133,11 @@ class _Sampler:
             yield from self._settle(block.part(_BRIDGE - len(self._pending), len(block)))
 
     def _settle(self, held: Log) -> Iterator[Segment]:
-        gaps = np.flatnonzero(np.diff(held.stamp_ns) * 1e-9 > CUT * self._dt) + 1
-        edges = [0] + gaps.tolist() + [len(held)]
+        gaps = []
+        steps = np.diff(held.stamp_ns)
+        if steps.max(initial=0) * 1e-9 > CUT * self._dt:
+            gaps = (np.flatnonzero(steps * 1e-9 > CUT * self._dt) + 1).tolist()
+        edges = [0, *gaps, len(held)]
         for first, last in pairwise(edges[:-1]):
             yield from self._stretch(held.part(first, last), ends=True)
             self._anchor, self._emitted = float(self._time(held.stamp_ns[last])), 0
@@ -159,10 +162,12 @@ class _Sampler:
         count = int(np.floor((reach - self._anchor) / self._dt)) + 1 - self._emitted
         if count <= 0 or t.size < 4:
             return
-        grid = self._anchor + self._dt * np.arange(self._emitted, self._emitted + count)
+        grid = np.arange(self._emitted, self._emitted + count, dtype=np.float64)
+        grid *= self._dt
+        grid += self._anchor
         first = int(np.searchsorted(t, grid[0] - 0.5 * self._dt))
         own = slice(first, first + count)
-        even = t[own].size == count and bool(np.all(np.abs(t[own] - grid) <= EVEN * self._dt))
+        even = _alike(t[own], grid, EVEN * self._dt)
         weights: list[tuple[IntArray, FloatArray]] = []
         if not even:
             weights = _cubic(t, grid)
@@ -190,6 +195,14 @@ class _Sampler:
             continues=self._emitted > 0,
         )
         self._emitted += count
+
+
+def _alike(t: FloatArray, grid: FloatArray, reach: float) -> bool:
+    """Whether there are as many times as instants, each within `reach` of its own."""
+    if t.size != grid.size:
+        return False
+    off = t - grid
+    return bool(off.max() <= reach and off.min() >= -reach)
 
 
 def _cubic(t: FloatArray, grid: FloatArray) -> list[tuple[IntArray, FloatArray]]:

@@ -42,24 +42,28 @@ def spaced(blocks: Iterable[Log], period: float) -> Iterator[Log]:
     for block in blocks:
         if not len(block):
             continue
-        rest = block
+        far = np.diff(block.stamp_ns) >= near_ns
+        settled: list[Log] = []
+        first = 0
         if held is not None:
-            far = np.flatnonzero(np.diff(block.stamp_ns, prepend=held.stamp_ns[-1]) >= near_ns)
-            if not far.size:
-                held = join([held, block])
-                continue
-            held = join([held, block.part(0, int(far[0]))]) if far[0] else held
-            settled: list[Log] = [_settled(held, before, period)]
-            before, rest = held.part(len(held) - 1, len(held)), block.part(int(far[0]), len(block))
-        else:
-            settled = []
-        far = np.flatnonzero(np.diff(rest.stamp_ns) >= near_ns)
-        last = int(far[-1]) + 1 if far.size else 0
-        if last:
-            settled.append(_settled(rest.part(0, last), before, period))
-            before = rest.part(last - 1, last)
+            if block.stamp_ns[0] - held.stamp_ns[-1] < near_ns:
+                if not far.any():
+                    held = join([held, block])
+                    continue
+                first = int(far.argmax()) + 1
+                held = join([held, block.part(0, first)])
+            settled.append(_settled(held, before, period))
+            before = held.part(len(held) - 1, len(held))
+        last = first
+        if far[first:].any():
+            last = len(block) - 1 - int(far[::-1].argmax())
+            own = block.part(first, last)
+            if not far[first : last - 1].all():
+                own = _settled(own, before, period)
+            settled.append(own)
+            before = block.part(last - 1, last)
         yield from _bridged(settled)
-        held = rest.part(last, len(rest))
+        held = block.part(last, len(block))
     if held is not None:
         yield _settled(held, before, period)
 
