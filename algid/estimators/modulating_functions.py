@@ -113,11 +113,11 @@ class Windows:
         """
         rows = signals.shape[1] // self.step
         blocks = signals[:, : rows * self.step].reshape(signals.shape[0], rows, self.step)
-        parts = blocks @ np.ascontiguousarray(kernel.reshape(OVERLAP, self.step).T)
+        parts = kernel.reshape(OVERLAP, self.step) @ blocks.swapaxes(1, 2)
         wanted = rows - OVERLAP + 1
         result = np.zeros((signals.shape[0], wanted))
         for part in range(OVERLAP):
-            result += parts[:, part : part + wanted, part]
+            result += parts[:, part, part : part + wanted]
         return result
 
     def equations(
