@@ -191,6 +191,8 @@ class Grams:
 
     def _wide(self, loaded: bool, gram: FloatArray) -> FloatArray:
         """Gram matrices (B, P + 1, P + 1) in p of a log's (B, q + 1, q + 1)."""
+        if not self._both:
+            return gram
         wide = np.zeros((len(gram), self.size + 1, self.size + 1))
         wide[:, *self._rows(loaded)] = gram
         return wide
