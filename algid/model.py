@@ -476,6 +476,19 @@ def torque(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     return np.einsum("aqn,q->an", regressor(model, motion, c), c)
 
 
+def load(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
+    """Each joint's load (2, N) in N m that a model's coefficients `c` (q,) give a motion.
+
+    It is what friction by load goes by, less that friction, and as no gain reads it.
+    """
+    values = Values(motion, model.shape)
+    inertia, rest = model.compiled.of_load
+    m11, m12, m21, m22 = (summed(weighted, c, values) for weighted in inertia)
+    alpha1, alpha2 = motion.alpha
+    first = m11 * alpha1 + m12 * alpha2 + summed(rest[0], c, values)
+    return np.stack([first, m21 * alpha1 + m22 * alpha2 + summed(rest[1], c, values)])
+
+
 def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     """J, the derivative of the torque by the coefficients.
 

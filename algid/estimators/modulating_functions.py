@@ -23,14 +23,14 @@ window.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
-from algid.model import TERMS, Model, Motion, attributes, gains, torque
+from algid.model import Model, Motion, attributes, gains, load
 from algid.physics.expressions import Product, Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
@@ -271,13 +271,9 @@ class Windows:
         shared = attributes(model, "by_load")
         if not shared:
             return
-        loads = {model.names[place] for place in model.compiled.loads}
-        terms = tuple(term for term in model.terms if loads & set(TERMS[term].names))
-        bearing, value = replace(model, terms=terms), model.values(c)
-        k = np.array([value[name] if name in loads else 0.0 for name in bearing.names])
-        load = torque(bearing, k, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
+        L = load(model, c, Motion(theta, omega, np.gradient(omega, self.dt, axis=1)))
         for name, joint in shared:
-            yield name, joint, np.abs(load[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
+            yield name, joint, np.abs(L[joint]) * np.tanh(omega[joint] / model.coulomb_speed)
 
     def square_speeds(self, piece: Segment) -> FloatArray:
         """Each joint's squared velocity (2, R) in (rad/s)², averaged over `equations` windows."""

@@ -15,6 +15,9 @@ from algid.model import (
     Motion,
     acceleration,
     damping,
+    gains,
+    load,
+    regressor,
     torque,
 )
 from tests.estimators.test_model import VALUES
@@ -45,6 +48,19 @@ def test_accelerations_are_those_whose_torque_it_is(terms: tuple[str, ...], grav
     found = acceleration(model, c, theta, omega, torque(model, c, Motion(theta, omega, alpha)))
     # the mass matrix has a condition number of about 10
     np.testing.assert_allclose(found, alpha, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("gravity", [9.81, 0.0])
+@pytest.mark.parametrize("terms", MODELS, ids=lambda terms: "+".join(terms) or "plain")
+def test_a_load_is_what_its_columns_make_of_the_coefficients(
+    terms: tuple[str, ...], gravity: float
+) -> None:
+    model = Model(terms, gravity, coulomb_speed=0.5)
+    motion = Motion(*_states())
+    c, loads = _constants(model), list(model.compiled.loads)
+    amplified = np.einsum("aqn,q->an", regressor(model, motion, c)[:, loads], c[loads])
+    expected = amplified / np.array(gains(model, c))[:, None]
+    np.testing.assert_allclose(load(model, c, motion), expected, rtol=1e-9, atol=1e-12)
 
 
 def test_without_terms_it_is_the_arms_forward_dynamics() -> None:
