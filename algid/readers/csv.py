@@ -250,10 +250,10 @@ def _lines_without(place: int, separator: bytes) -> re.Pattern[bytes]:
 
 def _leaves_quotes_open(text: bytes) -> bool:
     """Whether some line of a text, which ends with a line, holds an odd number of quotes."""
+    if b'"' not in text:
+        return False
     letters = np.frombuffer(text, np.uint8)
     quotes = np.flatnonzero(letters == ord('"'))
-    if quotes.size == 0:
-        return False
     lines = np.searchsorted(np.flatnonzero(letters == _LINE_END), quotes)
     return bool(np.any(np.bincount(lines) % 2))
 
