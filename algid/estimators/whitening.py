@@ -231,17 +231,9 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
         return low_passed(signal[..., ::-1], dt, -lag)[..., ::-1]
     n = signal.shape[-1]
     reach = min(n - 1, 2 + int(12 * lag / dt))
-    before = 2 * signal[..., :1] - signal[..., reach:0:-1]
-    after = 2 * signal[..., -1:] - signal[..., -2 : -reach - 2 : -1]
-    extended = np.concatenate([before, signal, after], axis=-1)
     decay = np.exp(-dt / lag)
     mean = (1 - decay) * lag / dt
     numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
-    passed = np.empty_like(extended)
-    for place in np.ndindex(extended.shape[:-1]):
-        origin = extended[place][0]
-        response, _ = recursion(numerator, denominator, extended[place] - origin, np.zeros(1))
-        passed[place] = response + origin
     whole = int(lag / dt)
     rest = lag / dt - whole
     start = reach + whole
@@ -253,8 +245,17 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
         (rest + 1) * rest * (rest - 1) / 6,
     )
     later = np.zeros_like(signal)
-    for point, weight in enumerate(weights, start - 1):
-        later += weight * passed[..., point : point + n]
+    for place in np.ndindex(signal.shape[:-1]):
+        row = signal[place]
+        if not row.any():  # of the joint that a column does not act on
+            continue
+        before = 2 * row[0] - row[reach:0:-1]
+        after = 2 * row[-1] - row[-2 : -reach - 2 : -1]
+        extended = np.concatenate([before, row, after])
+        response, _ = recursion(numerator, denominator, extended - extended[0], np.zeros(1))
+        passed = response + extended[0]
+        for point, weight in enumerate(weights, start - 1):
+            later[place] += weight * passed[point : point + n]
     return later
 
 
