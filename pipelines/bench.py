@@ -173,8 +173,8 @@ def main() -> None:
     costs = {one.name: middle(one.costs) for one in taking_part if one.costs}
     failed = {one.name: one.failed for one in taking_part if one.failed}
     if given.day:
-        write(given.out, day_rows(costs, failed), taking_part, name="day")
-        print((given.out / "day.md").read_text(encoding="utf-8"))
+        write(given.out, day_rows(costs, failed), taking_part, name="days")
+        print((given.out / "days.md").read_text(encoding="utf-8"))
         return
     profile = stages(given.out / "million.parquet")
     write(given.out, rows(costs, failed), taking_part, profile)
