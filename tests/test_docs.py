@@ -87,10 +87,15 @@ def alike(shown: str, printed: str) -> bool:
     if "…" in shown:
         start = shown[: shown.index("…")].rstrip()
         shown, printed = start, printed[: len(start)]
-    if " ".join(NUMBER.sub("#", shown).split()) != " ".join(NUMBER.sub("#", printed).split()):
+    if _words(shown) != _words(printed):
         return False
     pairs = zip(NUMBER.findall(shown), NUMBER.findall(printed), strict=True)
     return all(abs(number(a) - number(b)) <= ROUNDING * abs(number(a)) for a, b in pairs)
+
+
+def _words(line: str) -> list[str]:
+    """Without numbers and the length of rules, which follows that of the numbers."""
+    return re.sub("─+", "─", NUMBER.sub("#", line)).split()
 
 
 def number(text: str) -> float:
