@@ -74,6 +74,7 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     except BaseException as error:  # whatever a library raises, a panic too
         if (stop := _stop_behind(error)) is not None:
+            _let_go(error)
             complain("stopped; nothing half-written is left")
             raise stop from None
         if isinstance(error, SystemExit | KeyboardInterrupt):
@@ -95,14 +96,28 @@ def _stop_behind(error: BaseException) -> _StoppedError | None:
     A signal that comes while a library is imported, or reads, may be wrapped in its exception:
     Python 3.11 turns what is raised as a class is made into a RuntimeError.
     """
+    return next((one for one in _behind(error) if isinstance(one, _StoppedError)), None)
+
+
+def _behind(error: BaseException) -> list[BaseException]:
+    """An exception, and those that it was raised in place of."""
+    found: list[BaseException] = []
     behind: BaseException | None = error
-    seen: set[int] = set()
-    while behind is not None and id(behind) not in seen:
-        if isinstance(behind, _StoppedError):
-            return behind
-        seen.add(id(behind))
+    while behind is not None and behind not in found:
+        found.append(behind)
         behind = behind.__cause__ or behind.__context__
-    return None
+    return found
+
+
+def _let_go(error: BaseException) -> None:
+    """End what was begun in the frames of an exception, and what no ``with`` had taken over yet.
+
+    A signal may come when a context has been entered, and before its exit is known.
+    """
+    from traceback import clear_frames
+
+    for one in _behind(error):
+        clear_frames(one.__traceback__)
 
 
 class _Stopping:

@@ -18,6 +18,7 @@ import pytest
 import algid.cli
 from algid.cli import _StoppedError
 from algid.cli.output import console
+from algid.construction import new_folder, under_construction
 from algid.faults import EXIT_INTERNAL
 from algid.text import printable
 from tests.cli.commands import call
@@ -156,6 +157,27 @@ def test_a_stop_in_another_exception_is_a_stop(
     monkeypatch.setattr("algid.inspection.report.format_of", stopped)
     said = "algid: stopped; nothing half-written is left\n"
     assert run("inspect", "log.csv") == (142, said)
+
+
+def test_a_stop_between_a_with_and_its_block_leaves_nothing(
+    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The folder is made, and nobody is to take it away yet, when the signal comes."""
+
+    def entered(_path: object) -> None:
+        making = under_construction(tmp_path / "result", new_folder)
+        making.__enter__()
+        assert left() != []
+        raise _StoppedError(15)
+
+    def left() -> list[str]:
+        return [place.name for place in tmp_path.iterdir() if "result" in place.name]
+
+    found = []
+    monkeypatch.setattr("algid.inspection.report.format_of", entered)
+    monkeypatch.setattr("algid.cli.output.complain", lambda line: found.append((line, left())))
+    assert run("inspect", "log.csv") == (143, "")
+    assert found == [("stopped; nothing half-written is left", [])]
 
 
 def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_path: Path) -> None:
