@@ -20,7 +20,7 @@ SELDOM = (20_000, 20, 20)
 """Thresholds of Python's search for cycles: its own let a short command search for a seventh of its
 time through what it has imported."""
 PATIENCE = 5.0  # s to clear up in after a signal, before a second one is heard
-AGAIN = 0.02  # s after which a signal comes again that a destructor or a callback swallowed
+AGAIN = 0.02  # s after which a signal comes again that an import put off or a callback swallowed
 
 
 def main() -> None:
@@ -123,15 +123,22 @@ def _let_go(error: BaseException) -> None:
 class _Stopping:
     """Leave by an exception, so that what is half-written is taken away.
 
-    What comes meanwhile has to wait.
+    What comes meanwhile has to wait. So has a signal that comes while Python imports, whose locks
+    an exception would leave taken: another thread would wait for them for ever.
     """
 
     def __init__(self) -> None:
         self._patient_until = 0.0
+        self._put_off: int | None = None
 
-    def __call__(self, number: int, _frame: FrameType | None) -> None:
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        if self._put_off is not None and number == signal.SIGALRM:
+            number, self._put_off = self._put_off, None
         now = time.monotonic()
         if now < self._patient_until:
+            return
+        if _imports(frame):
+            self._again(number)
             return
         self._patient_until = now + PATIENCE
         raise _StoppedError(number)
@@ -144,12 +151,23 @@ class _Stopping:
         if not isinstance(what.exc_value, _StoppedError):
             sys.__unraisablehook__(what)
             return
-        from threading import Timer
-
         self._patient_until = 0.0
-        again = Timer(AGAIN, os.kill, (os.getpid(), what.exc_value.number))
-        again.daemon = True
-        again.start()
+        self._again(what.exc_value.number)
+
+    def _again(self, number: int) -> None:
+        """Hear the signal once more, by the clock: a thread to send it may need an import."""
+        self._put_off = number
+        signal.signal(signal.SIGALRM, self)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether a frame is one of Python's imports, or called by one."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 class _StoppedError(SystemExit):

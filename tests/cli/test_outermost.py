@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+import algid
 import algid.cli
 from algid.cli import _StoppedError
 from algid.cli.output import console
@@ -178,6 +179,31 @@ def test_a_stop_between_a_with_and_its_block_leaves_nothing(
     monkeypatch.setattr("algid.cli.output.complain", lambda line: found.append((line, left())))
     assert run("inspect", "log.csv") == (143, "")
     assert found == [("stopped; nothing half-written is left", [])]
+
+
+def test_a_stop_waits_for_the_end_of_an_import(tmp_path: Path) -> None:
+    """An exception within an import may leave its lock taken."""
+    (tmp_path / "slow.py").write_text("import os, time; os.kill(os.getpid(), 15); time.sleep(0.2)")
+    script = """
+import sys, time
+import algid.cli, algid.cli.app
+def called(_arguments):
+    import slow
+    print("imported", flush=True)
+    time.sleep(5)
+algid.cli.app.called = lambda _: called
+algid.cli.main()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}:{Path(algid.__file__).parents[1]}"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    stopped = "algid: stopped; nothing half-written is left\n"
+    assert (done.returncode, done.stdout, done.stderr) == (143, "imported\n", stopped)
 
 
 def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_path: Path) -> None:
