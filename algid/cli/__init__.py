@@ -79,8 +79,10 @@ def run(arguments: Sequence[str]) -> int:
             raise stop from None
         if isinstance(error, SystemExit | KeyboardInterrupt):
             raise
-        is_told = isinstance(error, AlgidError)
-        line, code = (str(error), int(Exit.USAGE)) if is_told else fault(error)
+        if isinstance(error, AlgidError):
+            line, code = str(error), int(Exit.USAGE)
+        else:
+            line, code = fault(error)
         cause = error
     if os.environ.get(TRACEBACK) == "1":
         import traceback
@@ -157,7 +159,7 @@ class _Stopping:
     def _again(self, number: int) -> None:
         """Hear the signal once more, by the clock: a thread to send it may need an import."""
         self._put_off = number
-        signal.signal(signal.SIGALRM, self)
+        signal.signal(signal.SIGALRM, self)  # which may have been ignored
         signal.setitimer(signal.ITIMER_REAL, AGAIN)
 
 

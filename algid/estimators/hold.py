@@ -108,7 +108,7 @@ class Lateness:
 
     @property
     def prior(self) -> Prior:
-        """The delay's prior where the log does not tell it."""
+        """The delay's prior where the log leaves it open."""
         mean, spread = self._expected
         return Prior(DELAYS, np.array([mean]), np.array([[spread**-2]]))
 

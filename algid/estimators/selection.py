@@ -127,7 +127,7 @@ class Selection:
 
     @property
     def undetermined(self) -> Lateness | None:
-        """The torque's lateness, if the logs were to choose its hold and do not tell it."""
+        """The torque's lateness, if the logs were to choose its hold and leave it open."""
         if self.hold_by != "logs" or self.late is None or self.late.determined:
             return None
         return self.late

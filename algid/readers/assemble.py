@@ -26,7 +26,7 @@ from algid.words import counted
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-_Told = tuple[SampleTable, tuple[Notice, ...]]
+_Noted = tuple[SampleTable, tuple[Notice, ...]]
 """A table, and what is to be said of it."""
 PASSIVE_TORQUE = 0.01
 """Of the other joint's: more than what a torque's noise makes of a joint without a motor."""
@@ -110,10 +110,10 @@ class TableReader:
             room.reference,
         )
 
-    def _samples(self, rows: int) -> Iterator[_Told]:
+    def _samples(self, rows: int) -> Iterator[_Noted]:
         """Checked and sorted tables that are not empty, with what is to be said of each."""
         notices, total = self.notices, 0
-        held: _Told | None = None
+        held: _Noted | None = None
         path, only = self.origin.path, self.origin.reading.segment
         ordered = in_order(path, one_after_another(path, self.tables(rows), only))
         for table in cut(self._finite(self._within(ordered)), rows):
@@ -194,7 +194,7 @@ class TableReader:
         without = (f"tau{self.origin.reading.passive}", *REFERENCES)
         return {name: values for name, values in table.columns.items() if name not in without}
 
-    def _of_passive(self, samples: Iterator[_Told]) -> tuple[tuple[Notice, ...], Iterator[_Told]]:
+    def _of_passive(self, samples: Iterator[_Noted]) -> tuple[tuple[Notice, ...], Iterator[_Noted]]:
         """Notice of a torque in the column of a joint that is called passive, and all samples.
 
         The first `ROWS` samples show it.
@@ -203,9 +203,9 @@ class TableReader:
         names = f"tau{passive}", f"tau{3 - (passive or 1)}"
         if passive is None or not set(names) <= set(mapping):
             return (), samples
-        looked_at: list[_Told] = []
-        for told in samples:
-            looked_at.append(told)
+        looked_at: list[_Noted] = []
+        for noted in samples:
+            looked_at.append(noted)
             if sum(len(table) for table, _ in looked_at) >= ROWS:
                 break
         samples = chain(looked_at, samples)
