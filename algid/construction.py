@@ -18,6 +18,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
+from algid.guard import tell
+
 MARK = ".algid-"
 """Separates a temporary name's target from its eight digits: ``.NAME.algid-0123abcd``."""
 OLD = ".algid-old-"
@@ -45,6 +47,7 @@ def under_construction(path: Path, make: Callable[[Path], None]) -> Iterator[Pat
             os.close(handle)
         finally:
             remove(temporary)
+            tell(f"-{temporary.absolute()}")
 
 
 def new_file(path: Path) -> None:
@@ -77,16 +80,19 @@ def _made(path: Path, make: Callable[[Path], None]) -> tuple[Path, int]:
         Where its folder is gone.
     """
     for _ in range(MOST_TRIES):
-        temporary = beside(path)  # named before it is made: a signal may come as soon as it stands
+        temporary = beside(path)
+        tell(f"+{temporary.absolute()}")  # before it is made: its end may come as soon as it stands
         try:
             make(temporary)
             return temporary, held(temporary)
         except (BlockingIOError, FileNotFoundError):
             remove(temporary)
+            tell(f"-{temporary.absolute()}")
             if not path.parent.is_dir():
                 raise
         except BaseException:
             remove(temporary)
+            tell(f"-{temporary.absolute()}")
             raise
     raise OSError(errno.EBUSY, os.strerror(errno.EBUSY), str(path))
 

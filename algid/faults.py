@@ -13,13 +13,12 @@ from pathlib import Path
 from types import TracebackType
 
 from algid.errors import AlgidError, text_of
+from algid.guard import TRACEBACK, reading
 from algid.options import flag
 
 EXIT_USAGE = 2
 EXIT_INTERNAL = 70
 """The number that sysexits.h gives to an internal error."""
-TRACEBACK = "ALGID_TRACEBACK"
-"""A variable of the environment: set to 1, it shows where an exception came from."""
 
 _OWN = str(Path(__file__).parent) + os.sep
 _MEANT = (AlgidError, SystemExit, KeyboardInterrupt, GeneratorExit)
@@ -29,9 +28,13 @@ _LONGEST_REASON = 200
 
 @contextmanager
 def during(stage: str, file: object) -> Iterator[None]:
-    """Note on an exception from within the block what was being done, and with which file."""
+    """Note on an exception from within the block what was being done, and with which file.
+
+    Whoever guards the process knows meanwhile that the file is being read.
+    """
     try:
-        yield
+        with reading(str(file)):
+            yield
     except _MEANT:
         raise
     except BaseException as error:  # a panic in a library of Rust is no Exception

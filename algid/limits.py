@@ -56,8 +56,6 @@ class FileLimits:
     """Of one such line."""
     unit_letters: int = 40
     """Of a unit that a schema states."""
-    unit_statements: int = 512
-    """Statements of units in the lines above a table that are looked at."""
     metadata_keys: int = 8192
     """Of a schema that are looked at for units: each column may have one."""
     name_letters: int = 512

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from algid.arm import Arm, FloatArray
+from algid.errors import LogError
 from algid.notices import Notice
 from algid.quantiles import median
 
@@ -58,6 +59,10 @@ class Truth:
 
 ZEROS = {"horizontal": 0.0, "hanging": -math.pi / 2, "upright": math.pi / 2}
 """rad: where θ1 is zero, as the angle from the horizontal."""
+SLOWEST = 0.2
+"""s: a longer median step is no recording of an arm in motion, which has 5 Hz at least."""
+_LARGEST, _LONGEST = 1e30, 9.2e9
+"""What no signal, and no time in s, reaches: a mark for a missing value, ticks for seconds."""
 SAME_OFFSET = 1e-9
 """rad or N m: offsets this close are one, written in different units."""
 STRICT = {"extra": "forbid"}
@@ -246,8 +251,9 @@ class Log:
 
         Raises
         ------
-        ValueError
-            If a shape does not fit, a value is not finite, or the times do not increase.
+        LogError
+            If a shape does not fit, values are no plain numbers or not finite, or the times do not
+            increase.
 
         Examples
         --------
@@ -256,21 +262,31 @@ class Log:
         >>> len(algid.Log.from_arrays(t, theta=[t, t], tau=[t, t]))
         3
         """
-        times = np.asarray(t, dtype=np.float64)
+        times = _numbers(name, "t", t)
         if times.ndim != 1 or times.size < 2:
-            raise ValueError(f"t must have shape (N,) with two samples or more, got {times.shape}")
-        if not np.all(np.diff(times) > 0):
-            raise ValueError("t must be finite and strictly increasing")
+            raise LogError(
+                f"{name}: t: expected two samples or more, (N,), found the shape {times.shape}"
+            )
+        if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0)):
+            raise LogError(f"{name}: t: expected finite times that increase; sort them")
+        if np.abs(times).max() > _LONGEST:
+            raise LogError(f"{name}: t: expected times in s, found {times[-1]:g}: over 292 years")
+        notices: tuple[Notice, ...] = ()
+        step = median(np.diff(times))
+        if step > SLOWEST:
+            numbers = {"column": "t", "unit": "s", "rate": 1 / step}
+            notices = (Notice("SLOW_CLOCK", numbers=numbers),)
         log = cls(
             stamp_ns=np.round(times * 1e9).astype(np.int64),
-            theta=_two_rows("theta", theta, times.size),
-            tau=_two_rows("tau", tau, times.size),
+            theta=_two_rows(name, "theta", theta, times.size),
+            tau=_two_rows(name, "tau", tau, times.size),
             origin=Origin(name, "arrays", {}),
+            notices=notices,
         )
         if omega is not None:
-            log = replace(log, omega=_two_rows("omega", omega, times.size))
+            log = replace(log, omega=_two_rows(name, "omega", omega, times.size))
         if reference is not None:
-            log = replace(log, reference=_two_rows("reference", reference, times.size))
+            log = replace(log, reference=_two_rows(name, "reference", reference, times.size))
         return log
 
     def __len__(self) -> int:
@@ -308,15 +324,33 @@ class Log:
         )
 
 
-def _two_rows(name: str, values: ArrayLike, count: int) -> FloatArray:
+def _numbers(log: str, name: str, values: ArrayLike) -> FloatArray:
+    """Plain numbers as float64: ticks of a date, a mask or an imaginary part would be lost."""
+    unit = " in s" if name == "t" else ""
+    try:
+        array = np.asanyarray(values)
+        if array.dtype.kind not in "iufO" or np.ma.is_masked(array):
+            kind = "masked values" if np.ma.is_masked(array) else array.dtype
+            raise LogError(f"{log}: {name}: expected plain numbers{unit}, found {kind}")
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise LogError(f"{log}: {name}: expected numbers of one shape ({error})") from error
+
+
+def _two_rows(log: str, name: str, values: ArrayLike, count: int) -> FloatArray:
     """A signal of both joints (2, N), given so or as (N, 2)."""
-    array = np.asarray(values, dtype=np.float64)
+    array = _numbers(log, name, values)
     if array.shape == (count, 2) and count != 2:
         array = array.T
     if array.shape != (2, count):
-        raise ValueError(f"{name} must have shape (2, {count}) or ({count}, 2), got {array.shape}")
-    if not np.all(np.isfinite(array)):
-        raise ValueError(f"{name} must be finite")
+        raise LogError(
+            f"{log}: {name}: expected the shape (2, {count}) or ({count}, 2), found {array.shape}"
+        )
+    if not np.all(np.abs(array) < _LARGEST):
+        raise LogError(
+            f"{log}: {name}: expected finite numbers below {_LARGEST:g} in size; leave other "
+            "samples out"
+        )
     return np.ascontiguousarray(array)
 
 

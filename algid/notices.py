@@ -3,8 +3,7 @@
 Whoever shows it writes the words.
 
 A `Notice` is data: nobody searches, cuts or compares its text. A `Remedy` holds settings by name
-and value, which are written as flags for the command that was typed, as lines of a profile, or as
-Python's keywords.
+and value, which are written as flags for the command that was typed, or as Python's keywords.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from algid.options import BY_TAKER, FLAGS, OPTIONS, PROFILE, flag
+from algid.options import FLAGS, OPTIONS, flag
 from algid.text import joined
 from algid.words import counted
 
@@ -42,12 +41,7 @@ def _own(name: str, value: object) -> bool:
     return name in FLAGS and not isinstance(value, bool)
 
 
-def _has_line(name: str, value: object) -> bool:
-    """Whether a profile has the setting."""
-    return not _own(name, value) or (PROFILE, name) in BY_TAKER
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Remedy:
     """Settings that mend what a notice is of, by name: ``zero``, ``tau1.sign``.
 
@@ -82,28 +76,6 @@ class Remedy:
         return tuple(words)
 
     @property
-    def lines(self) -> str:
-        """As lines of a profile; empty where no profile has such a setting."""
-        own: list[str] = []
-        channels: list[str] = []
-        for name, value in self.settings.items():
-            if not _has_line(name, value):
-                continue
-            option = BY_TAKER.get((PROFILE, name))
-            if option is not None and option.channels:
-                first, second = option.channels[:2]
-                channels.append(f"unit = {_toml(name, value)} of [{first}] and [{second}]")
-                continue
-            channel, dot, key = name.partition(".")
-            if name == "accept" and isinstance(value, str):
-                value = [value]
-            if dot:
-                channels.append(f"{key} = {_toml(name, value)} of [{channel}]")
-            else:
-                own.append(f"{name} = {_toml(name, value)}")
-        return ", ".join(own + channels)
-
-    @property
     def keywords(self) -> dict[str, Any]:
         """As Python's keywords, a channel's settings in a dictionary of their own."""
         keywords: dict[str, Any] = {}
@@ -116,12 +88,14 @@ class Remedy:
         return keywords
 
     def __str__(self) -> str:
-        text, lines = " ".join(map(_quoted, self.flags)), self.lines
+        text = " ".join(map(_quoted, self.flags))
         if self.when:
             text = f"{self.when}: {text}"
-        if lines:
-            text = f"{text} (profile: {lines})"
         return text
+
+    def __repr__(self) -> str:
+        text = ", ".join(f"{name}={value!r}" for name, value in self.keywords.items())
+        return text.replace("'", '"')
 
 
 def _quoted(word: str) -> str:
@@ -187,7 +161,7 @@ class _Words(string.Formatter):
 
 MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     # of estimates
-    "NOT_IDENTIFIABLE": "{names} {names:is|are} not identifiable",
+    "NOT_IDENTIFIABLE": "{names} {names:is|are} not identifiable{record:~: #}",
     "NOT_SIGNIFICANT": "{names} {names:is|are} not significant: zero lies within the 95 % interval",
     "WEAK_EXCITATION": "{names} {names:is|are} too weakly excited",
     "SINGULAR": "{names} {names:is|are} singular",
@@ -392,6 +366,15 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "the column {column!r} for {name} states the unit {unit!r}, and is taken for {given} as "
         "told"
     ),
+    "STATED_UNUSED": {
+        "line": "the file says {said}, which was not used",
+        "rate": "the file says {said}, and its stamps {rate:.4g} Hz, which are used",
+        "columns": (
+            "{column!r} has the values {values}, and was not used: samples may be of several arms "
+            "or recordings"
+        ),
+        "setting": "given and of no use for this log: {said}",
+    },
     "CURRENT_AS_TORQUE": (
         "{column!r} for {name} is a current by its name, and is taken for a torque in {given} as "
         "told"
@@ -502,8 +485,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "in motion"
     ),
     "NO_LINE_END": (
-        "row {row:,}, the last, has no line end: its last number may be cut off, so the row was "
-        "left out"
+        "the last row has no line end: its last number may be cut off, so the row was left out"
     ),
     "EMPTY_CELLS": "{count} of {rows:# row|rows} dropped for want of a value",
     # of checks
@@ -553,10 +535,16 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "the log lasts {seconds:.3g} s; an estimate needs a second of motion at least, ten are "
         "better"
     ),
-    "SLOW_SAMPLING": (
-        "{samples:.2g} samples in a period of the motion at {rate:.4g} Hz: too slow to tell its "
-        "acceleration; record faster, or move more slowly"
-    ),
+    "SLOW_SAMPLING": {
+        "period": (
+            "{samples:.2g} samples in a period of the motion at {rate:.4g} Hz: too slow to tell "
+            "its acceleration; record faster, or move more slowly"
+        ),
+        "turn": (
+            "a joint turns {turn:.2g} rad between samples, more than derivatives follow: the "
+            "{kept} estimate with robust intervals is reported; record {times:.2g} times as fast"
+        ),
+    },
     "NEAR_STAMPS": (
         "{count:# sample follows|samples follow} the one before by less than {share:g} of a "
         "period of "
@@ -585,10 +573,15 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "wider by as much, and small changes go unseen"
     ),
     "ARM_DOUBTFUL": "the arm's own result is {grade}: {headline}",
-    "LENGTH_CONTRADICTED": (
-        "{name} of {given:g} m lies {distance:.0f} σ from the result's {estimate:.5g} ± {std:.2g} "
-        "m; one is wrong"
-    ),
+    "LENGTH_CONTRADICTED": {
+        "identified": (
+            "{name} is given as {given:g} m, but identified as {estimate:.5g} ± {std:.2g} m "
+            "({distance:.0f} σ apart)"
+        ),
+        "stated": (
+            "{name} is given as {given:g} m, but the arm's result was made with {stated:g} m"
+        ),
+    },
     # of designs and fleets
     "TERMS_LEFT_OUT": (
         "the plan leaves out {terms}: where they are estimated too, error bars are somewhat "
@@ -633,7 +626,7 @@ def _text(code: str, numbers: Mapping[str, Any]) -> str:
     form = MESSAGES[code]
     if not isinstance(form, str):
         form = form[numbers["case"]]
-    values = {"flag": FLAGS, "accepted": False, "looked_at": 0} | dict(numbers)
+    values = {"flag": FLAGS, "accepted": False, "looked_at": 0, "record": ""} | dict(numbers)
     return _Words().vformat(form + _ANYWHERE, (), values)
 
 
@@ -682,10 +675,7 @@ class Notice:
 
     @property
     def advice(self) -> str:
-        """What mends it, in words: flags, and the profile's lines beside them.
-
-        Empty where nothing is known.
-        """
+        """What mends it, in flags; empty where nothing is known."""
         return "; ".join(map(str, self.remedies))
 
     @property

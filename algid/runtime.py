@@ -17,8 +17,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-import resource
-import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
@@ -26,8 +24,6 @@ from contextlib import contextmanager
 from functools import cache
 from itertools import islice
 from typing import Any, Generic, TypeVar
-
-from algid.errors import SettingError
 
 _VARIABLES = (
     "OPENBLAS_NUM_THREADS",
@@ -46,50 +42,6 @@ def bound_by_environment() -> None:
         os.environ.setdefault(variable, "1")
 
 
-OPEN_FILES = 32
-"""Files that a command has open at once, at most."""
-OPEN_FILES_A_WORKER = 8
-MOST_THREADS = 1024
-
-
-def check_environment() -> None:
-    """Refuse what libraries would end in a panic for, before they are loaded.
-
-    Raises
-    ------
-    SettingError
-        If POLARS_MAX_THREADS is no number of threads, or too few files may be open at once.
-    """
-    threads = os.environ.get("POLARS_MAX_THREADS")
-    if threads is not None and not (
-        threads.isascii() and threads.isdigit() and 0 < int(threads[:5]) <= MOST_THREADS
-    ):
-        expected = f"expected a whole number from 1 to {MOST_THREADS}"
-        raise SettingError(
-            f"POLARS_MAX_THREADS: {expected}, found {threads!r:.60}; mend or unset it"
-        )
-    may_open(OPEN_FILES)
-
-
-def may_open(files: int) -> None:
-    """Let this process have so many files open at once.
-
-    Raises
-    ------
-    SettingError
-        Where the system does not allow it.
-    """
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = float("inf") if hard == resource.RLIM_INFINITY else hard
-    if soft != resource.RLIM_INFINITY and soft < files <= most:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
-    elif most < files:
-        raise SettingError(
-            f"the limit on open files: expected {files} or more, found {hard}; raise it with "
-            "ulimit -n"
-        )
-
-
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """One thread for the BLAS libraries that are loaded, within the block."""
@@ -97,38 +49,6 @@ def one_blas_thread() -> Iterator[None]:
 
     with threadpool_limits(limits=1, user_api="blas"):
         yield
-
-
-_NOT_ENDING = {
-    *(
-        "SIGKILL",
-        "SIGSTOP",
-        "SIGTSTP",
-        "SIGTTIN",
-        "SIGTTOU",
-        "SIGCONT",
-        "SIGCHLD",
-        "SIGURG",
-        "SIGWINCH",
-        "SIGINFO",
-    ),
-    *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT", "SIGTRAP", "SIGSYS", "SIGEMT"),
-}
-"""Signals that nobody can handle, that end no process, or that tell of a fault in it."""
-
-
-def ending_signals() -> list[int]:
-    """Signals that would end this process.
-
-    Of those it was told to ignore, as by nohup, Ctrl-C and SIGTERM alone.
-    """
-    others = {getattr(signal, name) for name in _NOT_ENDING if hasattr(signal, name)}
-    wanted = (signal.SIGINT, signal.SIGTERM)
-    return sorted(
-        number
-        for number in signal.valid_signals() - others
-        if number in wanted or signal.getsignal(number) not in (None, signal.SIG_IGN)
-    )
 
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h

@@ -29,6 +29,7 @@ class Verdict:
     reasons : what makes it doubtful, the weightiest first
     notes : what was seen of the data and is no reason to doubt it
     command : what to run first, to mend it or to find out
+    title : what is said in place of the grade's word
     """
 
     grade: Grade
@@ -36,6 +37,7 @@ class Verdict:
     reasons: tuple[Notice, ...] = ()
     notes: tuple[Notice, ...] = ()
     command: str | None = None
+    title: str = ""
 
     def __repr__(self) -> str:
         codes = ", ".join(dict.fromkeys(one.code for one in self.reasons)) or "none"
@@ -43,8 +45,8 @@ class Verdict:
 
     @property
     def word(self) -> str:
-        """The word of its grade."""
-        return GRADE_WORDS[self.grade]
+        """Its title, or the word of its grade."""
+        return self.title or GRADE_WORDS[self.grade]
 
     @property
     def sentence(self) -> str:

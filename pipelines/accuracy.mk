@@ -3,16 +3,15 @@
 ACCURACY_DRAWS ?= 100
 ACCURACY_MODEL_DRAWS ?= 4
 
-accuracy: setup ## errors against the Cramér-Rao bound, peers, real arm; into build/accuracy
+accuracy: setup ## errors against the Cramér-Rao bound, peers, errors of real joints; into build/accuracy
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --draws $(ACCURACY_DRAWS) -o build/accuracy
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy_models --draws $(ACCURACY_MODEL_DRAWS) -o build/accuracy
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy_short -o build/accuracy
 
 accuracy-quick: setup
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --quick -o build/accuracy
 
-run-to-run: setup ## halves of two real arms' runs: whether intervals hold, and repeatability beside output error
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.run_to_run ../shared/data/dfki
+run-to-run: setup ## all splits of two real arms' runs into halves: whether intervals hold, and repeatability
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.run_to_run ../shared/data
 
 saturation: setup ## torques cut off by a sensor or a drive: whether they are found and left out, and coverage
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.saturation

@@ -1,6 +1,6 @@
 """How accurate the estimators are, and whether their error bars are honest: `make accuracy`.
 
-Writes `accuracy.md`, `accuracy.json` and `accuracy.html` into the output folder. `--draws 100` is
+Writes `accuracy.md` and `accuracy.json` into the output folder. `--draws 100` is
 the full run; `--quick` makes it short. Every figure stands beside the one asked for.
 """
 
@@ -27,6 +27,7 @@ from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate
 from pipelines import accuracy_scenes as scenes
+from pipelines.accuracy_report import markdown
 from pipelines.cramer_rao import joint_bound
 
 SCENES = ("case1", "case2", "arm1", "arm2", "arm3", "arm4", "arm5")
@@ -255,19 +256,11 @@ def _first(logs: list[Segment], count: int) -> list[Segment]:
     return logs[:count]
 
 
-def dfki_rows(folder: Path) -> list[Row]:
-    """The real arm, each run predicted from the others, by the README beside the data."""
-    from pipelines.accuracy_dfki import evaluate
-
-    return evaluate(folder)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("build/accuracy"))
     parser.add_argument("--draws", type=int, default=100)
     parser.add_argument("--quick", action="store_true", help="six draws instead")
-    parser.add_argument("--dfki", type=Path, default=Path("../shared/data/dfki"))
     given = parser.parse_args()
     draws = 6 if given.quick else given.draws
     given.output.mkdir(parents=True, exist_ok=True)
@@ -281,14 +274,10 @@ def main() -> None:
         "table4": table4_rows(),
         "timing": timing_rows(min(draws, 20)),
         "cost": cost_rows(),
-        "dfki": dfki_rows(given.dfki) if given.dfki.is_dir() else [],
     }
     (given.output / "accuracy.json").write_text(json.dumps(found, indent=1))
-    from pipelines.accuracy_report import markdown, plot
-
     text = markdown(found)
     (given.output / "accuracy.md").write_text(text)
-    plot(found, given.output / "accuracy.html")
     print(text)
 
 

@@ -1,8 +1,7 @@
-"""Tables and plot of the accuracy benchmark."""
+"""Tables of the accuracy benchmark."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 METHODS = ("filtered", "paper", "weak", "refined")
@@ -19,13 +18,12 @@ def markdown(found: dict[str, Any]) -> str:
         *_side_by_side(found["noise"]),
     ]
     lines += ["", *_table4(found["table4"])]
-    for title in ("timing", "cost", "dfki"):
-        if found[title]:
-            lines += ["", f"## {title}", "", "| what | asked | measured |", "|---|---|---|"]
-            lines += [
-                f"| {row['what']} | {_number(row['asked'])} | {_number(row['value'])} |"
-                for row in found[title]
-            ]
+    for title in ("timing", "cost"):
+        lines += ["", f"## {title}", "", "| what | asked | measured |", "|---|---|---|"]
+        lines += [
+            f"| {row['what']} | {_number(row['asked'])} | {_number(row['value'])} |"
+            for row in found[title]
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -86,22 +84,3 @@ def _table4(rows: list[dict[str, Any]]) -> list[str]:
         asked = row["paper_error_percent"] / 100
         lines.append(f"| {row['case']} | {row['row']} | {asked:.2g} | {row['error_percent']:.2g} |")
     return lines
-
-
-def plot(found: dict[str, Any], path: Path) -> None:
-    """RMS error of each method over the bound, every arm and noise."""
-    import plotly.graph_objects as go  # type: ignore[import-untyped,unused-ignore]
-
-    figure = go.Figure()
-    for method in METHODS:
-        names, values = [], []
-        for row in found["noise"]:
-            names += [f"{row['arm']} {_sigma(row)}"] * len(LABELS)
-            values += row["rms_over_bound"][method]
-        figure.add_trace(go.Box(x=names, y=values, name=method, boxpoints="all"))
-    figure.update_layout(
-        title="RMS error over the Cramér-Rao bound, k1 … k7 and m_p",
-        boxmode="group",
-        yaxis={"type": "log", "title": "RMS / bound"},
-    )
-    figure.write_html(path, include_plotlyjs=True)

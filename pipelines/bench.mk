@@ -1,4 +1,4 @@
-.PHONY: bench bench-day growth
+.PHONY: bench bench-day
 
 BENCH_ROUNDS ?= 5
 
@@ -6,9 +6,6 @@ bench: setup ## time algid and its peers on the same logs; into build/bench
 	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[bench]'
 	$(BIN)/python -m pipelines.bench --rounds $(BENCH_ROUNDS) -o build/bench
 	$(BIN)/python -m pipelines.bench_processor --rounds $(BENCH_ROUNDS) -o build/bench
-
-growth: setup ## processor time and memory by samples, logs and terms; into build/growth, 1 GB of disk
-	$(BIN)/python -m pipelines.bench_growth -o build/growth
 
 bench-day: setup ## 24 h at 1 kHz as Parquet and MCAP: memory and time, 7 GB of disk
 	$(BIN)/python -m pipelines.bench --day --rounds 3 -o build/bench-day

@@ -37,11 +37,10 @@ pipeline-$(1)-$(2): setup
 endef
 $(foreach case,$(CASES),$(foreach format,$(FORMATS),$(eval $(call PIPELINE,$(case),$(format)))))
 
-# The README's pictures, of a noisy pair of logs, and the guide's, of its table of the race.
+# The README's pictures, of a noisy pair of logs.
 .PHONY: pictures
 pictures: setup
 	@rm -rf build/pictures
 	@$(ALGID) synth --force case1 --torque wide --duration 10 --position-noise 1e-3 --torque-noise 1e-2 -o build/pictures >/dev/null
 	@$(ALGID) identify build/pictures/case1-unloaded.mcap --loaded build/pictures/case1-loaded.mcap -o build/pictures -q
 	$(BIN)/python -m pipelines.pictures build/pictures/case1-unloaded.algid -o data/pictures
-	$(BIN)/python -m pipelines.race_pictures data/pictures

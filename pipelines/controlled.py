@@ -1,5 +1,4 @@
-"""Arms under a controller, many draws side by side: the simulator of `accuracy_track` and
-`accuracy_design`.
+"""Arms under a controller, many draws side by side.
 
 It shares no equation with algid: inertia, centripetal torques and weight are written out from the
 masses, one Runge-Kutta step of fourth order a sample.

@@ -14,16 +14,11 @@ from pathlib import Path
 import algid
 from algid.api.guide import SUMMARIES, text_of
 
-PICTURES = Path(algid.__file__).parents[1] / "data/pictures"
-
 
 def pages(folder: Path) -> None:
-    """Write a Markdown file a topic, a list of them, the reference, and the pictures."""
+    """Write a Markdown file a topic, a list of them, and the reference."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "pictures").mkdir()
-    for picture in PICTURES.glob("race-*.svg"):
-        shutil.copy(picture, folder / "pictures")
     for topic in SUMMARIES:
         (folder / f"{topic}.md").write_text(_linked(text_of(topic)), encoding="utf-8")
     rows = "\n".join(f"- [{topic}]({topic}.md): {words}" for topic, words in SUMMARIES.items())
@@ -36,10 +31,7 @@ def pages(folder: Path) -> None:
 
 
 def _linked(text: str) -> str:
-    """A page whose mentions of other pages, commands in the terminal, lead there, and whose
-    pictures stand beside it.
-    """
-    text = text.replace("](../../data/pictures/", "](pictures/")
+    """A page whose mentions of other pages, commands in the terminal, lead there."""
     return re.sub(r"`(algid guide ([\w-]+))`", r"[`\1`](\2.md)", text)
 
 

@@ -9,12 +9,10 @@ the truth, and advice that names anything else. Writes `efforts.md` into the out
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +21,7 @@ from algid.arm import FloatArray, inverse_dynamics, passive_torque
 from algid.exits import exit_of
 from algid.results import Result
 from algid.synth.simulator import SimulatedMotion
+from pipelines.experiment import experiment
 from pipelines.planar import ARMS, Row, motions, noisy, scene
 
 NAMES = {
@@ -84,37 +83,22 @@ def _exit(result: Result) -> int:
     return int(exit_of(failed=failed, lost=result.data_lost))
 
 
-def lines(draws: int, processes: int) -> Iterator[str]:
+def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """The table, row by row."""
     yield (
         "| effort | draws | named | exit 0 without a flag | exit 0 with it | m_p held "
         "| other advice |"
     )
     yield "|---|---|---|---|---|---|---|"
-    with ProcessPoolExecutor(processes) as pool:
-        for effort in NAMES:
-            total: Counter[str] = Counter()
-            for found in pool.map(judged, [(effort, name, draws) for name in ARMS]):
-                total.update(found)
-            cells = [str(total[cell]) for cell in ("draws", "named", "exit 0", "then 0", "held")]
-            others = sorted(cell for cell in total if cell.startswith("other "))
-            named = [f"{total[cell]} {cell.removeprefix('other ')}" for cell in others]
-            yield f"| {effort} | {' | '.join([*cells, ', '.join(named) or 'none'])} |"
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=20, help="of each arm and effort")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/efforts"))
-    given = parser.parse_args()
-    text = []
-    for line in lines(given.draws, given.processes):
-        print(line, flush=True)
-        text.append(line)
-    given.output.mkdir(parents=True, exist_ok=True)
-    (given.output / "efforts.md").write_text("\n".join([*text, ""]), encoding="utf-8")
+    for effort in NAMES:
+        total: Counter[str] = Counter()
+        for found in pool.map(judged, [(effort, name, draws) for name in ARMS]):
+            total.update(found)
+        cells = [str(total[cell]) for cell in ("draws", "named", "exit 0", "then 0", "held")]
+        others = sorted(cell for cell in total if cell.startswith("other "))
+        named = [f"{total[cell]} {cell.removeprefix('other ')}" for cell in others]
+        yield f"| {effort} | {' | '.join([*cells, ', '.join(named) or 'none'])} |"
 
 
 if __name__ == "__main__":
-    main()
+    experiment("efforts", __doc__, lines, 20, "arm and effort")

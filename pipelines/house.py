@@ -1,105 +1,81 @@
-"""How the house stands: size, density, literals, flags, tests, and a log's way through the rooms.
+"""The size of the house beside its budget: syntax nodes, code lines and files, and how many ideas.
 
-Sizes are of code without indentation, comments and docstrings, as `ast` writes it. The way is
-traced: `algid identify` on a short log, every call from one module of algid to another. A climb is
-a call into a room above the caller's, of those in the order of the table of allowed imports; to
-take the next item from a generator that was handed down counts in the second figure alone.
+A node is one of `ast.walk`: neither long lines nor short names change it. Code lines are those of
+`ast.unparse` without docstrings. Ideas are counted by the names and loops that carry them, options
+and commands by what `--help` prints.
 """
 
 from __future__ import annotations
 
 import ast
-import inspect
-import io
 import re
+import subprocess
 import sys
-import threading
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
-from tempfile import TemporaryDirectory
-from types import FrameType
-from typing import Any
 
-from algid.cli import main
-from algid.options import OPTIONS, flag
-from algid.physics.terms import ALWAYS, OPTIONAL
-from pipelines import bench_logs
-from pipelines.house_tests import reach
-from tests.test_layers import TABLE
+from algid.notices import MESSAGES
 
-_SAMPLES = 4000  # of the traced log, at 1 kHz
-_COLUMNS = 100
-_FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]+")
-_FLAGS = {flag(one.name, off=off) for one in OPTIONS for off in (False, True)}
+BUDGETS = {
+    "input, output, batches": (57_000, 50),
+    "face": (57_000, 58),
+    "core": (102_000, 80),
+    "algid": (216_000, 190),
+    "tests": (215_000, None),
+    "pipelines": (62_000, None),
+}
+"""Syntax nodes and files that a part of the house may have."""
 
+PARTS = {
+    "input, output, batches": """readers writers batches log files stores construction staging
+    limits runtime threads faults crash_report compiled names items ros2 arrow blocks guard""",
+    "core": """physics model arm signals estimators identification tracks designs synth
+    significance quantiles criteria methods table4 cases""",
+}
+"""Rooms of a part; what stands in neither belongs to the face."""
 
-def figures() -> Iterator[tuple[str, str]]:
-    """Each figure of the house, by its name."""
-    code, tests = _texts("algid"), _texts("tests")
-    lines, of_tests = (sum(map(_lines, texts)) for texts in (code, tests))
-    lengths = [_lines(text) for text in code if _lines(text) > 2]
-    helpers = sum(map(_with_one_caller, code))
-    yield "files", f"{len(code)}"
-    yield from _sizes(code)
-    yield from _literals()
-    functions = [name for text in tests for name in _functions(text) if name.startswith("test_")]
-    yield "tests", f"{len(functions):,}"
-    reached = reach()
-    for name, part in (
-        ("tests of private names", reached.private),
-        ("tests that reach inside rooms", reached.inside),
-    ):
-        yield name, f"{part:,}, {100 * part / reached.tests:.1f} %"
-    yield "lines of tests", f"{of_tests:,}"
-    yield "lines, docstrings among them", f"{lines:,}"
-    yield "lines of docstrings", f"{sum(map(_docstring_lines, code)):,}"
-    yield "median module, lines", f"{median(lengths):.0f}"
-    yield "private functions with one caller, per 1,000 lines", f"{1000 * helpers / lines:.1f}"
-    yield "lines of tests to lines of code", f"{of_tests / lines:.2f}"
-    calls, resumed = way()
-    rooms = {room for pair in calls for room in pair}
-    yield "rooms on a log's way", f"{len(rooms)} of {len(TABLE)}"
-    for name, pairs in (("climbs on it", calls), ("with resumed generators", calls | resumed)):
-        up = climbs(pairs)
-        yield name, f"{len(up)}" + (f": {', '.join(up)}" if up else "")
+IDEAS = {
+    "reweighting loops": r"for _ in range\(\w*(?i:reweight)",
+    "leave-one-outs": r"(?i)^\w+\.\w*(left_out|without_each|by_themselves)$",
+    "Runge-Kuttas": r"/ 6(\.0)? \* \(",
+    "sandwiches": r"^(combine\.sandwich|shrinkage\.(dispersion|spread)|term_grams\._spread"
+    r"|exogeneity\._(influences|variance)|instruments\._apart|diagnostics\.by_themselves"
+    r"|saturation\._solved|evidence\.\w*(sandwich|dispersion)\w*)$",
+    "tests of the model": r"^(refined\.\w*refuted\w*|log_likelihood\.refuted|identifiability\.judge"
+    r"|misfit\.misfit|agreement\.agree|by_likelihood\._refuted_alone|\w+\.score_test)$",
+    "choosers of terms": r"^(selection\._?select\w*|by_likelihood\.completed|coarse\._starts"
+    r"|model_choice\.without_nothing|shrunk\.shrunk|terms\.(choose|drop)\w*)$",
+}
+"""By idea, a pattern of `module.function` or of the source of each function of the core that holds
+it: one each is enough."""
 
 
-def _sizes(code: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Size and density of the code, and names and classes of which there are too many."""
-    bare = [ast.unparse(_bare(ast.parse(text))) for text in code]
-    lines = sum(map(_lines, bare)) + len(bare)
-    letters = sum(len(line.strip()) for text in bare for line in text.splitlines())
-    yield "characters of code", f"{letters:,}"
-    nodes = [node for text in bare for node in ast.walk(ast.parse(text))]
-    comprehensions = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
-    unpacked = sum(isinstance(node, ast.Starred) for node in nodes)
-    unpacked += sum(node.keys.count(None) for node in nodes if isinstance(node, ast.Dict))
-    for name, count in (
-        ("comprehensions", sum(isinstance(node, comprehensions) for node in nodes)),
-        ("conditional expressions", sum(isinstance(node, ast.IfExp) for node in nodes)),
-        ("starred unpackings", unpacked),
-    ):
-        yield f"{name} per 1,000 lines of code", f"{1000 * count / lines:.1f}"
-    source = [line for text in code for line in text.splitlines()]
-    yield "lines beyond 100 columns", f"{sum(len(line) > _COLUMNS for line in source):,}"
-    yield "functions with a local called found", f"{sum(map(_with_found, nodes))}"
-    settings = [
-        node.name for node in nodes if isinstance(node, ast.ClassDef) and _is_settings(node)
-    ]
-    yield "classes that hold hold and delay", f"{len(settings)}: {', '.join(settings)}"
+@dataclass
+class Size:
+    """Syntax nodes, code lines and files."""
+
+    nodes: int = 0
+    lines: int = 0
+    files: int = 0
+
+    def add(self, other: Size) -> None:
+        """Count another size in."""
+        self.nodes += other.nodes
+        self.lines += other.lines
+        self.files += other.files
 
 
-def _bare(tree: ast.Module) -> ast.Module:
-    """The tree without docstrings, also those of variables."""
+def size(text: str) -> Size:
+    """The size of one file."""
+    tree = ast.parse(text)
+    nodes = sum(1 for _ in ast.walk(tree))
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list):
-            kept = [one for one in body if not _is_text(one)]
-            node.body = kept or [ast.Pass()]  # type: ignore[attr-defined]
-    return tree
+            code = [one for one in body if not _is_text(one)]
+            node.body = code or [ast.Pass()]  # type: ignore[attr-defined]
+    return Size(nodes, ast.unparse(tree).count("\n") + 1, 1)
 
 
 def _is_text(node: ast.AST) -> bool:
@@ -110,141 +86,82 @@ def _is_text(node: ast.AST) -> bool:
     )
 
 
-def _with_found(node: ast.AST) -> bool:
-    """Whether a function stores into a name that says nothing."""
-    return isinstance(node, ast.FunctionDef) and any(
-        isinstance(one, ast.Name) and one.id == "found" and isinstance(one.ctx, ast.Store)
-        for one in ast.walk(node)
-    )
+def part_of(room: str) -> str:
+    """The part of the house to which a room of `algid/` belongs."""
+    return next((part for part, rooms in PARTS.items() if room in rooms.split()), "face")
 
 
-def _is_settings(node: ast.ClassDef) -> bool:
-    """Whether a class holds a hold and a delay in s; that one is estimated is no setting of it."""
-    own = {
-        one.target.id: ast.unparse(one.annotation)
-        for one in node.body
-        if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name)
-    }
-    return own.get("delay") == "float" and bool(own.keys() & {"hold", "torque_hold"})
-
-
-def _literals() -> Iterator[tuple[str, str]]:
-    """String literals that name terms and coefficients, or flags, where they do not belong."""
-    every = (*ALWAYS, *OPTIONAL)
-    names = {term.name for term in every} | {name for term in every for name in term.names}
-    terms: Counter[str] = Counter()
-    flags: Counter[str] = Counter()
-    for path in sorted(Path("algid").rglob("*.py")):
-        room = path.parts[1]
-        tree = _bare(ast.parse(path.read_text(encoding="utf-8")))
-        texts = [
-            node.value
-            for node in ast.walk(tree)
-            if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        ]
-        if room != "physics":
-            terms[str(path)] += sum(text in names for text in texts)
-        if room not in ("cli", "options.py"):
-            spelled = [word for text in texts for word in _FLAG.findall(text)]
-            flags[str(path)] += sum(word in _FLAGS for word in spelled)
-    for name, counts in (("of terms and coefficients", terms), ("of flags outside cli", flags)):
-        most = ", ".join(f"{Path(path).name} {count}" for path, count in counts.most_common(6))
-        yield f"literals {name}", f"{counts.total()}, most in {most}"
-
-
-def _functions(text: str) -> list[str]:
-    return [node.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
-
-
-def _texts(folder: str) -> list[str]:
-    return [path.read_text(encoding="utf-8") for path in sorted(Path(folder).rglob("*.py"))]
-
-
-def _lines(text: str) -> int:
-    return text.count("\n")
-
-
-def _docstring_lines(text: str) -> int:
-    found = 0
-    for node in ast.walk(ast.parse(text)):
-        if (
-            isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
-            and ast.get_docstring(node) is not None
-        ):
-            found += (node.body[0].end_lineno or 0) - node.body[0].lineno + 1
+def sizes(root: Path = Path()) -> dict[str, Size]:
+    """The size of each room of `algid/`, of each part, and of `algid`, `tests` and `pipelines`."""
+    found: dict[str, Size] = {}
+    for top in ("algid", "tests", "pipelines"):
+        for path in sorted((root / top).rglob("*.py")):
+            own = size(path.read_text(encoding="utf-8"))
+            names = [top]
+            if top == "algid":
+                room = path.relative_to(root / top).parts[0].removesuffix(".py")
+                names += [part_of(room), f"algid/{room}"]
+            for name in names:
+                found.setdefault(name, Size()).add(own)
     return found
 
 
-def _with_one_caller(text: str) -> int:
-    """Private functions and methods that their module names once.
-
-    What a decorator hands on is called by others.
-    """
-    nodes = list(ast.walk(ast.parse(text)))
-    named = Counter(node.id for node in nodes if isinstance(node, ast.Name))
-    named += Counter(node.attr for node in nodes if isinstance(node, ast.Attribute))
-    private = [
-        node.name
-        for node in nodes
+def ideas(root: Path = Path("algid")) -> Iterator[tuple[str, int]]:
+    """Each idea, and how many functions of the core hold it."""
+    texts = [
+        (f"{path.stem}.{node.name}", ast.unparse(node))
+        for path in sorted(root.rglob("*.py"))
+        if part_of(path.relative_to(root).parts[0].removesuffix(".py")) == "core"
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef)
-        and node.name.startswith("_")
-        and not node.decorator_list
     ]
-    return sum(not name.startswith("__") and named[name] == 1 for name in private)
+    for idea, pattern in IDEAS.items():
+        yield idea, sum(any(re.search(pattern, text) for text in both) for both in texts)
 
 
-def climbs(pairs: set[tuple[str, str]]) -> list[str]:
-    """Those of the pairs of rooms whose second one is above the first."""
-    floor = {name: number for number, name in enumerate(TABLE)}
-    return sorted(f"{one} to {other}" for one, other in pairs if floor[other] > floor[one])
+def commands_and_options() -> tuple[int, int]:
+    """Commands of `algid`, and the different long options of them all."""
+
+    def helped(*words: str) -> str:
+        call = [sys.executable, "-m", "algid", *words, "--help"]
+        return subprocess.run(call, capture_output=True, text=True, check=True).stdout
+
+    def below(*words: str) -> list[tuple[str, ...]]:
+        panel = helped(*words).partition("─ Commands")[2]
+        return [(*words, name) for name in re.findall(r"^│ ([a-z][a-z-]*) {2,}\S", panel, re.M)]
+
+    commands = [leaf for one in below() for leaf in below(*one) or [one]]
+    rows = [
+        row
+        for words in commands
+        for row in re.findall(r"^│ [* ]*(--[a-z].*?)(?: <| {3})", helped(*words), re.M)
+    ]
+    flags = {flag for row in rows for flag in re.findall(r"--[a-z][\w-]*", row)}
+    return len(commands), len(flags - {"--help"})
 
 
-def way() -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
-    """Rooms that call and rooms that are called while a log is identified, its report and series
-    written.
-
-    Calls of functions, and generators that are begun or resumed.
-
-    Raises
-    ------
-    SystemExit
-        If the command fails.
-    """
-    called: set[tuple[str, str]] = set()
-    resumed: set[tuple[str, str]] = set()
-
-    def watch(frame: FrameType, event: str, _: Any) -> None:
-        if event != "call" or frame.f_back is None:
-            return
-        one, other = (_room(place.f_globals.get("__name__", "")) for place in (frame.f_back, frame))
-        if one and other and one != other:
-            generator = frame.f_code.co_flags & inspect.CO_GENERATOR
-            (resumed if generator else called).add((one, other))
-
-    with TemporaryDirectory() as folder:
-        log = bench_logs.parquet(Path(folder, "log.parquet"), _SAMPLES)
-        threading.setprofile(watch)
-        sys.setprofile(watch)
-        try:
-            with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-                sys.argv = ["algid", "identify", str(log), "-o", folder]
-                main()
-        except SystemExit as end:
-            if end.code:
-                raise
-        finally:
-            sys.setprofile(None)
-            threading.setprofile(None)
-    return called, resumed
-
-
-def _room(module: str) -> str | None:
-    """The room in which a module of algid stands."""
-    top, _, rest = module.partition(".")
-    room = rest.partition(".")[0]
-    return room if top == "algid" and room in TABLE else None
+def main() -> None:
+    """Print the table."""
+    found = sizes()
+    print(f"{'room':28s} {'nodes':>8s} {'budget':>8s} {'lines':>7s} {'files':>6s} {'budget':>7s}")
+    totals = [name for name in BUDGETS if name in found]
+    rooms = sorted((name for name in found if name not in BUDGETS), key=lambda n: -found[n].nodes)
+    for name in totals + rooms:
+        one, (nodes, files) = found[name], BUDGETS.get(name, (None, None))
+        asked, asked_files = (f"{n:,}" if n else "" for n in (nodes, files))
+        print(
+            f"{name:28s} {one.nodes:8,} {asked:>8s} {one.lines:7,} {one.files:6,} {asked_files:>7s}"
+        )
+    print()
+    commands, options = commands_and_options()
+    for name, count, allowed in (
+        *((idea, count, 1) for idea, count in ideas()),
+        ("codes of notices", len(MESSAGES), 70),
+        ("commands", commands, 12),
+        ("options", options, 60),
+    ):
+        print(f"{name:28s} {count:8,} {allowed:8,}")
 
 
 if __name__ == "__main__":
-    for name, value in figures():
-        print(f"{name:52s} {value}")
+    main()

@@ -10,11 +10,9 @@ alarm. Errors that the score test has no shape for are among them.
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from algid.log import Log, Origin, Reading
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, SimulatedMotion, steered
 from pipelines.accuracy_scenes import case_of
+from pipelines.experiment import experiment
 
 ARMS = ("case1", "arm22")
 RATE, DURATION = 250.0, 8.0
@@ -128,43 +127,28 @@ def judged(job: tuple[str, str, float, int]) -> Counter[str]:
     return total
 
 
-def lines(draws: int, processes: int) -> Iterator[str]:
+def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """The table, row by row."""
     yield "| error | share | draws | said | Good | held | held of Good | farthest of Good, σ |"
     yield f"|{'---|' * 8}"
-    with ProcessPoolExecutor(processes) as pool:
-        for error, share in ROWS:
-            jobs = [(name, error, share, draws) for name in ARMS]
-            total: Counter[str] = Counter()
-            farthest = 0
-            for of_arm in pool.map(judged, jobs):
-                farthest = max(farthest, of_arm.pop("far", 0))
-                total.update(of_arm)
-            cells = [
-                f"{100 * share:g} %",
-                str(total["draws"]),
-                str(total["said"]),
-                str(total["good"]),
-                f"{total['held']}/{total['told']}",
-                f"{total['held good']}/{total['told good']}",
-                f"{farthest / 10:.1f}",
-            ]
-            yield f"| {error} | {' | '.join(cells)} |"
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=10, help="of each arm and row")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/misfit"))
-    given = parser.parse_args()
-    given.output.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for line in lines(given.draws, given.processes):
-        print(line, flush=True)
-        rows.append(line)
-    (given.output / "misfit.md").write_text("\n".join([*rows, ""]), encoding="utf-8")
+    for error, share in ROWS:
+        jobs = [(name, error, share, draws) for name in ARMS]
+        total: Counter[str] = Counter()
+        farthest = 0
+        for of_arm in pool.map(judged, jobs):
+            farthest = max(farthest, of_arm.pop("far", 0))
+            total.update(of_arm)
+        cells = [
+            f"{100 * share:g} %",
+            str(total["draws"]),
+            str(total["said"]),
+            str(total["good"]),
+            f"{total['held']}/{total['told']}",
+            f"{total['held good']}/{total['told good']}",
+            f"{farthest / 10:.1f}",
+        ]
+        yield f"| {error} | {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":
-    main()
+    experiment("misfit", __doc__, lines, 10, "arm and row")

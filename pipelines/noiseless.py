@@ -9,16 +9,17 @@ deviations, both relative. Writes `noiseless.md` into the output folder.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
-from pathlib import Path
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 import algid
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
+from pipelines.experiment import experiment
 
 INTEGRATORS = ("Euler", "implicitfast", "implicit", "RK4")
 STEPS = ((1e-3, 1), (2e-3, 1), (2e-4, 5))  # s, and how many of them from sample to sample
@@ -106,8 +107,9 @@ def logged(
     return algid.Log.from_arrays(t, np.array(angles).T, np.array(torques).T), constants
 
 
-def row(integrator: str, step: float, every: int, draws: int, *, open_loop: bool) -> str:
-    """What became of the draws."""
+def row(job: tuple[str, tuple[float, int], bool, int]) -> str:
+    """What became of the draws of an integrator, a step, a loop."""
+    integrator, (step, every), open_loop, draws = job
     used, held, told = 0, 0, 0
     errors, deviations = [0.0], [np.nan]
     for seed in range(draws):
@@ -136,31 +138,15 @@ def row(integrator: str, step: float, every: int, draws: int, *, open_loop: bool
     )
 
 
-def lines(draws: int) -> Iterator[str]:
+def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """The table, row by row."""
     yield (
         "| integrator | loop | step, logged | identified | intervals hold | largest error "
         "| median σ |"
     )
     yield "|---|---|---|---|---|---|---|"
-    for integrator in INTEGRATORS:
-        for step, every in STEPS:
-            for open_loop in (False, True):
-                yield row(integrator, step, every, draws, open_loop=open_loop)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=10, help="arms of each row")
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/noiseless"))
-    given = parser.parse_args()
-    text = []
-    for line in lines(given.draws):
-        print(line, flush=True)
-        text.append(line)
-    given.output.mkdir(parents=True, exist_ok=True)
-    (given.output / "noiseless.md").write_text("\n".join([*text, ""]), encoding="utf-8")
+    yield from pool.map(row, product(INTEGRATORS, STEPS, (False, True), (draws,)))
 
 
 if __name__ == "__main__":
-    main()
+    experiment("noiseless", __doc__, lines, 10, "row")

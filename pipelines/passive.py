@@ -11,11 +11,9 @@ constant. Writes
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import numpy as np
 
@@ -26,6 +24,7 @@ from algid.signals.filters import correlate
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, steered
 from pipelines.accuracy_scenes import case_of
+from pipelines.experiment import experiment
 
 ARMS = ("case1", "arm21", "arm22", "arm23")
 RATE, DURATION = 250.0, 10.0
@@ -98,19 +97,18 @@ def judged(job: tuple[str, int, int]) -> Counter[str]:
     return found
 
 
-def lines(draws: int, processes: int) -> Iterator[str]:
+def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
     """The table, row by row."""
     names = " | ".join(CONSTANT_NAMES)
     yield f"| joint without motor | draws | converged | failed | nothing | {names} |"
     yield f"|{'---|' * (5 + len(CONSTANT_NAMES))}"
-    with ProcessPoolExecutor(processes) as pool:
-        for passive, title in ((1, "1 (acrobot)"), (2, "2 (pendubot)")):
-            total: Counter[str] = Counter()
-            jobs = [(name, passive, draws) for name in ARMS]
-            for (name, *_), found in zip(jobs, pool.map(judged, jobs), strict=True):
-                total.update(found)
-                yield _line(f"{title}, {name}", found)
-            yield _line(f"{title}, all", total)
+    for passive, title in ((1, "1 (acrobot)"), (2, "2 (pendubot)")):
+        total: Counter[str] = Counter()
+        jobs = [(name, passive, draws) for name in ARMS]
+        for (name, *_), found in zip(jobs, pool.map(judged, jobs), strict=True):
+            total.update(found)
+            yield _line(f"{title}, {name}", found)
+        yield _line(f"{title}, all", total)
 
 
 def _line(title: str, total: Counter[str]) -> str:
@@ -119,19 +117,5 @@ def _line(title: str, total: Counter[str]) -> str:
     return f"| {title} | {' | '.join(map(str, [*cells, *held]))} |"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=50, help="of each of four arms and kind")
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/passive"))
-    given = parser.parse_args()
-    text = []
-    for line in lines(given.draws, given.processes):
-        print(line, flush=True)
-        text.append(line)
-    given.output.mkdir(parents=True, exist_ok=True)
-    (given.output / "passive.md").write_text("\n".join([*text, ""]), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    experiment("passive", __doc__, lines, 50, "of four arms and kind")

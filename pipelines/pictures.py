@@ -20,7 +20,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from algid.report.page import result_document, write_report
+from algid.report.page import result_document, write_pages
 from algid.report.terminal import print_document
 from algid.results import Result, read_result
 
@@ -46,7 +46,7 @@ def main() -> int:
     if chromium is None:
         print("chromium is not installed: no picture of the report", file=sys.stderr)
         return 1
-    page = write_report(wanted.result)
+    page, _ = write_pages(wanted.result)
     for theme in THEMES:
         photograph(chromium, page, theme, wanted.output / f"report-{theme}.png")
     return 0

@@ -1,12 +1,13 @@
-"""Arms of the race, simulated by a road of their own: the general planar arm under the Runge-Kutta
-method.
+"""Arms of the race, simulated side by side by a road of their own: the general planar arm under
+the Runge-Kutta method.
 
-======  ================================================  =======================
+======  ================================================  ==============
 symbol  name                                              shape
-======  ================================================  =======================
-K       moments K1, K2, K4 as phasors                     (3,) complex
-x       angles and velocities of both joints              (4,)
-======  ================================================  =======================
+======  ================================================  ==============
+S       arms that are integrated side by side             scalar
+K       moments K1, K2, K4 as phasors                     (3, S) complex
+x       angles and velocities of both joints              (4, S)
+======  ================================================  ==============
 
 With centres of mass at angles δ off their links, K1 = m2 l1 lc2 exp(i δ2), K2 = g m2 lc2 exp(i δ2)
 and K4 = m1 g lc1 exp(i δ1) + m2 g l1; the constants k1, k2, k4 are their real parts, what lies
@@ -15,14 +16,13 @@ along the links.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from algid.arm import Arm, FloatArray
-from algid.signals.segments import Segment
-from algid.synth.excitation import MultiSine
+from algid.log import Log
 from pipelines.accuracy_scenes import random_arm
 from pipelines.cramer_rao import Truth, information
 
@@ -31,143 +31,134 @@ SUBSTEPS = 4
 SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
 ENCODER = 2 * np.pi / 4096
 KINDS = ("straight", "off-line", "friction", "position-controlled", "encoder 12 bit")
+BOUNDED = ("straight", "encoder 12 bit")  # whose Cramér-Rao bound is known
 OFF_LINE = np.deg2rad([8.0, -12.0])
 FRICTION, WIDTH = 0.08, 0.08  # Coulomb's share of the drive's RMS; rad/s
-
-Drive = Callable[[float, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A simulated arm: constants, link 1's length in m, a log, another to predict, the bound (7,)
-    where it is known.
+    """A simulated arm: constants (7,), link 1's length in m, a log, another to predict, the true
+    motion of the log.
     """
 
     kind: str
     seed: int
     truth: FloatArray
     l1: float
-    log: Segment
-    ahead: Segment
-    bound: FloatArray | None
+    log: Log
+    ahead: Log
+    motion: Truth
+
+    def bound(self) -> FloatArray:
+        """Cramér and Rao's least standard deviations (7,) of the constants."""
+        sigma = ENCODER / np.sqrt(12) if self.kind == "encoder 12 bit" else SIGMA_THETA
+        found = information(self.motion, self.truth, 9.81, sigma, SIGMA_TAU, loaded=False)
+        return np.sqrt(np.diag(np.linalg.inv(found)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Plant:
-    arm: Arm
-    K: tuple[complex, complex, complex]
-    k: FloatArray
-    coulomb: FloatArray
-
-    @classmethod
-    def of(cls, arm: Arm, off: FloatArray, coulomb: FloatArray) -> _Plant:
-        lean1, lean2 = np.exp(1j * off)
-        K1 = arm.m2 * arm.l1 * arm.lc2 * lean2
-        K2 = arm.g * arm.m2 * arm.lc2 * lean2
-        K4 = arm.m1 * arm.g * arm.lc1 * lean1 + arm.m2 * arm.g * arm.l1
-        k = arm.constants().copy()
-        k[[0, 1, 3]] = K1.real, K2.real, K4.real
-        return cls(arm, (K1, K2, K4), k, coulomb)
-
-    def rate(self, x: FloatArray, tau: FloatArray) -> FloatArray:
-        """ẋ (4,) under the torque (2,)."""
-        K1, K2, K4 = self.K
-        k3, k5, b = self.k[2], self.k[4], self.k[5:7]
-        q1, q2, w1, w2 = x
-        turned = K1 * np.exp(1j * q2)
-        mass = np.array([[k5 + k3 + 2 * turned.real, k3 + turned.real], [k3 + turned.real, k3]])
-        # d Re(K1 e^{iθ2}) / dθ2 = −Im(K1 e^{iθ2}): what is centripetal
-        spin = np.array([-turned.imag * (2 * w1 + w2) * w2, turned.imag * w1**2])
-        both = (K2 * np.exp(1j * (q1 + q2))).real
-        weight = np.array([(K4 * np.exp(1j * q1)).real + both, both])
-        omega = x[2:]
-        rubbing = b * omega + self.coulomb * np.tanh(omega / WIDTH)
-        return np.concatenate([omega, np.linalg.solve(mass, tau - spin - weight - rubbing)])
+def scenes(seeds: Sequence[int]) -> list[Scene]:
+    """The arms of all kinds for each seed, with two logs each."""
+    keys = [(kind, seed, run) for seed in seeds for kind in KINDS for run in range(2)]
+    motions = dict(zip(keys, _moved(keys), strict=True))
+    found = []
+    for seed in seeds:
+        arm, _ = random_arm(100 + seed)
+        for kind in KINDS:
+            both = [motions[kind, seed, run] for run in range(2)]
+            rng = np.random.default_rng([seed, KINDS.index(kind)])
+            logs = [_logged(motion, kind, rng) for motion in both]
+            truth = arm.constants().copy()
+            truth[[0, 1, 3]] = _moments(arm, kind).real
+            found.append(Scene(kind, seed, truth, arm.l1, logs[0], logs[1], both[0]))
+    return found
 
 
-def scene(kind: str, seed: int) -> Scene:
-    """The arm of a kind and seed, its log and the log that is to be predicted."""
-    arm, _ = random_arm(100 + seed)
-    drives = [_sines(arm, 1000 * seed + place) for place in range(2)]
-    t = np.arange(round(DURATION * RATE)) / RATE
-    size = np.sqrt(np.mean(drives[0](t) ** 2, axis=1))
-    plant = _Plant.of(
-        arm,
-        OFF_LINE if kind == "off-line" else np.zeros(2),
-        FRICTION * size if kind == "friction" else np.zeros(2),
-    )
-    rng = np.random.default_rng([seed, KINDS.index(kind)])
-    truths, logs = [], []
-    for place, drive in enumerate(drives):
-        if kind == "position-controlled":
-            truth = _moved(plant, _controlled(plant, seed + 50 * place), held=True)
-        else:
-            truth = _moved(plant, _open_loop(drive))
-        truths.append(truth)
-        logs.append(_logged(truth, kind, rng))
-    bound = None
-    if kind in ("straight", "encoder 12 bit"):
-        sigma = ENCODER / np.sqrt(12) if kind == "encoder 12 bit" else SIGMA_THETA
-        found = information(truths[0], plant.k, arm.g, sigma, SIGMA_TAU, loaded=False)
-        bound = np.sqrt(np.diag(np.linalg.inv(found)))
-    return Scene(kind, seed, plant.k, arm.l1, logs[0], logs[1], bound)
+def _moments(arm: Arm, kind: str) -> FloatArray:
+    """K1, K2, K4 of an arm (3,) complex."""
+    lean1, lean2 = np.exp(1j * (OFF_LINE if kind == "off-line" else np.zeros(2)))
+    first, second = arm.m1 * arm.lc1 * lean1, arm.m2 * arm.lc2 * lean2
+    return np.array([arm.l1 * second, arm.g * second, arm.g * (first + arm.m2 * arm.l1)])
 
 
-def _sines(arm: Arm, seed: int) -> MultiSine:
-    """Six harmonics a joint of 0.2 to 3 Hz, which swing the arm about without spinning it round."""
+def _sines(arm: Arm, seed: int, t: FloatArray) -> FloatArray:
+    """Six harmonics a joint of 0.2 to 3 Hz, which swing the arm about without spinning it round:
+    torques (2, N) at times (N,).
+    """
     k1, k2, k3, k4, k5, k6, k7 = arm.constants()
     need = (k4 + k2 + 3 * k6 + 15 * (k5 + k3 + 2 * k1), k2 + 3 * k7 + 15 * k3)
     rng = np.random.default_rng(seed)
-    frequencies = tuple(tuple(rng.uniform(0.2, 3.0, 6).tolist()) for _ in range(2))
-    phases = tuple(tuple(rng.uniform(0, 2 * np.pi, 6).tolist()) for _ in range(2))
-    return MultiSine(tuple((0.2 * float(force),) * 6 for force in need), frequencies, phases)
+    frequency, phase = rng.uniform(0.2, 3.0, (2, 6)), rng.uniform(0, 2 * np.pi, (2, 6))
+    angle = 2 * np.pi * frequency[..., None] * t + phase[..., None]
+    return 0.2 * np.array(need)[:, None] * np.sin(angle).sum(axis=1)
 
 
-def _controlled(plant: _Plant, seed: int) -> Drive:
-    """A digital PD law with gravity's compensation that follows sines of up to 1.5 Hz."""
-    rng = np.random.default_rng(seed)
-    frequency, phase = rng.uniform(0.2, 1.5, (2, 4)), rng.uniform(0, 2 * np.pi, (2, 4))
+def _moved(keys: Sequence[tuple[str, int, int]]) -> list[Truth]:
+    """The true motions of kinds, seeds and runs.
+
+    A position-controlled arm follows sines of up to 1.5 Hz by a digital PD law, whose torque is
+    held from sample to sample; the others are driven by sines of torque.
+    """
+    arms = [random_arm(100 + seed)[0] for _, seed, _ in keys]
+    K = np.stack([_moments(arm, kind) for arm, (kind, _, _) in zip(arms, keys, strict=True)], -1)
+    k = np.stack([arm.constants() for arm in arms], axis=-1)
+    fine = np.arange(2 * SUBSTEPS * round(DURATION * RATE) + 1) / (2 * SUBSTEPS * RATE)
+    drives = [
+        _sines(arm, 1000 * seed + run, fine) for arm, (_, seed, run) in zip(arms, keys, strict=True)
+    ]
+    rubs = np.array([kind == "friction" for kind, _, _ in keys])
+    # both runs of an arm rub alike: by its first drive
+    size = [drives[place - run] for place, (_, _, run) in enumerate(keys)]
+    coulomb = rubs * FRICTION * np.sqrt(np.mean(np.square(size), axis=2)).T
+    held = np.array([kind == "position-controlled" for kind, _, _ in keys])
+    tau = np.stack(drives, axis=-1)  # (2, fine, S)
+    drawn = [np.random.default_rng(seed + 50 * run) for _, seed, run in keys]
+    frequency = np.stack([rng.uniform(0.2, 1.5, (2, 4)) for rng in drawn], axis=-1)
+    phase = np.stack([rng.uniform(0, 2 * np.pi, (2, 4)) for rng in drawn], axis=-1)
     amplitude = 0.35 / np.sqrt(frequency)
-    stiffness = np.array([plant.k[4] + plant.k[2] + 2 * plant.k[0], plant.k[2]]) * 20.0**2
+    stiffness = np.stack([k[4] + k[2] + 2 * k[0], k[2]]) * 20.0**2
 
-    def torque(now: float, x: FloatArray) -> FloatArray:
-        angle = 2 * np.pi * frequency * now + phase
-        wanted = np.array([-np.pi / 2, 0.0]) + (amplitude * np.sin(angle)).sum(axis=1)
-        speed = (amplitude * 2 * np.pi * frequency * np.cos(angle)).sum(axis=1)
-        return np.asarray(stiffness * (wanted - x[:2]) + stiffness / 10.0 * (speed - x[2:]))
+    def rate(x: FloatArray, torque: FloatArray) -> FloatArray:
+        w1, w2 = x[2:]
+        turned = K[0] * np.exp(1j * x[1])
+        m11, m12, m22 = k[4] + k[2] + 2 * turned.real, k[2] + turned.real, k[2]
+        both = (K[1] * np.exp(1j * (x[0] + x[1]))).real
+        rubbing = k[5:7] * x[2:] + coulomb * np.tanh(x[2:] / WIDTH)
+        # d Re(K1 e^{iθ2}) / dθ2 = −Im(K1 e^{iθ2}): what is centripetal
+        weight = (K[2] * np.exp(1j * x[0])).real
+        b1 = torque[0] + turned.imag * (2 * w1 + w2) * w2 - weight - both - rubbing[0]
+        b2 = torque[1] - turned.imag * w1**2 - both - rubbing[1]
+        det = m11 * m22 - m12**2
+        return np.stack([w1, w2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det])
 
-    return torque
-
-
-def _open_loop(torque: MultiSine) -> Drive:
-    """The drive of a torque (2, N) over times (N,)."""
-    return lambda now, _: torque(np.array([now]))[:, 0]
-
-
-def _moved(plant: _Plant, drive: Drive, held: bool = False) -> Truth:
-    """The true motion; a `held` torque is that of the sample before until the next."""
     n, h = round(DURATION * RATE), 1 / RATE / SUBSTEPS
-    x = np.array([-np.pi / 2, 0.0, 0.0, 0.0])
-    states, torques = np.empty((4, n)), np.empty((2, n))
+    x = np.zeros((4, len(keys)))
+    x[0] = -np.pi / 2
+    states, torques = np.empty((n, 4, len(keys))), np.empty((n, 2, len(keys)))
     for sample in range(n):
-        now = sample / RATE
-        states[:, sample], torques[:, sample] = x, drive(now, x)
-        for part in range(SUBSTEPS):
-            at = now + part * h
-            first, middle, last = (
-                torques[:, sample] if held else drive(at + share * h, x)
-                for share in (0.0, 0.5, 1.0)
-            )
-            a = plant.rate(x, first)
-            b = plant.rate(x + 0.5 * h * a, middle)
-            c = plant.rate(x + 0.5 * h * b, middle)
-            x = x + h / 6 * (a + 2 * b + 2 * c + plant.rate(x + h * c, last))
-    return Truth(np.arange(n) / RATE, states[:2], states[2:], torques)
+        angle = 2 * np.pi * frequency * (sample / RATE) + phase
+        wanted = (amplitude * np.sin(angle)).sum(axis=1)
+        wanted[0] -= np.pi / 2
+        speed = (amplitude * 2 * np.pi * frequency * np.cos(angle)).sum(axis=1)
+        controlled = stiffness * (wanted - x[:2]) + stiffness / 10.0 * (speed - x[2:])
+        first = 2 * SUBSTEPS * sample
+        tau[:, first : first + 2 * SUBSTEPS + 1, held] = controlled[:, None, held]
+        states[sample], torques[sample] = x, tau[:, first]
+        for part in range(first, first + 2 * SUBSTEPS, 2):
+            a = rate(x, tau[:, part])
+            b = rate(x + 0.5 * h * a, tau[:, part + 1])
+            c = rate(x + 0.5 * h * b, tau[:, part + 1])
+            x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c, tau[:, part + 2]))
+    t = np.arange(n) / RATE
+    return [
+        Truth(t, states[:, :2, s].T.copy(), states[:, 2:, s].T.copy(), torques[..., s].T.copy())
+        for s in range(len(keys))
+    ]
 
 
-def _logged(truth: Truth, kind: str, rng: np.random.Generator) -> Segment:
+def _logged(truth: Truth, kind: str, rng: np.random.Generator) -> Log:
     theta = truth.theta + SIGMA_THETA * rng.standard_normal(truth.theta.shape)
     if kind == "encoder 12 bit":
         theta = np.round(truth.theta / ENCODER) * ENCODER
     tau = truth.tau + SIGMA_TAU * rng.standard_normal(truth.tau.shape)
-    return Segment(0.0, 1 / RATE, theta, tau)
+    return Log.from_arrays(truth.t, theta, tau)

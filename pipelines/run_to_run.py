@@ -1,186 +1,140 @@
-"""Whether intervals hold from run to run: disjoint halves of the runs of a real arm.
+"""Whether intervals hold from run to run: all splits of a real arm's runs into halves.
 
-    python -m pipelines.run_to_run ../shared/data/dfki --splits 16
+    python -m pipelines.run_to_run ../shared/data
 
-Each split gives two estimates that share no run: by `algid identify` without a flag (each half
-chooses its own terms and its own estimator), and by the weak estimator with given terms. z is
-their difference over its standard deviation; asked of what no flag gives: an RMS between 0.7 and
-1.2, and 92 to 99 % of the differences inside what both 95 % intervals allow. Repeatability is the
-scatter of k1 … k5 between halves over their size, the mean of the five; asked is that of an
-output-error fit on the same splits (`pipelines.output_error`), without and with a gain of joint 2,
-which algid leaves open.
+The ten runs of C.1 and the nine of A.0 can be split into halves in 126 ways each. Both halves of a
+split are estimated by themselves, with no flag: each chooses its own terms. z is the difference
+of two estimates of k1 … k7 over its standard deviation; "inside" are differences within what both
+95 % intervals allow. Repeatability is the scatter of k1 … k5 between halves over their size, the
+mean of the five; "held out" the RMSE of the torque of the other half's runs, motion below 20 Hz and
+residual below 5 Hz.
+
+Splits share runs, so that their figures are not independent. What stands behind ± is the
+jackknife's standard error: every figure is taken anew without one run, over all splits of the
+others.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections import Counter
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from itertools import chain
+from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from scipy.signal import butter, sosfiltfilt
 
-from algid.arm import CONSTANT_NAMES
-from algid.estimators import weak
-from algid.estimators.weak import Source, WeakSettings
-from algid.identification.identify import identify
-from algid.identification.source import open_sources
-from algid.identification.survey import Survey
-from algid.log import Log, Origin
-from algid.model import Model
-from algid.profile import Profile
-from algid.results import Estimate
-from algid.signals.segments import Segment
-from pipelines import output_error
-from pipelines.accuracy_dfki import run
+from algid.arm import FloatArray
+from algid.log import Log
+from pipelines.race_peers import PEERS, Answer, even
+from pipelines.race_regressions import NAMES, columns, smoothed
 
-NO_FLAG = "no flag"
-OUTPUT_ERROR = "output error"
-WITH_GAIN = "output error, gain"
-MODELS = (NO_FLAG, "viscous", "coulomb + rotor", OUTPUT_ERROR, WITH_GAIN)
-ARMS = ("C1_sysid", "A0_sysid")
-Row = dict[str, Any]
+BUILDS = {"C.1": "C1_sysid", "A.0": "A0_sysid"}
+L1 = 0.2  # m, of both builds
+FIGURES = (
+    "inside, %",
+    "RMS of z",
+    "repeatability, %",
+    "held out, joint 1, N m",
+    "held out, joint 2, N m",
+)
+
+Half = tuple[int, ...]
+Split = tuple[Half, Half]
 
 
-@dataclass(frozen=True)
-class _Half:
-    """By name estimate, standard deviation and half width of the interval; the estimator.
-
-    The terms.
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A contender's answer on a half, None where it fell; the mean square of what it misses of each
+    other run's torque (2,), and the processor time in s.
     """
 
-    found: dict[str, tuple[float, float, float]]
-    estimator: str
-    terms: tuple[str, ...]
+    answer: Answer | None
+    missed: Mapping[int, FloatArray]
+    seconds: float
 
 
 @cache
-def _runs(folder: Path) -> tuple[Segment, ...]:
-    """The longest stretch of each run, angles in algid's convention."""
-    files = sorted(folder.glob("*.csv"))
-    if folder.name == "C1_sysid":
-        return tuple(run(path) for path in files)
-    survey = Survey(open_sources(files, "unloaded", Profile(zero="hanging"), 9.81))
-    return tuple(max(survey.segments(log), key=len) for log in survey.logs)
+def runs(folder: Path, build: str) -> tuple[Log, ...]:
+    """The runs of a build, θ1 from the horizontal: these logs measure it from hanging."""
+    import algid
+
+    logs = map(algid.read_log, sorted((folder / "dfki" / BUILDS[build]).glob("*.csv")))
+    return tuple(replace(log, theta=log.theta - [[np.pi / 2], [0.0]]) for log in logs)
 
 
-def _source(log: Segment) -> Source:
-    def once() -> Iterable[Segment]:
-        return [log]
-
-    return once
-
-
-def _estimated(job: tuple[Path, tuple[int, ...], str]) -> _Half:
-    folder, places, model = job
-    logs = [_runs(folder)[place] for place in places]
-    if model in (OUTPUT_ERROR, WITH_GAIN):
-        start = weak.fit(
-            [_source(log) for log in logs], settings=WeakSettings(Model(("coulomb", "rotor")))
-        )
-        p = output_error.fit(logs, start.values[:7], gain=model == WITH_GAIN).tolist()
-        found = zip(output_error.NAMES, p[: len(output_error.NAMES)], strict=True)
-        return _Half({name: (value, np.nan, np.nan) for name, value in found}, model, ())
-    return _identified(logs) if model == NO_FLAG else _weak(logs, model)
+def splits(places: Sequence[int]) -> Iterator[Split]:
+    """Every split of runs into halves; of an odd number the second has one more."""
+    for one in combinations(places, len(places) // 2):
+        other = tuple(place for place in places if place not in one)
+        if len(one) < len(other) or one < other:
+            yield one, other
 
 
-def _identified(logs: Sequence[Segment]) -> _Half:
-    as_logs = [
-        Log(
-            np.round(np.arange(len(log)) * log.dt * 1e9).astype(np.int64),
-            log.theta,
-            log.tau,
-            Origin(str(n), "csv", {}),
-        )
-        for n, log in enumerate(logs)
-    ]
-    result = identify(as_logs, report=False)
-    terms = tuple(result.fit.model.terms) if result.fit and result.fit.model else ()
-    return _Half(
-        {name: one for name, e in result.parameters.items() if (one := _numbers(e))},
-        result.estimator,
-        terms,
+def held_out(answer: Answer, log: Log) -> FloatArray:
+    """Mean square (2,) of what an answer misses of a log's torque below 5 Hz."""
+    segment = even(log)
+    motion = smoothed(segment, 20.0)
+    known = dict(zip(NAMES, np.nan_to_num(answer.values), strict=False)) | answer.terms
+    p = np.array([known.get(name, 0.0) for name in NAMES])
+    missed = segment.tau - np.einsum("ijn,j->in", columns(motion, answer.width), p)
+    below = butter(3, 5.0, fs=1 / segment.dt, output="sos")
+    edge = round(0.3 / segment.dt)
+    return np.asarray(np.mean(sosfiltfilt(below, missed, axis=1)[:, edge:-edge] ** 2, axis=1))
+
+
+def fitted(job: tuple[Path, str, str, Half]) -> Fit:
+    """One contender on some runs of a build."""
+    folder, build, peer, half = job
+    every = runs(folder, build)
+    begin = time.process_time()
+    try:
+        answer = PEERS[peer][0]([every[place] for place in half], L1)
+    except Exception:  # a contender that falls is a result
+        return Fit(None, {}, time.process_time() - begin)
+    seconds = time.process_time() - begin
+    others = [place for place in range(len(every)) if place not in half]
+    return Fit(answer, {place: held_out(answer, every[place]) for place in others}, seconds)
+
+
+def figures(taken: Sequence[Split], found: Mapping[Half, Fit]) -> FloatArray:
+    """`FIGURES` (5,) over splits; NaN where a contender has no such figure."""
+    differences, squares, missed = [], [], []
+    for one, other in taken:
+        a, b = found[one].answer, found[other].answer
+        if a is None or b is None:
+            continue
+        apart = a.values - b.values
+        squares.append(2 * (apart / (a.values + b.values))[:5] ** 2)
+        missed += [found[one].missed[run] for run in other]
+        missed += [found[other].missed[run] for run in one]
+        if a.interval is None or b.interval is None or a.std is None or b.std is None:
+            continue
+        allowed = 0.5 * np.hypot(np.ptp(a.interval, axis=1), np.ptp(b.interval, axis=1))
+        differences.append(np.stack([np.abs(apart) / allowed, apart / np.hypot(a.std, b.std)]))
+    inside = z = np.nan
+    if differences:
+        share, ratio = np.concatenate(differences, axis=1)
+        inside = 100 * np.mean(share[np.isfinite(share)] <= 1)
+        z = np.sqrt(np.nanmean(ratio**2))
+    if not squares:
+        return np.full(len(FIGURES), np.nan)
+    scatter = 100 * np.mean(np.sqrt(np.nanmean(squares, axis=0)))
+    return np.array([inside, z, scatter, *np.sqrt(np.mean(missed, axis=0))])
+
+
+def jackknifed(count: int, found: Mapping[Half, Fit]) -> FloatArray:
+    """Standard errors (5,) of `FIGURES` over all splits of so many runs."""
+    every = range(count)
+    without = np.stack(
+        [figures(list(splits([run for run in every if run != left])), found) for left in every]
     )
-
-
-def _numbers(found: Estimate) -> tuple[float, float, float] | None:
-    low, high = found.ci95 or (None, None)
-    if found.estimate is None or found.std is None or low is None or high is None:
-        return None
-    return found.estimate, found.std, 0.5 * (high - low)
-
-
-def _weak(logs: Sequence[Segment], model: str) -> _Half:
-    terms = () if model == "viscous" else tuple(model.split(" + "))
-    fit = weak.fit([_source(log) for log in logs], settings=WeakSettings(Model(terms)))
-    found = zip(fit.names, fit.values.tolist(), fit.std.tolist(), strict=True)
-    return _Half(
-        {name: (value, std, fit.quantile * std) for name, value, std in found if np.isfinite(std)},
-        "weak",
-        terms,
-    )
-
-
-def evaluate(folder: Path, splits: int, model: str = NO_FLAG, seed: int = 0) -> list[Row]:
-    """Repeatability of k1 … k5, RMS of z and share inside of k1 … k7, over splits drawn by `seed`.
-
-    The coefficients of friction mean what the width makes of them, which each half finds by itself.
-    """
-    rng = np.random.default_rng(seed)
-    orders = [rng.permutation(len(_runs(folder))) for _ in range(splits)]
-    halves = [tuple(part.tolist()) for order in orders for part in np.array_split(order, 2)]
-    with ProcessPoolExecutor(2) as pool:
-        found = list(pool.map(_estimated, [(folder, half, model) for half in halves]))
-    z, inside = [], []
-    for one, other in zip(found[::2], found[1::2], strict=True):
-        for name in one.found.keys() & other.found.keys() & set(CONSTANT_NAMES):
-            (a, std_a, half_a), (b, std_b, half_b) = one.found[name], other.found[name]
-            z.append((a - b) / np.hypot(std_a, std_b))
-            inside.append(abs(a - b) <= np.hypot(half_a, half_b))
-    asked = model == NO_FLAG
-    rows: list[Row] = [{"what": "repeatability, %", "value": _repeatability(found), "asked": None}]
-    if model in (OUTPUT_ERROR, WITH_GAIN):
-        return rows
-    return [
-        *rows,
-        {
-            "what": "RMS of z (0.7 to 1.2)",
-            "value": float(np.sqrt(np.mean(np.square(z)))),
-            "asked": 1.2 if asked else None,
-        },
-        {
-            "what": "inside the 95 % intervals, % (92 to 99)",
-            "value": float(100 * np.mean(inside)),
-            "asked": 92.0 if asked else None,
-        },
-        {
-            "what": "estimators and terms of the halves",
-            "value": dict(
-                Counter(chain.from_iterable((half.estimator, *half.terms) for half in found))
-            ),
-            "asked": None,
-        },
-    ]
-
-
-def _repeatability(found: Sequence[_Half]) -> float:
-    """Scatter of k1 … k5 between halves over their size, in %: the root of the mean square, the
-    mean of the five.
-    """
-    scatter = []
-    for name in ("k1", "k2", "k3", "k4", "k5"):
-        pairs = [
-            (one.found[name][0], other.found[name][0])
-            for one, other in zip(found[::2], found[1::2], strict=True)
-            if name in one.found and name in other.found
-        ]
-        scatter.append(np.sqrt(np.mean([2 * ((a - b) / (a + b)) ** 2 for a, b in pairs])))
-    return float(100 * np.mean(scatter))
+    spread = (without - without.mean(axis=0)) ** 2
+    return np.asarray(np.sqrt((count - 1) / count * spread.sum(axis=0)))
 
 
 def main() -> None:
@@ -189,19 +143,32 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--splits", type=int, default=16)
-    parser.add_argument("--seed", type=int, default=0, help="of the splits that are drawn")
-    parser.add_argument("--arm", action="append", choices=ARMS, help="only this arm, or these")
+    parser.add_argument("--build", action="append", choices=tuple(BUILDS), help="only these")
     parser.add_argument(
-        "--model", action="append", choices=MODELS, help="only this model, or these"
+        "--of", action="append", choices=tuple(PEERS), help="contenders; algid if none is named"
     )
     given = parser.parse_args()
-    for arm in given.arm or ARMS:
-        for model in given.model or MODELS:
-            for row in evaluate(given.folder / arm, given.splits, model, given.seed):
-                value = row["value"]
-                shown = value if isinstance(value, dict) else format(value, ".3g")
-                print(f"{arm}, {model}: {row['what']}: {shown}", flush=True)
+    print("| build | contender | splits | " + " | ".join(FIGURES) + " |")
+    print("|" + (3 + len(FIGURES)) * "---|", flush=True)
+    with ProcessPoolExecutor(2) as pool:
+        for build in given.build or BUILDS:
+            count = len(runs(given.folder, build))
+            every = list(range(count))
+            wanted = set(splits(every))
+            for left in every:
+                wanted |= set(splits([run for run in every if run != left]))
+            halves = sorted({half for split in wanted for half in split})
+            for peer in given.of or ("algid",):
+                jobs = [(given.folder, build, peer, half) for half in halves]
+                found = dict(zip(halves, pool.map(fitted, jobs, chunksize=4), strict=True))
+                values = figures(list(splits(every)), found)
+                errors = jackknifed(count, found)
+                cells = [
+                    f"{value:.3g} ± {error:.2g}" if np.isfinite(value) else "–"
+                    for value, error in zip(values, errors, strict=True)
+                ]
+                taken = len(list(splits(every)))
+                print(f"| {build} | {peer} | {taken} | " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":

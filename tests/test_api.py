@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import inspect
 import json
 import re
@@ -17,11 +16,9 @@ import pyarrow as pa
 import pytest
 
 import algid
-from algid.errors import LogError, ResultError, SettingError
+from algid.errors import LogError, OutputError, ResultError, SettingError
 from algid.log import ChannelReading, Reading
-from algid.model import PARAMETERS
-from algid.results import Estimate, Result, Status, write_result
-from algid.results.notebook import interval_bar
+from algid.results import Result, Status, write_result
 from tests.report.folders import build
 
 
@@ -269,9 +266,9 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     other = algid.identify(algid.Log.from_arrays(log.t, log.theta.T, log.tau.T), settings=weak)
     assert one.parameters == other.parameters
     assert one.parameters["k1"].estimate == pytest.approx(one.parameters["k1"].estimate)
-    with pytest.raises(ValueError, match=r"theta must have shape"):
+    with pytest.raises(LogError, match=r"^log: theta: expected the shape \(2, 2001\)"):
         algid.Log.from_arrays(log.t, log.theta[:, 1:], log.tau)
-    with pytest.raises(ValueError, match="strictly increasing"):
+    with pytest.raises(LogError, match=r"^log: t: expected finite times that increase"):
         algid.Log.from_arrays(log.t[::-1], log.theta, log.tau)
     frame = one.to_frame()
     assert frame["parameter"].to_list() == list(one.estimates)
@@ -282,45 +279,81 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     assert one.verdict.word in one._repr_html_()
 
 
-def test_a_notebook_shows_each_meaning_and_a_bar_of_each_interval(tmp_path: Path) -> None:
-    made = build(tmp_path / "a.algid", duration=1.0)
-    shown = made._repr_html_()
-    bounded = [found for found in made.estimates.values() if found.ci95 and None not in found.ci95]
-    assert bounded
-    assert shown.count("<svg") == len(bounded)
-    assert PARAMETERS["k1"].meaning in html.unescape(shown)
-
-
 @pytest.mark.parametrize(
-    ("interval", "rect", "zero"),
+    ("changes", "why"),
     [
-        ((1.0, 2.0), (60.0, 59.0), 1.0),  # half of the scale from 0 to 2
-        ((-2.0, -1.0), (1.0, 59.0), 119.0),
-        ((-1.0, 3.0), (1.0, 118.0), 30.5),
-        ((1.0, 1.0), (119.0, 1.0), 1.0),
+        ({"theta": np.full((2, 501), np.nan)}, "theta: expected finite"),
+        ({"tau": np.zeros((2, 501), dtype=int)}, "tau: expected float64, found int64"),
+        ({"stamp_ns": np.arange(501.0)}, "stamp_ns: expected increasing integers"),
+        ({"stamp_ns": np.zeros(501, dtype=np.int64)}, "stamp_ns: expected increasing integers"),
     ],
+    ids=["NaN", "integers", "times in s", "one time"],
 )
-def test_a_bar_is_drawn_against_zero(
-    interval: tuple[float, float], rect: tuple[float, float], zero: float
+def test_a_log_whose_arrays_are_not_a_logs_is_refused_in_a_line(
+    changes: dict[str, Any], why: str
 ) -> None:
-    middle = sum(interval) / 2
-    drawn = interval_bar(Estimate(estimate=middle, std=0.1, ci95=interval, unit="kg"))
-    assert f'<rect x="{rect[0]:.1f}" y="3" width="{rect[1]:.1f}"' in drawn
-    assert f'd="M{zero:.1f} 0v' in drawn
-    assert f'cx="{rect[0] + (rect[1] / 2 if interval[0] < interval[1] else 0):.1f}"' in drawn
+    log, _ = algid.synthesise("case1", duration=0.5)
+    for verb in (algid.identify, algid.inspect, lambda one: algid.identify([log, one])):
+        with pytest.raises(LogError, match=f"^case1-unloaded: {why}[^\\n]*$"):
+            verb(replace(log, **changes))
+    with pytest.raises(LogError, match=r"^case1-unloaded: expected two samples or more, found 1"):
+        algid.identify(log.part(0, 1))
 
 
-@pytest.mark.parametrize(
-    "found",
-    [
-        Estimate(estimate=None, unit="kg"),
-        Estimate(estimate=1.0, unit="kg"),
-        Estimate(estimate=1.0, std=1.0, ci95=(None, None), unit="kg"),
-        Estimate(estimate=0.0, std=0.0, ci95=(0.0, 0.0), unit="kg"),
-    ],
-)
-def test_what_has_no_interval_has_no_bar(found: Estimate) -> None:
-    assert interval_bar(found) == ""
+@pytest.mark.parametrize("logs", [None, [], ()])
+def test_no_log_at_all_is_a_setting_that_lacks(logs: Any) -> None:
+    with pytest.raises(SettingError, match=r"^identify: expected an unloaded log, .* found none$"):
+        algid.identify(logs)
+
+
+def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> None:
+    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", torque_noise=1e-2)
+    hanging = np.array([[np.pi / 2], [0.0]])
+    other = algid.Log.from_arrays(log.t, np.degrees(-(log.theta + hanging)), -log.tau)
+    said: dict[str, Any] = {
+        "zero": "hanging",
+        "angle_unit": "deg",
+        "signs": (-1, -1),
+        "start": 0.5,
+    }
+    algid.write_log(tmp_path / "arm.csv", other)
+    by_file = algid.identify(tmp_path / "arm.csv", estimator="weak", **said)
+    found = algid.identify(other, estimator="weak", **said)
+    assert found.log.rows == 1501
+    assert found.profile == by_file.profile
+    for name, one in found.parameters.items():
+        assert one.estimate == pytest.approx(by_file.parameters[name].estimate, rel=1e-9)
+    arm = algid.identify(log.part(500, 2001), estimator="weak")
+    assert found.parameters["k4"].estimate == pytest.approx(arm.parameters["k4"].estimate, rel=1e-6)
+    assert algid.inspect(other, **said).clock == algid.inspect(tmp_path / "arm.csv", **said).clock
+    # what only a file has, and what has been said when the log was read
+    with pytest.raises(SettingError, match=r"^topic: log is a Log in memory"):
+        algid.identify(other, topic="/joint_states")
+    with pytest.raises(SettingError, match=r"^theta1\.source: log is a Log in memory"):
+        algid.validate(found, [other], theta1={"source": "q1"})
+    read = algid.read_log(tmp_path / "arm.csv", **said)
+    with pytest.raises(SettingError, match=r"^zero: .*arm\.csv has been read already"):
+        algid.track(read, found, zero="hanging")
+    assert algid.identify(read, estimator="weak", end=1.0).log.rows == 1001
+
+
+def test_a_design_and_a_comparison_take_results_in_memory(tmp_path: Path) -> None:
+    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", torque_noise=1e-2)
+    result = algid.identify(log, model="plain")
+    other = algid.identify(log, estimator="weak", model="plain")
+    result_file = tmp_path / "result.json"
+    write_result(result, result_file)
+    asked: dict[str, Any] = {"range": 1.2, "speed": 3, "torque": 1.5, "duration": 1.0, "rate": 100}
+    asked |= {"position_noise": 1e-3, "torque_noise": 1e-2}
+    shown: list[tuple[str, int, int]] = []
+    plan = algid.design(result, **asked, progress=lambda *step: shown.append(step))
+    assert plan.bounds == algid.design(result_file, **asked).bounds
+    assert shown[0] == ("searching", 0, 0)
+    one = algid.compare(result, other, out=tmp_path / "mine.html")
+    assert one.as_json() == algid.compare([result, other]).as_json()
+    assert "results side by side" in (tmp_path / "mine.html").read_text(encoding="utf-8")
+    with pytest.raises(OutputError, match="mine"):
+        algid.compare(result, other, out=tmp_path / "mine.html")
 
 
 WEAK = algid.Settings(estimator="weak")

@@ -27,7 +27,6 @@ import pytest
 import algid
 from algid.api.guide import SUMMARIES
 from pipelines.docs import pages
-from pipelines.race_pictures import pictures
 from pipelines.typed import run
 
 ROOT = Path(__file__).parents[1]
@@ -175,14 +174,6 @@ def test_the_short_page_states_what_the_whole_tables_state() -> None:
     whole = [PAGES[f"measured-{name}"].read_text("utf-8") for name in ("arms", "real", "speed")]
     short = set(decimal.findall(PAGES["measured"].read_text("utf-8")))
     assert short - set(decimal.findall(" ".join(whole))) == set()
-
-
-def test_the_pictures_show_the_figures_of_the_page() -> None:
-    """`python -m pipelines.race_pictures data/pictures` draws them anew."""
-    drawn = pictures(PAGES["measured"].read_text("utf-8"))
-    shown = {name: (ROOT / f"data/pictures/{name}.svg").read_text("utf-8") for name in drawn}
-    assert shown == drawn
-    assert "<title>algid, C.1: " in drawn["race-repeats"]
 
 
 def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path) -> None:

@@ -15,13 +15,14 @@ from tests.layers import PURE, Room, breaches, cycles, imported, parsed, room
 
 ROOT = Path(algid.__file__).parent
 TABLE: dict[str, Room] = {  # lower rooms first
-    "construction": room(),
     "errors": room(),
     "exits": room(),
+    "guard": room("exits"),
+    "construction": room("guard"),
     "limits": room(),
     "units": room(),
     "options": room("limits units"),
-    "faults": room("errors options"),
+    "faults": room("errors guard options"),
     "progress": room(),
     "significance": room(),
     "criteria": room(),
@@ -38,7 +39,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "names": room("arm", "numpy", PURE),
     "physics": room("arm names", "numpy", PURE),
     "model": room("arm names physics", "numpy", PURE),
-    "log": room("arm notices quantiles", "numpy"),
+    "log": room("arm errors notices quantiles", "numpy"),
     "signals": room("arm compiled criteria log", "numpy", PURE),
     "estimators": room(
         "arm compiled criteria model names notices physics progress quantiles signals "
@@ -47,7 +48,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "methods": room("estimators progress"),
     "files": room("construction errors limits options", "pydantic"),
     "stores": room("construction errors files", "pyarrow"),
-    "runtime": room("errors", "threadpoolctl"),
+    "runtime": room(packages="threadpoolctl"),
     "profile": room("errors files options units", "pydantic"),
     "settings": room("errors limits methods model options physics signals"),
     "results": room(
@@ -66,8 +67,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
                        "readers signals units words", "numpy"),
     "report": room(
         "arm arrow blocks criteria errors files inspection methods model notices options progress "
-        "results ros2 significance text verdict words",
-        "matplotlib mcap numpy plotly pyarrow rich"
+        "quantiles results ros2 significance text verdict words",
+        "jinja2 markupsafe mcap numpy plotly pyarrow rich"
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
@@ -79,7 +80,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "batches": room(
         "construction errors files identification limits options profile readers results "
         "runtime settings stores text verdict words",
-        "distributed mcap polars pyarrow pydantic",
+        "distributed polars pyarrow pydantic",
     ),
     "tracks": room(
         "arm compiled criteria errors estimators files identification model names notices options "
@@ -94,18 +95,18 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "exports": room(
         "arm errors files identification model notices options physics results text words",
-        "numpy scipy",
+        "jinja2 numpy scipy",
     ),
-    "fleet": room("errors files limits model notices physics progress report significance text "
+    "fleet": room("arm errors files limits model notices physics progress report significance text "
                   "verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exports files fleet identification "
         "inspection limits log methods model notices options physics profile progress "
         "readers report results runtime settings stores synth tracks units writers",
-        "matplotlib numpy polars",
+        "numpy plotly polars",
     ),
     "cli": room(
-        "api errors exits faults files limits options profile report runtime settings text "
+        "api errors exits faults files guard limits options profile report runtime settings text "
         "words",
         "rich typer",
     ),

@@ -112,6 +112,4 @@ def test_every_option_of_a_log_is_a_field_of_a_profile_or_stands_for_some() -> N
 
 def test_a_profiles_velocity_is_not_the_option_of_that_name() -> None:
     assert Remedy({"velocity": False}).flags == ("--set", "velocity=false")
-    assert Remedy({"velocity": False}).lines == "velocity = false"
     assert Remedy({"velocity": "measured"}).flags == ("--velocity", "measured")
-    assert Remedy({"velocity": "measured"}).lines == ""

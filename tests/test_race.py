@@ -14,7 +14,7 @@ NEEDS = {
     "PySINDy weak form": "pysindy",
     "pinocchio regressors": "pinocchio",
 }
-SLOW = {"MuJoCo sysid", "output error", "IDIM-IV"}  # above 5 s on a busy machine
+SLOW = {"MuJoCo sysid", *(peer for peer in EXAMPLES if peer.startswith(("output", "IDIM")))}
 
 
 @pytest.mark.parametrize(

@@ -227,7 +227,7 @@ def _workers(
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
     from algid.batches.workers import Workers
-    from algid.runtime import OPEN_FILES, OPEN_FILES_A_WORKER, cores, may_open
+    from algid.runtime import cores
 
     if scheduler is not None:
         from algid.batches.cluster import cluster
@@ -236,7 +236,6 @@ def _workers(
             yield pool_and_size
         return
     count = workers or cores()
-    may_open(OPEN_FILES + OPEN_FILES_A_WORKER * count)
     executor = Workers(count, memory_limit, timeout)
     try:
         yield executor, 2 * count

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 
 def compare(
-    results: Sequence[Result | str | Path],
-    *,
+    *results: Result | str | Path | Sequence[Result | str | Path],
     labels: Sequence[str] | None = None,
     out: str | Path | None = None,
     force: bool = False,
@@ -26,11 +25,12 @@ def compare(
 
     Parameters
     ----------
-    results : Result or path of one, two or more
+    *results : Result or path of one, two or more
+        One after another, or in a list.
     labels : str, one each
         What to call them; by default what tells their folders, or their logs, apart.
     out : Path
-        Folder to write the page ``compare.html`` into; None writes nothing.
+        The page, ``NAME.html``, or the folder to write ``compare.html`` into; None writes nothing.
     force : bool
         Replace a page that is there.
 
@@ -53,37 +53,43 @@ def compare(
     >>> import algid
     >>> logs = algid.synthesise("case1", duration=3.0, excitation="wide", torque_noise=1e-2)
     >>> ways = [algid.identify(*logs, estimator=name) for name in ("refined", "weak")]
-    >>> algid.compare(ways, labels=["refined", "weak"]).largest_sigma < 4
+    >>> algid.compare(*ways, labels=["refined", "weak"]).largest_sigma < 4
     True
     """
     from algid.report.comparison import compare as compared
 
-    if isinstance(results, str | Path | Result):
-        results = [results]
-    if len(results) < 2:
+    given: list[Result | str | Path] = []
+    for one in results:
+        if isinstance(one, str | Path | Result):
+            given.append(one)
+        else:
+            given += one
+    if len(given) < 2:
         raise SettingError(
-            f"compare: expected two results or more, found {len(results)}; name another one"
+            f"compare: expected two results or more, found {len(given)}; name another one"
         )
-    if labels is not None and len(labels) != len(results):
-        raise SettingError(f"labels: expected {len(results)}, found {len(labels)}")
+    if labels is not None and len(labels) != len(given):
+        raise SettingError(f"labels: expected {len(given)}, found {len(labels)}")
     if out is not None:
         refuse_existing(page_of(Path(out)), force)
-    read = [opened(one) for one in results]
-    paths = [Path(one) for one in results if not isinstance(one, Result)]
+    read = [opened(one) for one in given]
+    paths = [Path(one) for one in given if not isinstance(one, Result)]
     if labels is None and len(paths) == len(read):
         labels = labels_of(paths)
     comparison = compared(read, labels)
     if out is not None:
-        from algid.report.comparison_page import write_comparison
+        from algid.report.comparison import write_comparison
 
-        write_comparison(comparison, read, Path(out), force)
+        write_comparison(comparison, page_of(Path(out)), force)
     return comparison
 
 
 def page_of(out: Path) -> Path:
     """Where the page of a comparison goes."""
-    from algid.report.comparison_page import NAME
+    from algid.report.comparison import NAME
 
+    if out.suffix == ".html":
+        return out
     return out / NAME
 
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.api.given import folder_or_none, parts_of
+from algid.api.given import called, folder_or_none, parts_of
 from algid.api.options import two_names
 from algid.api.ranges import check
 from algid.errors import SettingError
 from algid.files import refuse_existing
 from algid.options import flag
+from algid.results import Result
 
 if TYPE_CHECKING:
     import polars as pl
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from algid.report.document import Document
 
 RATE, DURATION = 1000.0, 10.0
-DRIVES = ("position", "torque")
 
 Pair = float | tuple[float, float] | str
 Span = Pair | tuple[tuple[float, float], tuple[float, float]]
@@ -77,7 +77,7 @@ class Planned:
 
 
 def design(
-    prior: str | Path,
+    prior: Result | str | Path,
     *,
     limits: str | Path | None = None,
     range: Span | None = None,  # noqa: A002  # as the flag
@@ -88,7 +88,6 @@ def design(
     duration: float | None = None,
     rate: float | None = None,
     runs: tuple[int, int] | str | None = None,
-    drive: Literal["position", "torque"] = "position",
     wanted: Sequence[str] | str | None = None,
     position_noise: float | None = None,
     torque_noise: float | None = None,
@@ -109,8 +108,9 @@ def design(
 
     Parameters
     ----------
-    prior : str or Path
-        Result folder of the arm, name of a case that ships with algid, or a TOML file of the arm.
+    prior : Result, str or Path
+        Result of the arm or its folder, name of a case that ships with algid, or a TOML file of the
+        arm.
     limits : path
         TOML file with limits in these keywords' words, which beat it.
     range : float, rad
@@ -123,8 +123,6 @@ def design(
         Of a run and its log; 10 s at 1000 Hz.
     runs : pair of int
         Runs without and with the payload.
-    drive : 'position' or 'torque'
-        Position control, or open loop torque.
     wanted : names of parameters
         That matter, like ("k1", "m_p"); all by default.
     position_noise, torque_noise : float, rad and N m
@@ -192,10 +190,6 @@ def design(
         margin=margin,
         seed=seed,
     )
-    if drive not in DRIVES:
-        raise SettingError(
-            f"{flag('drive')}: expected one of {', '.join(DRIVES)}, found {drive!r:.60}"
-        )
     of_flags = {
         "range": range,
         "speed": speed,
@@ -215,7 +209,7 @@ def design(
         file = Path(limits)
     asked = request(file, flags)
     names = two_names("joints", joints)
-    source = str(prior)
+    source = called(prior)
     folder = None
     if out is not None:
         folder = folder_of(source, Path(out))
@@ -223,10 +217,16 @@ def design(
     loaded = None
     if asked.get("runs", None) is not None:
         loaded = asked.content["runs"][1] > 0
-    known = prior_of(source, loaded, KnownBefore(l1, l2, payload, prior_error))
+    known = prior_of(
+        prior if isinstance(prior, Result) else source,
+        loaded,
+        KnownBefore(l1, l2, payload, prior_error),
+    )
     noise = noise_of(known, position_noise, torque_noise, noise_from)
-    campaign = campaign_of(known, asked, noise, wanted, drive, margin, seed)
+    campaign = campaign_of(known, asked, noise, wanted, margin, seed)
     origin = Provenance(source, command, names, known.doubts)
+    if progress is not None:
+        progress("searching", 0, 0)
     with folder_or_none(folder, force) as temporary:
         with one_blas_thread():
             planned = plan(campaign, progress)
@@ -245,7 +245,6 @@ def campaign_of(
     asked: Request,
     noise: NoiseLevels,
     wanted: Sequence[str] | str | None,
-    drive: str,
     margin: float,
     seed: int,
 ) -> Campaign:
@@ -266,7 +265,6 @@ def campaign_of(
         limits=limits_of(asked, prior.lengths),
         asked=asked_for(prior.belief, names, prior.source),
         duration=asked.get("duration", DURATION),
-        drive=drive,  # type: ignore[arg-type]
         margin=margin,
         seed=seed,
     )

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from algid.api.given import meant
 from algid.api.options import with_options
 from algid.api.result import Result
 from algid.options import flag
@@ -78,10 +79,8 @@ def identify(
     AlgidError
         If a log cannot be used, or nothing can be written.
     SettingError
-        If a setting is not known or wrong, or logs are to be cross-validated of which there is one
-        alone.
-    ValueError
-        If there is neither an unloaded log nor `parameters`.
+        If a setting is not known or wrong, there is neither an unloaded log nor `parameters`, or
+        logs are to be cross-validated of which there is one alone.
 
     Examples
     --------
@@ -94,6 +93,7 @@ def identify(
     from algid.identification.identify import identify as run
 
     asked, meaning = with_options(settings, profile, options)
+    unloaded, loaded = meant(unloaded, meaning), meant(loaded, meaning)
     if export and not report:
         from algid.errors import SettingError
 

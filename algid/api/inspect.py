@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from algid.api.given import meant
 from algid.api.options import meaning
 
 if TYPE_CHECKING:
@@ -48,7 +49,8 @@ def inspect(log: LogLike, *, profile: ProfileLike | None = None, **options: Any)
     """
     from algid.inspection.report import inspect_log
 
-    return inspect_log(log, meaning(profile, options))
+    own = meaning(profile, options)
+    return inspect_log(meant(log, own), own)
 
 
 def content(found: Inspection) -> Iterator[Table | str]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from algid.progress import Progress
     from algid.report.document import Document
-    from algid.report.figures.base import Figure, Missing
 
 
 @dataclass(frozen=True)
@@ -20,13 +19,6 @@ class Reported:
     written: list[Path]
     document: Callable[[], Document]
     as_json: Callable[[], str]
-    figures: Callable[[], Sequence[Figure | Missing]]
-
-    def save_plots(self, folder: Path, prefix: str, form: Literal["pdf", "png"]) -> list[Path]:
-        """Write each figure as a file of its own; raises `SettingError` without matplotlib."""
-        from algid.report.plots import save_plots
-
-        return save_plots(self.figures(), folder, prefix, form)
 
 
 def report(
@@ -57,25 +49,22 @@ def _of_result(
 ) -> Reported:
     from algid.api import identify
     from algid.report.export import export_mcap
-    from algid.report.gallery import gallery
-    from algid.report.page import write_markdown, write_report
+    from algid.report.page import write_pages
     from algid.results import read_result
 
     result = read_result(folder)
-    written = [write_report(folder, shared_library, progress), write_markdown(folder)]
+    written = write_pages(folder, shared_library, progress)
     if export:
         written.append(export_mcap(folder, progress))
     return Reported(
         written,
         lambda: identify.document(result),
         lambda: identify.as_json(result),
-        lambda: gallery(folder, result).every,
     )
 
 
 def _of_track(folder: Path, export: bool) -> Reported:
     from algid.api import track
-    from algid.tracks.figures import figures
     from algid.tracks.page import write_pages
     from algid.tracks.read import read_track
 
@@ -85,5 +74,4 @@ def _of_track(folder: Path, export: bool) -> Reported:
         written,
         lambda: track.document(result),
         lambda: track.as_json(result),
-        lambda: figures(result),
     )

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import results
+from algid.api.given import meant
 from algid.api.options import meaning
 
 if TYPE_CHECKING:
     import polars as pl
-    from matplotlib.figure import Figure
+    from plotly.graph_objects import Figure
 
     from algid.api.options import ProfileLike
     from algid.identification.source import LogLike
@@ -70,31 +71,36 @@ class Result(results.Result):  # noqa: D101
         """
         from algid.identification.predicting import predicted
 
-        return predicted(self, log, "loaded" if loaded else "unloaded", meaning(profile, options))
+        own = meaning(profile, options)
+        return predicted(self, meant(log, own), "loaded" if loaded else "unloaded", own)
 
     def plot(self) -> Figure:
-        """Every estimate with its 95 % interval, in percent of the estimate; needs matplotlib.
+        """The page's figure of every estimate with its 95 % interval, in percent of the estimate.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            A notebook shows it; ``savefig`` writes it.
-
-        Raises
-        ------
-        SettingError
-            If matplotlib is not installed (``pip install 'algid[plots]'``).
+        plotly.graph_objects.Figure
+            A notebook shows it; ``write_image`` and ``write_html`` write it.
 
         Examples
         --------
         >>> import algid
         >>> log, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
-        >>> algid.identify(log, estimator="weak").plot().axes[0].get_xlabel()
-        '95 % interval, % of the estimate'
+        >>> algid.identify(log, estimator="weak").plot().data[0].y[:3]
+        ('k1', 'k2', 'k3')
         """
-        from algid.report.interval_plot import interval_plot
+        from plotly.graph_objects import Figure
 
-        return interval_plot(self)
+        from algid.report.figures import intervals
+
+        panels = intervals(self).figure
+        return Figure({"data": panels.data, "layout": panels.layout})
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        from algid.report.render import notebook
+
+        return notebook(self, self.subject)
 
 
 def read_result(path: str | Path) -> Result:

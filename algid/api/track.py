@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.api.given import folder_or_none
+from algid.api.given import folder_or_none, meant
 from algid.api.options import meaning
 from algid.api.ranges import check
 
@@ -87,6 +87,7 @@ def track(
 
     check("track", l1=l1, l2=l2)
     own = meaning(profile, options)
+    log = meant(log, own)
     folder = None
     if out is not None:
         folder = track_folder(_name(log), Path(out))

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.api.given import called, opened
+from algid.api.given import called, meant, opened
 from algid.api.options import meaning
 from algid.api.ranges import check
 from algid.results import Result
@@ -77,6 +77,7 @@ def validate(
     from algid.identification.validated import Validated
 
     known, own = None, meaning(profile, options)
+    logs, loaded = meant(logs, own), meant(loaded, own)
     check("validate", max_nrmse=max_nrmse)
     file = called(result)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":

@@ -178,8 +178,8 @@ def _identified(task: Task) -> Result:
         refuse_links(Path(task.out), task.job.name)
     with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
         place = (stage if away else Path(task.out)) / task.job.name
-        logs = _here(task.job.logs, stage / "logs", task.profile)
-        loaded = _here(task.job.loaded, stage / "loaded", task.profile)
+        logs = _here(task.job.logs, stage / "logs")
+        loaded = _here(task.job.loaded, stage / "loaded")
         with naming({log.path: log.url for log in logs + loaded if isinstance(log, Staged)}):
             result = identify(
                 logs,
@@ -202,12 +202,12 @@ def _identified(task: Task) -> Result:
         return result
 
 
-def _here(paths: Sequence[str], folder: Path, profile: Profile | None) -> list[str | Staged]:
+def _here(paths: Sequence[str], folder: Path) -> list[str | Staged]:
     """Logs as they can be read on this machine."""
     here: list[str | Staged] = []
     for number, path in enumerate(paths):
         if is_url(path):
-            here.append(staged(path, folder / str(number), profile))
+            here.append(staged(path, folder / str(number)))
         else:
             here.append(path)
     return here

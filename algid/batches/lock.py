@@ -11,6 +11,7 @@ import fcntl
 import hashlib
 import os
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ from algid.options import flag
 from algid.stores import is_url, public
 
 LOCK = ".lock"
+DYING = 2.0  # s that the processes of a killed batch may take to be gone
 
 
 @contextmanager
@@ -60,7 +62,18 @@ def lock_file(out: str) -> Path:
 
 
 def _held(path: Path) -> int:
-    """A handle that holds the file; one that its last holder removed meanwhile is made anew."""
+    """A handle that holds the file; one that its last holder removed meanwhile is made anew.
+
+    Processes of a batch that was killed hold it until they are gone.
+
+    Raises
+    ------
+    OSError
+        If it cannot be opened, or another batch holds it: then a `BlockingIOError`.
+    BlockingIOError
+        As above.
+    """
+    until = time.monotonic() + DYING
     while True:
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
         try:
@@ -69,6 +82,11 @@ def _held(path: Path) -> int:
                 return handle
         except FileNotFoundError:
             pass
+        except BlockingIOError:
+            if time.monotonic() > until:
+                os.close(handle)
+                raise
+            time.sleep(0.02)
         except OSError:
             os.close(handle)
             raise

@@ -35,7 +35,6 @@ from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.options import flag
 from algid.profile import Profile
 from algid.results import Result
-from algid.runtime import ending_signals
 from algid.settings import Settings
 from algid.stores import Store
 
@@ -348,21 +347,20 @@ def _seen(path: str) -> Input | None:
 
 @contextmanager
 def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
-    """The first signal that would end the process sets `stop`.
-
-    a second one raises `KeyboardInterrupt`.
-    """
+    """Ctrl-C and SIGTERM set `stop`; signals of other threads are left to the main one."""
 
     def handle(_number: int, _frame: FrameType | None) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
         stop.set()
 
-    before = {number: signal.signal(number, handle) for number in ending_signals()}
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [(number, signal.signal(number, handle)) for number in numbers]
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in before:
             signal.signal(number, handler)
 
 

@@ -57,7 +57,7 @@ def command_line() -> str:
 
 def print_report(document: Document, json: Callable[[], str], form: ResultFormat) -> None:
     """Print `document`, or the text of `json`, alone to stdout, so that it can be piped."""
-    from algid.report.markdown import markdown
+    from algid.report.render import markdown
     from algid.report.terminal import print_document
 
     if form is ResultFormat.TABLE:
@@ -68,7 +68,7 @@ def print_report(document: Document, json: Callable[[], str], form: ResultFormat
 
 def print_tables(tables: Iterable[Table], json: Callable[[], str], form: ResultFormat) -> None:
     """Print `tables`, or what `json` gives, to stdout."""
-    from algid.report.markdown import markdown_table
+    from algid.report.render import markdown_table
     from algid.report.terminal import print_table
 
     if form is ResultFormat.JSON:

@@ -15,7 +15,9 @@ def compare(
     results: Annotated[
         list[Path], typer.Argument(metavar="RESULT RESULT...", help="Two results or more.")
     ],
-    out: Annotated[Path | None, out("Folder to write the page compare.html into.")] = None,
+    out: Annotated[
+        Path | None, out("Page NAME.html, or the folder to write compare.html into.")
+    ] = None,
     force: Force = False,
     form: Form = ResultFormat.TABLE,
     quiet: Quiet = False,
@@ -27,7 +29,7 @@ def compare(
     from algid.api.compare import compare as run
     from algid.api.compare import page_of
 
-    comparison = run(results, out=out, force=force)
+    comparison = run(*results, out=out, force=force)
     if quiet:
         return
     print_tables(comparison.tables(), comparison.as_json, form)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -13,13 +12,6 @@ from algid.cli.common import Force, Form, Quiet, ResultFormat, command_line, out
 from algid.cli.completion import cases
 from algid.cli.output import remark
 from algid.exits import Exit
-
-
-class Drive(StrEnum):
-    """What the arm is driven by."""
-
-    POSITION = "position"
-    TORQUE = "torque"
 
 
 def design(
@@ -69,9 +61,6 @@ def design(
     runs: Annotated[
         str | None, typer.Option(help="Runs without and with the payload, like 2,1.")
     ] = None,
-    drive: Annotated[
-        Drive, typer.Option(help="Position control, or open loop torque.")
-    ] = Drive.POSITION,
     wanted: Annotated[
         str | None,
         typer.Option("--for", help="Parameters that matter, like k1,m_p; all by default."),
@@ -149,7 +138,6 @@ def design(
             duration=duration,
             rate=rate,
             runs=runs,
-            drive=drive.value,
             wanted=wanted,
             position_noise=position_noise,
             torque_noise=torque_noise,

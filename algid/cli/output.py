@@ -32,6 +32,12 @@ def complain(text: str) -> None:
     remark("algid: " + text.replace("\n", "\\n"))
 
 
+def clear_line() -> None:
+    """Give the terminal back a blank line and its cursor, after a process that was showing one."""
+    if sys.stderr.isatty():
+        print("\r\x1b[2K\x1b[?25h", end="", file=sys.stderr, flush=True)
+
+
 def console(**options: Any) -> Console:
     """A terminal whose text is printable; `options` are those of rich."""
     from rich.console import Console

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -10,22 +9,6 @@ import typer
 
 from algid.cli.common import OUTPUT, Export, Form, Quiet, ResultFormat, print_report
 from algid.cli.output import remark
-
-
-class PlotFormat(StrEnum):
-    """How figures are saved."""
-
-    PDF = "pdf"
-    PNG = "png"
-
-
-SavePlots = Annotated[
-    Path | None,
-    typer.Option(
-        help="Folder for each figure as a file of its own, for papers; needs matplotlib: "
-        "algid[plots]."
-    ),
-]
 
 
 def report(
@@ -40,10 +23,6 @@ def report(
             help="Also write estimates.mcap, for Foxglove and PlotJuggler.", rich_help_panel=OUTPUT
         ),
     ] = None,
-    save_plots: SavePlots = None,
-    plot_format: Annotated[
-        PlotFormat, typer.Option(help="What --save-plots writes.")
-    ] = PlotFormat.PDF,
     shared_library: Annotated[
         bool,
         typer.Option("--shared-library", help="Put the plotting library once beside the folders."),
@@ -52,7 +31,7 @@ def report(
 ) -> None:
     """Write report.html and report.md into each RESULT and print its table.
 
-    Example: algid report case1-unloaded.algid --save-plots figures
+    Example: algid report case1-unloaded.algid --export mcap
     """
     from algid.api.report import report as run
     from algid.report.progress import progress
@@ -62,11 +41,8 @@ def report(
             made = run(
                 folder, export=export is not None, shared_library=shared_library, progress=shown
             )
-        written = made.written
-        if save_plots is not None:
-            written += made.save_plots(save_plots, folder.resolve().stem, plot_format.value)
         if quiet:
             continue
         print_report(made.document(), made.as_json, form)
-        for path in written:
+        for path in made.written:
             remark(f"wrote {path}")

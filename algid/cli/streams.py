@@ -66,6 +66,8 @@ def harden_streams() -> None:
         except (AttributeError, OSError, ValueError):  # not of this process
             continue
         stream.flush()
+        if name == "stderr":  # libraries write to the descriptor itself: see `algid.guard.begin`
+            handle = os.dup(handle)
         raw = io.BufferedWriter(_Pipe(handle, told_as))
         lines = name == "stderr" or stream.isatty()
         setattr(sys, name, io.TextIOWrapper(raw, stream.encoding, "spelled", line_buffering=lines))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -13,17 +12,14 @@ from algid.arm import FloatArray
 from algid.criteria import UNDETERMINED
 from algid.designs.belief import Asked, Belief
 from algid.designs.information import Experiment, Information, Slopes, informations
-from algid.designs.limits import HANGING, Limits, Row, Usage, resting, usage
+from algid.designs.limits import Limits, Row, Usage, resting, usage
 from algid.designs.optimise import optimise
 from algid.designs.position import JUDGED_RATE, PositionProblem
-from algid.designs.swing import sampled
-from algid.designs.torque import TorqueProblem, search
 from algid.errors import SettingError
 from algid.model import Motion
 from algid.options import flag
 from algid.progress import Progress
 
-Drive = Literal["position", "torque"]
 MARGIN = 0.05
 """Of each limit, kept for what a controller overshoots while its model is a fifth wrong."""
 ARMS = 20  # of the belief, of which the worst is reported
@@ -41,7 +37,6 @@ class Campaign:
     limits : Limits
     asked : Asked
     duration : float, s, of one run
-    drive : 'position' or 'torque'
     margin : float
         Share of each limit that the plan leaves.
     seed : int
@@ -52,7 +47,6 @@ class Campaign:
     limits: Limits
     asked: Asked
     duration: float
-    drive: Drive = "position"
     margin: float = MARGIN
     seed: int = 0
 
@@ -65,8 +59,8 @@ class Design:
     ----------
     campaign : Campaign
     t : (N,), s
-    motions : dict of Motion
-        The believed arm's, without and with the payload: the same under position control.
+    motion : Motion
+        What a position controller follows, whatever the arm.
     torque : dict of (2, N), N m
         What the believed arm needs for them.
     std : (Q,)
@@ -81,18 +75,13 @@ class Design:
 
     campaign: Campaign
     t: FloatArray
-    motions: dict[bool, Motion]
+    motion: Motion
     torque: dict[bool, FloatArray]
     std: FloatArray
     worst: FloatArray
     shares: FloatArray
     usage: Usage
     interrupted: bool
-
-    @property
-    def motion(self) -> Motion:
-        """The motion without payload, or with it where there is no other."""
-        return self.motions[min(self.motions)]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -140,10 +129,24 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     """
     rate = campaign.experiment.rate
     t = np.arange(round(campaign.duration * rate) + 1) / rate
+    kept = campaign.limits.within(campaign.margin)
+    experiment, belief = campaign.experiment, campaign.belief
+    loads = list(map(belief.load, experiment.kinds))
     try:
-        if campaign.drive == "torque":
-            return _swung(campaign, t, progress)
-        return _guided(campaign, t, progress)
+        rest = resting(kept, experiment.shared.model, loads)
+        problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
+        optimum = optimise(problem, rate, campaign.seed, progress)
+        motion = problem.family.motion(optimum.x, problem.family.basis(t))
+        slopes = Slopes(experiment.shared.model, motion, rate)
+        # the error bars of its log
+        recorded = dict.fromkeys(experiment.kinds, motion)
+        every = max(1, round(rate / JUDGED_RATE))
+        whole = informations(experiment, recorded, belief.mean, 1, rate)
+        C = _covariance(campaign, whole)
+        worst = np.diag(C)
+        for arm in belief.draws(ARMS, campaign.seed):
+            drawn = informations(experiment, recorded, arm, every, rate)
+            worst = np.maximum(worst, np.diag(_covariance(campaign, drawn)))
     except np.linalg.LinAlgError as error:
         # Torque noise below the rounding of the noise of twice differentiated angles.
         raise SettingError(
@@ -151,93 +154,18 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
             f"differentiated twice, leaves nothing of the torque ({error}); ask for a lower rate "
             f"or less {flag('position_noise')}"
         ) from error
-
-
-def _driven_joints(limits: Limits) -> None:
-    """Raises `SettingError` where a joint that is to follow a motion has no drive."""
-    without = np.flatnonzero(limits.torque == 0)
-    if without.size:
-        raise SettingError(
-            f"{flag('torque')}: position control asks for a drive at either joint, found 0 for "
-            f"joint {without[0] + 1}; {flag('drive')} torque plans for a joint without one"
-        )
-
-
-def _guided(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
-    """The plan under position control: one motion, whatever the arm."""
-    _driven_joints(campaign.limits)
-    kept = campaign.limits.within(campaign.margin)
-    experiment, belief = campaign.experiment, campaign.belief
-    loads = list(map(belief.load, experiment.kinds))
-    rest = resting(kept, experiment.shared.model, loads)
-    problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
-    optimum = optimise(problem, experiment.rate, campaign.seed, progress)
-    motion = problem.family.motion(optimum.x, problem.family.basis(t))
-    slopes = Slopes(experiment.shared.model, motion, experiment.rate)
-    kinds = [False]
-    if experiment.shared.payload:
-        kinds.append(True)
-    motions, torque = {}, {}
-    for loaded in kinds:
-        motions[loaded] = motion
-        torque[loaded] = np.einsum("aqn,q->an", slopes.Y, belief.load(loaded).c)
-    used = usage(campaign.limits, slopes, loads, derivatives=False)
-    return _judged(campaign, t, motions, torque, used, optimum.interrupted)
-
-
-def _swung(campaign: Campaign, t: FloatArray, progress: Progress | None) -> Design:
-    """The plan of an open loop: one torque, under which every arm and load moves in its own way."""
-    limits = campaign.limits.within(campaign.margin)
-    start = np.array(HANGING)
-    if campaign.experiment.shared.model.gravity == 0:
-        start = limits.middle
-    problem = TorqueProblem(
-        campaign.experiment,
-        campaign.belief,
-        limits,
-        campaign.asked,
-        campaign.duration,
-        start,
-        campaign.seed,
-    )
-    x, interrupted = search(problem, campaign.seed, progress)
-    swung = problem.checked(x)
-    motions = {loaded: sampled(swung.t, motion, t) for loaded, motion in swung.motions.items()}
-    torque = dict.fromkeys(motions, problem.torques(swung.x, t))
-    used = Usage(swung.usage.rows, swung.usage.u * (1 - campaign.margin))
-    return _judged(campaign, t, motions, torque, used, interrupted)
-
-
-def _judged(
-    campaign: Campaign,
-    t: FloatArray,
-    motions: dict[bool, Motion],
-    torque: dict[bool, FloatArray],
-    used: Usage,
-    interrupted: bool,
-) -> Design:
-    """A plan with the error bars of its log, at the times `t` (N,)."""
-    experiment, belief = campaign.experiment, campaign.belief
-    recorded = {loaded: motions[loaded] for loaded in experiment.kinds}
-    every = max(1, round(experiment.rate / JUDGED_RATE))
-    whole = informations(experiment, recorded, belief.mean, 1, experiment.rate)
-    C = _covariance(campaign, whole)
-    worst = np.diag(C)
-    for arm in belief.draws(ARMS, campaign.seed):
-        drawn = informations(experiment, recorded, arm, every, experiment.rate)
-        worst = np.maximum(worst, np.diag(_covariance(campaign, drawn)))
-    samples = round(SECOND * experiment.rate)
-    parts = np.sum([one.parts(samples) for one in whole], axis=0)
+    kinds = (False, True) if experiment.shared.payload else (False,)
+    parts = np.sum([one.parts(round(SECOND * rate)) for one in whole], axis=0)
     return Design(
         campaign=campaign,
         t=t,
-        motions=motions,
-        torque=torque,
+        motion=motion,
+        torque={kind: np.einsum("aqn,q->an", slopes.Y, belief.load(kind).c) for kind in kinds},
         std=np.sqrt(np.diag(C)),
         worst=np.sqrt(worst),
         shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
-        usage=used,
-        interrupted=interrupted,
+        usage=usage(campaign.limits, slopes, loads, derivatives=False),
+        interrupted=optimum.interrupted,
     )
 
 

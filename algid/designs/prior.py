@@ -79,13 +79,13 @@ class KnownBefore:
         return lengths
 
 
-def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
-    """The prior that `source` describes.
+def prior_of(given: Result | str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
+    """The prior that is given.
 
     Parameters
     ----------
-    source : str
-        A result's folder or file, the name of a shipped case, or a TOML file of an arm.
+    given : Result or str
+        A result, its folder or file, the name of a shipped case, or a TOML file of an arm.
     loaded : bool or None
         Whether there are to be runs with the payload; None where there are if a payload is known.
     knowns : KnownBefore
@@ -98,11 +98,15 @@ def prior_of(source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedA
         If no arm has such an inertia matrix, or a payload is to be carried of which nothing is
         known.
     """
-    path = Path(source)
-    if path.is_dir() or path.suffix == ".json":
-        prior = _of_result(read_result(path), source, loaded, knowns)
+    if isinstance(given, Result):
+        source = given.log.path
+        prior = _of_result(given, source, loaded, knowns)
+    elif Path(given).is_dir() or Path(given).suffix == ".json":
+        source = given
+        prior = _of_result(read_result(given), source, loaded, knowns)
     else:
-        prior = of_case(load_case(source), source, loaded, knowns)
+        source = given
+        prior = of_case(load_case(given), source, loaded, knowns)
     value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
     wrong = wrong_inertia(value)
     if wrong is not None:

@@ -17,11 +17,11 @@ from algid.files import read_toml
 from algid.options import flag, range_of
 
 Positive = Annotated[float, Field(gt=0)]  # inf is no limit
-NonNegative = Annotated[float, Field(ge=0)]  # nothing is a joint without a drive
 Pair = Positive | tuple[Positive, Positive]
 Span = tuple[float, float]
 MOST_RUNS = 1000
 Runs = Annotated[int, Field(ge=0, le=MOST_RUNS)]
+FURTHEST = 2 * np.pi  # rad to either side: few joints turn further
 SMALLEST, LARGEST = 1e-6, 1e6
 """What a limit in rad, rad/s, rad/s² or N m may be, but for 0 and inf."""
 
@@ -40,7 +40,7 @@ class LimitsFile(BaseModel):
     range: Positive | tuple[Positive, Positive] | tuple[Span, Span] | None = None
     speed: Pair | None = None
     acceleration: Pair | None = None
-    torque: NonNegative | tuple[NonNegative, NonNegative] | None = None
+    torque: Pair | None = None
     tip_height: float | None = None
     duration: Annotated[float, _within("duration")] | None = None
     rate: Annotated[float, _within("rate")] | None = None
@@ -124,10 +124,6 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
         height=height,
         lengths=lengths,
     )
-    if not limits.torque.any():
-        raise SettingError(
-            f"{flag('torque')}: expected a drive at one joint at least, found 0 for both"
-        )
     every = np.stack([limits.half, limits.speed, limits.acceleration, limits.torque])
     if not np.any(np.isfinite(every)):
         raise SettingError(
@@ -137,7 +133,7 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
 
 
 def _check(name: str, value: Any) -> None:
-    """Raises `SettingError` where a limit is neither inf nor such as an arm may have."""
+    """Raises `SettingError` where a limit is neither inf nor such as an arm may have, in rad."""
     if value is None:
         return
     numbers = np.abs(np.array(value, dtype=np.float64)).ravel()
@@ -146,6 +142,12 @@ def _check(name: str, value: Any) -> None:
         raise SettingError(
             f"{flag(name)}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found "
             f"{numbers[wrong][0]:g}"
+        )
+    far = numbers[np.isfinite(numbers)].max(initial=0.0)
+    if name == "range" and far > FURTHEST:
+        raise SettingError(
+            f"{flag(name)}: expected rad, found {far:g}, more than a turn: for {far:g}° give "
+            f"{np.radians(far):.4g}; inf is no limit"
         )
 
 
@@ -180,7 +182,7 @@ _LIKE = {
     "range": "rad like 1.2 (to both sides of hanging), 1.2,1.0, or -2.7:-0.4,-1.2:1.2",
     "speed": "rad/s like 3 or 3,4",
     "acceleration": "rad/s² like 30 or 30,60",
-    "torque": "N m like 5 or 5,2; 0 is a joint without a drive",
+    "torque": "N m like 5 or 5,2",
     "runs": "numbers of runs without and with the payload like 2,1",
 }
 
@@ -201,7 +203,7 @@ def _parsed(name: str, text: str) -> Any:
     numbers = tuple(table[:, 0].tolist())
     if name == "runs":
         return _runs(numbers)
-    if min(numbers) < 0 or (min(numbers) == 0 and name != "torque"):
+    if min(numbers) <= 0:
         return None
     if len(numbers) == 1:
         return numbers[0]

@@ -8,11 +8,9 @@ import numpy as np
 
 from algid.designs.campaign import Design
 from algid.designs.limits import Row
-from algid.designs.torque import END
 from algid.model import UNITS
 from algid.notices import Notice, Remedy
-from algid.report.document import Column, Drawn, Table
-from algid.report.drawings import gauges
+from algid.report.document import Kind, Table
 from algid.text import ABSENT, percent, resolved, significant, unit_text
 from algid.verdict import Verdict, graded
 from algid.words import counted
@@ -27,7 +25,6 @@ SIGNS = {
     "acceleration": "rad/s²",
     "torque": "N m",
     "tip-height": "m",
-    "rest": "rad/s",
 }
 
 
@@ -48,25 +45,20 @@ def bound_table(design: Design) -> Table:
                 significant(float(design.std[place]), 2),
                 unit_text(UNITS[name]),
                 relative,
-                worst,
                 _YES[bool(asked.wanted[place])],
+                worst,
             )
         )
-    columns = (
-        Column("Parameter", "name"),
-        Column("Believed", "number"),
-        Column("Predicted ±", "number"),
-        Column("Unit", "text", 2),
-        Column("± %", "number"),
-        Column("Worst arm ± %", "number", 1),
-        Column("Asked for", "text", 3),
-    )
+    columns: dict[str, Kind] = {
+        "Parameter": "name", "Believed": "number", "Predicted ±": "number", "Unit": "text",
+        "± %": "number", "Requested": "text", "Worst arm ± %": "number",
+    }  # fmt: skip
     runs = design.campaign.experiment.runs
     note = (
         f"One standard deviation, from {_runs(runs)} together, if sensors are as noisy as stated. "
         "The worst arm is the worst of 20 drawn from what is believed."
     )
-    return Table("What the campaign will tell", columns, tuple(rows), note)
+    return Table("Predicted standard deviations", columns, tuple(rows), note)
 
 
 def _runs(runs: tuple[int, int]) -> str:
@@ -90,29 +82,23 @@ def limit_table(design: Design) -> Table:
         rows.append(
             (
                 kind,
-                place_name(row) or ABSENT,
                 significant(value, 4),
                 significant(limit, 4),
-                SIGNS[row.limit],
                 percent(used, 1.0, 3),
                 _YES[used >= BINDS * most],
+                SIGNS[row.limit],
+                place_name(row) or ABSENT,
             )
         )
-    columns = (
-        Column("Limit", "name"),
-        Column("Tightest", "text", 1),
-        Column("Used", "number", 2),
-        Column("Allowed", "number"),
-        Column("Unit", "text", 3),
-        Column("%", "number"),
-        Column("Binds", "text"),
-    )
+    columns: dict[str, Kind] = {
+        "Limit": "name", "Used": "number", "Allowed": "number", "%": "number", "Active": "text",
+        "Unit": "text", "Tightest": "text",
+    }  # fmt: skip
     note = (
         f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller "
         "overshoots. Torque is the largest that any arm of those believed possible asks for."
     )
-    drawn = Drawn("of the limit", gauges({kind: used for kind, (_, used) in tightest.items()}), "%")
-    return Table("What limits bind", columns, tuple(rows), note, drawn=(drawn,))
+    return Table("Active limits", columns, tuple(rows), note)
 
 
 def kind_name(row: Row) -> str:
@@ -137,8 +123,6 @@ def place_name(row: Row) -> str:
 
 def limit_name(row: Row) -> str:
     """A limit, its joint and its side in words."""
-    if row.limit == "rest":
-        return f"velocity of joint {(row.joint or 0) + 1} at the end"
     kind, comma, load = kind_name(row).partition(",")
     if row.joint is None:
         return f"{kind}{comma}{load}"
@@ -151,9 +135,6 @@ def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
     if row.joint is None:
         reach = float(limits.lengths.sum())
         return limits.height, reach - used * (reach - limits.height)
-    if row.limit == "rest":
-        limit = END * float(np.abs(design.motion.omega[row.joint]).max())
-        return limit, used * limit
     if row.limit == "range":
         low, high = float(limits.low[row.joint]), float(limits.high[row.joint])
         middle, half = 0.5 * (low + high), used * 0.5 * (high - low)

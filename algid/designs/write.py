@@ -63,9 +63,8 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
     texts = {
         "design.json": design_json(design, origin),
         "report.html": page_html(design, origin.source, origin.doubts),
+        "joint_trajectory.yaml": joint_trajectory(design, origin.joints),
     }
-    if design.campaign.drive == "position":
-        texts["joint_trajectory.yaml"] = joint_trajectory(design, origin.joints)
     for name, text in texts.items():
         with whole_file(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -81,8 +80,6 @@ def trajectory(design: Design) -> dict[str, FloatArray]:
     columns |= _of_joints("alpha", motion.alpha)
     columns |= _of_joints("tau", design.torque[first])
     if True in design.torque and not first:
-        if design.motions[True] is not motion:
-            columns |= _of_joints("loaded_theta", design.motions[True].theta)
         columns |= _of_joints("loaded_tau", design.torque[True])
     return columns
 
@@ -145,7 +142,7 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
         "prior": origin.source,
         "command": origin.command,
         "verdict": asdict(verdict(design, origin.doubts)),
-        "drive": campaign.drive,
+        "drive": "position",
         "duration": campaign.duration,
         "rate": experiment.rate,
         "runs": {"unloaded": experiment.runs[0], "loaded": experiment.runs[1]},

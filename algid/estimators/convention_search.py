@@ -134,6 +134,14 @@ class Candidate:
             return False
         return all(self.demands.get(name, np.inf) > MET for name in _INERTIAL)
 
+    @property
+    def plausible(self) -> bool:
+        """True if it explains the torque and breaks only demands of inertia.
+
+        Slow motion and friction leave those open; weight and the sign of friction they do not.
+        """
+        return set(self.broken) <= set(_INERTIAL) and float(self.left.max()) < EXPLAINED
+
 
 @dataclass(frozen=True)
 class Judgement:

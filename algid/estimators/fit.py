@@ -179,7 +179,7 @@ class Fit:
     @property
     def refuted(self) -> bool:
         """Whether the refined estimator rejected its likelihood and returned another estimate."""
-        return has_code(self.notes, "REFUTED", "MISFIT")
+        return has_code(self.notes, "REFUTED", "MISFIT", "SLOW_SAMPLING")
 
     @property
     def beyond_errors(self) -> bool:

@@ -18,7 +18,7 @@ stays a parameter too, between none and that half millisecond, which is its devi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import log, sqrt
+from math import log
 from typing import Literal
 
 import numpy as np
@@ -58,12 +58,6 @@ class Lateness:
     std: float
     half: float
     effect: float = np.inf
-
-    @classmethod
-    def by_odds(cls, odds: float, half: float) -> Lateness:
-        """Half a sample late, or not at all, as surely as the logarithm of the odds says."""
-        late = half if odds > 0 else 0.0
-        return cls(late, half * sqrt(0.5 / max(abs(odds), 1e-300)), half)
 
     @property
     def odds(self) -> float:

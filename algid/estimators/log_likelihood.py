@@ -138,32 +138,19 @@ class LogEvidence:
         self.kept = [replace(piece, omega=None) for piece in kept]
         if not self.kept:
             return
-        self._trajectories = [self._first_trajectory(piece) for piece in self.kept]
+        self._trajectories = [_smoothed(piece.theta, piece.dt) for piece in self.kept]
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
         theta = medians(np.transpose([level.theta for level in guesses]))
         tau = medians(np.transpose([level.tau for level in guesses]))
-        guess = floored(NoiseLevels(theta, tau), floor)
+        self._guess = guess = floored(NoiseLevels(theta, tau), floor)
         squares = np.mean([roughness(piece.tau) ** 2 for piece in self.kept], axis=0)
         self._rough = np.maximum(guess.tau, np.sqrt(squares))
-        self._floor = self._least_noise(floor, guess)
-        self._guess = self._first_noise(guess)
+        self._floor = replace(floor, tau=np.maximum(floor.tau, SURE * guess.tau))
         self.noise = known or self._guess
         rms = np.max([np.sqrt(np.mean(piece.tau**2, axis=1)) for piece in self.kept], axis=0)
         # A joint without a motor carries a load of the size of the other's.
         self._least = _NEGLIGIBLE * np.where(rms > 0, rms, rms.max())
-
-    def _first_trajectory(self, piece: Segment) -> FloatArray:
-        """The angles (2, N) at which a piece is first linearised."""
-        return _smoothed(piece.theta, piece.dt)
-
-    def _first_noise(self, guess: NoiseLevels) -> NoiseLevels:
-        """The levels that training starts from, where differences of samples show `guess`."""
-        return guess
-
-    def _least_noise(self, floor: NoiseLevels, guess: NoiseLevels) -> NoiseLevels:
-        """The least levels, where digitisation has those of `floor`."""
-        return replace(floor, tau=np.maximum(floor.tau, SURE * guess.tau))
 
     @property
     def noise_known(self) -> bool:
@@ -246,7 +233,7 @@ class LogEvidence:
         """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""
         gathered = _Gathered()
         for piece in self._pieces():
-            start = self._first_trajectory(piece)
+            start = _smoothed(piece.theta, piece.dt)
             first = self._linearise(c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)

@@ -191,15 +191,6 @@ def _white_noise(signal: FloatArray, difference: FloatArray | None = None) -> Fl
     return np.maximum(spread / np.sqrt(comb(2 * _DIFFERENCE, _DIFFERENCE)), _SMALLEST * size)
 
 
-def differences_noise(signal: FloatArray, order: int) -> FloatArray:
-    """White noise (2,) with the same median size of differences of some order as a signal (2, N).
-
-    The higher the order, the less a motion leaves in them.
-    """
-    median = medians(np.abs(np.diff(signal, order, axis=1))) / 0.6745
-    return np.asarray(median / np.sqrt(comb(2 * order, order)))
-
-
 def quantum(signal: FloatArray) -> FloatArray:
     """Step of the encoder behind each row of a signal.
 

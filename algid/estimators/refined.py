@@ -20,7 +20,6 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.criteria import SETTLED
 from algid.estimators.body import with_body
-from algid.estimators.coarse_likelihood import CoarseEvidence, turns_far
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.identifiability import judge, open_directions
@@ -38,7 +37,9 @@ from algid.estimators.widths import Width, has_width, likeliest_width
 from algid.names import evenly_spread
 from algid.notices import Notice
 from algid.progress import Progress
+from algid.quantiles import quantile
 from algid.signals.differences import Stencil
+from algid.signals.segments import Segment
 
 _STEPS = 20
 _NOISE_STEPS = 12  # then noise levels stay and columns are smooth, so that the rest can settle
@@ -70,8 +71,6 @@ def fit(
     prior: Prior | None = None,
     progress: Progress | None = None,
     noise: NoiseLevels | None = None,
-    *,
-    coarse: bool = False,
 ) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
@@ -90,9 +89,6 @@ def fit(
         Called with each step of the training and how many samples of how many it has gone over.
     noise : NoiseLevels
         Known noise levels; None estimates them log by log.
-    coarse : bool
-        Whether logs whose arm turns far from sample to sample are integrated between samples. The
-        torque has no low-pass then.
 
     Returns
     -------
@@ -113,8 +109,12 @@ def fit(
         )
     start = weak_fit(unloaded, loaded, settings, lengths, prior)
     shared, anchored = start.shared, _anchored(start)
-    logs = _opened(unloaded, False, shared, settings, noise, coarse=coarse)
-    logs += _opened(loaded, True, shared, settings, noise, coarse=coarse)
+    logs = _opened(unloaded, False, shared, settings, noise)
+    logs += _opened(loaded, True, shared, settings, noise)
+    turn = max(largest_turn(log.kept) for log in logs)
+    if turn > FAR:
+        numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "times": turn / FAR}
+        return start.noted(Notice("SLOW_SAMPLING", numbers=numbers))
     refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
     try:
         if len(logs) >= _MANY:
@@ -221,8 +221,6 @@ def _opened(
     shared: Shared,
     settings: WeakSettings,
     noise: NoiseLevels | None,
-    *,
-    coarse: bool,
 ) -> list[LogEvidence]:
     """The logs of a kind that are long enough.
 
@@ -238,12 +236,7 @@ def _opened(
             shift = replace(shift, delay=float(c[-1]))
         return Stencil(dt, shift.at(dt) - shared.model.lag(c), held=shift.held)
 
-    every = []
-    for source in sources:
-        log = LogEvidence(source, loaded, shared, stencil, noise)
-        if coarse and turns_far(log.kept):
-            log = CoarseEvidence(source, loaded, shared, stencil, noise)
-        every.append(log)
+    every = [LogEvidence(source, loaded, shared, stencil, noise) for source in sources]
     kept = [log for log in every if log.kept]
     if every and not kept:
         which = "unloaded"
@@ -254,6 +247,20 @@ def _opened(
             "samples without a gap"
         )
     return kept
+
+
+FAR = 0.35
+"""rad from one sample to the next: beyond it derivatives by differences do not follow a turn. A
+stencil of nine samples errs by the eighth power of this angle, over 3150, of the fastest part of
+an acceleration, and the joints' coupling has parts three times as fast as the joints turn."""
+_SELDOM = 1e-3
+"""Share of the samples between which a joint may turn further."""
+
+
+def largest_turn(pieces: Sequence[Segment]) -> float:
+    """What a joint turns from sample to sample, in rad, but for the largest `_SELDOM` of turns."""
+    turns = [np.abs(np.diff(piece.theta, axis=1)).max(axis=0) for piece in pieces]
+    return float(quantile(np.concatenate(turns), 1 - _SELDOM)) if turns else 0.0
 
 
 def _train(

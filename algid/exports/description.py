@@ -329,20 +329,15 @@ _FRAME = "theta1 from the horizontal, theta2 from link 1, counterclockwise; grav
 
 
 def comment(arm: Description, remarks: list[str], before: str) -> str:
-    """The header with something before each line."""
-    return "\n".join(f"{before}{line}".rstrip() for line in header(arm, remarks))
+    """The comment at the top of a file, with something before each line.
 
-
-def header(arm: Description, remarks: list[str]) -> list[str]:
-    """Lines of the comment at the top of a file."""
-    lines = [
-        f"Two-link arm by algid export, from {arm.source}.",
-        f"{_FRAME} SI units.",
-        "",
-    ]
-    lines += [str(number).rstrip() for number in arm.numbers]
+    No text in it ends a comment of C or a string of Python.
+    """
+    lines = [f"Two-link arm by algid export, from {arm.source}.", f"{_FRAME} SI units.", ""]
+    lines += [str(number) for number in arm.numbers]
     if remarks or arm.warnings:
         lines.append("")
     lines += [f"This file {remark}." for remark in remarks]
     lines += [f"Warning: {warning.text}." for warning in arm.warnings]
-    return lines
+    text = "\n".join(f"{before}{line}".rstrip() for line in lines)
+    return text.replace("*/", "* /").replace("\\", "/").replace('"""', "'''")

@@ -1,18 +1,21 @@
-"""Export formats by name with their writers, and the payload as YAML for planners."""
+"""Export formats by name, each a template with what it is made of, and the payload for planners."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from algid.errors import ResultError, SettingError
 from algid.exports.description import Description, describe
 from algid.exports.links import Knowns
-from algid.exports.programs import c99, python_module
-from algid.exports.robots import mjcf, sdf, urdf
+from algid.exports.programs import program
+from algid.exports.robots import numbers, robot
 from algid.identification.known import contradictions, covariance_of
 from algid.notices import Notice
 from algid.options import flag
@@ -21,21 +24,26 @@ from algid.results import Result
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its suffix, its text of an arm, whether it needs links, and its flags."""
+    """A format: its template, what that is made of, whether it needs links, and its flags."""
 
-    suffix: str
-    text: Callable[[Description], str]
+    template: str
+    content: Callable[[Description], dict[str, Any]]
     links: bool
     takes: frozenset[str]
+
+    @property
+    def suffix(self) -> str:
+        """What names of its files end in."""
+        return Path(self.template).suffix
 
 
 _LINKS = frozenset({"l1", "l2", "m1", "m2", "rotor1"})
 FORMATS = {
-    "urdf": Format(".urdf", urdf, True, _LINKS),
-    "mjcf": Format(".xml", mjcf, True, _LINKS),
-    "sdf": Format(".sdf", sdf, True, _LINKS),
-    "python": Format(".py", python_module, False, frozenset({"l1"})),
-    "c": Format(".c", c99, False, frozenset({"l1"})),
+    "urdf": Format("arm.urdf", partial(robot, rotors=False), True, _LINKS),
+    "mjcf": Format("arm.xml", partial(robot, rotors=True), True, _LINKS),
+    "sdf": Format("arm.sdf", partial(robot, rotors=False), True, _LINKS),
+    "python": Format("arm.py", partial(program, before=""), False, frozenset({"l1"})),
+    "c": Format("arm.c", partial(program, before=" * "), False, frozenset({"l1"})),
 }
 PAYLOAD = "yaml"
 
@@ -67,12 +75,28 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
         if name not in takes:
             raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
     if to == PAYLOAD:
-        return payload_yaml(result, file, knowns), contradictions(result, knowns.given)
+        content = _payload(result, file, knowns)
+        return _rendered("payload.yaml", content), contradictions(result, knowns.given)
     arm = describe(result, file, knowns, links=FORMATS[to].links)
-    return FORMATS[to].text(arm), arm.warnings
+    return _rendered(FORMATS[to].template, FORMATS[to].content(arm)), arm.warnings
 
 
-def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
+def _rendered(template: str, content: dict[str, Any]) -> str:
+    """The template's text; no value in it comes from outside but numbers and cleaned names."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters["n"] = numbers
+    return environment.get_template(f"{template}.j2").render(content)
+
+
+def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
     """Mass, centre of gravity and inertia of a result's payload, with their errors and covariance.
 
     Raises
@@ -95,46 +119,32 @@ def payload_yaml(result: Result, file: str, knowns: Knowns) -> str:
         raise ResultError(
             f"{file}: the result does not tell where the payload hangs; give {flag('l2')}"
         )
-    spread = 0.0 if given or identified is None else identified.std
-    y, y_std = _with_std(result, "y_p")
-    J, J_std = _with_std(result, "J_p")
+
+    def body(name: str) -> tuple[float, float | None]:
+        """Estimate and standard deviation of a part of the payload's body: zero without one."""
+        estimate = result.payload.get(name)
+        if estimate is None or estimate.estimate is None:
+            return 0.0, 0.0
+        return estimate.estimate, estimate.std
+
+    def number(value: float | None) -> str:
+        return "null" if value is None else repr(float(value))
+
+    (y, y_std), (J, J_std) = body("y_p"), body("J_p")
+    # nothing is shared with what is given or not determined
     shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
-    rows = "".join(f"    - [{', '.join(map(repr, row))}]\n" for row in _covariance(result, shared))
-    where = "given" if given else "identified"
-    return (
-        f"# Payload by algid export, from {json.dumps(file)}, estimator {result.estimator}; SI "
-        "units.\n"
-        "# Mass identified; what is 0 below was not determined by the logs, or lies out of the "
-        "arm's plane.\n"
-        f"# centre_of_gravity x {where}, in the frame of link 2: x along the link from joint 2.\n"
-        "payload:\n"
-        f"  mass: {mass.estimate!r}  # kg\n"
-        f"  mass_std: {_or_null(mass.std)}\n"
-        "  frame: link2\n"
-        f"  centre_of_gravity: [{float(length)!r}, {y!r}, 0.0]  # m\n"
-        f"  centre_of_gravity_std: [{_or_null(spread)}, {_or_null(y_std)}, 0.0]\n"
-        f"  inertia: {{ixx: 0.0, iyy: 0.0, izz: {J!r}, ixy: 0.0, ixz: 0.0, iyz: 0.0}}  # kg m^2\n"
-        f"  izz_std: {_or_null(J_std)}\n"
-        "  covariance:  # of mass, x, y and izz\n" + rows
-    )
-
-
-def _covariance(result: Result, shared: Sequence[str]) -> list[list[float]]:
-    """Covariance (4, 4) of mass, x, y and inertia: nothing of what is given or not determined."""
-    covariance = covariance_of(result, ("m_p", "l2", "y_p", "J_p"), shared)
-    rows: list[list[float]] = np.nan_to_num(covariance).tolist()
-    return rows
-
-
-def _with_std(result: Result, name: str) -> tuple[float, float | None]:
-    """Estimate and standard deviation of a part of the payload's body: zero if it has no body."""
-    estimate = result.payload.get(name)
-    return (
-        (0.0, 0.0)
-        if estimate is None or estimate.estimate is None
-        else (estimate.estimate, estimate.std)
-    )
-
-
-def _or_null(value: float | None) -> str:
-    return "null" if value is None else repr(float(value))
+    covariance = np.nan_to_num(covariance_of(result, ("m_p", "l2", "y_p", "J_p"), shared))
+    return {
+        "file": json.dumps(file),
+        "estimator": result.estimator,
+        "where": "given" if given else "identified",
+        "mass": mass.estimate,
+        "mass_std": number(mass.std),
+        "x": length,
+        "x_std": number(0.0 if given or identified is None else identified.std),
+        "y": y,
+        "y_std": number(y_std),
+        "J": J,
+        "J_std": number(J_std),
+        "covariance": covariance.tolist(),
+    }

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -25,33 +23,8 @@ from algid.words import counted
 
 GRAVITY = 9.81
 _PARALLEL = 1e-3  # sine of the angle between axes that count as one direction
+_ROUNDING = 1e-12  # m: a link this long has no length
 _BESIDE = 1e-9  # rad: a centre of mass less off its link's line is on it
-
-
-@dataclass(frozen=True, eq=False)
-class _Body:
-    """Mass, first moment (3,), second moment ∫ r rᵀ dm (3, 3) in the frame of a link."""
-
-    mass: float
-    moment: FloatArray
-    second: FloatArray
-
-    def moved(self, rotation: FloatArray, shift: FloatArray) -> _Body:
-        """The body in a frame in which its own stands at `shift`, turned by `rotation`."""
-        moment = rotation @ self.moment
-        second = rotation @ self.second @ rotation.T
-        cross = np.outer(moment, shift)
-        return _Body(
-            self.mass,
-            moment + self.mass * shift,
-            second + cross + cross.T + self.mass * np.outer(shift, shift),
-        )
-
-    def __add__(self, other: _Body) -> _Body:
-        return _Body(self.mass + other.mass, self.moment + other.moment, self.second + other.second)
-
-
-_NOTHING = _Body(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def read_urdf(path: Path) -> Predictor:
@@ -71,7 +44,7 @@ def read_urdf(path: Path) -> Predictor:
     except (ET.ParseError, UnicodeDecodeError) as error:
         raise ResultError(f"{path}: not XML ({error}); expected a URDF file") from error
     try:
-        arm, friction = _Robot(robot).arm()
+        arm, friction = _arm(robot)
     except ValueError as error:
         raise ResultError(
             f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
@@ -95,143 +68,123 @@ def read_urdf(path: Path) -> Predictor:
     return Predictor(model, coefficients)
 
 
-class _Robot:
-    """The joints of a URDF file, by the link that they hang from."""
+def _arm(robot: ET.Element) -> tuple[Arm, tuple[float, float]]:
+    """The arm, and its joints' Coulomb friction in N m.
 
-    def __init__(self, robot: ET.Element) -> None:
-        self._links = {_attribute(link, "name"): link for link in robot.findall("link")}
-        self._joints = robot.findall("joint")
-        self._moving = []
-        turning = True
-        for joint in self._joints:
-            kind = _attribute(joint, "type")
-            if kind != "fixed":
-                self._moving.append(joint)
-                turning &= kind in ("revolute", "continuous")
-        if len(self._moving) != 2 or not turning:
-            raise ValueError(
-                f"found {counted(len(self._moving), 'moving joint')}, or not all of them turn"
-            )
-        self._parent = {_linked(joint, "child"): joint for joint in self._joints}
-        self._refuse_circles()
-
-    def _refuse_circles(self) -> None:
-        """Raises `ValueError` where a link hangs from two joints, or from itself."""
-        if len(self._parent) < len(self._joints):
+    Raises
+    ------
+    ValueError
+        If the robot is no such arm.
+    """
+    links = {_attribute(link, "name"): link for link in robot.findall("link")}
+    joints = robot.findall("joint")
+    hung: dict[str, list[ET.Element]] = {}
+    for joint in joints:
+        hung.setdefault(_linked(joint, "parent"), []).append(joint)
+    # from the base on: each link's frame in the base's where both angles are 0, and after how many
+    # of the moving joints it comes
+    children = [_linked(joint, "child") for joint in joints]
+    open_ends = [(name, 0, np.eye(4)) for name in hung if name not in children]
+    frames: dict[str, FloatArray] = {}
+    inertia = np.zeros((3, 4, 4))  # ∫ (r, 1) (r, 1)ᵀ dm of the base and of both links
+    moving: list[tuple[ET.Element, int, FloatArray]] = []
+    while open_ends:
+        name, after, frame = open_ends.pop(0)
+        if name not in links:
+            raise ValueError(f"there is no link {name}")
+        if name in frames:
             raise ValueError("a link hangs from two joints")
-        for link in self._parent:
-            passed, above = {link}, link
-            while above in self._parent:
-                above = _linked(self._parent[above], "parent")
-                if above in passed:
-                    raise ValueError(f"link {link!r} is fixed to itself")
-                passed.add(above)
-
-    def arm(self) -> tuple[Arm, tuple[float, float]]:
-        """The arm, and its joints' Coulomb friction in N m."""
-        first, second = self._moving
-        base, place = self._frame(first)
-        follows = self._frame(second)[0] == self._child(first)
-        if base in {self._child(first), self._child(second)} or not follows:
-            first, second = second, first
-            base, place = self._frame(first)
-        if self._frame(second)[0] != self._child(first):
-            raise ValueError("the joints do not follow one another")
-        about = place[0] @ _axis(first)
-        turn, at = self._frame(second)[1]
-        if np.linalg.norm(np.cross(_axis(first), turn @ _axis(second))) > _PARALLEL:
-            raise ValueError("the joints' axes are not parallel")
-        length, one = self._planar(self._child(first), _axis(first), at)
-        tip = self._tip(self._child(second))
-        reach, two = self._planar(self._child(second), _axis(second), tip)
-        tilt = math.sqrt(max(0.0, 1 - float(about[2]) ** 2))
-        g = GRAVITY * tilt if tilt > _PARALLEL else 0.0
-        arm = Arm(
-            m1=one[0], lc1=one[1], I1=one[2], delta1=one[3], l1=length, b1=_loss(first, "damping"),
-            m2=two[0], lc2=two[1], I2=two[2], delta2=two[3], l2=reach, b2=_loss(second, "damping"),
-            g=g,
-        )  # fmt: skip
-        return arm, (_loss(first, "friction"), _loss(second, "friction"))
-
-    def _child(self, joint: ET.Element) -> str:
-        return _linked(joint, "child")
-
-    def _frame(self, joint: ET.Element) -> tuple[str, tuple[FloatArray, FloatArray]]:
-        """The moving link (or the base) that carries a joint, and the joint's frame in it."""
-        rotation, at = _origin(joint)
-        link = _linked(joint, "parent")
-        while link in self._parent and self._parent[link] not in self._moving:
-            turn, shift = _origin(self._parent[link])
-            rotation, at = turn @ rotation, shift + turn @ at
-            link = _linked(self._parent[link], "parent")
-        return link, (rotation, at)
-
-    def _fixed(self, link: str) -> list[ET.Element]:
-        return [
-            joint
-            for joint in self._joints
-            if joint not in self._moving and _linked(joint, "parent") == link
-        ]
-
-    def _body(self, link: str) -> _Body:
-        """A link with all that is fixed to it, in its frame."""
-        body = _NOTHING
-        if link not in self._links:
-            raise ValueError(f"there is no link {link}")
-        inertial = self._links[link].find("inertial")
-        if inertial is not None:
-            mass = _number(_attribute(_part(inertial, "mass"), "value"))
-            moments = _part(inertial, "inertia")
-            xx, yy, zz, xy, xz, yz = (
-                _number(_attribute(moments, name))
-                for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-            )
-            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-            second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-            body = _Body(mass, np.zeros(3), second).moved(*_origin(inertial))
-        for joint in self._fixed(link):
-            body = body + self._body(self._child(joint)).moved(*_origin(joint))
-        return body
-
-    def _tip(self, link: str) -> FloatArray:
-        body = self._body(link)
-        at, rotation = np.zeros(3), np.eye(3)
-        while self._fixed(link):
-            turn, shift = _origin(self._fixed(link)[-1])
-            at, rotation = at + rotation @ shift, rotation @ turn
-            link = self._child(self._fixed(link)[-1])
-        return at if np.linalg.norm(at) > 0 else body.moment / max(body.mass, 1e-300)
-
-    def _planar(
-        self, link: str, about: FloatArray, end: FloatArray
-    ) -> tuple[float, tuple[float, float, float, float]]:
-        """Length of a link in the plane, its mass, and its centre, inertia about it and angle.
-
-        The centre is so far from the joint, and so turned off the link's line, in rad.
-
-        Raises
-        ------
-        ValueError
-            If the link has no mass, or no length across its axis.
-        """
-        body = self._body(link)
-        if body.mass <= 0:
-            raise ValueError(f"link {link} has no mass")
-        line = end - about * (about @ end)
-        length = float(np.linalg.norm(line))
-        if length == 0:
-            raise ValueError(f"link {link} has no length across its axis")
-        line = line / length
-        centre = body.moment / body.mass
-        along, beside = float(line @ centre), float(np.cross(about, line) @ centre)
-        second = float(np.trace(body.second) - about @ body.second @ about)  # about the joint
-        far = math.copysign(math.hypot(along, beside), along)  # behind the joint it is negative
-        turned = math.atan2(beside * math.copysign(1.0, along), abs(along))
-        return length, (body.mass, far, second - body.mass * far**2, turned)
+        frames[name] = frame
+        body = frame @ _origin(links[name].find("inertial"))
+        share = body @ _pseudo_inertia(links[name]) @ body.T
+        for joint in hung.get(name, ()):
+            at, own = frame @ _origin(joint), after
+            if _attribute(joint, "type") != "fixed":
+                moving.append((joint, after, at))
+                own = len(moving)
+            open_ends.append((_linked(joint, "child"), own, at))
+        if after < 3:
+            inertia[after] += share
+    for name in children:
+        if name not in frames:
+            raise ValueError(f"link {name!r} is fixed to itself")
+    kinds = {_attribute(joint, "type") for joint, _, _ in moving}
+    if len(moving) != 2 or not kinds <= {"revolute", "continuous"}:
+        raise ValueError(f"found {counted(len(moving), 'moving joint')}, or not all of them turn")
+    (first, _, at1), (second, after, at2) = moving
+    if after != 1:
+        raise ValueError("the joints do not follow one another")
+    about = at1[:3, :3] @ _axis(first)
+    if np.linalg.norm(np.cross(about, at2[:3, :3] @ _axis(second))) > _PARALLEL:
+        raise ValueError("the joints' axes are not parallel")
+    tip = _linked(second, "child")
+    while tip in hung:
+        tip = _linked(hung[tip][-1], "child")
+    end = frames[tip][:3, 3]
+    if np.array_equal(end, at2[:3, 3]):  # no frame tells: the centre of mass
+        end = inertia[2, :3, 3] / max(inertia[2, 3, 3], 1e-300)
+    names = (_linked(first, "child"), _linked(second, "child"))
+    l1, one = _planar(names[0], inertia[1], about, at1[:3, 3], at2[:3, 3])
+    l2, two = _planar(names[1], inertia[2], about, at2[:3, 3], end)
+    tilt = math.sqrt(max(0.0, 1 - float(about[2]) ** 2))
+    g = GRAVITY * tilt if tilt > _PARALLEL else 0.0
+    arm = Arm(
+        m1=one[0], lc1=one[1], I1=one[2], delta1=one[3], l1=l1, b1=_loss(first, "damping"),
+        m2=two[0], lc2=two[1], I2=two[2], delta2=two[3], l2=l2, b2=_loss(second, "damping"),
+        g=g,
+    )  # fmt: skip
+    return arm, (_loss(first, "friction"), _loss(second, "friction"))
 
 
-def _linked(joint: ET.Element, side: Literal["parent", "child"]) -> str:
-    """The name of a joint's parent or child link."""
+def _pseudo_inertia(link: ET.Element) -> FloatArray:
+    """Second moment, first moment and mass (4, 4) in the frame of a link's inertial element."""
+    P = np.zeros((4, 4))
+    inertial = link.find("inertial")
+    if inertial is not None:
+        moments = _part(inertial, "inertia")
+        xx, yy, zz, xy, xz, yz = (
+            _number(_attribute(moments, name))
+            for name in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        )
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        P[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+        P[3, 3] = _number(_attribute(_part(inertial, "mass"), "value"))
+    return P
+
+
+def _planar(
+    name: str, P: FloatArray, about: FloatArray, joint: FloatArray, end: FloatArray
+) -> tuple[float, tuple[float, float, float, float]]:
+    """Length of a link in the plane, its mass, and its centre, inertia about it and angle.
+
+    The centre is so far from the joint, and so turned off the link's line, in rad.
+
+    Raises
+    ------
+    ValueError
+        If the link has no mass, or no length across its axis.
+    """
+    mass = P[3, 3]
+    if mass <= 0:
+        raise ValueError(f"link {name} has no mass")
+    line = end - joint - about * (about @ (end - joint))
+    length = float(np.linalg.norm(line))
+    if length <= _ROUNDING:
+        raise ValueError(f"link {name} has no length across its axis")
+    line = line / length
+    shift = np.eye(4)
+    shift[:3, 3] = -joint
+    moved = shift @ P @ shift.T
+    centre, second = moved[:3, 3] / mass, moved[:3, :3]
+    along, beside = float(line @ centre), float(np.cross(about, line) @ centre)
+    h = float(np.trace(second) - about @ second @ about)  # about the joint
+    far = math.copysign(math.hypot(along, beside), along)  # behind the joint it is negative
+    turned = math.atan2(beside * math.copysign(1.0, along), abs(along))
+    return length, (float(mass), far, h - float(mass) * far**2, turned)
+
+
+def _linked(joint: ET.Element, side: str) -> str:
+    """The name of a joint's `parent` or `child` link."""
     return _attribute(_part(joint, side), "link")
 
 
@@ -251,16 +204,19 @@ def _attribute(element: ET.Element, name: str) -> str:
     return text
 
 
-def _origin(element: ET.Element) -> tuple[FloatArray, FloatArray]:
-    """Rotation and place of an element's origin: roll, pitch, yaw about fixed axes."""
-    origin = element.find("origin")
+def _origin(element: ET.Element | None) -> FloatArray:
+    """An element's origin (4, 4): roll, pitch, yaw about fixed axes, and its place."""
+    origin = None if element is None else element.find("origin")
     given = {} if origin is None else origin.attrib
     roll, pitch, yaw = _three(given.get("rpy", "0 0 0"))
     (a, b, c), (p, q, r) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     about_x = np.array([[1, 0, 0], [0, a, -p], [0, p, a]])
     about_y = np.array([[b, 0, q], [0, 1, 0], [-q, 0, b]])
     about_z = np.array([[c, -r, 0], [r, c, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x, _three(given.get("xyz", "0 0 0"))
+    frame = np.eye(4)
+    frame[:3, :3] = about_z @ about_y @ about_x
+    frame[:3, 3] = _three(given.get("xyz", "0 0 0"))
+    return frame
 
 
 def _axis(joint: ET.Element) -> FloatArray:

@@ -295,11 +295,12 @@ def write_history(history: History, out: Path, batch: Path) -> list[Path]:
     OutputError
         If `out` cannot be written.
     """
-    from algid.fleet.page import fleet_html, reports_of
+    from algid.fleet.page import fleet_document
+    from algid.report.render import page
 
     for name, frame in (("fleet.parquet", history.windows), ("findings.parquet", history.findings)):
         with whole_file(out / name) as temporary:
             frame.write_parquet(temporary)
     with whole_file(out / "fleet.html") as temporary:
-        temporary.write_text(fleet_html(history, reports_of(history, batch, out)), encoding="utf-8")
+        temporary.write_text(page(fleet_document(history, batch, out)), encoding="utf-8")
     return [out / name for name in ("fleet.parquet", "findings.parquet", "fleet.html")]

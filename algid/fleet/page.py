@@ -1,40 +1,19 @@
-"""The fleet's page: what drifts, changed or stands out, and every robot log by log.
-
-It opens offline.
-"""
+"""The fleet's page: its robots, what drifts, changed or stands out, and a figure of that."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from algid import __version__
-from algid.fleet.drift import ALPHA, SPAN
-from algid.fleet.figures import courses, overview, robot_figure
+from algid.fleet.drift import ALPHA
+from algid.fleet.figures import overview
 from algid.fleet.history import History
-from algid.fleet.tables import (
-    MOST_ROWS,
-    change_table,
-    drift_table,
-    finding_table,
-    parameter_table,
-    robot_table,
-)
+from algid.fleet.tables import MOST_ROWS, change_table, finding_table, robot_table
 from algid.notices import Notice
-from algid.report.document import (
-    Content,
-    Depth,
-    Document,
-    ReadingAid,
-    References,
-    Section,
-    filled,
-)
-from algid.report.frame import page
+from algid.report.document import Document, Section
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
 from algid.words import counted
@@ -42,36 +21,36 @@ from algid.words import counted
 if TYPE_CHECKING:
     import polars as pl
 
-READING = (
-    "Read: each parameter has one scale of change for all robots; the band is the 95 % interval "
-    "of the mean over "
-    f"{SPAN} months. Level within its band is steady{{drifts}}. A robot's name leads to all its "
-    "parameters."
-)
 MOST_ROBOTS = 40  # whose table is printed
 MOST_NAMED = 3  # drifts, and logs that stand out
-# robots shown log by log: those of which something was found, then the first
-MOST_DRAWN = 40
 
 
-def fleet_html(history: History, reports: Mapping[str, str] | None = None) -> str:
-    """The page's text; `reports` says where the report of each job is."""
-    return page(fleet_document(history, reports or {}))
-
-
-def fleet_document(history: History, reports: Mapping[str, str] | None = None) -> Document:
-    """The report of a fleet; `reports`, which only a page has, say where the report of each job is.
+def fleet_document(
+    history: History, batch: Path | None = None, out: Path | None = None
+) -> Document:
+    """The report of a fleet; with the folders of `batch` and page also its figure and links.
 
     A long list of robots is left to the page.
     """
-    if reports is None:
-        sections = [_table_section(history)]
-    else:
-        sections = _page_sections(history, reports)
+    links, latest, figure = dict[str, str](), dict[str, str](), None
+    if batch is not None and out is not None:
+        worst = history.findings["job"].unique().head(MOST_ROWS).to_list()
+        links = {visible(job): place for job in worst if (place := _report(job, batch, out))}
+        for robot, job in history.roster.head(MOST_ROWS).select("robot", "latest").iter_rows():
+            place = _report(job, batch, out)
+            if place:
+                latest[visible(robot)] = place
+        figure = overview(history)
+    robots = robot_table(history, latest)
+    tables = (change_table(history), finding_table(history, links))
     return Document(
         title="Fleet",
         verdict=verdict(history),
-        sections=tuple(sections),
+        sections=(
+            Section("numbers", "Findings", tables),
+            Section("logs", "" if figure is None else figure.title, (figure,) if figure else ()),
+            Section("robots", "Robots", (robots,), folded=history.robots > MOST_ROBOTS),
+        ),
         kicker="a fleet's history",
         name="Fleet",
         facts=f"{counted(history.robots, 'robot')} · {counted(history.logs, 'log')}",
@@ -79,163 +58,16 @@ def fleet_document(history: History, reports: Mapping[str, str] | None = None) -
     )
 
 
-def _table_section(history: History) -> Section:
-    """The tables alone."""
-    depth = Depth.TERMINAL
-    if history.robots > MOST_ROBOTS:
-        depth = Depth.PAGE
-    content = [robot_table(history).at(depth)]
-    content += filled(change_table(history), drift_table(history), finding_table(history))
-    return Section(tuple(content))
-
-
-def _page_sections(history: History, reports: Mapping[str, str]) -> list[Section]:
-    """The tables with their drawings and links, what to look at first, then each robot."""
-    keys = {robot: f"robot-{place}" for place, robot in enumerate(_drawn(history), start=1)}
-    sections = [_linked_tables(history, keys, reports)]
-    first = overview(history, reports)
-    if first is not None:
-        sections.append(Section((first,)))
-    if keys:
-        which = ReadingAid(_which(history, len(keys)))
-        sections.append(Section((which,), "each", "Each robot"))
-    shown = _only(history, list(keys))
-    for robot, key in keys.items():
-        sections.append(_robot_section(shown, robot, key, reports))
-    others = _other_reports(history, keys, reports)
-    sections.append(Section(others, "reports", "Other robots' reports", fold="closed"))
-    return sections
-
-
-def _linked_tables(
-    history: History, keys: Mapping[str, str], reports: Mapping[str, str]
-) -> Section:
-    """The tables, whose names lead to a robot's section or report, or to a log's report."""
-    places = {}
-    for robot, job in history.roster.select("robot", "latest").iter_rows():
-        if robot in keys:
-            places[visible(robot)] = f"#{keys[robot]}"
-        elif job in reports:
-            places[visible(robot)] = reports[job]
-    jobs = {visible(job): place for job, place in reports.items()}
-    drawn = tuple(courses(history, MOST_ROWS))
-    robots = replace(robot_table(history).at(Depth.PAGE), drawn=drawn, links=places)
-    content: list[Content] = [robots]
-    if drawn:
-        drifts = ", orange drifts" if history.drifts.height else ""
-        content.append(ReadingAid(READING.format(drifts=drifts)))
-    content += filled(
-        replace(change_table(history), links=places),
-        replace(drift_table(history), links=places),
-        replace(finding_table(history), links=jobs),
-    )
-    return Section(tuple(content))
-
-
-def _drawn(history: History) -> list[str]:
-    """Robots that are shown log by log, in the roster's order."""
-    if history.jobs is None:
-        return []
-    every = history.roster["robot"].to_list()
-    marked = history.drifts["robot"].to_list() + history.findings["robot"].to_list()
-    if history.changes is not None:
-        marked += history.changes["robot"].to_list()
-    chosen = set(list(dict.fromkeys(marked + every))[:MOST_DRAWN])
-    return [robot for robot in every if robot in chosen]
-
-
-def _only(history: History, robots: list[str]) -> History:
-    """The history of those robots alone, since their logs and windows are searched often."""
-    import polars as pl
-
-    own = pl.col("robot").is_in(robots)
-    jobs = history.jobs
-    if jobs is not None:
-        jobs = jobs.filter(own)
-    return replace(history, windows=history.windows.filter(own), jobs=jobs)
-
-
-def _which(history: History, shown: int) -> str:
-    if shown == history.robots:
-        return "Read: open a robot to see all its parameters, log by log, and its reports."
-    return (
-        f"Read: open a robot to see all its parameters, log by log. {shown} of "
-        f"{counted(history.robots, 'robot')} are "
-        "here: those of which something was found, then the first."
-    )
-
-
-def _robot_section(history: History, robot: str, key: str, reports: Mapping[str, str]) -> Section:
-    """A robot: its parameters, their courses and its reports, folded."""
-    import polars as pl
-
-    assert history.jobs is not None
-    jobs = history.jobs.filter(pl.col("robot") == robot)
-    title = f"{visible(robot)} · {counted(jobs.height, 'log')}"
-    days = jobs["time"].drop_nulls()
-    if len(days):
-        first, last = days.min(), days.max()
-        title += f" · {first.date()} to {last.date()}"  # type: ignore[union-attr]
-    own = pl.col("robot") == robot
-    drifting = history.drifts.filter(own)["parameter"].sort().to_list()
-    if drifting:
-        title += f" · {joined(drifting)} drift{'s' * (len(drifting) == 1)}"
-    if history.changes is not None and history.changes.filter(own).height:
-        title += " · changed at once"
-    outlying = history.findings.filter(own)["job"].n_unique()
-    if outlying:
-        title += f" · {counted(outlying, 'log stands out', 'logs stand out')}"
-    content: list[Content] = [
-        parameter_table(history, robot, jobs),
-        robot_figure(history, robot, jobs, reports, f"{key}-logs"),
-    ]
-    links = [(visible(job), reports[job]) for job in jobs["job"].to_list() if job in reports]
-    if links:
-        content.append(References({"Reports, the latest first": links}, MOST_ROWS))
-    return Section(tuple(content), key, title, fold="closed", listed=False)
-
-
-def _other_reports(
-    history: History, keys: Mapping[str, str], reports: Mapping[str, str]
-) -> tuple[References, ...]:
-    """The reports of the robots that are not shown log by log."""
-    if not reports or history.jobs is None:
-        return ()
-    groups: dict[str, list[tuple[str, str]]] = {}
-    for (robot,), part in history.jobs.group_by("robot", maintain_order=True):
-        if str(robot) not in keys:
-            groups[str(robot)] = [
-                (job, reports[job]) for job in part["job"].to_list() if job in reports
-            ]
-    if not groups:
-        return ()
-    return (References(groups, MOST_ROWS),)
-
-
-def reports_of(history: History, batch: Path, out: Path) -> dict[str, str]:
-    """Where each job's report is, as seen from `out`; jobs without one are left out."""
-    if history.jobs is None:
-        return {}
-    reports, listed = {}, dict[str, frozenset[str]]()
-    for job in history.jobs["job"].to_list():
-        above = job.rpartition("/")[0]
-        if above not in listed:  # a folder is looked into once, not once a job
-            listed[above] = _names_in(batch / above)
-        if f"{job.rpartition('/')[2]}.algid" not in listed[above]:
-            continue
-        page = batch / f"{job}.algid" / "report.html"
-        if page.is_file():
-            there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
-            reports[job] = "./" + quote(there)  # a name such as javascript: leads nowhere else
-    return reports
-
-
-def _names_in(folder: Path) -> frozenset[str]:
-    """Names of what a folder holds; none where it cannot be read."""
+def _report(job: str, batch: Path, out: Path) -> str:
+    """Where a job's report is, as seen from `out`; empty without one."""
+    page = batch / f"{job}.algid" / "report.html"
     try:
-        return frozenset(path.name for path in folder.iterdir())
-    except (OSError, ValueError):
-        return frozenset()
+        if not page.is_file():
+            return ""
+    except (OSError, ValueError):  # a name that no file can have
+        return ""
+    there = os.path.relpath(page.resolve(), out.resolve()).replace(os.sep, "/")
+    return "./" + quote(there)  # a name such as javascript: leads nowhere else
 
 
 def verdict(history: History) -> Verdict:

@@ -1,247 +1,98 @@
-"""A fleet's tables: its robots, and what drifts, changed or stands out."""
+"""A fleet's tables: its robots, what drifts or changed, and which logs stand out."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 import numpy as np
+import polars as pl
 
 from algid.fleet.changes import ALPHA as CHANGED
 from algid.fleet.drift import ALPHA, SPAN
 from algid.fleet.history import History
-from algid.model import PARAMETERS, UNITS
-from algid.report.document import Column, Table
+from algid.report.document import Kind, Table
 from algid.significance import NORMAL
-from algid.text import ABSENT, joined, resolved, significant, unit_text, visible
+from algid.text import ABSENT, joined, significant, visible
 from algid.words import counted
 
-if TYPE_CHECKING:
-    import polars as pl
-
 MOST_ROWS = 200
+KINDS = {"payload": "payload unlike its label", "outlier": "outlier"}
 
 
-def robot_table(history: History) -> Table:
-    """Every robot: its logs, their dates, and what was found of it."""
-    import polars as pl
-
+def robot_table(history: History, links: Mapping[str, str] | None = None) -> Table:
+    """Every robot: its logs, what was found of it, and their dates."""
     drifting = dict(history.drifts.group_by("robot").agg(pl.col("parameter").sort()).iter_rows())
-    standing_out = dict(
-        history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows()
-    )
+    outlying = dict(history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows())
     changed: dict[str, list[str]] = {}
     if history.changes is not None:
-        changed = _days_of(history.changes)
-    columns = (
-        Column("Robot", "name"),
-        Column("Logs", "number"),
-        Column("From", "text", rank=2),
-        Column("To", "text", rank=1),
-        Column("Drift", "text"),
-        Column("Changed", "text", rank=3),
-        Column("Stand out", "number"),
-    )
-    shown = history.roster.head(MOST_ROWS)
+        for robot, after in history.changes.select("robot", "after").unique().sort("after").rows():
+            changed.setdefault(robot, []).append(_day(after))
     rows = []
-    for row in shown.iter_rows(named=True):
-        robot = row["robot"]
-        no_drift = "none" if row["tested"] else "not tested"
-        rows.append(
-            (
-                visible(robot),
-                str(row["logs"]),
-                _day(row["first"]),
-                _day(row["last"]),
-                joined(drifting.get(robot, [])) or no_drift,
-                joined(changed.get(robot, [])) or ABSENT,
-                str(standing_out.get(robot, 0)),
-            )
-        )
+    for row in history.roster.head(MOST_ROWS).iter_rows(named=True):
+        robot, none = row["robot"], "none" if row["tested"] else "not tested"
+        found = (joined(drifting.get(robot, [])) or none, joined(changed.get(robot, [])) or ABSENT)
+        dates = (_day(row["first"]), _day(row["last"]))
+        out = str(outlying.get(robot, 0))
+        rows.append((visible(robot), str(row["logs"]), *found, out, *dates))
     notes = []
-    if shown.height < history.robots:
-        notes.append(f"{counted(history.robots, 'robot')}; the first {shown.height} are shown.")
+    if len(rows) < history.robots:
+        notes.append(f"{counted(history.robots, 'robot')}; the first {len(rows)} are shown.")
     if history.scattered is not None:
         notes.append(history.scattered.text)
-    table = Table("Robots", columns, tuple(rows), " ".join(notes))
-    if not changed:
-        return table.without(("Changed",))
-    return table
+    columns: dict[str, Kind] = {
+        "Robot": "name", "Logs": "number", "Drift": "text", "Changed": "text",
+        "Stand out": "number", "From": "text", "To": "text",
+    }  # fmt: skip
+    table = Table("Robots", columns, tuple(rows), " ".join(notes), links)
+    return table if changed else table.without(("Changed",))
 
 
 def _day(time: datetime | None) -> str:
-    if time is None:
-        return ABSENT
-    return time.date().isoformat()
-
-
-def _days_of(changes: pl.DataFrame) -> dict[str, list[str]]:
-    """The days on which each robot changed."""
-    days: dict[str, list[str]] = {}
-    for robot, after in changes.select("robot", "after").unique(maintain_order=True).iter_rows():
-        days.setdefault(robot, []).append(after.date().isoformat())
-    return days
+    return ABSENT if time is None else time.date().isoformat()
 
 
 def change_table(history: History) -> Table:
-    """Robots that changed at once, each change's clearest parameters first."""
-    columns = (
-        Column("Robot", "name"),
-        Column("Between", "text"),
-        Column("Parameter", "text"),
-        Column("Step, %", "number"),
-        Column("Step", "number", rank=1),
-        Column("Unit", "text", rank=2),
-    )
-    rows = []
-    if history.changes is not None:
-        for row in history.changes.head(MOST_ROWS).iter_rows(named=True):
-            rows.append(
-                (
-                    visible(row["robot"]),
-                    f"{_day(row['before'])} and {_day(row['after'])}",
-                    row["parameter"],
-                    f"{100 * row['share']:+.3g}",
-                    _with_half(row["step"], row["step_std"]),
-                    unit_text(UNITS[row["parameter"]]),
-                )
-            )
-    note = (
-        "An arm, a drive or a convention was replaced: what came before and what comes after are "
-        f"tested apart. Significant at p < {significant(CHANGED, 1)} in a robot's life."
-    )
-    return Table("Changed at once", columns, tuple(rows), note)
-
-
-def parameter_table(history: History, robot: str, jobs: pl.DataFrame) -> Table:
-    """Every parameter of a robot with logs `jobs`: latest value, mean, trend, and findings."""
-    import polars as pl
-
-    columns = (
-        Column("Parameter", "name"),
-        Column("Latest log, ± 95 %", "number"),
-        Column(f"Mean of {SPAN} months, ± 95 %", "number"),
-        Column("Unit", "text"),
-        Column("Trend, % a month", "number"),
-        Column("Found", "text"),
-        Column("Meaning", "text"),
-    )
-    own = history.windows.filter(pl.col("robot") == robot).sort("month", "end")
-    rows = []
-    for parameter in history.parameters:
-        part = own.filter(pl.col("parameter") == parameter)
-        if not part.height:
-            continue
-        last, std = part.row(-1, named=True), f"{parameter}_std"
-        latest, value = jobs.filter(pl.col(std) > 0), ABSENT
-        if latest.height:
-            value = _with_half(latest[parameter][0], latest[std][0])
-        rows.append(
-            (
-                parameter,
-                value,
-                _with_half(last["mean"], last["mean_std"]),
-                unit_text(UNITS[parameter]),
-                _trend(last),
-                _found(history, robot, parameter),
-                PARAMETERS[parameter].meaning,
-            )
-        )
-    return Table("Parameters", columns, tuple(rows))
-
-
-def _with_half(value: float, std: float) -> str:
-    return f"{resolved(value, std)} ± {significant(NORMAL * std, 2)}"
-
-
-def _trend(row: dict[str, float]) -> str:
-    if np.isnan(row["p"]) or not row["mean"]:
-        return "not tested"
-    percent = 100 / abs(row["mean"])
-    return f"{percent * row['slope']:+.2g} ± {significant(NORMAL * percent * row['slope_std'], 2)}"
-
-
-def _found(history: History, robot: str, parameter: str) -> str:
-    """What was found of a robot's parameter, in words."""
-    import polars as pl
-
-    own = (pl.col("robot") == robot) & (pl.col("parameter") == parameter)
-    words = []
-    if history.drifts.filter(own).height:
-        words.append("drifts")
-    if history.changes is not None:
-        for row in history.changes.filter(own).iter_rows(named=True):
-            words.append(f"changed by {100 * row['share']:+.2g} % on {_day(row['after'])}")
-    outlying = history.findings.filter(own & (pl.col("kind") == "outlier")).height
-    if outlying:
-        words.append(counted(outlying, "outlier"))
-    return joined(words) or ABSENT
-
-
-def drift_table(history: History) -> Table:
-    """Parameters that drift, the clearest first."""
-    columns = (
-        Column("Robot", "name"),
-        Column("Parameter", "text"),
-        Column("Until", "text", rank=1),
-        Column("Logs", "number", rank=2),
-        Column("Mean", "number", rank=3),
-        Column("Slope, % a month", "number"),
-        Column("95 % interval", "number"),
-        Column("p", "number", rank=4),
-    )
+    """Parameters that drift, then those that changed at once, the clearest first."""
     rows = []
     for row in history.drifts.head(MOST_ROWS).iter_rows(named=True):
         percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
-        slope, half = percent * row["slope"], NORMAL * percent * row["slope_std"]
-        rows.append(
-            (
-                visible(row["robot"]),
-                row["parameter"],
-                row["end"].date().isoformat(),
-                str(row["logs"]),
-                significant(row["mean"]),
-                f"{slope:+.3g}",
-                f"[{slope - half:.3g}, {slope + half:.3g}]",
-                f"{row['p']:.1e}",
-            )
-        )
+        half = significant(NORMAL * percent * row["slope_std"], 2)
+        trend = f"{percent * row['slope']:+.3g} ± {half}"
+        rows.append((row["robot"], row["parameter"], "drift", trend, "% a month", _day(row["end"])))
+    changes = history.changes if history.changes is not None else pl.DataFrame()
+    for row in changes.head(MOST_ROWS).iter_rows(named=True):
+        half = significant(NORMAL * abs(row["share"] / row["step"]) * 100 * row["step_std"], 2)
+        step = f"{100 * row['share']:+.3g} ± {half}"
+        between = f"{_day(row['before'])} to {_day(row['after'])}"
+        rows.append((row["robot"], row["parameter"], "step", step, "%", between))
     note = (
-        f"{history.drifts.height} found. A slope over {SPAN} months is significant at p < "
-        f"{significant(ALPHA, 1)}."
+        f"± is 95 %. A drift is a slope over {SPAN} months with p < {significant(ALPHA, 1)}; a "
+        f"step, where an arm, a drive or a convention was replaced, has p < "
+        f"{significant(CHANGED, 1)} in a robot's life: what comes before and after is tested apart."
     )
-    return Table("Drift", columns, tuple(rows), note)
+    columns: dict[str, Kind] = {
+        "Robot": "name", "Parameter": "text", "Kind": "text", "Change": "number", "Unit": "text",
+        "When": "text",
+    }  # fmt: skip
+    shown = tuple((visible(robot), *rest) for robot, *rest in rows)
+    return Table("Drift and steps", columns, shown, note)
 
 
-def finding_table(history: History) -> Table:
+def finding_table(history: History, links: Mapping[str, str] | None = None) -> Table:
     """Payloads unlike their labels, and outliers, the farthest first."""
-    import polars as pl
-
-    columns = (
-        Column("Job", "name"),
-        Column("Robot", "text", rank=1),
-        Column("What", "text"),
-        Column("Parameter", "text"),
-        Column("Value", "number"),
-        Column("Expected", "number"),
-        Column("σ away", "number"),
-    )
     worst = history.findings.sort(pl.col("sigmas").abs(), descending=True).head(MOST_ROWS)
-    kinds = {"payload": "payload unlike its label", "outlier": "outlier"}
     rows = []
     for row in worst.iter_rows(named=True):
-        rows.append(
-            (
-                visible(row["job"]),
-                visible(row["robot"]),
-                kinds[row["kind"]],
-                row["parameter"],
-                significant(row["value"]),
-                significant(row["expected"]),
-                f"{row['sigmas']:+.1f}",
-            )
-        )
+        numbers = (significant(row["value"]), significant(row["expected"]))
+        away = f"{row['sigmas']:+.1f}"
+        what = (row["parameter"], away, *numbers, KINDS[row["kind"]], visible(row["robot"]))
+        rows.append((visible(row["job"]), *what))
     note = f"{history.findings.height} found."
     if history.findings.height > len(rows):
         note = f"{history.findings.height} found; the farthest {len(rows)} are shown."
-    return Table("Logs that stand out", columns, tuple(rows), note)
+    columns: dict[str, Kind] = {
+        "Job": "name", "Parameter": "text", "σ away": "number", "Value": "number",
+        "Expected": "number", "What": "text", "Robot": "text",
+    }  # fmt: skip
+    return Table("Logs that stand out", columns, tuple(rows), note, links)

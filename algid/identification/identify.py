@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES
-from algid.errors import AlgidError, LogError, ResultError, SettingError
+from algid.errors import LogError, ResultError, SettingError
 from algid.estimators.paper import SHORTEST
 from algid.files import refuse_misleading, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
+from algid.identification.known import contradictions
 from algid.identification.outcome import Identified
 from algid.identification.series import write_fit_series
 from algid.identification.source import (
@@ -120,10 +120,8 @@ def identify(
     AlgidError
         If a log cannot be used, or nothing can be written.
     SettingError
-        If a setting is not known or wrong, or logs are to be cross-validated of which there is one
-        alone.
-    ValueError
-        If there is neither an unloaded log nor `parameters`.
+        If a setting is not known or wrong, there is neither an unloaded log nor `parameters`, or
+        logs are to be cross-validated of which there is one alone.
     """
     refuse_misleading(name)
     settings = settings or Settings()
@@ -142,7 +140,10 @@ def identify(
         stated = meaning.model_dump(mode="json", exclude_unset=True)
     alone = earlier is not None or settings.effort == "external"
     if not survey.unloaded and not (alone and survey.loaded):
-        raise ValueError("an unloaded log is needed, or parameters and a loaded log")
+        raise SettingError(
+            f"identify: expected an unloaded log, or a loaded one with {flag('parameters')}, found "
+            f"{'a loaded one alone' if survey.loaded else 'none'}"
+        )
     if settings.cross_validate:
         for kind, logs in (("unloaded", survey.unloaded), ("loaded", survey.loaded)):
             if len(logs) == 1:
@@ -160,7 +161,11 @@ def identify(
             result = result.model_copy(update={"settings": result.settings | {"command": command}})
         write_result(result, temporary / "result.json")
         if report:
-            _write_pages(temporary, result, shared_library, progress)
+            from algid.report.page import write_pages
+
+            if progress is not None:
+                progress("report", 0, 0)
+            write_pages(temporary, shared_library, progress)
         if export:
             from algid.report.export import export_mcap
 
@@ -215,7 +220,12 @@ def _identified(
         result = result_of(outcome, settings, survey)
     notices = result.notices
     if earlier is not None:
-        notices = read_otherwise(result.logs, earlier.result, earlier.file) + notices
+        lengths = {name: one for name in ("l1", "l2") if (one := getattr(settings, name))}
+        notices = (
+            read_otherwise(result.logs, earlier.result, earlier.file)
+            + list(contradictions(earlier.result, lengths))
+            + notices
+        )
     return result.model_copy(update={"profile": stated, "notices": notices})
 
 
@@ -250,7 +260,6 @@ def _by_likelihood(
     from algid.identification.doubts import residual_of, with_doubt, with_endogeneity
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
-    from algid.identification.trials import advised
 
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
@@ -266,10 +275,7 @@ def _by_likelihood(
     fit = with_endogeneity(sure, survey, settings, chosen)
     survey.begin("prediction")
     outcome = outcome_of(fit, predictions, survey, settings, chosen)
-    again = partial(_again, earlier=earlier)
-    tried = replace(settings, torque_hold=asked.torque_hold)
-    notices = advised(outcome.notices + of_driver, survey, tried, again)
-    outcome = replace(outcome, notices=notices)
+    outcome = replace(outcome, notices=outcome.notices + of_driver)
     if folder is not None:
         survey.begin("series")
         write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
@@ -278,24 +284,11 @@ def _by_likelihood(
     return outcome, settings
 
 
-def _again(survey: Survey, settings: Settings, earlier: Earlier | None) -> Identified | None:
-    """The outcome by other settings; None where the logs cannot be used so."""
-    from algid.identification.outcome import outcome_of
-
-    try:
-        fit, predictions, chosen = _fitted(survey, settings, earlier)
-    except AlgidError:
-        return None
-    settings = replace(settings, torque_hold=chosen.hold)
-    return outcome_of(fit, predictions, survey, settings, chosen)
-
-
 def _fitted(
     survey: Survey, settings: Settings, earlier: Earlier | None
 ) -> tuple[Fit, Predictions, Selection]:
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
     from algid.identification.by_likelihood import run_fit
-    from algid.identification.coarse import fit_coarse
     from algid.identification.known import prior_of
     from algid.identification.model_choice import choose_model, with_hold_of_fit, without_nothing
 
@@ -306,10 +299,6 @@ def _fitted(
         chosen = choose_model(survey, settings, earlier.result)
         prior = prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
-    coarse = fit_coarse(survey, settings, chosen, prior)
-    if coarse is not None:
-        fit, chosen = coarse
-        return fit, {}, chosen
     settings = replace(settings, torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
     better = without_nothing(with_hold_of_fit(fit, chosen), fit, settings)
@@ -344,15 +333,3 @@ def _with_the_papers(
 
 def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
     return next(iter(survey.unloaded), None), next(iter(survey.loaded), None)
-
-
-def _write_pages(
-    folder: Path, result: Result, shared_library: bool, progress: Progress | None
-) -> None:
-    from algid.report.markdown import markdown
-    from algid.report.page import result_document, write_report
-
-    if progress is not None:
-        progress("report", 0, 0)
-    (folder / "report.md").write_text(markdown(result_document(result)), encoding="utf-8")
-    write_report(folder, shared_library, progress)

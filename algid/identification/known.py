@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from math import isclose
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from algid.signals.shift import TorqueShift
 from algid.significance import CERTAIN, sigmas
 
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
+SAME_LENGTH = 0.01  # of a length: what two rulers differ by
 
 
 def model_of(result: Result) -> Model:
@@ -212,7 +214,11 @@ def payload_length(result: Result) -> tuple[float, float] | None:
 
 
 def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice, ...]:
-    """Notices of given lengths that contradict the result's own, or its l1 = g k1 / k2."""
+    """Notices of given lengths that contradict those that a result was made with or identified.
+
+    What it identified are the payload's lengths, or l1 = g k1 / k2.
+    """
+    stated = given_lengths(result)
     identified: dict[str, tuple[float | None, float | None]] = {}
     for name in ("l1", "l2"):
         if name in result.payload:
@@ -222,12 +228,18 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
         identified["l1"] = by_constants
     notices = []
     for name, given in lengths.items():
+        if name in stated:
+            if not isclose(given, stated[name], rel_tol=SAME_LENGTH):
+                numbers = {"case": "stated", "name": name, "given": given, "stated": stated[name]}
+                notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
+            continue
         estimate, std = identified.get(name, (None, None))
         if estimate is None or not std:
             continue
         distance = abs(given - estimate) / std
         if distance > FAR:
             numbers = {
+                "case": "identified",
                 "name": name,
                 "given": given,
                 "distance": distance,

@@ -18,7 +18,7 @@ from algid.estimators.prediction import PredictionScore, cross_validate, score
 from algid.estimators.selection import Selection
 from algid.identification.by_likelihood import Predictions
 from algid.identification.predicted import prediction
-from algid.identification.remarks import fit_notes, fit_warnings
+from algid.identification.remarks import fit_notes, fit_warnings, torque_unit
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
 from algid.model import DELAYS, K3, K5, UNITS
@@ -82,7 +82,7 @@ def outcome_of(
     if survey.loaded:
         combined = _loaded_rows(fit, rows, stds, gone)
     summary = fit_summary(fit, predictions, survey, settings, chosen)
-    notices = list(fit_warnings(fit))
+    notices = list(fit_warnings(fit, torque_unit(survey.logs)))
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("NO_CROSS_VALIDATION"))
     outcome = Identified(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,12 +10,14 @@ from algid import results
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
 from algid.identification.phases import phase_note
+from algid.identification.source import LogSource
 from algid.methods import estimator_of
 from algid.model import K4
 from algid.notices import Notice, Remedy, has_code
 from algid.significance import CERTAIN, LEVEL, ONE_SIDED, chance, sigmas
+from algid.units import TORQUE
 
-STEEL = 8000.0  # kg/m³
+STEEL, AIR = 8000.0, 1.2  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have
 FAR_APART = sigmas(CERTAIN)  # past which two logs are not of one arm
 
@@ -28,8 +30,31 @@ def exchanged(fit: Fit) -> bool:
     return False
 
 
-def fit_warnings(fit: Fit) -> Iterator[Notice]:
-    """What a user should know about a fit."""
+def torque_unit(logs: Sequence[LogSource]) -> float | None:
+    """N m of the one unit that all torques were read in.
+
+    None where they differ, or an offset in N m or a PD law's gains do not follow the unit.
+    """
+    units = set()
+    for log in logs:
+        reading = log.origin.reading
+        for joint in (1, 2):
+            channel = reading.channels.get(f"tau{joint}")
+            if joint == reading.passive:
+                continue
+            if channel is None:
+                units.add("N m")
+            elif channel.offset:
+                return None
+            else:
+                units.add(channel.unit)
+    if len(units) != 1:
+        return None
+    return TORQUE.get(units.pop())
+
+
+def fit_warnings(fit: Fit, unit: float | None = None) -> Iterator[Notice]:
+    """What a user should know about a fit, whose torques were read in a `unit` of so many N m."""
     yield from fit.notes
     if not fit.converged and not has_code(fit.notes, "NOT_FEASIBLE"):
         yield Notice("REFINED_FAILED")
@@ -51,7 +76,7 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
     if phases is not None:
         yield phases
     yield from _of_gains(fit)
-    yield from _of_mass(fit)
+    yield from _of_mass(fit, unit)
     if "m_p" in fit.names:
         yield from _of_payload(fit)
     given, by_constants = fit.shared.lengths.get("l1"), length_by_constants(fit)
@@ -72,8 +97,11 @@ def fit_warnings(fit: Fit) -> Iterator[Notice]:
         yield Notice("LOGS_APART", numbers={"distance": apart})
 
 
-def _of_mass(fit: Fit) -> Iterator[Notice]:
-    """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1)."""
+def _of_mass(fit: Fit, unit: float | None) -> Iterator[Notice]:
+    """Notice of an arm heavier than steel cubes of its links: m1 lc1 / l1 + m2 = k4 / (g l1).
+
+    A smaller unit of torque scales every constant alike, so that the fit shows what it would give.
+    """
     by_constants = length_by_constants(fit)
     if K4 not in fit.names or K4 in fit.absent or by_constants is None:
         return
@@ -82,9 +110,18 @@ def _of_mass(fit: Fit) -> Iterator[Notice]:
         return
     mass = abs(float(fit.values[fit.names.index(K4)])) / (fit.shared.model.gravity * length)
     if mass > STEEL * length**3:
-        small = Remedy({"torque_unit": "mN m"}, "where torques are in mN m")
+        remedies: tuple[Remedy, ...] = ()
+        if (
+            unit is not None
+            and fit.prior is None
+            and fit.converged
+            and not list(broken_bounds(fit))
+        ):
+            lighter = mass * TORQUE["mN m"] / unit
+            if AIR * length**3 <= lighter <= STEEL * length**3:
+                remedies = (Remedy({"torque_unit": "mN m"}, "where torques are in mN m"),)
         numbers = {"mass": mass, "length": length}
-        yield Notice("HEAVY_ARM", numbers=numbers, remedies=(small,))
+        yield Notice("HEAVY_ARM", numbers=numbers, remedies=remedies)
 
 
 def _of_gains(fit: Fit) -> Iterator[Notice]:

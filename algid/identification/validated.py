@@ -11,7 +11,7 @@ import numpy as np
 
 from algid.estimators.rollout import HORIZONS, RolloutScore
 from algid.identification.validate import Simulation
-from algid.report.document import Column, Table
+from algid.report.document import Kind, Table
 from algid.report.tables import by_state
 from algid.results import TorquePrediction
 from algid.text import ABSENT, file_name, significant, visible
@@ -129,10 +129,9 @@ class Validated:
 def _table(
     title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]], note: str = ""
 ) -> Table:
-    columns = [Column(headings[0], "name")]
-    for one in headings[1:]:
-        columns.append(Column(one, "number"))
-    return Table(title, tuple(columns), tuple(rows), note)
+    columns: dict[str, Kind] = dict.fromkeys(headings, "number")
+    columns[headings[0]] = "name"
+    return Table(title, columns, tuple(rows), note)
 
 
 def _as_json(one: TorquePrediction | None) -> dict[str, Any] | None:

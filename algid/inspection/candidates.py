@@ -9,7 +9,7 @@ from pathlib import Path
 from algid.errors import LogError
 from algid.log import Log
 from algid.notices import Remedy
-from algid.readers.formats import Entry, format_of
+from algid.readers.formats import Entry, entries_at
 
 _TORQUE = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
 _CURRENT = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
@@ -20,7 +20,7 @@ _MOST = 4
 def torques_beside(log: Log, channel: str) -> list[Remedy]:
     """What else in the log's file may be the torque `channel`, and the settings that take it."""
     try:
-        entries = format_of(Path(log.origin.path)).entries(Path(log.origin.path))
+        entries = entries_at(Path(log.origin.path))
     except LogError:  # a log in memory, or a file that is gone
         return []
     used = set(log.origin.mapping.values())

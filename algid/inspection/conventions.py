@@ -140,10 +140,13 @@ def mend(log: Read, judgement: Judgement | None) -> Mend | None:
             "seen from behind)"
         )
     small = max(abs(angle) for angle in convention.zero) < _SMALL
+    settings = _settings(convention, log)
+    if not settings:  # it is how the log was read
+        return None
     return Mend(
         words,
         _contradiction(judgement),
-        _settings(convention, log),
+        settings,
         another=not (small and only_zeros),
     )
 
@@ -193,23 +196,24 @@ def _tried(log: Log, suspicion: Suspicion, recording: Recorded) -> Iterator[Reme
         if weightless is not None and weightless.convincing:
             yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
             yield Remedy({"gravity": 0}, "for a horizontal plane")
-    real = _real(suspicion.guesses, partial(tried_together, [recording]))
+    together = partial(tried_together, [recording])
+    real = [one.convention for one in _tried_of(suspicion, together) if one.convincing]
     if suspicion.free_zero and not real:
-        real = _real(suspicion.guesses, partial(zeroed_together, [recording]))
-    for one in real:
-        yield Remedy(flat(_settings(one.convention, log)))
+        zeroed = _tried_of(suspicion, partial(zeroed_together, [recording]))
+        real = [one.convention for one in zeroed if one.convincing]
+    if not real:  # friction may hide inertia, and not where gravity pulls
+        real = [one.convention for one in _tried_of(suspicion, together) if one.plausible]
+    for convention in real:
+        settings = _settings(convention, log)
+        if settings and suspicion.agrees(convention.zero[0]):
+            yield Remedy(flat(settings))
 
 
-def _real(
-    guesses: Iterable[Convention], tried: Callable[[Convention], Candidate | None]
+def _tried_of(
+    suspicion: Suspicion, tried: Callable[[Convention], Candidate | None]
 ) -> list[Candidate]:
-    """Those of the guesses, as they are `tried`, under which the log shows a real arm."""
-    real = []
-    for guess in guesses:
-        one = tried(guess)
-        if one is not None and one.convincing:
-            real.append(one)
-    return real
+    """What the log says under each guess; nothing under one that it cannot be tried by."""
+    return [one for guess in suspicion.guesses if (one := tried(guess)) is not None]
 
 
 def _clauses(convention: Convention) -> Iterator[str]:

@@ -23,6 +23,8 @@ _EDGE = 10
 _K2, _K3, _K4, _K5 = 1, 2, 3, 4
 _OF_LEFT = 0.1
 """Share of the rough fit's residual that gravity's columns fit by differentiation errors."""
+_SAME_TURN = 10.0
+"""° between the turn of a rough fit and one that it stands for."""
 _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 
@@ -116,6 +118,13 @@ class Suspicion:
     guesses: tuple[Convention, ...] = ()
     weightless: bool = False
     free_zero: bool = False
+
+    def agrees(self, zero: float) -> bool:
+        """True if a zero of θ1, in rad, turns gravity back by what it is turned."""
+        if not self.free_zero:
+            return True
+        left = self.notice.numbers["turn"] + math.degrees(zero)
+        return abs(math.remainder(left, 360)) <= _SAME_TURN
 
 
 def gravity_findings(figures: DynamicFigures) -> Suspicion | None:

@@ -23,8 +23,8 @@ from algid.inspection.findings import CONTRADICTIONS
 from algid.log import Log
 from algid.notices import Notice, has_code, lossy
 from algid.readers import read_log
-from algid.readers.formats import Entry, format_of, in_memory
-from algid.readers.memory import NAME
+from algid.readers.formats import Entry, entries_at, entries_of, format_of
+from algid.readers.memory import NAME, open_columns
 
 T = TypeVar("T")
 
@@ -73,9 +73,9 @@ def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
     if isinstance(log, Log):
         return log.origin.format, ()
     if not isinstance(log, str | Path):
-        return in_memory(log)
-    form = format_of(Path(log))
-    return form.name, form.entries(Path(log))
+        table = open_columns(log)
+        return table.kind, entries_of(table)
+    return format_of(Path(log)).name, entries_at(Path(log))
 
 
 if TYPE_CHECKING:

@@ -30,7 +30,9 @@ def sampling(log: Log) -> Iterator[Notice]:
         yield Notice("SHORT_LOG", numbers={"seconds": clock.duration})
     samples = samples_a_period(log)
     if samples < _FEWEST:
-        yield Notice("SLOW_SAMPLING", numbers={"samples": samples, "rate": clock.rate})
+        yield Notice(
+            "SLOW_SAMPLING", numbers={"case": "period", "samples": samples, "rate": clock.rate}
+        )
     near = near_stamps(log.stamp_ns, log.period)
     if near:
         yield Notice("NEAR_STAMPS", numbers={"count": near, "share": NEAR, "period": period})

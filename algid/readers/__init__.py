@@ -47,13 +47,21 @@ def open_log(path: str | Path | Columns, profile: Profile | None = None) -> Tabl
 
 def _open_one(path: str | Path | Columns, profile: Profile) -> TableReader:
     """Open a log that stands in one file, or in memory."""
-    if not isinstance(path, str | Path):
+    from algid.readers.flat import TableFile, open_table
+
+    if isinstance(path, str | Path):
+        from algid.readers.formats import format_of
+
+        found = format_of(Path(path)).open(Path(path), profile)
+        if not isinstance(found, TableFile):
+            from algid.readers.messages.reader import open_messages
+
+            return open_messages(found, profile)
+    else:
         from algid.readers.memory import open_columns
 
-        return open_columns(path, profile)
-    from algid.readers.formats import format_of
-
-    return format_of(Path(path)).open(Path(path), profile)
+        found = open_columns(path)
+    return open_table(found, profile)
 
 
 def read_log(path: str | Path | Columns, profile: Profile | None = None) -> Log:

@@ -1,271 +1,313 @@
-"""Logs that are read as a whole: NumPy archives, MATLAB files."""
+"""Files that are read as a whole: NumPy, MATLAB, HDF5, JSON lines.
+
+A JSON object a line: ``{"motor_state": [{"q": 1}]}`` has ``motor_state[0].q``.
+"""
 
 from __future__ import annotations
 
+import io
+import json
+import re
 import zipfile
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from algid.arrow import table_of_columns
 from algid.errors import LogError
 from algid.limits import LIMITS
-from algid.readers.assemble import TableReader
-from algid.readers.columns import Columns, assign
-from algid.readers.frames import flat_reader, number, of_numbers, timed_by_index
-from algid.readers.hdf5 import arrays_of
-from algid.readers.jsonlines import frame_of_lines
-from algid.readers.matfile import check_elements
+from algid.notices import Notice
+from algid.readers.attributes import ATTRIBUTES
+from algid.readers.flat import BATCH_ROWS, TableFile, as_log_error
 from algid.readers.names import TIMES
-from algid.readers.natives import natively
 from algid.words import counted, repeated
 
-_MOST_TOLD = 12
-"""Arrays that fit nothing and are listed."""
-
 if TYPE_CHECKING:
-    import polars as pl
-
-    from algid.profile import Profile
+    import pyarrow as pa
 
 
-def open_arrays(path: Path, kind: str, profile: Profile) -> TableReader:
-    """Open a log of the kind "npz", "npy", "mat", "hdf5" or "jsonl".
-
-    Raises
-    ------
-    LogError
-        If the file is damaged, too large to be read as a whole, or lacks a channel.
-    """
-    content, others = contents_of(path, kind)
-    return open_content(str(path), kind, content, profile, others=others)
-
-
-def open_content(
-    path: str,
-    kind: str,
-    content: Content,
-    profile: Profile,
-    *,
-    units: Mapping[str, str] | None = None,
-    others: tuple[str, ...] = (),
-) -> TableReader:
-    """Open a log of columns that are in memory, under the name `path`.
-
-    Parameters
-    ----------
-    path, kind : str
-    content : Content
-    profile : Profile
-    units : mapping
-        Units by column that are stated elsewhere than in the columns' names.
-    others : tuple of str
-        What else the log holds, for the error of a channel that is missing.
-
-    Raises
-    ------
-    LogError
-        If a channel is missing, or is not of numbers.
-    """
-    import polars as pl
-
-    schema = content.schema
-    profile = timed_by_index(profile, schema)
-    try:
-        columns = assign(path, schema.names(), profile, units or {})
-    except LogError as error:
-        if not others:
-            raise
-        raise LogError(
-            f"{error}; the log also holds, of another length: {', '.join(others[:_MOST_TOLD])}"
-        ) from error
-    columns = of_numbers(path, columns, schema)
-
-    def frames(columns: Columns, rows: int, most: int | None) -> Iterator[pl.DataFrame]:
-        numbers = [
-            number(name, pl.col(source), schema[source]) for name, source in columns.sources.items()
-        ]
-        end = content.rows if most is None else min(most, content.rows)
-        for first in range(0, end, rows):
-            yield content.part(first, min(first + rows, end), set(columns.sources.values())).select(
-                numbers
-            )
-
-    return flat_reader(path, kind, columns, frames, profile, content.rows)
-
-
-@dataclass(frozen=True, eq=False)
-class Content:
-    """The flat columns of a file, of so many rows: arrays or a frame."""
-
-    columns: Mapping[str, NDArray[Any]] | pl.DataFrame
-    rows: int
-
-    @property
-    def schema(self) -> pl.Schema:
-        """The types of the columns as frames have them."""
-        return self.part(0, 1).schema
-
-    def part(self, first: int, last: int, names: Collection[str] | None = None) -> pl.DataFrame:
-        """Some rows of all columns, or of `names` only, since a frame holds each array twice."""
-        import polars as pl
-
-        if isinstance(self.columns, pl.DataFrame):
-            return self.columns[first:last]
-        part = {}
-        for name, column in self.columns.items():
-            if names is None or name in names:
-                part[name] = _native(column[first:last])
-        return pl.DataFrame(part)
-
-
-def contents_of(path: Path, kind: str) -> tuple[Content, tuple[str, ...]]:
-    """The file's flat columns, and its arrays that fit in none, each with its shape.
-
-    A matrix or a list gives a column a joint, ``q[0]``, ``q[1]``.
-
-    Raises
-    ------
-    LogError
-        If the file is damaged, too large, or holds no arrays of one length.
-    """
-    if path.stat().st_size > LIMITS.whole_bytes:
-        raise LogError(
-            f"{path}: a {kind} file of more than 1 GiB is not read as a whole; save it as Parquet"
-        )
-    others: tuple[str, ...] = ()
-    with natively(path, kind):
-        if kind == "jsonl":
-            frame = frame_of_lines(path)
-            content = Content(frame, frame.height)
-        else:
-            columns, others = columns_of(str(path), _LOADERS[kind](path))
-            content = Content(columns, len(next(iter(columns.values()), ())))
-        width = len(content.schema)  # of types that polars does not take it tells here
-    if width > LIMITS.columns:
-        raise LogError(f"{path}: {counted(width, 'column')}; expected {LIMITS.columns} at most")
-    return content, others
-
-
-def _npy(path: Path) -> dict[str, NDArray[Any]]:
-    with path.open("rb") as stream:
-        array = np.lib.format.read_array(stream, allow_pickle=False)
-        if stream.read(1):
-            raise LogError(
-                f"{path}: its head says {counted(len(array), 'row')}, and there is more behind "
-                "them; the file was "
-                "damaged, save it again"
-            )
-    if array.dtype.names is None:
-        raise LogError(
-            f"{path}: an array without names; save it with np.savez(FILE, t=…, q=…, tau=…)"
-        )
-    return {name: array[name] for name in array.dtype.names}
-
-
-def _npz(path: Path) -> dict[str, NDArray[Any]]:
-    with zipfile.ZipFile(path) as archive:
+def open_npz(path: Path) -> TableFile:
+    """Open a NumPy archive; raises `LogError` where it is damaged or too large."""
+    _refuse_large(path)
+    with as_log_error(path, "NumPy"), zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
         twice = repeated(archive.namelist())
-    if twice:
-        raise LogError(f"{path}: the array {twice[0]!r} stands in the archive twice; save it again")
-    if claimed > LIMITS.whole_bytes:
-        raise LogError(
-            f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as Parquet"
-        )
-    with np.load(path, allow_pickle=False) as archive:
-        return dict(archive)
+        if twice:
+            raise LogError(
+                f"{path}: the array {twice[0]!r} stands in the archive twice; save it again"
+            )
+        if claimed > LIMITS.whole_bytes:
+            raise LogError(
+                f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as "
+                "Parquet"
+            )
+        arrays: dict[str, NDArray[Any]] = {}
+        for name in archive.namelist():
+            with archive.open(name) as stream:
+                arrays[name.removesuffix(".npy")] = np.lib.format.read_array(
+                    stream, allow_pickle=False
+                )
+                if stream.read(1):
+                    raise LogError(
+                        f"{path}: the array {name!r} is longer than its head says; save it again"
+                    )
+    return of_arrays(str(path), "npz", arrays)
 
 
-def _matlab(path: Path) -> Mapping[str, NDArray[Any]]:
+def open_matlab(path: Path) -> TableFile:
+    """Open a MATLAB file; raises `LogError` where it is damaged or too large."""
     from scipy.io import loadmat
 
-    check_elements(path)
+    _refuse_large(path)
+    arrays: dict[str, NDArray[Any]] = {}
+
+    def take(content: Mapping[str, Any], prefix: str) -> None:
+        for name, value in content.items():
+            if isinstance(value, dict):
+                take(value, f"{prefix}{name}.")
+            elif not name.startswith("__"):
+                arrays[f"{prefix}{name}"] = np.asarray(value)
+
+    with as_log_error(path, "MATLAB"):
+        try:
+            take(loadmat(path, simplify_cells=True), "")
+        except NotImplementedError:  # version 7.3 is HDF5
+            return of_arrays(str(path), "mat", *_of_hdf5(path))
+    return of_arrays(str(path), "mat", arrays)
+
+
+def open_hdf5(path: Path) -> TableFile:
+    """Open an HDF5 file; raises `LogError` where it is damaged or too large, or h5py is missing."""
+    _refuse_large(path)
+    with as_log_error(path, "HDF5"):
+        return of_arrays(str(path), "hdf5", *_of_hdf5(path))
+
+
+def _refuse_large(path: Path) -> None:
+    if path.stat().st_size > LIMITS.whole_bytes:
+        raise LogError(
+            f"{path}: a file of more than 1 GiB is not read as a whole; save it as Parquet"
+        )
+
+
+def _of_hdf5(
+    path: Path,
+) -> tuple[dict[str, NDArray[Any]], dict[str, dict[str, str]], dict[str, str]]:
+    """Datasets by their paths with dots, their attributes, and the file's; none of another file."""
     try:
-        content = loadmat(path, simplify_cells=True)
-    except NotImplementedError:  # version 7.3 is HDF5
-        return _hdf5(path)
-    return dict(_leaves(content, ""))
+        import h5py
+    except ImportError as error:
+        mend = "pip install 'algid[hdf5]', or in MATLAB save(FILE, '-v7')"
+        raise LogError(f"{path}: an HDF5 file, for which h5py is needed: {mend}") from error
+    arrays: dict[str, NDArray[Any]] = {}
+    attributes: dict[str, dict[str, str]] = {}
+
+    def take(name: str, one: Any) -> None:
+        if not isinstance(one, h5py.Dataset) or one.is_virtual or one.external:
+            return
+        kinds = [one.dtype[each] for each in one.dtype.names or ()] or [one.dtype]
+        if name.startswith("#") or one.ndim > 2 or any(kind.kind not in "iufbSO" for kind in kinds):
+            return
+        if one.nbytes > LIMITS.whole_bytes:
+            raise LogError(f"{path}: the array {name!r} is of more than 1 GiB; save it as Parquet")
+        # HDF5 fills up with zeros what was never written
+        stored, expected, unit = one.id.get_storage_size(), one.nbytes, "bytes"
+        if one.chunks is not None:
+            counts = -(-np.array(one.shape) // np.array(one.chunks))
+            stored, unit = one.id.get_num_chunks(), "chunks"
+            expected = int(np.prod(counts)) if one.size else stored
+        if stored != expected and not any(kind.kind == "O" for kind in kinds):  # texts lie apart
+            raise LogError(
+                f"{path}: the array {name!r} has {stored} of {expected} {unit}; the file was cut "
+                "off or damaged, save it again"
+            )
+        plain, values = name.replace("/", "."), np.asarray(one[()])
+        attributes[plain] = {key: text_of(value) for key, value in one.attrs.items()}
+        if values.dtype.names:
+            arrays.update({f"{plain}.{each}": values[each] for each in values.dtype.names})
+        else:
+            arrays[plain] = np.atleast_1d(values)
+
+    with h5py.File(path, "r") as file:
+        file.visititems(take)
+        metadata = {key: text_of(value) for key, value in file.attrs.items()}
+    return arrays, attributes, metadata
 
 
-def _hdf5(path: Path) -> Mapping[str, NDArray[Any]]:
-    return arrays_of(path, most_bytes=LIMITS.whole_bytes, most_arrays=LIMITS.columns)
+def of_arrays(
+    path: str,
+    kind: str,
+    arrays: Mapping[str, NDArray[Any]],
+    attributes: Mapping[str, Mapping[str, str]] | None = None,
+    metadata: Mapping[str, str] | None = None,
+) -> TableFile:
+    """Columns as long as the time, or as the longest array; a matrix has ``q[0]``, ``q[1]``.
 
-
-_LOADERS = {"npy": _npy, "npz": _npz, "mat": _matlab, "hdf5": _hdf5}
-
-
-def _leaves(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, NDArray[Any]]]:
-    for name, value in content.items():
-        if name.startswith("__"):
-            continue
-        if isinstance(value, dict):
-            yield from _leaves(value, f"{prefix}{name}.")
-        elif isinstance(value, np.ndarray):
-            yield f"{prefix}{name}", value
-
-
-def columns_of(
-    path: str, arrays: Mapping[str, NDArray[Any]]
-) -> tuple[dict[str, NDArray[Any]], tuple[str, ...]]:
-    """Columns as long as the time, or as the longest array, and the other arrays with their shapes.
-
-    A nested name's last part stands for it where that is unique.
+    A nested name's last part stands for it where that is unique. Texts and single numbers are
+    metadata; those named as an attribute, ``units``, are of the columns in their order, or of the
+    column behind a dot.
 
     Raises
     ------
     LogError
         If no array has two samples.
     """
-    numbers = {}
+    import pyarrow as pa
+
+    last = {name: name.rpartition(".")[2] for name in arrays}
+    twice = repeated(name for name in last.values())
+    short = {name: name if last[name] in twice else last[name] for name in arrays}
+    of_columns = {short.get(name, name): dict(one) for name, one in (attributes or {}).items()}
+    found, texts = {}, dict(metadata or {})
+    signals = [name for name, one in arrays.items() if one.dtype.kind in "iufbmM" and one.size > 1]
     for name, array in arrays.items():
-        if array.dtype.kind in "iuf":
-            numbers[name] = np.squeeze(array)
-    numbers = _by_short_names(numbers)
-    rows = _rows_of(numbers)
+        key, _, column = name.partition(".")
+        if column and key.lower() in ATTRIBUTES and array.size == 1:
+            of_columns.setdefault(column, {})[key] = text_of(array)
+        elif name.lower() in ATTRIBUTES and array.shape == (len(signals),):
+            for column, value in zip(signals, array, strict=True):
+                if text := text_of(value):
+                    of_columns.setdefault(short[column], {})[name] = text
+        elif array.dtype.kind in "iufbmMOUS":
+            found[short[name]] = np.squeeze(array)
+    rows, timed = 0, 0
+    for name, array in found.items():
+        if array.dtype.kind not in "OUS":
+            rows = max(rows, *array.shape, 0)
+        if name.lower() in TIMES and array.ndim == 1:
+            timed = max(timed, array.size)
+    rows = timed or rows
     if rows < 2:
         raise LogError(
             f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}"
         )
-    columns: dict[str, NDArray[Any]] = {}
-    others: list[str] = []
-    for name, array in numbers.items():
+    columns: dict[str, NDArray[Any] | pa.Array] = {}
+    fields, others = [], list[str]()
+
+    def take(name: str, values: NDArray[Any], said: Mapping[str, str] | None) -> None:
+        if values.dtype.kind in "iuf" and not np.ma.isMaskedArray(values):
+            columns[name] = values
+            kind = pa.from_numpy_dtype(values.dtype.newbyteorder("="))
+        else:
+            try:
+                columns[name] = made = _arrow(values)
+            except (pa.ArrowException, TypeError, ValueError, UnicodeError):
+                others.append(f"{name} (no numbers)")
+                return
+            kind = made.type
+        fields.append(pa.field(name, kind, metadata=said))
+
+    for name, array in found.items():
+        said = of_columns.get(name)
         if array.shape == (rows,):
-            columns[name] = array
+            take(name, array, said)
         elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
             upright = array if array.shape[0] == rows else array.T
             for place, column in enumerate(upright.T):
-                columns[f"{name}[{place}]"] = column
+                take(f"{name}[{place}]", column, said)
+        elif array.dtype.kind in "OUS" or array.ndim == 0:
+            texts[name] = text_of(array)
         else:
-            others.append(f"{name} ({' × '.join(map(str, array.shape)) or 'one number'})")
-    return columns, tuple(others)
+            others.append(f"{name} ({' × '.join(map(str, array.shape))})")
+
+    def batches(names: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
+        end = rows if most is None else min(most, rows)
+        for first in range(0, end, BATCH_ROWS):
+            part = {}
+            for name in names:  # Arrow knows this machine's byte order alone
+                values = columns[name][first : min(first + BATCH_ROWS, end)]
+                if isinstance(values, np.ndarray):
+                    values = np.ascontiguousarray(values, values.dtype.newbyteorder("="))
+                part[name] = values
+            yield from table_of_columns(part).to_batches()
+
+    schema = pa.schema(fields, metadata=texts or None)
+    return TableFile(path, kind, schema, rows, batches, others=tuple(others))
 
 
-def _by_short_names(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Arrays by the last part of their nested names, where that is unique."""
-    last = {name: name.rpartition(".")[2] for name in arrays}
-    twice = repeated(last.values())
-    named = {}
-    for name, array in arrays.items():
-        named[name if last[name] in twice else last[name]] = array
-    return named
+def _arrow(values: NDArray[Any]) -> pa.Array:
+    """A column that is no plain array of numbers: masked, of dates, texts or objects."""
+    import pyarrow as pa
+
+    if np.ma.isMaskedArray(values):
+        native = np.ascontiguousarray(values.data, values.dtype.newbyteorder("="))
+        return pa.array(native, mask=np.ma.getmaskarray(values))
+    if values.dtype.kind == "S":
+        values = np.char.decode(values, "utf-8")
+    return pa.array(values.tolist() if values.dtype.kind in "OU" else values)
 
 
-def _rows_of(arrays: Mapping[str, NDArray[Any]]) -> int:
-    """As many rows as the longest time has; without a time, as the longest array."""
-    longest = 0
-    clocks = []
-    for name, array in arrays.items():
-        longest = max(longest, *array.shape, 0)
-        if name.lower() in TIMES and array.ndim == 1:
-            clocks.append(array.size)
-    return max(clocks, default=longest)
+def text_of(value: Any) -> str:
+    """An attribute as text; lists as JSON."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = np.squeeze(value).tolist()
+    if isinstance(value, list | tuple):
+        return json.dumps([text_of(one) for one in value])
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
-def _native(array: NDArray[Any]) -> NDArray[Any]:
-    """In this machine's byte order and in one piece; halves as float32."""
-    kind = np.float32 if array.dtype == np.float16 else array.dtype.newbyteorder("=")
-    return np.ascontiguousarray(array, kind)
+def of_arrow(path: str, kind: str, table: pa.Table, notices: tuple[Notice, ...] = ()) -> TableFile:
+    """A table in memory."""
+
+    def batches(names: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
+        yield from table.select(list(names)).slice(0, most).to_batches(BATCH_ROWS)
+
+    return TableFile(path, kind, table.schema, table.num_rows, batches, notices=notices)
+
+
+def is_json_lines(head: bytes) -> bool:
+    """Whether the first line of a text is a JSON object, with another behind it."""
+    first, _, rest = head.lstrip(b"\xef\xbb\xbf \t\r\n").partition(b"\n")
+    if not (first.startswith(b"{") and rest.lstrip().startswith(b"{")):
+        return False
+    return bool(first.strip()) and _is_object(first)
+
+
+def _is_object(line: bytes) -> bool:
+    """Whether a line is a JSON object, or blank; NaN is no JSON."""
+    try:
+        return not line.strip() or isinstance(json.loads(line, parse_constant=int), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def open_json_lines(path: Path) -> TableFile:
+    """Open JSON lines; a last line that breaks off is left out and told.
+
+    Raises
+    ------
+    LogError
+        If another line is no JSON object, or the file is too large.
+    """
+    import polars as pl
+
+    _refuse_large(path)
+    text = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    notices: tuple[Notice, ...] = ()
+    whole = text.rfind(b"\n") + 1
+    if not _is_object(text[whole:]):
+        numbers = {"case": "row", "row": text.count(b"\n") + 1}
+        text, notices = text[:whole], (Notice("CUT_OFF", numbers=numbers, lossy=True),)
+    # polars takes the cube of the depth of lists and objects; brackets within texts are none
+    deep = re.compile(rb"(?:[\[{][^\[\]{}]*){%d}" % LIMITS.json_depth)
+    if deep.search(text) and deep.search(re.sub(rb'"(?:[^"\\]|\\.)*"', b"", text)):
+        raise LogError(
+            f"{path}: lists and objects within one another, more than {LIMITS.json_depth} deep; "
+            "expected a sample of an arm in every line"
+        )
+    with as_log_error(path, "JSON lines"):
+        try:
+            frame = pl.read_ndjson(io.BytesIO(text), infer_schema_length=None)
+        except pl.exceptions.PolarsError as error:
+            reason = str(error).partition("\n")[0][:200]
+            wrong = (place for place, line in enumerate(text.split(b"\n")) if not _is_object(line))
+            raise LogError(
+                f"{path}: line {next(wrong, 0) + 1}: expected a JSON object in every line "
+                f"({reason}); mend or cut it"
+            ) from error
+        # whole numbers that Arrow has not
+        frame = frame.with_columns(pl.col(pl.Int128).cast(pl.Float64))
+        return of_arrow(str(path), "jsonl", frame.to_arrow(), notices)

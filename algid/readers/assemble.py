@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
 from algid.readers.runs import one_after_another
+from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, stack
 from algid.readers.timebase import in_order
 from algid.words import counted
@@ -49,6 +50,8 @@ class TableReader:
     notices: tuple[Notice, ...] = ()
     rows: int = 0
     """Samples to expect, 0 where the file does not tell."""
+    stated_rate: float | None = None
+    """Samples a second, as the file states them beside its stamps."""
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
         """Blocks of at most `rows` samples.
@@ -58,8 +61,13 @@ class TableReader:
         LogError
             If a value is not finite, time runs wrong, or there are fewer than two samples.
         """
-        with during("reading", self.origin.path):
-            yield from self._gathered(rows)
+        blocks = self._gathered(rows)
+        while True:
+            with during("reading", self.origin.path):
+                log = next(blocks, None)
+            if log is None:
+                return
+            yield log
 
     def whole(self) -> Log:
         """The whole log.
@@ -117,6 +125,8 @@ class TableReader:
         path, only = self.origin.path, self.origin.reading.segment
         ordered = in_order(path, one_after_another(path, self.tables(rows), only))
         for table in cut(self._finite(self._within(ordered)), rows):
+            if total < 2 <= len(table):
+                notices += other_rate(self.stated_rate, table.stamp_ns)
             notices += table.notices
             if len(table):
                 if held is not None:
@@ -253,6 +263,7 @@ def reader_of(
     stated: Mapping[str, str],
     notices: tuple[Notice, ...] = (),
     rows: int = 0,
+    said: Sequence[str] = (),
 ) -> TableReader:
     """A reader of `tables` as a profile says.
 
@@ -266,6 +277,8 @@ def reader_of(
     stated : mapping
         By canonical channel the unit that the file's own names state.
     notices, rows : as of `TableReader`
+    said : sequence of str
+        What the file states in words.
 
     Raises
     ------
@@ -299,9 +312,12 @@ def reader_of(
         absolute=profile.second_angle == "absolute",
         base=profile.drive == "base",
         passive=profile.passive,
-        laws=laws_of(origin.path, profile, origin.mapping),
+        laws=laws_of(origin.path, profile),
     )
-    return TableReader(replace(origin, reading=reading), tables, units, notices, rows)
+    notices += tuple(unused(said, reading, profile))
+    notices += tuple(settings_unused(profile, reading, origin.mapping))
+    origin = replace(origin, reading=reading)
+    return TableReader(origin, tables, units, notices, rows, stated_rate(said))
 
 
 _TURN = 2 * math.pi

@@ -44,6 +44,8 @@ class Columns:
     others: Mapping[str, str] = field(default_factory=dict)
     rate: float | None = None
     """Hz, of rows that are counted: there is no time."""
+    said: tuple[str, ...] = ()
+    """What the file states in words: comments, and metadata."""
 
     def dated(self) -> Columns:
         """The same with a time that holds dates or durations, which come in ns."""
@@ -115,7 +117,7 @@ def assign(
     if sources["t"] == "t" and all(sources[name] == name for name in profile.needed):
         units.setdefault("t", "s")  # algid's own names mean algid's own units
     others = other_joints(available, _chosen(sources, ("theta1", "theta2")))
-    if profile.rate is not None:
+    if not sources["t"]:
         # any column has a cell in each row that is counted
         sources["t"] = sources[profile.needed[0]]
         return Columns(sources, units, "ns", tuple(said), True, reading, others, profile.rate)
@@ -181,7 +183,7 @@ def _sources(
     if not (profile.velocity and sources.keys() >= set(VELOCITIES)):
         _leave_out(sources, VELOCITIES)
     if profile.rate is not None:
-        sources["t"] = ""
+        sources.setdefault("t", "")
     missing = [] if "t" in sources else ["t"]
     missing += [name for name in profile.needed if name not in sources]
     if missing:

@@ -116,20 +116,18 @@ class Law:
     kd: float
 
 
-def laws_of(
-    path: str, profile: Profile, mapping: Mapping[str, str]
-) -> tuple[Law | None, Law | None]:
+def laws_of(path: str, profile: Profile) -> tuple[Law | None, Law | None]:
     """The PD law of each joint, where the profile has one.
 
     Raises
     ------
     LogError
-        If one lacks its gain or its desired angle, or brakes by velocities that are not recorded.
+        If one lacks its gain or its desired angle.
     """
-    return _law(path, 1, profile, mapping), _law(path, 2, profile, mapping)
+    return _law(path, 1, profile), _law(path, 2, profile)
 
 
-def _law(path: str, joint: int, profile: Profile, mapping: Mapping[str, str]) -> Law | None:
+def _law(path: str, joint: int, profile: Profile) -> Law | None:
     name, channel = f"tau{joint}", (profile.tau1, profile.tau2)[joint - 1]
     given = [key for key in ("q_des", "kp", "kd") if getattr(channel, key) is not None]
     if not given:
@@ -141,13 +139,7 @@ def _law(path: str, joint: int, profile: Profile, mapping: Mapping[str, str]) ->
             f"{', '.join(given)} alone: "
             f"{Remedy(needed)}"
         )
-    law = Law(float(channel.kp or 0.0), float(channel.kd or 0.0))
-    if law.kd and f"omega{joint}" not in mapping:
-        velocities = Remedy({"omega1.source": None, "omega2.source": None})
-        raise LogError(
-            f"{path}: kd of {name} needs the joint's velocity, which is not there: {velocities}"
-        )
-    return law
+    return Law(float(channel.kp or 0.0), float(channel.kd or 0.0))
 
 
 @dataclass(frozen=True)
@@ -156,7 +148,8 @@ class Conversion:
 
     A second motor at the base does the work τ_m1 θ̇1 + τ_m2 (θ̇1 + θ̇2): joint 1 has the sum of
     both torques. The torque of the `passive` joint, which has no motor, is zero. One of a PD law
-    is made of the desired angle, which stands in its place, in the joint's own coordinates.
+    is made of the desired angle, which stands in its place, in the joint's own coordinates; where
+    no velocities are recorded, they are differences of the angles, central ones within a table.
     """
 
     channels: Mapping[str, ChannelReading]
@@ -178,7 +171,11 @@ class Conversion:
             self._joint_pair(table, VELOCITIES, omega)
         for joint, law in enumerate(self.laws):
             if law is not None:
-                speed = 0.0 if omega is None else omega[joint]
+                speed = np.zeros(len(table))
+                if omega is not None:
+                    speed = omega[joint]
+                elif law.kd and len(table) > 1:
+                    speed = np.gradient(theta[joint], 1e-9 * (table.stamp_ns - table.stamp_ns[0]))
                 room.tau[joint] = law.kp * (room.tau[joint] - theta[joint]) - law.kd * speed
         if self.absolute:
             theta[1] -= theta[0]

@@ -12,9 +12,8 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.notices import Remedy
 from algid.options import flag
-from algid.readers.stated import in_text
 from algid.units import is_foreign, unit_of
-from algid.words import counted, repeated
+from algid.words import counted
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|", "")
@@ -54,9 +53,11 @@ class Dialect:
     padded : bool
         Whether blanks stand behind cells.
     units : mapping
-        By column the unit that a row under the header states, else a line above it.
+        By column the unit that a row under the header states.
     dates : frozenset of str
         Columns whose cells are dates and times of day (ISO 8601).
+    texts : frozenset of str
+        Columns whose first cell is neither a number nor a date.
     """
 
     columns: tuple[str, ...]
@@ -68,6 +69,9 @@ class Dialect:
     padded: bool
     units: Mapping[str, str] = field(default_factory=dict)
     dates: frozenset[str] = frozenset()
+    texts: frozenset[str] = frozenset()
+    said: tuple[str, ...] = ()
+    """Titles and comments among the first lines."""
 
 
 def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Dialect:
@@ -92,7 +96,7 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
         cells, first_row = split(header, separator), 0
         if names is None:
             header = _commented_header(path, above, cells, separator)
-    columns = _named(path, split(header, separator), names)
+    columns = _named(path, split(header, separator), None if first_row else names)
     units: dict[str, str] = {}
     if len(data) > first_row:
         units = _units(columns, split(data[first_row][1], separator))
@@ -101,18 +105,9 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     if len(data) <= first_row:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
     dialect = _checked(path, columns, separator, comment, data[first_row:])
-    return replace(dialect, units=in_text(above, columns) | units)
-
-
-def described(path: Path, head: bytes) -> Dialect:
-    """The dialect of a table to look at: columns without a name are numbered.
-
-    Raises as `detect`.
-    """
-    try:
-        return detect(path, head)
-    except NoHeaderError as error:
-        return detect(path, head, [f"column {place + 1}" for place in range(error.columns)])
+    comments = [line for line in lines[number:] if comment and line.startswith(comment)]
+    said = (*filter(None, above), *(line.removeprefix(comment or "") for line in comments))
+    return replace(dialect, units=units, said=said)
 
 
 def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
@@ -159,21 +154,6 @@ def _units(columns: Sequence[str], cells: Sequence[str]) -> dict[str, str]:
         elif text not in ("", "-", "1"):
             return {}
     return units
-
-
-def kinds(path: Path, head: bytes, found: Dialect) -> dict[str, str]:
-    """By column "Int64", "Float64" or "String", as far as the first lines tell."""
-    lines = _lines(path, head)[found.skip :]
-    lines = lines[:-1] or lines  # the last may break off in the middle of a number
-    rows = _texts(_numbered(lines, found.comment))
-    kinds = {}
-    for column, cells in _cells_by_column(found.columns, rows, found.separator).items():
-        kinds[column] = "String"
-        if column in found.whole:
-            kinds[column] = "Int64"
-        elif all(map(_is_number, filter(None, cells))):
-            kinds[column] = "Float64"
-    return kinds
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -291,31 +271,26 @@ def _checked(
     """The dialect of a table with such columns and numbered rows."""
     skip, first = data[0]
     rows = _texts(data)
-    if len(columns) > LIMITS.columns:
-        raise LogError(
-            f"{path}: {counted(len(columns), 'column')}; expected {LIMITS.columns} at most"
-        )
     cells = split(first, separator)
     if len(cells) != len(columns):
         raise LogError(
             f"{path}: line {skip + 1} has {counted(len(cells), 'cell')} under a header "
             f"of {len(columns)}; mend the header"
         )
-    twice = repeated(filter(None, columns))
-    if twice:
-        raise LogError(f"{path}: the column {min(twice)!r} stands in the header twice; rename one")
     comma = padded = False
     if separator != ",":
         comma = any(_has_decimal_comma(row, separator) for row in rows)
     if separator:
         behind = re.compile(rf"[ \t]{re.escape(separator)}|[ ]$")
         padded = any(behind.search(row.rstrip("\r")) for row in rows)
-    whole, dates = set(), set()
+    whole, dates, texts = set(), set(), set()
     for column, cells in _cells_by_column(columns, rows, separator).items():
         if all(map(_WHOLE.match, cells)):
             whole.add(column)
         if all(map(_DATE.match, cells)):
             dates.add(column)
+        elif cells and cells[0] and not _is_number(cells[0]):
+            texts.add(column)
     return Dialect(
         columns,
         separator,
@@ -325,6 +300,7 @@ def _checked(
         frozenset(whole),
         padded,
         dates=frozenset(dates),
+        texts=frozenset(texts),
     )
 
 

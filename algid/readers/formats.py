@@ -7,9 +7,8 @@ is a module and an entry.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,7 +19,8 @@ from algid.readers.text import GZIP, MCAP, NUL_AMONG_ROWS, ZSTD, head_of, looks_
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-    from algid.readers.assemble import TableReader
+    from algid.readers.flat import TableFile
+    from algid.readers.messages.reader import MessageLog
     from algid.readers.messages.source import Source
 
 _MOST_SHOWN = 64
@@ -43,6 +43,7 @@ class Entry:
 
 
 Entries = tuple[Entry, ...]
+Opener = Callable[[Path, "Profile"], "TableFile | MessageLog"]
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,7 @@ class FileFormat:
     fits : callable
         Whether a path, whose first bytes are given, is of this format; a folder has none.
     open : callable
-        Opens a log of it as a profile says.
-    entries : callable
-        What a log of it holds, by name.
+        Opens a log of it; a profile may name columns that the file does not.
     messages : bool
         Whether it holds messages on topics, not columns.
     """
@@ -71,8 +70,7 @@ class FileFormat:
     title: str
     suffixes: tuple[str, ...]
     fits: Callable[[Path, bytes], bool]
-    open: Callable[[Path, Profile], TableReader]
-    entries: Callable[[Path], Entries]
+    open: Opener
     messages: bool = False
 
 
@@ -110,9 +108,9 @@ def _is_packed_text(magic: bytes, name: str) -> Callable[[Path, bytes], bool]:
 
 
 def _is_json_lines(_: Path, head: bytes) -> bool:
-    from algid.readers.jsonlines import is_lines
+    from algid.readers.arrays import is_json_lines
 
-    return is_lines(head)
+    return is_json_lines(head)
 
 
 def _is_text(_: Path, head: bytes) -> bool:
@@ -120,191 +118,98 @@ def _is_text(_: Path, head: bytes) -> bool:
     return bool(text) and looks_like_text(text)
 
 
-def _open_mcap(path: Path, profile: Profile) -> TableReader:
+def _mcap(path: Path, _: Profile) -> MessageLog:
     from algid.readers.mcap import open_mcap
 
-    return open_mcap([path], profile)
+    return open_mcap([path])
 
 
-def _mcap_entries(path: Path) -> Entries:
-    from algid.readers.mcap import messages_in
+def _bag(kind: str) -> Opener:
+    def opened(path: Path, _: Profile) -> MessageLog:
+        from algid.readers.bags import open_bag
 
-    with messages_in(path) as source:
-        return tuple(_topics(source))
+        return open_bag(path, kind)
 
-
-def _open_folder(path: Path, profile: Profile) -> TableReader:
-    from algid.readers.bags import open_bag
-    from algid.readers.bags.folder import bag_files
-    from algid.readers.mcap import open_mcap
-
-    bag = bag_files(path)
-    if bag.kind != "mcap":
-        return open_bag(path, "rosbag2", profile)
-    reader = open_mcap(bag.paths, profile)
-    return replace(reader, notices=(*bag.notices, *reader.notices))
+    return opened
 
 
-def _folder_entries(path: Path) -> Entries:
-    from algid.readers.bags.folder import bag_files
+def _parquet(path: Path, _: Profile) -> TableFile:
+    from algid.readers.arrow_files import open_parquet
 
-    bag = bag_files(path)
-    return _mcap_entries(bag.paths[0]) if bag.kind == "mcap" else _bag_entries("rosbag2", path)
-
-
-def _open_bag(kind: str, path: Path, profile: Profile) -> TableReader:
-    from algid.readers.bags import open_bag
-
-    return open_bag(path, kind, profile)
+    return open_parquet(path)
 
 
-def _bag_entries(kind: str, path: Path) -> Entries:
-    from algid.readers.bags import parts_of
+def _feather(path: Path, _: Profile) -> TableFile:
+    from algid.readers.arrow_files import open_feather
 
-    parts, _ = parts_of(path, kind)
-    with parts[0]() as source:
-        return tuple(_topics(source))
+    return open_feather(path)
 
 
-def _topics(source: Source) -> Iterator[Entry]:
-    from algid.readers.messages.plan import fields_shown
+def _csv(kind: str) -> Opener:
+    def opened(path: Path, profile: Profile) -> TableFile:
+        from algid.readers.csv import open_csv
 
-    first, last = source.span_ns or (0, 0)
-    for place, (number, channel) in enumerate(sorted(source.channels.items())):
-        form = f"{channel.type or 'no schema'}, {channel.encoding}"
-        count = None if source.counts is None else source.counts.get(number, 0)
-        rate = 1e9 * (count - 1) / (last - first) if count and count > 1 and last > first else None
-        joints, fields = fields_shown(source, number) if place < _MOST_SHOWN else ((), ())
-        yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN], rate)
+        return open_csv(path, kind, profile.columns)
+
+    return opened
 
 
-def _open_parquet(path: Path, profile: Profile) -> TableReader:
-    from algid.readers.parquet import open_parquet
+def _whole(kind: str) -> Opener:
+    """What opens a file that is read as a whole."""
 
-    return open_parquet(path, profile)
+    def opened(path: Path, _: Profile) -> TableFile:
+        from algid.readers import arrays
 
+        openers = {
+            "npz": arrays.open_npz,
+            "mat": arrays.open_matlab,
+            "hdf5": arrays.open_hdf5,
+            "jsonl": arrays.open_json_lines,
+        }
+        return openers[kind](path)
 
-def _parquet_entries(path: Path) -> Entries:
-    from algid.readers.parquet import counted_rows, schema_of
-
-    return _entries(schema_of(path), _known(lambda: counted_rows(path)))
-
-
-def _entries(kinds: Mapping[str, object], rows: int | None) -> Entries:
-    """The columns of so many rows with the names of their types."""
-    return tuple(Entry(name, str(kind), rows) for name, kind in kinds.items())
-
-
-def _open_csv(kind: str, path: Path, profile: Profile) -> TableReader:
-    from algid.readers.csv import open_csv
-
-    return open_csv(path, profile, kind)
-
-
-def _csv_entries(kind: str, path: Path) -> Entries:
-    from algid.readers.csv import counted_rows
-    from algid.readers.dialect import described, kinds
-
-    head = head_of(path, kind)
-    dialect = described(path, head)
-    rows = _known(lambda: counted_rows(path, kind, dialect))
-    return _entries(kinds(path, head, dialect), rows)
-
-
-def _known(count: Callable[[], int]) -> int | None:
-    """What can be counted; None in a damaged file, of which reading will tell more."""
-    try:
-        return count()
-    except LogError:
-        return None
-
-
-def _open_arrays(kind: str, path: Path, profile: Profile) -> TableReader:
-    from algid.readers.arrays import open_arrays
-
-    return open_arrays(path, kind, profile)
-
-
-def _array_entries(kind: str, path: Path) -> Entries:
-    from algid.readers.arrays import contents_of
-
-    content, others = contents_of(path, kind)
-    columns = _entries(content.schema, content.rows)
-    return columns + _entries(dict.fromkeys(others, "of another length"), None)
-
-
-def _open_feather(path: Path, profile: Profile) -> TableReader:
-    from algid.readers.feather import open_feather
-
-    return open_feather(path, profile)
-
-
-def _feather_entries(path: Path) -> Entries:
-    from algid.readers.feather import opened
-
-    feather = opened(path)
-    return tuple(Entry(field.name, str(field.type)[:80], feather.rows) for field in feather.schema)
-
-
-def _table(
-    name: str, title: str, suffixes: tuple[str, ...], fits: Callable[[Path, bytes], bool]
-) -> FileFormat:
-    """A format that is read as a whole."""
-    return FileFormat(
-        name, title, suffixes, fits, partial(_open_arrays, name), partial(_array_entries, name)
-    )
-
-
-def _csv(name: str, title: str, suffix: str, fits: Callable[[Path, bytes], bool]) -> FileFormat:
-    return FileFormat(
-        name, title, (suffix,), fits, partial(_open_csv, name), partial(_csv_entries, name)
-    )
-
-
-def _bag(name: str, title: str, suffix: str, magic: bytes) -> FileFormat:
-    return FileFormat(
-        name,
-        title,
-        (suffix,),
-        begins(magic),
-        partial(_open_bag, name),
-        partial(_bag_entries, name),
-        messages=True,
-    )
+    return opened
 
 
 FORMATS: tuple[FileFormat, ...] = (
-    FileFormat("mcap", "MCAP", (".mcap",), begins(MCAP), _open_mcap, _mcap_entries, messages=True),
+    FileFormat("mcap", "MCAP", (".mcap",), begins(MCAP), _mcap, messages=True),
+    FileFormat("rosbag2", "rosbag2 folder", (), _is_bag_folder, _bag("rosbag2"), messages=True),
     FileFormat(
-        "rosbag2",
-        "rosbag2 folder",
-        (),
-        _is_bag_folder,
-        _open_folder,
-        _folder_entries,
+        "db3",
+        "rosbag2 SQLite file",
+        (".db3",),
+        begins(b"SQLite format 3\x00"),
+        _bag("db3"),
         messages=True,
     ),
-    _bag("db3", "rosbag2 SQLite file", ".db3", b"SQLite format 3\x00"),
-    _bag("bag", "ROS 1 bag", ".bag", b"#ROSBAG V"),
+    FileFormat("bag", "ROS 1 bag", (".bag",), begins(b"#ROSBAG V"), _bag("bag"), messages=True),
+    FileFormat("parquet", "Parquet", (".parquet",), begins(b"PAR1"), _parquet),
+    FileFormat("feather", "Feather (Arrow)", (".feather", ".arrow"), begins(b"ARROW1"), _feather),
+    FileFormat("npz", "NumPy archive", (".npz",), _is_npz, _whole("npz")),
+    FileFormat("mat", "MATLAB", (".mat",), begins(b"MATLAB "), _whole("mat")),
     FileFormat(
-        "parquet", "Parquet", (".parquet",), begins(b"PAR1"), _open_parquet, _parquet_entries
+        "hdf5",
+        "HDF5 (`algid[hdf5]`)",
+        (".h5", ".hdf5"),
+        begins(b"\x89HDF\r\n\x1a\n"),
+        _whole("hdf5"),
     ),
     FileFormat(
-        "feather",
-        "Feather (Arrow)",
-        (".feather", ".arrow"),
-        begins(b"ARROW1"),
-        _open_feather,
-        _feather_entries,
+        "csv.zst",
+        "CSV packed with zstd",
+        (".csv.zst",),
+        _is_packed_text(ZSTD, "csv.zst"),
+        _csv("csv.zst"),
     ),
-    _table("npz", "NumPy archive", (".npz",), _is_npz),
-    _table("npy", "NumPy structured array", (".npy",), begins(b"\x93NUMPY")),
-    _table("mat", "MATLAB", (".mat",), begins(b"MATLAB ")),
-    _table("hdf5", "HDF5 (`algid[hdf5]`)", (".h5", ".hdf5"), begins(b"\x89HDF\r\n\x1a\n")),
-    _csv("csv.zst", "CSV packed with zstd", ".csv.zst", _is_packed_text(ZSTD, "csv.zst")),
-    _csv("csv.gz", "CSV packed with gzip", ".csv.gz", _is_packed_text(GZIP, "csv.gz")),
-    _table("jsonl", "JSON lines", (".jsonl", ".ndjson"), _is_json_lines),
-    _csv("csv", "CSV", ".csv", _is_text),
+    FileFormat(
+        "csv.gz",
+        "CSV packed with gzip",
+        (".csv.gz",),
+        _is_packed_text(GZIP, "csv.gz"),
+        _csv("csv.gz"),
+    ),
+    FileFormat("jsonl", "JSON lines", (".jsonl", ".ndjson"), _is_json_lines, _whole("jsonl")),
+    FileFormat("csv", "CSV", (".csv",), _is_text, _csv("csv")),
 )
 """In the order in which a file is held against them."""
 
@@ -329,6 +234,10 @@ def format_of(path: Path) -> FileFormat:
         raise LogError(
             f"{path}: the file begins with NUL bytes alone, as a crash leaves them where nothing "
             "was written; look for another copy, and at the recorder"
+        )
+    if head.startswith(b"\x93NUMPY"):
+        raise LogError(
+            f"{path}: a single NumPy array; save its columns with np.savez(FILE, t=…, q=…, tau=…)"
         )
     if looks_like_text(head.replace(b"\0", b"")):
         raise LogError(f"{path}: {NUL_AMONG_ROWS}")
@@ -384,9 +293,45 @@ def sniff(path: Path) -> str:
     return format_of(path).name
 
 
-def in_memory(given: object) -> tuple[str, Entries]:
-    """The format and the columns of a log in memory: see `algid.readers.memory`."""
-    from algid.readers.memory import content_of
+def entries_of(opened: TableFile | MessageLog) -> Entries:
+    """What a log holds, by name: columns, or the topics of its first file.
 
-    kind, content = content_of(given)
-    return kind, _entries(content.schema, content.rows)
+    Raises
+    ------
+    LogError
+        If not even that can be read.
+    """
+    from algid.readers.flat import TableFile, cells_of
+
+    if not isinstance(opened, TableFile):
+        with opened.parts[0]() as source:
+            return tuple(_topics(source))
+    rows = opened.rows or None
+    entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells_of(opened).items()]
+    entries += [Entry(name, "of another length") for name in opened.others]
+    return tuple(entries)
+
+
+def _topics(source: Source) -> Iterator[Entry]:
+    from algid.readers.messages.plan import fields_shown
+
+    first, last = source.span_ns or (0, 0)
+    for place, (number, channel) in enumerate(sorted(source.channels.items())):
+        form = f"{channel.type or 'no schema'}, {channel.encoding}"
+        count = None if source.counts is None else source.counts.get(number, 0)
+        rate = 1e9 * (count - 1) / (last - first) if count and count > 1 and last > first else None
+        joints, fields = fields_shown(source, number) if place < _MOST_SHOWN else ((), ())
+        yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN], rate)
+
+
+def entries_at(path: Path) -> Entries:
+    """What a log at a path holds: see `entries_of`; columns without a name are numbered."""
+    from algid.profile import Profile
+    from algid.readers.dialect import NoHeaderError
+
+    form = format_of(path)
+    try:
+        return entries_of(form.open(path, Profile()))
+    except NoHeaderError as error:
+        names = tuple(f"column {place + 1}" for place in range(error.columns))
+        return entries_of(form.open(path, Profile(columns=names)))

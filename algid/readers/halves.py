@@ -16,7 +16,7 @@ from algid.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice, Remedy
 from algid.readers.assemble import TableReader
-from algid.readers.formats import format_of
+from algid.readers.formats import entries_at
 from algid.readers.table import BLOCK_ROWS, SampleTable
 from algid.readers.timebase import Series, aligned, in_order, whole_topic
 
@@ -81,7 +81,7 @@ def _beside(log: Any, name: str) -> Path:
 
 def _torques(other: Path, profile: Profile, angles: Origin, open_one: Opener) -> TableReader:
     """The file of the torques; its joints follow the order of the angles' if both have names."""
-    names = {entry.name for entry in format_of(other).entries(other)}
+    names = {entry.name for entry in entries_at(other)}
     of_angles = {"columns": None}
     for key in ("time", "topic"):
         if getattr(profile, key) not in names:

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeGuard, cast
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
-from algid.errors import LogError
-from algid.limits import LIMITS
-from algid.readers.arrays import Content, columns_of, open_content
-from algid.readers.frames import cells
-from algid.words import counted
+from algid.errors import LogError, SettingError
+from algid.log import Log
+from algid.readers.arrays import of_arrays, of_arrow
+from algid.readers.attributes import decoded
+from algid.readers.flat import TableFile
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from algid.profile import Profile
-    from algid.readers.assemble import TableReader
 
 NAME = "log"
 """What a log in memory is called, as by `algid.Log.from_arrays`."""
@@ -44,7 +43,104 @@ def refuse_others(given: object) -> None:
     )
 
 
-def open_columns(given: Columns, profile: Profile) -> TableReader:
+_OF_A_LOG = (
+    "accept", "drive", "effort", "end", "gravity", "offsets", "passive", "second_angle", "signs",
+    "start", "velocity", "zero",
+)  # fmt: skip
+"""What a profile may say of arrays: where they are from has been said by giving them."""
+_OF_ANY_LOG = ("accept", "effort", "end", "gravity", "start", "velocity")
+"""What it may say of a log that was read by a profile before."""
+_OF_A_CHANNEL = ("counts", "gear_ratio", "offset", "sign", "torque_constant", "unit", "unwrap")
+
+
+def checked(log: Log) -> Log:
+    """The log, if its arrays are as `Log` has them.
+
+    Raises
+    ------
+    LogError
+        If there are fewer than two samples, stamps are no integers that increase, or an array
+        holds anything but finite numbers in double precision.
+    """
+    name, stamps = log.origin.path, log.stamp_ns
+    if stamps.size < 2:
+        raise LogError(f"{name}: expected two samples or more, found {stamps.size}; record longer")
+    if stamps.dtype != np.int64 or not np.all(stamps[1:] > stamps[:-1]):
+        raise LogError(
+            f"{name}: stamp_ns: expected increasing integers (int64, ns), found {stamps.dtype}; "
+            "algid.Log.from_arrays takes times in s"
+        )
+    for channel in ("theta", "tau", "omega"):
+        values = getattr(log, channel)
+        if values is None:
+            continue
+        if values.dtype != np.float64:
+            raise LogError(
+                f"{name}: {channel}: expected float64, found {values.dtype}; "
+                "algid.Log.from_arrays converts"
+            )
+        if not np.all(np.isfinite(values)):
+            raise LogError(f"{name}: {channel}: expected finite numbers; leave other samples out")
+    return log
+
+
+def with_profile(log: Log, profile: Profile | None) -> Log:
+    """A log in memory with the settings of a profile over its arrays, as if they were columns.
+
+    Parameters
+    ----------
+    log : Log
+    profile : Profile or None
+        What the user says of this log.
+
+    Raises
+    ------
+    LogError
+        As `checked`.
+    SettingError
+        If a setting says where channels are found, or again how a log is meant that was read.
+    """
+    from algid.notices import flat
+    from algid.profile import with_settings
+    from algid.readers import open_log
+
+    checked(log)
+    if profile is None:
+        return log
+    reading, given = log.origin.reading, profile.model_dump(exclude_unset=True)
+    for name in flat(given):
+        channel, dot, key = name.partition(".")
+        if (key not in _OF_A_CHANNEL) if dot else (channel not in _OF_A_LOG):
+            raise SettingError(
+                f"{name}: {log.origin.path} is a Log in memory, whose channels are known; leave it "
+                "out"
+            )
+        if reading.channels and name not in _OF_ANY_LOG:
+            raise SettingError(
+                f"{name}: {log.origin.path} has been read already; give it to algid.read_log"
+            )
+    columns = {"t": log.stamp_ns}
+    for names, values in (
+        (("theta1", "theta2"), log.theta),
+        (("tau1", "tau2"), log.tau),
+        (("omega1", "omega2"), log.omega),
+        (("q_des1", "q_des2"), log.reference),
+    ):
+        if values is not None:
+            columns |= zip(names, values, strict=True)
+    accept = set(profile.accept) | set(reading.accepted)
+    if profile.theta1.unit is None and profile.theta2.unit is None:
+        accept.add("DEGREES")  # a log's angles are in rad, however far joints turn
+    settings = {"time": "t", "time_unit": "ns", "accept": sorted(accept)}
+    read = open_log(columns, with_settings(profile, settings)).whole()
+    origin = replace(log.origin, mapping=read.origin.mapping, reading=read.origin.reading)
+    if reading.channels:
+        cut = replace(reading, start=profile.start, end=profile.end, accepted=tuple(sorted(accept)))
+        origin = replace(log.origin, reading=cut)
+    return replace(read, origin=origin, notices=log.notices + read.notices)
+
+
+def open_columns(given: Columns) -> TableFile:
     """Open a log of columns in memory.
 
     Parameters
@@ -52,75 +148,42 @@ def open_columns(given: Columns, profile: Profile) -> TableReader:
     given : frame, table or mapping
         A mapping may hold matrices too, (N, 2) or (2, N); an index of a pandas frame counts as a
         column if it has a name.
-    profile : Profile
 
     Raises
     ------
     LogError
-        If the columns cannot be taken over, a channel is missing, or one is not of numbers.
+        If the columns cannot be taken over.
     """
-    kind, content, others, units = _taken(given)
-    return open_content(NAME, kind, content, profile, units=units, others=others)
-
-
-def content_of(given: Columns) -> tuple[str, Content]:
-    """What columns in memory are called, and what they hold; raises as `open_columns`."""
-    return _taken(given)[:2]
-
-
-def _taken(given: Columns) -> tuple[str, Content, Any, dict[str, str]]:
-    """Kind, content, arrays of another length, and the units that are stated."""
     refuse_others(given)
     if isinstance(given, Mapping):
-        columns, others = columns_of(
-            NAME, {str(name): _array(name, values) for name, values in given.items()}
-        )
-        content = Content(columns, len(next(iter(columns.values()), ())))
-        return "arrays", _checked(content), others, {}
-    frame, units = _frame(given)
-    return "frame", _checked(Content(frame, frame.height)), (), units
-
-
-def _array(name: object, values: object) -> np.ndarray[Any, Any]:
-    try:
-        return np.asarray(values)
-    except Exception as error:  # whatever the values' own library raises
-        raise LogError(
-            f"{NAME}: {name!r} is no array ({error}); give numbers of one shape"
-        ) from error
-
-
-def _checked(content: Content) -> Content:
-    width = len(content.schema)
-    if width > LIMITS.columns:
-        raise LogError(f"{NAME}: {counted(width, 'column')}; expected {LIMITS.columns} at most")
-    return content
-
-
-def _frame(given: Columns) -> tuple[pl.DataFrame, dict[str, str]]:
-    """The columns as a frame, a list's cells as columns, and the units that its metadata state."""
-    import polars as pl
+        arrays = {}
+        for name, values in given.items():
+            try:
+                arrays[str(name)] = np.asanyarray(values)
+            except Exception as error:  # whatever the values' own library raises
+                raise LogError(
+                    f"{NAME}: {name!r} is no array ({error}); give numbers of one shape"
+                ) from error
+        return of_arrays(NAME, "arrays", arrays)
     import pyarrow as pa
 
-    from algid.readers.parquet import units_of_schema
-
-    units: dict[str, str] = {}
-    if isinstance(given, pl.DataFrame):
-        frame = given
-    else:
-        try:
-            table = pa.table(given)
-            frame = cast("pl.DataFrame", pl.from_arrow(table))
-        except Exception as error:  # whatever the frame's own library raises
-            reason = str(error).split("\n", maxsplit=1)[0][:200]
-            raise LogError(
-                f"{NAME}: the frame cannot be taken over ({reason}); give columns of numbers"
-            ) from error
-        units = units_of_schema(table.schema)
-
-    def width(column: str) -> int:
-        first = frame[column].drop_nulls().head(1)
-        return len(first.item()) if first.len() else 0
-
-    flat = {name: cell.alias(name) for name, (cell, _) in cells(frame.schema, width).items()}
-    return frame.select(*flat.values()), units
+    try:
+        table = pa.table(given)
+    except Exception as error:  # whatever the frame's own library raises
+        reason = str(error).split("\n", maxsplit=1)[0][:200]
+        raise LogError(
+            f"{NAME}: the frame cannot be taken over ({reason}); give columns of numbers"
+        ) from error
+    attributes = getattr(given, "attrs", None)  # of pandas
+    if isinstance(attributes, Mapping) and attributes:
+        fields, metadata = [], dict[str, str]()
+        for field in table.schema:
+            own = attributes.get(field.name)
+            said = {str(k): str(v) for k, v in own.items()} if isinstance(own, Mapping) else {}
+            fields.append(field.with_metadata(decoded(field.metadata) | said))
+        for key, value in attributes.items():
+            if key not in table.schema.names:
+                text = json.dumps(value, default=str) if isinstance(value, Mapping) else str(value)
+                metadata[str(key)] = text
+        table = table.cast(pa.schema(fields, metadata=metadata))
+    return of_arrow(NAME, "frame", table)

@@ -19,13 +19,13 @@ from algid.units import is_foreign, unit_of
 from algid.words import counted
 
 
-def _words(text: str) -> tuple[str, ...]:
+def words(text: str) -> tuple[str, ...]:
     """The words of a text, in their order."""
     return tuple(text.split())
 
 
 STEMS: dict[str, tuple[str, ...]] = {
-    "theta": _words(
+    "theta": words(
         """
         theta theta_meas pos_meas q_meas position_measured measured_position actual_q
         position pos q angle joint_position joint_pos joint_angle jointposition
@@ -33,7 +33,7 @@ STEMS: dict[str, tuple[str, ...]] = {
         observation_position observation_state
         """
     ),
-    "omega": _words(
+    "omega": words(
         """
         omega vel_meas dq_meas velocity_measured measured_velocity actual_qd
         velocity vel dq qd qdot q_dot dtheta thetadot theta_dot
@@ -41,7 +41,7 @@ STEMS: dict[str, tuple[str, ...]] = {
         observation_velocity
         """
     ),
-    "tau": _words(
+    "tau": words(
         """
         tau tau_meas tau_j tau_est torque_measured measured_torque actual_tau actual_torque
         torque trq effort joint_torque joint_effort torques efforts tau_filt
@@ -50,7 +50,7 @@ STEMS: dict[str, tuple[str, ...]] = {
         actual_current current currents motor_current joint_current i_q iq
         """
     ),
-    "q_des": _words(
+    "q_des": words(
         """
         q_des q_desired q_d q_ref q_reference q_cmd q_target target_q
         theta_des theta_desired theta_d theta_ref theta_cmd theta_target
@@ -60,9 +60,9 @@ STEMS: dict[str, tuple[str, ...]] = {
         """
     ),
 }
-COMMANDED = frozenset(_words("tau_con tau_cmd tau_des tau_d tau_j_d torque_cmd target_torque"))
-CURRENTS = frozenset(_words("actual_current current currents motor_current joint_current i_q iq"))
-TIMES = _words(
+COMMANDED = frozenset(words("tau_con tau_cmd tau_des tau_d tau_j_d torque_cmd target_torque"))
+CURRENTS = frozenset(words("actual_current current currents motor_current joint_current i_q iq"))
+TIMES = words(
     """
     stamp_ns t time timestamp stamp __time _time time_s time_ms time_us time_ns
     timestamp_s timestamp_ms timestamp_us timestamp_ns t_s t_ms t_us t_ns time_sec
@@ -71,7 +71,7 @@ TIMES = _words(
     """
 )
 _NO_JOINTS = frozenset(
-    _words(
+    words(
         """
         cmd command commanded ref reference des desired target goal set setpoint error err raw
         max min limit old new filt filtered meas measured actual est
@@ -94,6 +94,8 @@ _STATE_OF_JOINT = re.compile(r"^(?:\w+[./])*\w*state[./]?\[(\d{1,3})\][./](\w+)$
 _STATE_OF_ALL = re.compile(r"^(?:\w+[./])*\w*state[./](\w+)\[(\d{1,3})\]$")
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
 _NUMBERED = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})$")
+_COUNTED = re.compile(r"(?:^|_)(?:joint|axis|dof|actuator)(?=_|\d|$)")
+"""Words that a joint's number stands beside, and that name no joint."""
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
 
@@ -307,15 +309,24 @@ def _of_joint(by_joint: dict[str, str], joint: str) -> list[str]:
     names = _called(joint)
     columns = []
     for key, column in by_joint.items():
-        if key in names or key.rpartition("/")[2] in names:
+        own = key.rpartition("/")[2]
+        number = own.rpartition("_")[2] if joint.strip().isdecimal() else ""
+        if not names.isdisjoint((key, own, number)):
             columns.append(column)
     return columns
 
 
 def _called(joint: str) -> set[str]:
-    """Column names for a joint that a user names: ``Joint_2`` is joint 2 of ``Joint_2_pos``."""
+    """Joints of columns for one that a user names: ``Joint_2`` is joint 2 of ``Joint_2_pos``.
+
+    So is its column, ``dof_pos_2``.
+    """
     name = joint.strip().lower()
-    names = {name}
+    names = {name, _COUNTED.sub("_", name).strip("_")}
+    column = _parts_of([name])
+    for part in (*column.values(), *_worded(column).values()):
+        if part.joint and part.stem in _STEMS:
+            names.add(part.joint)
     numbered = _NUMBERED.match(name)
     if numbered:
         names.add(numbered[1].lstrip("0") or "0")
@@ -346,10 +357,13 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
 
 
 def _worded(parts: dict[str, Name]) -> dict[str, Name]:
-    """Parts of columns named by a joint and a stem: ``shoulder_pos``, ``torque elbow``."""
+    """Parts of columns named by a joint and a stem: ``shoulder_pos``, ``torque elbow``.
+
+    A number behind them counts the joints: ``dof_pos_2``, ``arm_torque_2``.
+    """
     by_words = {}
     for column, name in parts.items():
-        if name.joint is not None or name.stem in _STEMS:
+        if name.stem in _STEMS or not (name.joint is None or name.joint.isdecimal()):
             continue
         text = re.sub(r"\W+", "_", name.stem).strip("_")
         for stem in _STEMS:
@@ -357,7 +371,9 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
             if joint == text:
                 joint = text.removeprefix(f"{stem}_")
             if joint != text:
-                words = [word for word in joint.split("_") if word not in ("joint", "axis")]
+                words = [word for word in _COUNTED.sub("_", joint).split("_") if word]
+                if name.joint is not None:
+                    words.append(name.joint)
                 if words and _NO_JOINTS.isdisjoint(words):
                     by_words[column] = replace(name, stem=stem, joint="_".join(words))
                 break

@@ -7,18 +7,17 @@ import textwrap
 from collections.abc import Iterable, Sequence
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.model import DELAYS, PARAMETERS, SINES
+from algid.model import DELAYS, SINES
 from algid.notices import Notice
-from algid.report.phasors import Moment, moments
-from algid.results import Estimate, Result, Status
+from algid.report.phasors import moments
+from algid.results import Result, Status
+from algid.results.rows import rows_of
 from algid.results.verdict import share_text
-from algid.text import ABSENT, lines_of, resolved, significant, unit_text, visible
+from algid.text import ABSENT, lines_of, resolved, significant, visible
 from algid.verdict import MOST_REASONS, Verdict
 from algid.words import counted
 
 WIDTH, HEIGHT = 80, 25
-LEAST_ERROR = 0.01
-"""Percent of the truth: a smaller error is said to be smaller."""
 MOST_TERMS = 2
 """Lines of the terms kept."""
 MOST_COMMAND = 6
@@ -103,102 +102,52 @@ def _codes(notices: Iterable[Notice]) -> str:
 
 
 def _estimates(result: Result) -> list[str]:
-    """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning."""
-    errors, phasors = _errors(result), moments(result)
+    """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning.
+
+    A moment off its link's line has its size and its angle instead.
+    """
+    phasors = moments(result)
     constants = {name: one for name, one in result.parameters.items() if name in ARM}
     lines = []
-    for name, estimate in (constants | result.payload).items():
-        if name in phasors:
-            lines += _moment(name, phasors[name], estimate)
-            continue
-        number, error, words = ABSENT, "", ""
-        if estimate.estimate is not None:
-            number = _with_half(estimate)
-        if errors:
-            error = f"{errors[name]:>8}"
-        if estimate.status is not Status.OK:
-            words = estimate.status.value
-        elif name in PARAMETERS:
-            words = PARAMETERS[name].meaning.partition(", ")[0]
-        line = f"{visible(name):<4}{number:>19} {unit_text(estimate.unit):<10}{error} "
-        lines += _wrapped(f"{line}{words}", rest=" " * len(line))
+    for row in rows_of(result, constants | result.payload):
+        name, number, words, error = row.name, row.with_half, row.meaning.partition(", ")[0], ""
+        if row.name in phasors:
+            moment = phasors[row.name]
+            half = None if moment.std is None else moment.quantile * moment.std
+            name, words = f"|{name.upper()}|", f"at {moment.angle_text}"
+            number = f"{resolved(moment.size, moment.std)} ± {significant(half, 2)}"
+            if row.status != Status.OK:
+                words += f" {row.status}"
+        else:
+            if result.truth:
+                error = f"{'' if row.error == ABSENT else row.error + ' %':>8}"
+            if row.status != Status.OK:
+                words = row.status
+        line = f"{name:<4}{number:>19} {row.unit:<10}{error} "
+        lines += _wrapped(f"{line}{words if words != ABSENT else ''}", rest=" " * len(line))
     return lines
 
 
-def _moment(name: str, moment: Moment, estimate: Estimate) -> list[str]:
-    """A moment's size with its angle in place of its meaning."""
-    half = ABSENT
-    if moment.std is not None:
-        half = significant(moment.quantile * moment.std, 2)
-    symbol, number = f"|{name.upper()}|", f"{resolved(moment.size, moment.std)} ± {half}"
-    line = f"{symbol:<4}{number:>19} {unit_text(moment.unit):<10} "
-    words = f"at {moment.angle_text}"
-    if estimate.status is not Status.OK:
-        words += f" {estimate.status.value}"
-    return _wrapped(f"{line}{words}", rest=" " * len(line))
-
-
-def _with_half(estimate: Estimate) -> str:
-    """An estimate with half its 95 % interval."""
-    low, high = estimate.ci95 or (None, None)
-    half = ABSENT
-    if low is not None and high is not None:
-        half = significant((high - low) / 2, 2)
-    return f"{resolved(estimate.estimate, estimate.std)} ± {half}"
-
-
-def _errors(result: Result) -> dict[str, str]:
-    """By parameter its error in percent of the truth; empty of a log that does not know it."""
-    if not result.truth:
-        return {}
-    errors = {}
-    for name, one in result.estimates.items():
-        true = result.truth.get(name)
-        errors[name] = ""
-        if one.estimate is not None and true:
-            share = 100 * (one.estimate - true) / abs(true)
-            errors[name] = "<0.01 %" if abs(share) < LEAST_ERROR else f"{share:+.2g} %"
-    return errors
-
-
 def _terms(result: Result) -> list[str]:
-    """The terms of the torque beside eq. (1), and their coefficients."""
-    if result.fit is None:
+    """The terms of the torque beside eq. (1), with as many coefficients as have room, each whole.
+
+    The sine part of a moment that is shown as an angle is no coefficient of its own.
+    """
+    if result.torque_model is None:
         return []
-    terms: list[str] = []
-    if result.torque_model is not None:
-        terms += result.torque_model.terms
-    others = _beside_constants(result)
-    if not terms and not others:
-        return ["Terms kept: none"]
-    terms += [name for name in DELAYS if name in others and name not in terms]
-    numbers = [f"{name} {_with_half(estimate)}" for name, estimate in others.items()]
-    for most in range(len(numbers), -1, -1):
-        lines = _wrapped(f"Terms kept: {', '.join(terms)}{_beside(numbers, most)}")
-        if len(lines) <= MOST_TERMS:
-            return lines
-    return _at_most(MOST_TERMS, f"Terms kept: {', '.join(terms)}")
-
-
-def _beside(numbers: list[str], shown: int) -> str:
-    """The first of the terms' numbers in brackets, each whole, and how many more there are."""
-    if not numbers:
-        return ""
-    left = len(numbers) - shown
-    more = f"{left} {'more' if shown else 'numbers'} with -v" if left else ""
-    return f" ({', '.join([*numbers[:shown], *([more] if more else [])])})"
-
-
-def _beside_constants(result: Result) -> dict[str, Estimate]:
-    """The parameters of optional terms, but the sine parts that a moment's angle shows."""
-    others = dict(result.parameters)
-    for name in ARM:
-        others.pop(name, None)
+    terms = result.torque_model.terms + [name for name in DELAYS if name in result.parameters]
     phasors = moments(result)
-    for sine, name in SINES.items():
-        if name in phasors:
-            others.pop(sine, None)
-    return others
+    others = {n: one for n, one in result.parameters.items() if n not in ARM}
+    for sine in [sine for sine, name in SINES.items() if name in phasors]:
+        others.pop(sine, None)
+    numbers = [f"{row.name} {row.with_half}" for row in rows_of(result, others)]
+    for most in range(len(numbers), -1, -1):
+        more = [f"{len(numbers) - most} more with -v"] if most < len(numbers) else []
+        beside = f" ({', '.join(numbers[:most] + more)})" if numbers else ""
+        lines = _wrapped(f"Optional torque terms: {', '.join(terms) or 'none'}{beside}")
+        if len(lines) <= MOST_TERMS:
+            break
+    return lines
 
 
 def _at_most(lines: int, text: str) -> list[str]:

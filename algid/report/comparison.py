@@ -1,18 +1,44 @@
-"""Results side by side: how far apart in σ, and which settings differ."""
+"""Results side by side: how far apart in σ, and which settings differ; on a page with a figure."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from algid.report.document import Column, Table
+import numpy as np
+
+from algid import __version__
+from algid.files import whole_file
+from algid.report.document import Document, Kind, Section, Table
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot
+from algid.report.render import page
 from algid.report.tables import flat_settings
 from algid.results import Estimate, LogSummary, Result, Status
-from algid.text import ABSENT, file_name, formatted, resolved, significant, unit_text, visible
+from algid.significance import NORMAL, sigmas
+from algid.text import (
+    ABSENT,
+    file_name,
+    formatted,
+    joined,
+    resolved,
+    significant,
+    unit_text,
+    visible,
+)
+from algid.verdict import Verdict
 from algid.words import counted
+
+NAME = "compare.html"
+FAR = sigmas()
+"""σ, beyond which chance does not explain a difference."""
+LOOKS = tuple(
+    zip(
+        (BLUE, ORANGE, GREEN, RED, GREY), ("circle", "square", "diamond", "x", "cross"), strict=True
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -39,8 +65,22 @@ class Comparison:
         return self.estimates, self.settings
 
     def as_json(self) -> str:
-        """The text of a JSON file: see `comparison_json`."""
-        return comparison_json(self, self.results)
+        """Estimates, standard deviations and distances in σ as the text of a JSON file."""
+        parameters = {}
+        for name, distances in self.sigma.items():
+            every = [result.estimates.get(name) for result in self.results]
+            parameters[name] = {
+                "estimate": [None if one is None else one.estimate for one in every],
+                "std": [None if one is None else one.std for one in every],
+                "sigma": (None, *distances),
+            }
+        count = len(self.labels)
+        settings = {}
+        for first in range(0, len(self.settings.rows), count):
+            rows = self.settings.rows[first : first + count]
+            settings[rows[0][0]] = [row[-1] for row in rows]
+        content = {"labels": list(self.labels), "parameters": parameters, "settings": settings}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
     @property
     def largest_sigma(self) -> float | None:
@@ -49,10 +89,7 @@ class Comparison:
 
     def distances(self) -> list[float]:
         """Every distance that is known, in the order of the parameters."""
-        known: list[float] = []
-        for row in self.sigma.values():
-            known += [distance for distance in row if distance is not None]
-        return known
+        return [distance for row in self.sigma.values() for distance in row if distance is not None]
 
 
 def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> Comparison:
@@ -72,54 +109,15 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
         raise ValueError(f"a comparison needs at least two results, got {len(results)}")
     if labels is not None and len(labels) != len(results):
         raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
-    shown = _distinct(labels or [file_name(result.log.path) for result in results])
-    every = [result.estimates for result in results]
-    sigma: dict[str, tuple[float | None, ...]] = {}
-    for name in _names(every):
-        first = every[0].get(name)
-        sigma[name] = tuple(distance_sigma(first, other.get(name)) for other in every[1:])
-    return Comparison(
-        tuple(shown),
-        sigma,
-        _estimates(results, shown, sigma),
-        _settings(results, shown),
-        tuple(results),
-    )
-
-
-def _distinct(labels: Sequence[str]) -> list[str]:
-    """The labels as they are printed; with their numbers where two would look alike."""
-    shown = list(map(visible, labels))
-    if len(set(shown)) == len(shown):
-        return shown
-    return [f"{number} {label}" for number, label in enumerate(shown, start=1)]
-
-
-def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The names in several mappings, each once and in the order in which they are met."""
-    names: dict[str, None] = {}
-    for one in several:
-        names |= dict.fromkeys(one)
-    return list(names)
-
-
-def comparison_json(compared: Comparison, results: Sequence[Result]) -> str:
-    """The comparison as JSON: estimates, standard deviations and distances in σ by parameter."""
-    parameters = {}
-    for name, distances in compared.sigma.items():
-        values, stds = [], []
-        for result in results:
-            one = result.estimates.get(name, _NONE)
-            values.append(one.estimate)
-            stds.append(one.std)
-        parameters[name] = {"estimate": values, "std": stds, "sigma": (None,) + distances}
-    settings = {row[0]: row[1:] for row in compared.settings.rows}
-    content = {"labels": list(compared.labels), "parameters": parameters, "settings": settings}
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-_NONE = Estimate(estimate=None, std=None, ci95=None, unit="", status=Status.NOT_IDENTIFIABLE)
-"""In place of what a result does not estimate."""
+    shown = list(map(visible, labels or [file_name(result.log.path) for result in results]))
+    if len(set(shown)) < len(shown):
+        shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
+    first, sigma = results[0].estimates, dict[str, tuple[float | None, ...]]()
+    for name in dict.fromkeys(name for result in results for name in result.estimates):
+        others = [result.estimates.get(name) for result in results[1:]]
+        sigma[name] = tuple(distance_sigma(first.get(name), other) for other in others)
+    tables = _estimates(results, shown, sigma), _settings(results, shown)
+    return Comparison(tuple(shown), sigma, *tables, tuple(results))
 
 
 def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | None:
@@ -129,77 +127,39 @@ def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | No
     if first.std is None or other.std is None:
         return None
     combined = math.hypot(first.std, other.std)
-    if combined == 0:
-        return None
-    return (other.estimate - first.estimate) / combined
+    return (other.estimate - first.estimate) / combined if combined else None
 
 
 def _estimates(
     results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]
 ) -> Table:
-    columns = [Column("Parameter", "name"), Column("Unit", "text"), Column(labels[0], "number")]
-    change, distance = Column("Δ %", "number", rank=1), Column("Δ/σ", "number")
-    for label in labels[1:]:
-        columns += [Column(label, "number"), change, distance]
+    """The estimates one below the other: as wide for many results as for two."""
     rows = []
     for name, distances in sigma.items():
-        every, unit = _of_all(results, name)
-        cells = [visible(name), unit, with_std(every[0])]
-        for other, far in zip(every[1:], distances, strict=True):
-            cells += [with_std(other), _change(every[0], other), formatted(far, _SIGMAS)]
-        rows.append(tuple(cells))
+        first = results[0].estimates.get(name)
+        for label, result, far in zip(labels, results, (None, *distances), strict=True):
+            one, change = result.estimates.get(name), None
+            if one is None:
+                continue
+            if (
+                first is not None
+                and one is not first
+                and first.estimate
+                and one.estimate is not None
+            ):
+                change = 100 * (one.estimate - first.estimate) / abs(first.estimate)
+            off = (formatted(far, "+.1f"), formatted(change, "+.3g"))
+            rows.append((visible(name), label, with_std(one), unit_text(one.unit), *off))
     note = f"Differences are against {labels[0]}; ± is one standard deviation, σ combines both."
-    table = Table("Estimates side by side", tuple(columns), tuple(rows), note).without_empty()
-    return replace(table, upright=_upright(results, labels, sigma, note))
-
-
-def _of_all(results: Sequence[Result], name: str) -> tuple[list[Estimate | None], str]:
-    """Each result's estimate of a parameter, and its unit."""
-    estimates = [result.estimates.get(name) for result in results]
-    unit = next(unit_text(one.unit) for one in estimates if one is not None)
-    return estimates, unit
-
-
-def _change(first: Estimate | None, other: Estimate | None) -> str:
-    """By how many percent `other` differs from `first`."""
-    if first is None or not first.estimate or other is None or other.estimate is None:
-        return ABSENT
-    return f"{100 * (other.estimate - first.estimate) / abs(first.estimate):+.3g}"
-
-
-_SIGMAS = "+.1f"
-"""How a distance in σ is written."""
-
-
-def _upright(
-    results: Sequence[Result],
-    labels: list[str],
-    sigma: dict[str, tuple[float | None, ...]],
-    note: str,
-) -> Table:
-    """The estimates one below the other: as wide for many results as for two."""
-    columns = (
-        Column("Parameter", "name"),
-        Column("Result", "text"),
-        Column("Estimate", "number"),
-        Column("Δ/σ", "number"),
-    )
-    rows: list[tuple[str, ...]] = []
-    for name, distances in sigma.items():
-        estimates, unit = _of_all(results, name)
-        headings = [visible(name), unit] + [""] * (len(results) - 2)  # the unit under its name
-        for place, (label, estimate) in enumerate(zip(labels, estimates, strict=True)):
-            far = ""
-            if place > 0 and distances[place - 1] is not None:
-                far = formatted(distances[place - 1], _SIGMAS)
-            rows.append((headings[place], label, with_std(estimate), far))
+    columns: dict[str, Kind] = {
+        "Parameter": "name", "Result": "text", "Estimate": "number", "Unit": "text",
+        "Δ/σ": "number", "Δ %": "number",
+    }  # fmt: skip
     return Table("Estimates side by side", columns, tuple(rows), note)
 
 
-def with_std(estimate: Estimate | None) -> str:
+def with_std(estimate: Estimate) -> str:
     """``estimate ± std``, and the status where it is not OK."""
-    if estimate is None:
-        return ABSENT
     text = resolved(estimate.estimate, estimate.std)
     if estimate.std is not None:
         text += f" ± {significant(estimate.std, 2)}"
@@ -210,47 +170,28 @@ def with_std(estimate: Estimate | None) -> str:
 
 def _settings(results: Sequence[Result], labels: list[str]) -> Table:
     """What was set otherwise, and how the first log of each kind was read otherwise."""
-    roles = set.intersection(*map(_roles, results))
-    every = [_made_with(result, roles) for result in results]
-    rows: list[tuple[str, ...]] = []
-    for name in _names(every):
+    roles = set.intersection(*({log.role for log in result.logs} for result in results))
+    every = []
+    for result in results:
+        settings = flat_settings(result.settings)
+        settings.pop("command", None)  # it names the logs, and says again what is set
+        settings |= {"estimator": result.estimator, "algid": result.version}
+        firsts = {log.role: log for log in reversed(result.logs)}
+        for role, log in sorted(firsts.items(), reverse=True):  # the unloaded one first
+            if role not in roles:
+                settings[f"{role} log"] = file_name(log.path)
+                continue
+            settings |= {f"{role} log: {name}": text for name, text in _read(log).items()}
+        every.append(settings)
+    rows = []
+    for name in dict.fromkeys(name for settings in every for name in settings):
         values = [settings.get(name, ABSENT) for settings in every]
         if len(set(values)) > 1:
-            rows.append((visible(name),) + tuple(map(visible, values)))
-    columns = [Column("Setting", "name")]
-    columns += [Column(label, "text") for label in labels]
-    note = ""
-    if not rows:
-        note = "Every setting is the same, and every log was read the same way."
-    table = Table("Settings that differ", tuple(columns), tuple(rows), note)
-    upright: list[tuple[str, ...]] = []
-    for row in rows:
-        heading = row[0]
-        for label, value in zip(labels, row[1:], strict=True):
-            upright.append((heading, label, value))
-            heading = ""
-    headings = (Column("Setting", "name"), Column("Result", "text"), Column("Value", "text"))
-    return replace(table, upright=replace(table, columns=headings, rows=tuple(upright)))
-
-
-def _roles(result: Result) -> set[str]:
-    """Which kinds of logs a result is made from."""
-    return {log.role for log in result.logs}
-
-
-def _made_with(result: Result, roles: Collection[str]) -> dict[str, str]:
-    """The settings of a result, and how the first log of each of the roles was read."""
-    settings = flat_settings(result.settings)
-    settings.pop("command", None)  # it names the logs, and says again what is set
-    settings |= {"estimator": result.estimator, "algid": result.version}
-    firsts = {log.role: log for log in reversed(result.logs)}
-    for role, log in sorted(firsts.items(), reverse=True):  # the unloaded one first
-        if role not in roles:
-            settings[f"{role} log"] = file_name(log.path)
-        else:
-            for name, text in _read(log).items():
-                settings[f"{role} log: {name}"] = text
-    return settings
+            for label, value in zip(labels, values, strict=True):
+                rows.append((visible(name), label, visible(value)))
+    note = "" if rows else "Every setting is the same, and every log was read the same way."
+    columns: dict[str, Kind] = {"Setting": "name", "Result": "text", "Value": "text"}
+    return Table("Settings that differ", columns, tuple(rows), note)
 
 
 def _read(log: LogSummary) -> dict[str, str]:
@@ -267,3 +208,70 @@ def _read(log: LogSummary) -> dict[str, str]:
         read[name] = f"{one['source']}, {unit}{factor}{offset}"
     del plain["joints_told"]
     return read | {name: text or ABSENT for name, text in flat_settings(plain).items()}
+
+
+def write_comparison(found: Comparison, path: Path, force: bool) -> None:
+    """Write the page of a comparison.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written, or exists and `force` is not set.
+    """
+    with whole_file(path, force=force) as temporary:
+        temporary.write_text(page(comparison_document(found)), encoding="utf-8")
+
+
+def comparison_document(found: Comparison) -> Document:
+    """The report of a comparison."""
+    names, count = found.labels, counted(len(found.results), "result")
+    distances = [_distances(found)] if found.distances() else []
+    return Document(
+        title="Comparison",
+        verdict=verdict(found),
+        sections=(
+            Section("numbers", "Differences", (*distances, found.estimates)),
+            Section("settings", "Settings that differ", (found.settings,)),
+        ),
+        kicker="results side by side",
+        name=joined(list(names)) if len(names) < 4 else f"{names[0]} and {len(names) - 1} more",
+        facts=f"{count} · measured against {names[0]}",
+        made=f"Made by algid {__version__}.",
+    )
+
+
+def verdict(found: Comparison) -> Verdict:
+    """Whether the results agree: distances beyond `FAR` are named, the largest first."""
+    distances = []
+    for name, row in found.sigma.items():
+        for other, distance in zip(found.labels[1:], row, strict=True):
+            if distance is not None:
+                words = f"{visible(name)} of {other} ({distance:+.1f} σ)"
+                distances.append((abs(distance), words))
+    if not distances:
+        return Verdict("reservations", "no parameter has error bars in two results")
+    far = [words for size, words in sorted(distances, reverse=True) if size > FAR]
+    if far:
+        more = f" and {len(far) - 3} more" if len(far) > 3 else ""
+        differ = "differs" if len(far) == 1 else "differ"
+        headline = f"{joined(far[:3])}{more} {differ} by more than {FAR:.2g} σ"
+        return Verdict("reservations", headline, title="Different")
+    inside = sum(size <= NORMAL for size, _ in distances)
+    within = f"{inside} of {counted(len(distances), 'difference')} within {NORMAL:.2f} σ"
+    return Verdict("good", f"{within}; the largest is {max(distances)[1]}")
+
+
+def _distances(found: Comparison) -> Plot:
+    """How far each result is from the first, in combined standard deviations."""
+    names = [name for name, row in found.sigma.items() if set(row) != {None}]
+    panels = Panels([f"Distance from {found.labels[0]}, σ"], height=70 + 24 * len(names))
+    for place, label in enumerate(found.labels[1:]):
+        far = np.array([found.sigma[name][place] for name in names], dtype=np.float64)
+        colour, symbol = LOOKS[place % len(LOOKS)]
+        panels.dots(0, far, names, label, colour, 8, symbol)
+    reach = max(1.1 * (found.largest_sigma or 0.0), 4.0)
+    order = {"type": "category", "categoryarray": names, "autorange": "reversed"}
+    panels.axes(0, {"range": [-reach, reach]}, order)
+    panels.stretch(0, -NORMAL, NORMAL, BLUE)
+    reading = f"Within the band, ± {NORMAL:.2f} σ, chance alone puts 19 of 20 differences."
+    return Plot("distances", "Distances in σ", panels, reading)

@@ -1,163 +1,56 @@
-"""What a report says, whatever shows it: a verdict, then sections of tables, figures and words.
+"""A report, whatever shows it: a verdict, then sections of tables, figures and sentences.
 
 The reports of an identification, a track, a fleet, a design and a comparison are one `Document`
-each. Terminal, Markdown and page set it, each in one way for all of them; they choose nothing but
-how deep they go (`Depth`).
+each. Terminal, Markdown and page set it, each in one way for all of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from typing import Literal
 
 from algid.report.arm import ArmDrawing
-from algid.report.figures.base import Figure, Missing
+from algid.report.plot import Plot
 from algid.text import ABSENT
 from algid.verdict import Verdict
 
-Kind = Literal["name", "number", "text", "status", "doubtful status"]
-Fold = Literal["", "open", "closed"]
-
-
-class Depth(IntEnum):
-    """How deep a reader has to look for a table."""
-
-    TERMINAL = 0
-    """It stands in every format."""
-    MARKDOWN = 1
-    """A terminal has no room for it."""
-    FOLDED = 2
-    """Markdown folds it away: what was read, and how."""
-    PAGE = 3
-    """Only a page has it."""
-
-
-@dataclass(frozen=True)
-class Column:
-    """Heading of a column and what it holds.
-
-    a narrow terminal does without it, the highest `rank` first.
-
-    A doubtful status belongs to a result that failed: not even OK is shown as good.
-    """
-
-    heading: str
-    kind: Kind
-    rank: int = 0
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A column of drawings by the name of their row, after the column `after`, or last.
-
-    `small` ones share a line.
-    """
-
-    heading: str
-    rows: Mapping[str, str]
-    after: str = ""
-    small: bool = False
+Kind = Literal["name", "number", "text", "status"]
 
 
 @dataclass(frozen=True)
 class Table:
-    """A titled table of finished text, foreign text made visible.
+    """A titled table of finished text.
 
     Parameters
     ----------
-    title, columns, rows
+    title, rows
+    columns : kind by heading; a terminal without room for all leaves out the last ones
     note : one line below it
-    depth : which formats show it
-    drawn : columns of drawings, which only a page has
-    links : where the names of rows lead, which only a page tells
-    upright : what stands in its place where a terminal has no room for all of its columns
+    links : where the names of rows lead, which only a page shows
     """
 
     title: str
-    columns: tuple[Column, ...]
+    columns: Mapping[str, Kind]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
-    depth: Depth = Depth.TERMINAL
-    drawn: tuple[Drawn, ...] = ()
     links: Mapping[str, str] | None = None
-    upright: Table | None = None
-
-    def at(self, depth: Depth) -> Table:
-        """The table that deep."""
-        return replace(self, depth=depth)
 
     def without_empty(self) -> Table:
         """The table less the columns that hold nothing."""
-        kept = []
-        for place in range(len(self.columns)):
-            if any(row[place] not in (ABSENT, "") for row in self.rows):
-                kept.append(place)
-        return self.only(kept)
+        columns = zip(self.columns, zip(*self.rows, strict=True), strict=False)
+        return self.without([name for name, cells in columns if not set(cells) - {ABSENT, ""}])
 
     def without(self, headings: Collection[str]) -> Table:
         """The table less the columns of those headings."""
-        kept = []
-        for place, column in enumerate(self.columns):
-            if column.heading not in headings:
-                kept.append(place)
-        return self.only(kept)
-
-    def doubted(self) -> Table:
-        """The table as part of a result that failed."""
-        columns = []
-        for column in self.columns:
-            if column.kind == "status":
-                column = replace(column, kind="doubtful status")
-            columns.append(column)
-        return replace(self, columns=tuple(columns))
-
-    def narrower(self) -> Table | None:
-        """The table less the column that is missed least; None where all are needed."""
-        ranks = [column.rank for column in self.columns]
-        if max(ranks, default=0) == 0:
-            return None
-        kept = list(range(len(ranks)))
-        kept.remove(ranks.index(max(ranks)))
-        return self.only(kept)
-
-    def only(self, kept: Sequence[int]) -> Table:
-        """The table with the columns `kept`."""
-        return replace(
-            self,
-            columns=tuple(self.columns[i] for i in kept),
-            rows=tuple(tuple(row[i] for i in kept) for row in self.rows),
-        )
+        kept = {name: kind for name, kind in self.columns.items() if name not in headings}
+        places = [place for place, name in enumerate(self.columns) if name in kept]
+        rows = tuple(tuple(row[place] for place in places) for row in self.rows)
+        return replace(self, columns=kept, rows=rows)
 
 
-@dataclass(frozen=True)
-class ReadingAid:
-    """A line that tells how to read what stands above it."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class Bullets:
-    """Sentences as a list, or one that says that there is none."""
-
-    sentences: tuple[str, ...]
-    otherwise: str = ""
-
-
-@dataclass(frozen=True)
-class References:
-    """Links by what they belong to: pairs of words and place.
-
-    Beyond `most`, the rest is counted.
-    """
-
-    groups: Mapping[str, Sequence[tuple[str, str]]]
-    most: int
-
-
-Content = Table | Figure | Missing | ArmDrawing | ReadingAid | Bullets | References
+Content = Table | Plot | str | tuple[str, ...]
+"""A sentence is text, a list of them a tuple."""
 
 
 @dataclass(frozen=True)
@@ -166,19 +59,20 @@ class Section:
 
     Parameters
     ----------
+    key, title : its heading, which a page's contents lead to; the first section has none
     content : from top to bottom; a terminal and Markdown show its tables alone
-    key, title : its heading, which a page's contents lead to; without one they lead to its figures
-    beside : an arm that stands beside the content where there is room
-    fold : whether a page lets it be folded away, and how it stands at first
-    listed : whether a page's contents lead to it; one of many parts alike is not
+    folded : whether page and Markdown fold it away, and a terminal leaves it out
     """
 
-    content: tuple[Content, ...] = ()
-    key: str = ""
-    title: str = ""
-    beside: ArmDrawing | None = None
-    fold: Fold = ""
-    listed: bool = True
+    key: str
+    title: str
+    content: tuple[Content, ...]
+    folded: bool = False
+
+    @property
+    def shown(self) -> list[Content]:
+        """The content less tables without a row and empty lists."""
+        return [one for one in self.content if (one.rows if isinstance(one, Table) else one)]
 
 
 @dataclass(frozen=True)
@@ -192,7 +86,7 @@ class Document:
     sections : in the order in which they are read
     kicker, name, facts : a page's head: kind of page, its subject, and identifying numbers
     made : what made it, the page's last line
-    tab : the browser's title where `name` is not enough
+    arm : the arm, drawn beside the first section
     """
 
     title: str
@@ -202,20 +96,19 @@ class Document:
     name: str = ""
     facts: str = ""
     made: str = ""
-    tab: str = ""
+    arm: ArmDrawing | None = None
 
-    def content(self) -> Iterator[Content]:
-        """Everything in it, from top to bottom."""
-        for section in self.sections:
-            yield from section.content
-            if section.beside is not None:
-                yield section.beside
+    @property
+    def parts(self) -> list[Section]:
+        """The sections that show something."""
+        return [one for one in self.sections if one.shown]
 
-    def tables(self, *depths: Depth) -> list[Table]:
-        """Its tables of those depths."""
-        return [one for one in self.content() if isinstance(one, Table) and one.depth in depths]
+    @property
+    def plots(self) -> list[Plot]:
+        """Its figures, from top to bottom."""
+        return [one for part in self.sections for one in part.content if isinstance(one, Plot)]
 
-
-def filled(*tables: Table) -> tuple[Table, ...]:
-    """The tables that have a row."""
-    return tuple(table for table in tables if table.rows)
+    def tables(self, folded: bool = False) -> list[Table]:
+        """The tables of the sections that are folded, or of those that are not."""
+        every = [one for part in self.parts if part.folded == folded for one in part.shown]
+        return [one for one in every if isinstance(one, Table)]

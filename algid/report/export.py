@@ -33,7 +33,7 @@ from algid.blocks import stacked
 from algid.errors import ResultError
 from algid.files import whole_file
 from algid.progress import Progress
-from algid.report.reduce import blocks, by_log, columns_of, metadata_of, row_count
+from algid.report.series import blocks, by_log, facts_of
 from algid.results import read_result
 from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 
@@ -93,7 +93,7 @@ def start_stamps(path: Path, logs: int) -> list[int]:
     ResultError
         If the file cannot be read, or tells anything else.
     """
-    starts = metadata_of(path, START_KEY)
+    starts = facts_of(path)[2].get(START_KEY)
     try:
         known = list(map(int, json.loads(starts or "[]")))
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
@@ -111,7 +111,7 @@ def _write_torques(writer: Writer, path: Path, logs: int, progress: Progress | N
     schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
     torque, whole = JointStates(JOINTS).message, JointStates(JOINTS, whole=True).message
     channels: dict[str, int] = {}
-    done, total = 0, row_count(path)
+    done, total = 0, facts_of(path)[1]
     for log, block in by_log(blocks(path, SIGNALS, ROWS)):
         stamps = _stamps(path, block["t"], starts[log] if log < len(starts) else 0)
         place = "/algid" if log == 0 else f"/algid/log{log + 1}"
@@ -140,7 +140,7 @@ def write_series(writer: Writer, path: Path, topic: str) -> None:
     if not path.is_file():
         return
     [start] = start_stamps(path, 1)
-    names = [name for name in columns_of(path) if name != "t"]
+    names = [name for name in facts_of(path)[0] if name != "t"]
     definition = estimates_schema(field_names(names))
     schema = writer.register_schema(ESTIMATES, "ros2msg", definition.encode())
     channel = writer.register_channel(topic, "cdr", schema)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from algid.inspection.report import Inspection
-from algid.report.document import Column, Table
+from algid.report.document import Kind, Table
 from algid.text import visible
 from algid.words import counted
 
@@ -23,24 +23,24 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
     yield from _held(found)
     if found.mapping:
         rows = tuple((name, visible(source)) for name, source in sorted(found.mapping.items()))
-        yield Table("Taken as", (Column("algid", "name"), Column("log", "text")), rows)
+        yield Table("Taken as", {"algid": "name", "log": "text"}, rows)
     yield from _figures(found)
     for notices in (found.notices, found.findings):
         for one in notices:
             yield f"{one.code}: {visible(one.clause, 2000)}"
-    if found.refused:
+    refusing = [one.code for one in found.findings if one.refuse]
+    if refusing:
+        yield f"refused: {', '.join(dict.fromkeys(refusing))}"
+    elif found.refused:
         yield f"refused: {visible(found.refused, 2000)}"
 
 
 def _held(found: Inspection) -> Iterator[Table | str]:
     """Columns or topics, then what the messages of each topic hold."""
     shown = found.entries[:MOST_SHOWN]
-    columns = (
-        Column("Name", "name"),
-        Column("Type", "text"),
-        Column("Samples", "number"),
-        Column("Hz", "number"),
-    )
+    columns: dict[str, Kind] = {
+        "Name": "name", "Type": "text", "Samples": "number", "Hz": "number",
+    }  # fmt: skip
     rows = []
     for one in shown:
         count = rate = ""
@@ -74,14 +74,10 @@ def _figures(found: Inspection) -> Iterator[Table | str]:
             f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}{longest}"
         )
     if found.signals:
-        columns = (
-            Column("Channel", "name"),
-            Column("Low", "number"),
-            Column("High", "number"),
-            Column("Noise", "number"),
-            Column("Step", "number"),
-            Column("Saturated, %", "number"),
-        )
+        columns: dict[str, Kind] = {
+            "Channel": "name", "Low": "number", "High": "number", "Noise": "number",
+            "Step": "number", "Saturated, %": "number",
+        }  # fmt: skip
         rows = []
         for name, one in found.signals.items():
             values = (one.low, one.high, one.noise, one.step, 100 * one.saturated)

@@ -1,368 +1,238 @@
-"""What the figures need of a convergence series and of `torque.parquet`.
+"""Series of a result's folder in blocks of bounded memory, and short enough to draw.
 
-Each is gathered in one pass of bounded memory.
+A bucket of samples leaves its smallest and its largest value; buckets end where a block or a log
+does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.blocks import stacked
+from algid.arrow import numbers_of
+from algid.blocks import concatenated, rows_of
 from algid.criteria import CUT
 from algid.errors import ResultError
-from algid.methods import settles
-from algid.model import K7
 from algid.progress import Progress
-from algid.report.reduce import (
-    Block,
-    MinMax,
-    Share,
-    Thinned,
-    blocks,
-    broken_at_gaps,
-    bucket_size,
-    by_log,
-    columns_of,
-    row_count,
-)
+from algid.quantiles import median
 
-EPSILON = 0.2  # s: the paper's ε
-WINDOW = 2.0  # s: after which the paper's integrals restart, unless its own settings say otherwise
-LARGEST_CONDITION = 1e10  # beyond, the paper's stages call a system singular
-SERIES_POINTS = 1_200  # twice what a panel is wide, of two in a row
-STRETCHES = 400
-SAMPLES = 20_000
-MIDDLES = 500
-NOT_SERIES = ("t", "condition", "k7_condition")
-
-Series = tuple[FloatArray, FloatArray]
+Block = dict[str, FloatArray]
+ROWS = 1 << 18
+POINTS = 2_400
+"""Of a series: twice what a page is wide."""
+SAMPLES = 2_000
+MOTION = ("t", "theta1", "theta2", "omega1", "omega2")
+GOLDEN = 0.6180339887498949
+PLACES = frozenset({"log", "t", "x"})
+"""Columns that say where a row lies: each has a number in every row."""
 
 
-@dataclass(frozen=True, eq=False)
-class SeriesLog:
-    """Series by name: extremes of `lines`, sizes of `samples`, running medians of `middles`.
+@contextmanager
+def _parquet(path: Path) -> Iterator[Any]:
+    """The file, open; raises `ResultError` for what is no Parquet file that can be read."""
+    import pyarrow.lib
+    import pyarrow.parquet
 
-    `singular` is the share of samples that have no estimate, after ε, because the system was
-    singular; `condition` is the condition number, infinite ones left out. `start`, `end` and
-    `window` are in s.
-    """
-
-    start: float
-    end: float
-    window: float
-    coarse: bool
-    lines: dict[str, Series]
-    samples: dict[str, FloatArray]
-    middles: dict[str, Series]
-    singular: dict[str, Series]
-    condition: Series | None
-
-    @property
-    def windows(self) -> list[float]:
-        """When each window starts, in s."""
-        return list(map(float, np.arange(self.start, self.end, self.window)))
-
-    @property
-    def any_singular(self) -> bool:
-        """Whether any series has a singular stretch."""
-        return any(bool(share.any()) for _, share in self.singular.values())
+    try:
+        # without pre_buffer=False the file is kept in memory as it is read
+        with pyarrow.parquet.ParquetFile(path, pre_buffer=False) as file:
+            yield file
+    except (OSError, pyarrow.lib.ArrowException) as error:
+        reason = str(error).partition("\n")[0]
+        text = f"{path}: cannot read it as Parquet ({reason}); identify again with this version"
+        raise ResultError(text) from error
 
 
-def read_series(path: Path, settings: Mapping[str, Any]) -> SeriesLog:
-    """Read `path`: a column ``t``, a column a series, perhaps ``condition``.
+def blocks(
+    path: Path,
+    names: Sequence[str] = (),
+    rows: int = ROWS,
+    *,
+    finite: Collection[str] = PLACES,
+) -> Iterator[Block]:
+    """Yield columns `names` of `path`, by default all, `rows` samples at a time.
 
-    Raises `ResultError`.
-    """
-    columns = columns_of(path)
-    names = [name for name in columns if name not in NOT_SERIES]
-    gathering = _SeriesGathering(names, row_count(path), settings)
-    wanted = ["t"] + names
-    wanted += [name for name in ("condition", "k7_condition") if name in columns]
-    for block in blocks(path, wanted):
-        gathering.take(block)
-    return gathering.result("condition" in columns)
-
-
-def _window(settings: Mapping[str, Any]) -> float:
-    """After how long the integrals restart, s; the paper's where its own settings say nothing."""
-    window = settings.get("window")
-    if not settles(settings.get("estimator")) or isinstance(window, bool):
-        return WINDOW
-    if isinstance(window, int | float) and window > 0:
-        return float(window)
-    return WINDOW
-
-
-class _SeriesGathering:
-    def __init__(self, names: list[str], total: int, settings: Mapping[str, Any]) -> None:
-        self.names = names
-        self._total = total
-        self._window = _window(settings)
-        self._start: float | None = None
-        self._end = 0.0
-        self._size = bucket_size(total, SERIES_POINTS)
-        self._lines = _reducers(names, self._size)
-        self._singular = {name: Share(max(total // STRETCHES, 1)) for name in names}
-        self._condition = MinMax(self._size)
-        self._samples = Thinned(total // SAMPLES)
-
-    def take(self, block: Block) -> None:
-        """Add the next block."""
-        t = block["t"]
-        if self._start is None:
-            self._start = float(t[0])
-        self._end = float(t[-1])
-        since = t - self._start
-        # stamps are multiples of the period but for rounding, which must not move a window's first
-        # sample
-        late = np.mod(since + 1e-9, self._window) >= EPSILON
-        for name in self.names:
-            self._lines[name].feed(t, block[name])
-            lacking = late & np.isnan(block[name])
-            self._singular[name].feed(t, lacking & _ill_conditioned(name, block))
-        if "condition" in block:
-            condition = block["condition"]
-            self._condition.feed(t, np.where(np.isfinite(condition), condition, np.nan))
-        self._samples.feed(stacked(block, ["t"] + self.names))
-
-    def result(self, with_condition: bool) -> SeriesLog:
-        """What was gathered."""
-        start = self._start or 0.0
-        samples = self._samples.result(1 + len(self.names))
-        named = dict(zip(self.names, samples[1:], strict=True))
-        period = (self._end - start) / max(self._total - 1, 1)
-        return SeriesLog(
-            start=start,
-            end=self._end,
-            window=self._window,
-            coarse=self._size * period >= EPSILON,
-            lines=_results(self._lines),
-            samples=named,
-            middles={name: _medians(samples[0], values) for name, values in named.items()},
-            singular=_results(self._singular),
-            condition=self._condition.result() if with_condition else None,
-        )
-
-
-def _reducers(names: Iterable[str], size: int) -> dict[str, MinMax]:
-    """One of its own for each series."""
-    return {name: MinMax(size) for name in names}
-
-
-def _results(reducers: Mapping[str, MinMax | Share]) -> dict[str, Series]:
-    """What is left of each series."""
-    return {name: reducer.result() for name, reducer in reducers.items()}
-
-
-def _ill_conditioned(name: str, block: Block) -> NDArray[np.bool_]:
-    """Where the system of a series was singular (n,): everywhere where the file does not tell."""
-    conditions = ["condition"]
-    if name == K7:
-        conditions.append("k7_condition")
-    ill = [~(block[one] <= LARGEST_CONDITION) for one in conditions if one in block]
-    if not ill:
-        return np.ones(block["t"].size, dtype=np.bool_)
-    every: NDArray[np.bool_] = np.logical_or.reduce(ill)
-    return every
-
-
-def _medians(x: FloatArray, y: FloatArray) -> Series:
-    """Medians of the finite samples in `MIDDLES` stretches, NaN where there are none."""
-    size = max(x.size // MIDDLES, 1)
-    whole = x.size - x.size % size
-    stretches = np.sort(y[:whole].reshape(-1, size), axis=1)  # NaN goes last
-    finite = np.isfinite(stretches).sum(axis=1)
-    middle = stretches[np.arange(finite.size), np.maximum(finite - 1, 0) // 2]
-    return x[:whole:size], middle
-
-
-COLUMNS = (
-    "log",
-    "t",
-    "theta1",
-    "theta2",
-    "omega1",
-    "omega2",
-    "tau1",
-    "tau2",
-    "tau1_predicted",
-    "tau2_predicted",
-)
-MOTION = COLUMNS[2:6]
-RESIDUALS = ("residual1", "residual2")
-SERIES = COLUMNS[2:] + RESIDUALS
-SCORED = ("tau1", "tau2", "tau1_predicted", "tau2_predicted")
-SCORED_POINTS = 1_200  # of a curve without anything fast in it
-POINTS = 2_400  # a series; twice what the page is wide
-DOTS = 2_000
-
-
-@dataclass
-class LogRange:
-    """Extent of one log: its times in s, samples, largest gap in s, sampling period in s."""
-
-    first: float
-    last: float
-    samples: int = 0
-    largest_gap: float = 0.0
-    gaps: int = 0
-    period: float = float("nan")
-
-    @property
-    def duration(self) -> float:
-        """Time from the first to the last sample in s."""
-        return self.last - self.first
-
-
-@dataclass
-class TorqueLog:
-    """Reduced series by log and name, samples of the motion, extremes.
-
-    `motion` is (4, m): θ1, θ2, θ̇1, θ̇2; `extremes` maps a column to its smallest and largest
-    value; `rms` and `residual_rms` are in N m a joint. `worst` gives the log and the time in s of
-    each joint's largest residual; `reduced` tells whether a series holds fewer samples than the
-    log.
-    """
-
-    ranges: dict[int, LogRange]
-    series: dict[int, dict[str, Series]]
-    motion: FloatArray
-    extremes: dict[str, tuple[float, float]]
-    rms: tuple[float, float]
-    residual_rms: tuple[float, float]
-    unpredicted: int
-    worst: dict[int, tuple[int, float]]
-    reduced: bool
-
-
-def read_torque(path: Path, progress: Progress | None = None) -> TorqueLog:
-    """Read `path`, telling how far.
+    What is missing is NaN; columns that are `finite` may have none of these.
 
     Raises
     ------
     ResultError
-        Where it cannot be read, lacks a column, or a column of the motion holds no number.
+        If the file cannot be read, lacks a column, or a number in a `finite` one.
     """
-    total = row_count(path)
-    gathering = _Gathering(total)
-    for log, block in by_log(blocks(path, COLUMNS)):
-        gathering.take(log, block)
-        if progress is not None:
-            progress("report", sum(span.samples for span in gathering.ranges.values()), total)
-    for name in MOTION:
-        if np.isnan(gathering.extremes.get(name, (np.nan, np.nan))[0]):
-            raise ResultError(f"{path}: the column {name!r} holds no number; identify again")
-    return gathering.result()
+    with _parquet(path) as file:
+        known = file.schema_arrow.names
+        absent = [name for name in names if name not in known]
+        if absent:
+            raise ResultError(
+                f"{path}: expected a column {absent[0]!r}, found none; identify again with this "
+                "version"
+            )
+        for batch in file.iter_batches(batch_size=rows, columns=list(names or known)):
+            block: Block = {name: numbers_of(batch.column(name)) for name in batch.schema.names}
+            for name in finite & block.keys():
+                if not np.all(np.isfinite(block[name])):
+                    raise ResultError(
+                        f"{path}: column {name!r}: expected a number in every row; identify again "
+                        "with this version"
+                    )
+            yield block
+
+
+def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
+    """Split blocks where their column ``log`` changes: pairs of log and its stretch."""
+    for block in found:
+        log = block.get("log", np.zeros(block["t"].size))
+        edges = [0, *(np.flatnonzero(np.diff(log)) + 1).tolist(), log.size]
+        for first, last in pairwise(edges):
+            if last > first:
+                yield int(log[first]), rows_of(block, slice(first, last))
+
+
+def table(path: Path) -> dict[str, list[Any]]:
+    """The columns of a small file. Raises `ResultError` where it cannot be read."""
+    with _parquet(path) as file:
+        columns: dict[str, list[Any]] = file.read().to_pydict()
+        return columns
+
+
+def facts_of(path: Path) -> tuple[list[str], int, dict[bytes, bytes]]:
+    """Names of the columns, rows, and metadata of `path`. Raises `ResultError`."""
+    with _parquet(path) as file:
+        return file.schema_arrow.names, file.metadata.num_rows, file.schema_arrow.metadata or {}
 
 
 @dataclass
-class _Gathering:
-    total: int
-    ranges: dict[int, LogRange] = field(default_factory=dict)
-    reducers: dict[int, dict[str, MinMax]] = field(default_factory=dict)
-    extremes: dict[str, tuple[float, float]] = field(default_factory=dict)
+class LogFacts:
+    """One log: its times in s and samples, and each joint's largest residual with its time."""
 
-    def __post_init__(self) -> None:
-        self.size = bucket_size(self.total, POINTS)
-        self.motion = Thinned(self.total // DOTS)
-        self.squares = np.zeros(4)
-        self.counts = np.zeros(4)
-        self.worst: dict[int, tuple[float, int, float]] = {}
+    first: float
+    last: float = 0.0
+    samples: int = 0
+    period: float = np.nan
+    largest_step: float = 0.0
+    gaps: int = 0
+    worst: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)] * 2)
 
-    def take(self, log: int, block: Block) -> None:
-        """Add the next block of the log of that number."""
-        _add_residuals(block)
-        self._range(log, block["t"])
-        reducers = self.reducers.setdefault(log, _reducers(SERIES, self.size))
-        for name, reducer in reducers.items():
-            reducer.feed(block["t"], block[name])
-        self.motion.feed(stacked(block, MOTION))
-        for name in SERIES:
-            low, high = float(np.fmin.reduce(block[name])), float(np.fmax.reduce(block[name]))
-            old = self.extremes.get(name, (low, high))
-            self.extremes[name] = float(np.fmin(low, old[0])), float(np.fmax(high, old[1]))
+    def add(self, part: Block) -> None:
+        """Take the next samples."""
+        t = part["t"]
+        steps = np.diff(t, prepend=self.last if self.samples else t[0])
+        if np.isnan(self.period) and t.size > 1:
+            self.period = median(steps[1:])
+        self.samples += t.size
+        self.last = float(t[-1])
+        self.largest_step = max(self.largest_step, float(steps.max()))
+        self.gaps += int(np.count_nonzero(steps > CUT * self.period))
         for joint in (1, 2):
-            size = np.nan_to_num(np.abs(block[f"residual{joint}"]), nan=-1.0)
+            size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
             place = int(size.argmax())
-            if size[place] >= 0 and size[place] > self.worst.get(joint, (-1.0, 0, 0.0))[0]:
-                self.worst[joint] = (float(size[place]), log, float(block["t"][place]))
-        for place, name in enumerate(("tau1", "tau2", "residual1", "residual2")):
-            finite = block[name][np.isfinite(block[name])]
-            self.squares[place] += finite @ finite
-            self.counts[place] += finite.size
-
-    def _range(self, log: int, t: FloatArray) -> None:
-        """Extend the log's range."""
-        follows = log in self.ranges
-        span = self.ranges.setdefault(log, LogRange(float(t[0]), float(t[0])))
-        steps = np.diff(t, prepend=span.last if follows else t[0])
-        if np.isnan(span.period) and t.size > 1:
-            span.period = float(np.median(np.diff(t)))
-        span.samples += t.size
-        span.last = float(t[-1])
-        span.largest_gap = max(span.largest_gap, float(steps.max()))
-        span.gaps += int(np.count_nonzero(steps > CUT * span.period))
-
-    def result(self) -> TorqueLog:
-        """What was gathered."""
-        rms = np.sqrt(self.squares / np.maximum(self.counts, 1))
-        series, worst = {}, {}
-        for log, reducers in self.reducers.items():
-            series[log] = _broken(reducers, CUT * self.size * self.ranges[log].period)
-        for joint, (_, log, moment) in self.worst.items():
-            worst[joint] = log, moment
-        return TorqueLog(
-            ranges=self.ranges,
-            series=series,
-            motion=self.motion.result(4),
-            extremes=self.extremes,
-            rms=(float(rms[0]), float(rms[1])),
-            residual_rms=(float(rms[2]), float(rms[3])),
-            unpredicted=int(self.counts[0] - self.counts[2]),
-            worst=worst,
-            reduced=self.size > 2,
-        )
+            if size[place] > self.worst[joint - 1][0]:
+                self.worst[joint - 1] = float(size[place]), float(t[place])
 
 
-def _add_residuals(block: Block) -> None:
-    """Add measured less predicted torque to a block of both."""
-    for joint in (1, 2):
-        residual = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
-        block[f"residual{joint}"] = residual
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Every column in few rows, the smallest and the largest value of each bucket in turn.
 
-
-def _broken(reducers: Mapping[str, MinMax], longest: float) -> dict[str, Series]:
-    """The reduced series by name, broken at gaps longer than `longest`, s."""
-    series = {}
-    for name, reducer in reducers.items():
-        t, values = reducer.result()
-        series[name] = broken_at_gaps(t, values, longest)
-    return series
-
-
-def read_scored(path: Path) -> dict[int, dict[str, Series]]:
-    """The scored torque, its prediction and their difference by log and name, as a `TorqueLog`.
-
-    Raises `ResultError` where `path` cannot be read or lacks a column.
+    Parameters
+    ----------
+    columns : with `x`, the time that runs on from log to log, s, and NaN rows where a line breaks
+    logs : by number
+    samples : of angles and velocities, whole rows spread evenly over the logs
     """
-    size = bucket_size(row_count(path), SCORED_POINTS)
-    reducers: dict[int, dict[str, MinMax]] = {}
-    steps: dict[int, float] = {}
-    for log, block in by_log(blocks(path, ("log", "t") + SCORED)):
-        _add_residuals(block)
-        own = reducers.setdefault(log, _reducers(SCORED + RESIDUALS, size))
-        for name, reducer in own.items():
-            reducer.feed(block["t"], block[name])
-        if block["t"].size > 1:
-            steps.setdefault(log, float(np.median(np.diff(block["t"]))))
-    series = {}
-    for log, own in reducers.items():
-        series[log] = _broken(own, CUT * size * steps.get(log, np.inf))
-    return series
+
+    columns: Block
+    logs: dict[int, LogFacts]
+    samples: Block
+
+    def __getitem__(self, name: str) -> FloatArray:
+        return self.columns[name]
+
+    @property
+    def starts(self) -> dict[int, float]:
+        """Where each log begins on the axis `x`."""
+        places = np.flatnonzero(np.diff(self["log"], prepend=-1))
+        return {int(self["log"][place]): float(self["x"][place]) for place in places}
+
+
+def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) -> Drawn:
+    """Every column of `path` in at most about `points` rows, broken at gaps and between logs.
+
+    `progress` hears how many samples have been read.
+
+    Raises
+    ------
+    ResultError
+        If the file cannot be read, or holds no rows.
+    """
+    total = facts_of(path)[1]
+    size = max(1, -(-2 * total // points))
+    step = max(1, total // SAMPLES)
+    parts: list[Block] = []
+    samples: list[Block] = []
+    logs: dict[int, LogFacts] = {}
+    for log, part in by_log(blocks(path)):
+        for joint in (1, 2):
+            if f"tau{joint}_predicted" in part:
+                part[f"residual{joint}"] = part[f"tau{joint}"] - part[f"tau{joint}_predicted"]
+        part["log"] = np.full(part["t"].size, float(log))
+        logs.setdefault(log, LogFacts(float(part["t"][0]))).add(part)
+        # which sample of a stretch moves by the golden ratio: never in step with the motion
+        at = np.arange(0, part["t"].size, step)
+        at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), part["t"].size - 1)
+        samples.append({name: part[name][at] for name in ("log", *MOTION) if name in part})
+        parts.append(_reduced(part, size))
+        if progress is not None:
+            progress("report", sum(one.samples for one in logs.values()), total)
+    if not parts:
+        raise ResultError(f"{path}: it holds no rows; identify again with this version")
+    columns = concatenated(parts)
+    columns["x"] = columns["t"].copy()
+    end = None
+    for log, facts in sorted(logs.items()):
+        shift = 0.0 if end is None else 1.01 * end - facts.first
+        columns["x"][columns["log"] == log] += shift
+        end = facts.last + shift
+    longest = CUT * size * max(facts.period for facts in logs.values())
+    apart = (np.diff(columns["t"]) > longest) | (np.diff(columns["log"]) > 0)
+    broken = np.flatnonzero(apart) + 1
+    for name, values in columns.items():
+        nothing = values[broken - 1] if name in ("log", "x") else np.nan
+        columns[name] = np.insert(values, broken, nothing)
+    return Drawn(columns, logs, concatenated(samples))
+
+
+def _reduced(part: Block, size: int) -> Block:
+    """Smallest and largest of each `size` samples, in turn."""
+    if size <= 2:
+        return part
+    at = np.arange(0, part["t"].size, size)
+    short = {}
+    for name, values in part.items():
+        low, high = np.fmin.reduceat(values, at), np.fmax.reduceat(values, at)
+        short[name] = np.stack([low, high], axis=1).ravel()
+    return short
+
+
+def between(path: Path, log: int, low: float, high: float) -> Block:
+    """Every sample of a log with t in [low, high]; row groups elsewhere are not read."""
+    with _parquet(path) as file:
+        place = {name: i for i, name in enumerate(file.schema_arrow.names)}
+
+        def may_hold(group: int, name: str, low: float, high: float) -> bool:
+            own = file.metadata.row_group(group).column(place[name]).statistics
+            return own is None or bool(own.min <= high and own.max >= low)
+
+        groups = range(file.num_row_groups)
+        wanted = [g for g in groups if may_hold(g, "log", log, log) and may_hold(g, "t", low, high)]
+        rows = file.read_row_groups(wanted)
+        block = {name: numbers_of(rows[name].combine_chunks()) for name in rows.column_names}
+    near = (block["log"] == log) & (block["t"] >= low) & (block["t"] <= high)
+    return rows_of(block, near)

@@ -5,11 +5,10 @@ Foreign text never passes as markup; colours follow the console (`NO_COLOR`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from algid.report.brief import run_first
-from algid.report.document import Column, Depth, Document, Table
+from algid.report.document import Document, Table
 from algid.results import Status
 from algid.text import lines_of, visible
 from algid.verdict import Grade, Verdict
@@ -17,7 +16,6 @@ from algid.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table as RichTable
 
 LONGEST_WORD = 24  # columns; what is longer, like a path, breaks where it must
 GRADE_STYLES: dict[Grade, str] = {
@@ -30,9 +28,9 @@ GRADE_STYLES: dict[Grade, str] = {
 def print_document(document: Document, console: Console) -> None:
     """Print the verdict, what was found, and what is known against it, to `console`."""
     print_verdict(document.verdict, console)
-    for table in document.tables(Depth.TERMINAL):
+    for table in document.tables():
         console.print()
-        print_table(table, console)
+        print_table(table, console, failed=document.verdict.failed)
 
 
 def print_verdict(judged: Verdict, console: Console, most: int | None = None) -> None:
@@ -59,65 +57,13 @@ def print_verdict(judged: Verdict, console: Console, most: int | None = None) ->
             console.print(Text(line), soft_wrap=True)
 
 
-def print_table(table: Table, console: Console) -> None:
-    """Print one table, less the columns that the console has no room for.
+def print_table(table: Table, console: Console, *, failed: bool = False) -> None:
+    """Print one table, less the last columns where the console has no room for all.
 
-    No digit is ever cut off.
+    No digit is ever cut off. No status of a result that failed is shown as good.
     """
-    from rich.cells import cell_len
-    from rich.measure import Measurement
-    from rich.text import Text
-
-    while True:
-        headings = tuple(column.heading for column in table.columns)
-        columns = list(zip(headings, *table.rows, strict=True))
-        widths = [max(map(cell_len, column)) for column in columns]
-        wanted = Measurement.get(
-            console, console.options.update(width=10_000), rich_table(table, widths)
-        ).maximum
-        room = sum(widths) - max(wanted - console.width, 0)
-        narrowed = _narrowed(widths, list(map(_least, table.columns, columns)), room)
-        fewer = table.narrower()
-        most_missed = all(column.rank <= 1 for column in table.columns)
-        squeezed = sum(narrowed) <= room and most_missed and table.upright is None
-        if sum(widths) <= room or squeezed:
-            break
-        other = fewer or table.upright
-        if other is None:
-            break
-        table = other
-    console.print(rich_table(table, narrowed))
-    if table.note:
-        console.print(Text(table.note, "dim"))
-
-
-def _least(column: Column, cells: tuple[str, ...]) -> int:
-    """Least width that breaks no number of a column, and no word but those longer than any."""
-    from rich.cells import cell_len
-
-    least = 1
-    for cell in cells:
-        for word in cell.split():
-            least = max(least, min(cell_len(word), LONGEST_WORD))
-    if column.kind == "number":
-        least = max(least, max(map(cell_len, cells[1:]), default=0))
-    return least
-
-
-def _narrowed(widths: list[int], least: list[int], room: int) -> list[int]:
-    """Widths that add up to `room`: the widest column gives way first, none below its least."""
-    narrowed = list(widths)
-    while sum(narrowed) > room:
-        wide = [i for i, width in enumerate(narrowed) if width > least[i]]
-        if not wide:
-            break
-        narrowed[max(wide, key=narrowed.__getitem__)] -= 1
-    return narrowed
-
-
-def rich_table(table: Table, widths: Sequence[int]) -> RichTable:
-    """`table` as rich sets it, its columns that wide."""
     from rich import box
+    from rich.cells import cell_len
     from rich.table import Table as RichTable
     from rich.text import Text
 
@@ -129,22 +75,27 @@ def rich_table(table: Table, widths: Sequence[int]) -> RichTable:
         show_edge=False,
         collapse_padding=True,
     )
-    for column, width in zip(table.columns, widths, strict=True):
-        side: Literal["right", "left"] = "right" if column.kind == "number" else "left"
-        made.add_column(Text(column.heading), justify=side, overflow="fold", width=width)
+    styles = {"name": "bold", "number": "", "text": "", "status": "bold yellow"}
+    kept, used = 0, 0
+    for place, (heading, kind) in enumerate(table.columns.items()):
+        cells = [row[place] for row in table.rows]
+        # the least width that breaks no number, and no word but those longer than any
+        words = " ".join((heading, *cells)).split()
+        least = max(min(cell_len(word), LONGEST_WORD) for word in words)
+        if kind == "number":
+            least = max(least, *map(cell_len, cells), 1)
+        used += least + 2
+        if place and used - 2 > console.width:
+            break
+        kept += 1
+        side = "right" if kind == "number" else "left"
+        made.add_column(Text(heading), justify=side, overflow="fold", min_width=least)  # type: ignore[arg-type]
     for row in table.rows:
-        cells = []
-        for column, cell in zip(table.columns, row, strict=True):
-            cells.append(Text(cell, _style(column.kind, cell)))
-        made.add_row(*cells)
-    return made
-
-
-def _style(kind: str, cell: str) -> str:
-    if kind == "doubtful status":
-        return "bold red"
-    if kind == "status":
-        return "green" if cell == Status.OK.value else "bold yellow"
-    if kind == "name":
-        return "bold"
-    return ""
+        line = []
+        for cell, kind in zip(row[:kept], table.columns.values(), strict=False):
+            good = kind == "status" and cell == Status.OK.value and not failed
+            line.append(Text(cell, "green" if good else styles[kind]))
+        made.add_row(*line)
+    console.print(made)
+    if table.note:
+        console.print(Text(table.note, "dim"))

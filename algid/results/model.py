@@ -458,7 +458,11 @@ class Result(_Model):
     def __str__(self) -> str:
         rows = list(self._rows())
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = [self._subject, visible(self.verdict.sentence, 1000)]
+        judged = self.verdict
+        lines = [self.subject, visible(judged.sentence, 1000)]
+        mends = " or ".join(repr(one) for why in judged.reasons[:1] for one in why.remedies)
+        if mends:
+            lines.append(f"mend: {visible(mends, 1000)}")
         for row in rows:
             line = ""
             for cell, width, align in zip(row, widths, "<>><<", strict=True):
@@ -468,14 +472,8 @@ class Result(_Model):
 
     __repr__ = __str__
 
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        from algid.results.notebook import html_of
-
-        return html_of(self, self._subject)
-
     @property
-    def _subject(self) -> str:
+    def subject(self) -> str:
         """Whose estimate it is, and of which logs."""
         others = f" and {len(self.more_logs)} more" if self.more_logs else ""
         return f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{others}"

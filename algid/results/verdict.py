@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from algid.model import CHOICES, EVERY_TERM
+from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
 from algid.names import outside
-from algid.notices import Notice, Remedy, flat, notes_of, of_codes, warnings_of
-from algid.options import flag
+from algid.notices import Notice, Remedy, flat, has_code, notes_of, of_codes, warnings_of
+from algid.options import PROFILE, flag, options_of
 from algid.significance import SURE
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         TorquePrediction,
     )
 
+CONSTANTS = (K1, K2, K3, K4, K5, K6, K7)
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
 WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
 LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
@@ -56,6 +57,8 @@ CAUSES = (
     "LOST_SAMPLES",
 )
 """Notices that say why estimates would be wrong, the likeliest first: they lead the reasons."""
+CHANGED = ("REFINED_FAILED", "REFUTED", "MISFIT", "INSTRUMENTS_STAND", "REFERENCE_STANDS")
+"""Notices that say why another estimator's numbers are reported."""
 
 
 def judge(result: Result) -> Verdict:
@@ -76,14 +79,38 @@ def judge(result: Result) -> Verdict:
 
 
 def _command(result: Result, reasons: Sequence[Notice]) -> str | None:
-    """The command to run first: the first reason's remedy, or `algid inspect` without a cause."""
+    """The command to run first: the first cause's remedy, or `algid inspect` without a cause.
+
+    None where neither says more than the call that was made.
+    """
     causes = of_codes(reasons, *CAUSES, "UNKNOWN_CAUSE")
     if not causes:
         return None
+    if causes[0].code == "UNKNOWN_CAUSE":
+        words = ["algid", "inspect", result.log.path, *_of_reading(result)]
+        return visible(shlex.join(words), LONGEST_COMMAND)
     remedy = causes[0].remedy
-    if remedy is not None and "accept" not in remedy.settings:  # to accept a cause mends nothing
-        return again(result, remedy.flags)
-    return visible(shlex.join(["algid", "inspect", result.log.path]), LONGEST_COMMAND)
+    if remedy is None or "accept" in remedy.settings:  # to accept a cause mends nothing
+        return None
+    said = flat(result.profile) | result.settings
+    if all(said.get(name) == value for name, value in remedy.settings.items()):
+        return None
+    return again(result, remedy.flags)
+
+
+def _of_reading(result: Result) -> list[str]:
+    """The flags of the call that say how a log is read."""
+    made = result.settings.get("command")
+    if not isinstance(made, str):
+        return list(Remedy(flat(result.profile)).flags)
+    taken = {flag(one.name) for one in options_of(PROFILE)}
+    flags: list[str] = []
+    words = iter(shlex.split(made))
+    for word in words:
+        name, equals, _ = word.partition("=")
+        if name in taken:
+            flags += [word] if equals else [word, next(words, "")]
+    return flags
 
 
 def again(result: Result, flags: Sequence[str]) -> str:
@@ -157,6 +184,8 @@ def _failure(result: Result) -> str | None:
         return "the estimator did not converge"
     if "IMPLAUSIBLE" in statuses:
         return _contradiction(result.fit)
+    if has_code(result.notices, "LENGTH_CONTRADICTED"):
+        return "a link length contradicts the arm's result"
     usable, count = sum(one.usable for one in estimates), len(estimates)
     if not usable or not any(map(_tells, estimates)):
         words = {STATUS_WORDS.get(status, "absent") for status in statuses}
@@ -254,7 +283,11 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 
 
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
-    """Reasons for doubt in a result, the weightiest first: causes, statuses, fit, notices."""
+    """Reasons for doubt in a result, the weightiest first.
+
+    Causes, what changed the estimator, statuses, the fit, and notices: those of the fit before
+    those of a log.
+    """
     doubts = warnings_of(result.notices)
     causes = of_codes(doubts, *CAUSES)
     causes.sort(key=lambda one: CAUSES.index(one.code))
@@ -262,11 +295,13 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     if failed and not causes and (is_implausible(result) or poor):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
+    changed = of_codes(doubts, *CHANGED)
+    yield from changed
     yield from _of_statuses(_asked_for(result))
     if result.fit is not None:
         yield from _of_fit(result.fit, failed=failed)
     yield from _far_from_truth(result)
-    yield from outside(doubts, causes)
+    yield from sorted(outside(doubts, causes + changed), key=lambda one: bool(one.logs))
 
 
 def _asked_for(result: Result) -> dict[str, Estimate]:
@@ -291,7 +326,10 @@ def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:
     for status in STATUS_WORDS:
         names = [visible(name) for name, one in estimates.items() if one.status == status]
         if names:
-            yield Notice(status, numbers={"names": names})
+            numbers: dict[str, Any] = {"names": names}
+            if status == "NOT_IDENTIFIABLE" and not set(CONSTANTS).isdisjoint(names):
+                numbers["record"] = "record a run in which both joints move"
+            yield Notice(status, numbers=numbers)
     wide = []
     for name, one in estimates.items():
         spread = _spread(one)

@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from algid.files import whole_file
-from algid.report.document import Bullets, Document, Section, filled
+from algid.report.document import Document, Section
 from algid.report.export import START_KEY, write_series
-from algid.report.frame import page
-from algid.report.markdown import markdown
+from algid.report.render import markdown, page, write_texts
 from algid.report.tables import settings_table
 from algid.significance import NORMAL
 from algid.text import file_name, significant
-from algid.tracks.figures import figures
+from algid.tracks.figures import payload_figure
 from algid.tracks.result import TrackResult, track_json
 from algid.tracks.tables import (
     change_table,
@@ -35,15 +34,12 @@ def track_document(result: TrackResult) -> Document:
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
     sentences = tuple(one.sentence for one in result.notices)
-    warnings = Bullets(sentences, "The readers gave no warning.")
-    changes = tuple(filled(change_table(result)))
-    masses = (stretch_table(result),) + tuple(figures(result)) + changes
-    quality = (warnings,) + quality_tables(result)
     origin = (settings_table(result.settings), track_provenance(result))
     sections = (
-        Section(masses),
-        Section(quality, "data", "Data quality"),
-        Section(origin, "settings", "Settings and provenance"),
+        Section("numbers", "Numbers", (stretch_table(result), change_table(result))),
+        Section("payload", "Payload in time", (payload_figure(result),)),
+        Section("data", "Data quality", (sentences, *quality_tables(result)), folded=True),
+        Section("settings", "Settings and provenance", origin, folded=True),
     )
     return Document(
         title=f"Payload in time of {name}",
@@ -69,7 +65,7 @@ def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
     """Write everything into `folder`, `track.mcap` where asked. Raises `OutputError`."""
     _write_curve(result, folder / "track.parquet")
     _write_stretches(result, folder / "stretches.parquet")
-    _write_text(folder / "track.json", track_json(result))
+    write_texts(folder, {"track.json": track_json(result)})
     write_pages(result, folder, mcap)
 
 
@@ -80,19 +76,11 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
     """
     document = track_document(result)
     pages = {"report.html": page(document), "report.md": markdown(document)}
-    written = []
-    for name, text in pages.items():
-        _write_text(folder / name, text)
-        written.append(folder / name)
+    written = write_texts(folder, pages)
     if mcap:
         _write_mcap(result, folder)
         written.append(folder / "track.mcap")
     return written
-
-
-def _write_text(path: Path, text: str) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def _write_curve(result: TrackResult, path: Path) -> None:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from algid.errors import ResultError
 from algid.files import first_misfit, read_text
 from algid.notices import Notice
-from algid.report.reduce import Block, blocks
+from algid.report.series import Block, blocks
 from algid.results import LogSummary, misfit_of_numbers
 from algid.significance import NORMAL
 from algid.tracks.payload import Stretch, Track

@@ -57,15 +57,17 @@ class TrackResult:
         """Whether every stretch has status OK."""
         return set(self.statuses) <= {StretchStatus.OK}
 
-    def truth(self, stretch: Stretch) -> float | None:
-        """True payload in kg amid a stretch, where the log states it."""
+    @property
+    def truth(self) -> tuple[float, ...]:
+        """True payload in kg at the middle of each stretch; empty where the log lacks it."""
         if self.schedule is None:
-            return None
-        middle = (stretch.start + stretch.end) / 2
-        for time, mass in reversed(self.schedule):
-            if time <= middle:
-                return mass
-        return 0.0
+            return ()
+        masses = []
+        for stretch in self.track.stretches:
+            middle = (stretch.start + stretch.end) / 2
+            reached = [mass for time, mass in self.schedule if time <= middle]
+            masses.append(reached[-1] if reached else 0.0)
+        return tuple(masses)
 
 
 def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
@@ -79,7 +81,9 @@ def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
 def track_json(result: TrackResult) -> str:
     """The text of `track.json`: times in s since the log's first sample, masses in kg."""
     stretches: list[dict[str, Any]] = []
-    for stretch, status in zip(result.track.stretches, result.statuses, strict=True):
+    every = result.track.stretches
+    truth = result.truth or (None,) * len(every)
+    for stretch, status, mass in zip(every, result.statuses, truth, strict=True):
         stretches.append(
             {
                 "start": stretch.start,
@@ -89,7 +93,7 @@ def track_json(result: TrackResult) -> str:
                 "ci95": list(stretch.ci95),
                 "unit": "kg",
                 "status": status.value,
-                "truth": result.truth(stretch),
+                "truth": mass,
             }
         )
     changes: list[dict[str, float]] = []

@@ -13,6 +13,7 @@ from algid.errors import LogError
 from algid.estimators.too_short import TooShortError
 from algid.files import read_whole
 from algid.identification.identify import reused
+from algid.identification.known import contradictions
 from algid.identification.source import LogLike, open_source, read_otherwise
 from algid.identification.survey import Survey
 from algid.notices import Notice, lossy, merged
@@ -77,6 +78,8 @@ def track_log(
     if judged.grade != "good":
         numbers = {"grade": judged.word.lower(), "headline": judged.headline}
         notices.append(Notice("ARM_DOUBTFUL", numbers=numbers))
+    lengths = {name: one for name, one in (("l1", l1), ("l2", l2)) if one is not None}
+    notices += contradictions(result, lengths)
     notices += read_otherwise([survey.summary(source)], result, called)
     notices += merged(of_log)
     schedule = None

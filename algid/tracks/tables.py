@@ -1,15 +1,12 @@
-"""The tables of a track: finished text that terminal, Markdown and HTML merely set.
-
-Whether to trust a track: one sentence, and the reasons behind it.
-"""
+"""The tables of a track, and its verdict."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from algid.notices import Notice, lossy, notes_of, warnings_of
-from algid.report.document import Column, Depth, Table, filled
+from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
+from algid.report.document import Kind, Table
 from algid.report.tables import log_tables, provenance_table
 from algid.results.verdict import LEAST_R2, WORST_R2, share_text
 from algid.text import ABSENT, file_name, joined, significant
@@ -18,62 +15,30 @@ from algid.tracks.result import StretchStatus, TrackResult
 from algid.verdict import Verdict, graded
 from algid.words import counted
 
-COLUMNS = (
-    Column("Stretch", "name"),
-    Column("From, s", "number"),
-    Column("To, s", "number"),
-    Column("Payload", "number"),
-    Column("± 95 %", "number"),
-    Column("Unit", "text"),
-    Column("Status", "status"),
-    Column("95 % interval", "number", rank=1),
-    Column("Truth", "number", rank=3),
-    Column("Error", "number", rank=2),
-)
-
 
 def stretch_table(result: TrackResult) -> Table:
     """The stretches, their masses and intervals."""
     rows = []
-    for place, (stretch, status) in enumerate(
-        zip(result.track.stretches, result.statuses, strict=True), start=1
+    truths = result.truth or (None,) * len(result.track.stretches)
+    for place, (stretch, status, truth) in enumerate(
+        zip(result.track.stretches, result.statuses, truths, strict=True), start=1
     ):
-        low, high = stretch.ci95
-        truth = result.truth(stretch)
         true = error = ABSENT
         if truth is not None:
-            true = fixed(truth, stretch.std)
-            error = fixed(stretch.m_p - truth, stretch.std)
-        rows.append(
-            (
-                str(place),
-                f"{stretch.start:.3f}",
-                f"{stretch.end:.3f}",
-                mass_text(stretch),
-                half_text(stretch),
-                "kg",
-                status.value,
-                f"[{fixed(low, stretch.std)}, {fixed(high, stretch.std)}]",
-                true,
-                error,
-            )
-        )
-    table = Table("Payload by stretch", COLUMNS, tuple(rows)).without_empty()
-    if verdict(result).failed:
-        return table.doubted()
-    return table
+            true, error = fixed(truth, stretch.std), fixed(stretch.m_p - truth, stretch.std)
+        span = (f"{stretch.start:.3f}", f"{stretch.end:.3f}")
+        mass = (mass_text(stretch), half_text(stretch), "kg", status.value)
+        rows.append((str(place), *span, *mass, true, error))
+    columns: dict[str, Kind] = {
+        "Stretch": "name", "From, s": "number", "To, s": "number", "Payload": "number",
+        "± 95 %": "number", "Unit": "text", "Status": "status", "Truth": "number",
+        "Error": "number",
+    }  # fmt: skip
+    return Table("Payload by stretch", columns, tuple(rows)).without_empty()
 
 
 def change_table(result: TrackResult) -> Table:
     """When the payload changed, and by how much."""
-    columns = (
-        Column("Change", "name"),
-        Column("At, s", "number"),
-        Column("Between, s", "number", rank=1),
-        Column("By", "number"),
-        Column("Unit", "text"),
-        Column("Truth at, s", "number", rank=2),
-    )
     times = [time for time, _ in result.schedule or () if time > 0]
     rows = []
     for place, (moment, low, high) in enumerate(result.track.changes.tolist()):
@@ -85,7 +50,11 @@ def change_table(result: TrackResult) -> Table:
         if times:
             true = f"{min(times, key=lambda time: abs(time - moment)):.3f}"
         between = f"[{low:.3f}, {high:.3f}]"
-        rows.append((str(place + 1), f"{moment:.3f}", between, step, "kg", true))
+        rows.append((str(place + 1), f"{moment:.3f}", step, "kg", between, true))
+    columns: dict[str, Kind] = {
+        "Change": "name", "At, s": "number", "By": "number", "Unit": "text",
+        "Between, s": "number", "Truth at, s": "number",
+    }  # fmt: skip
     note = "Between: the change's 95 % interval."
     return Table("Changes", columns, tuple(rows), note).without_empty()
 
@@ -100,17 +69,12 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
         ),
     )
     log, channels = log_tables([result.log])
-    holes = []
-    for start, end in result.track.holes.tolist():
-        holes.append((f"{start:.3f}", f"{end:.3f}"))
-    ends = (Column("From, s", "name"), Column("To, s", "number"))
+    holes = [(f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist()]
     return (
-        Table(
-            "Fit", (Column("What", "name"), Column("Value", "number")), fit, depth=Depth.MARKDOWN
-        ),
+        Table("Fit", {"What": "name", "Value": "number"}, fit),
         log.without(["Arm"]),
         channels.without(["Log"]),
-        *filled(Table("Times without samples", ends, tuple(holes), depth=Depth.PAGE)),
+        Table("Times without samples", {"From, s": "name", "To, s": "number"}, tuple(holes)),
     )
 
 
@@ -204,6 +168,8 @@ def _weighed(result: TrackResult) -> str:
 
 
 def _failure(result: TrackResult) -> str | None:
+    if has_code(result.notices, "LENGTH_CONTRADICTED"):
+        return "a link length contradicts the arm's result"
     if result.track.explained < WORST_R2:
         share = f"{max(100 * result.track.explained, 0):.0f} %"
         return (

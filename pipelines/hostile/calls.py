@@ -72,9 +72,8 @@ NEVER = {
     "--version",
     "--install-completion",
     "--show-completion",
-    "--save-plots",
 }
-"""Options that wait for ever by intent, talk to a cluster, or need another package."""
+"""Options that wait for ever by intent, talk to a cluster, or print nothing else."""
 SLOW = {("identify", "--estimator"), ("identify", "--model"), ("identify", "--cross-validate")}
 """Flags that choose honest work of more than a second."""
 

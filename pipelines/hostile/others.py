@@ -33,13 +33,9 @@ def other_files(folder: Path, log: Log) -> list[Path]:
         _feather(path, columns, packing)
     np.savez(folder / "clean.npz", **columns)
     np.savez_compressed(folder / "clean.packed.npz", **columns)
-    table = np.empty(len(log), [(name, float) for name in columns])
-    for name, values in columns.items():
-        table[name] = values
-    np.save(folder / "clean.npy", table)
     savemat(folder / "clean.mat", columns)
     savemat(folder / "clean.packed.mat", {"run": columns}, do_compression=True)
-    names = ("clean.npz", "clean.packed.npz", "clean.npy", "clean.mat", "clean.packed.mat")
+    names = ("clean.npz", "clean.packed.npz", "clean.mat", "clean.packed.mat")
     return [
         *paths,
         *(folder / name for name in names),

@@ -124,6 +124,22 @@ def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(
     assert _digest(tmp_path / "out") == undisturbed.digest
 
 
+def test_the_started_process_is_killed_and_the_batch_resumed_at_once(
+    logs: Path, tmp_path: Path, undisturbed: Undisturbed
+) -> None:
+    """Its child and the workers go with it; nothing waits for them but the next run itself."""
+    running = _start(logs, tmp_path / "out")
+    _wait_for_records(tmp_path / "out", 1)
+    running.kill()
+    running.wait()
+    last = _start(logs, tmp_path / "out")
+    told, errors = last.communicate()
+    running.communicate()
+    assert (last.returncode, errors) == (0, "")
+    assert f"{JOBS} ok" in told
+    assert _digest(tmp_path / "out") == undisturbed.digest
+
+
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
     logs: Path, tmp_path: Path, sent: signal.Signals
@@ -137,7 +153,7 @@ def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
     _wait_for_records(tmp_path / "out", 1)
     running.send_signal(sent)
     told, errors = running.communicate(timeout=60)
-    assert (running.returncode, errors) == (130, "")
+    assert (running.returncode, errors) == (128 + sent, "")
     assert "1 ok; 1 run now, 1 left" in told
     assert pl.read_parquet(tmp_path / "out/jobs.parquet")["job"].to_list() == ["d0"]
     assert not [path for path in (tmp_path / "out").rglob(".*") if path.name != ".jobs"]

@@ -374,7 +374,6 @@ def test_an_object_replaced_while_it_is_read_fails(
     served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, at: int
 ) -> None:
     """Whatever was fetched by then: its ends, the summary, a part of the whole."""
-    monkeypatch.setattr("algid.batches.fetch.SMALL", 0)
     monkeypatch.setattr("algid.batches.fetch._PIECE", 1 << 17)
     arrays = np.random.default_rng(0).normal(size=(2, 40000, 2)).astype("<f8")
     first, second = (one.tobytes() for one in arrays)

@@ -304,18 +304,12 @@ def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None
 def test_a_campaign_takes_what_is_asked_and_else_its_defaults() -> None:
     limits = {"range": "1.2", "speed": "3", "torque": "1.5"}
     noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    plain = campaign_of(prior(), request(None, limits), noise, None, "position", 0.05, 4)
-    assert (plain.duration, plain.experiment.rate, plain.drive, plain.margin, plain.seed) == (
-        10,
-        1000,
-        "position",
-        0.05,
-        4,
-    )
+    plain = campaign_of(prior(), request(None, limits), noise, None, 0.05, 4)
+    assert (plain.duration, plain.experiment.rate, plain.margin, plain.seed) == (10, 1000, 0.05, 4)
     assert plain.experiment.runs == ((1, 1) if load_case("case1").payload else (1, 0))
     asked = request(None, limits | {"duration": 2.0, "rate": 100.0, "runs": "3,0"})
-    other = campaign_of(prior(), asked, noise, "k1, k3", "torque", 0.1, 0)
+    other = campaign_of(prior(), asked, noise, "k1, k3", 0.1, 0)
     assert (other.duration, other.experiment.rate, other.experiment.runs) == (2, 100, (3, 0))
-    assert (other.drive, other.margin) == ("torque", 0.1)
+    assert other.margin == 0.1
     assert plain.asked.wanted.all()
     assert np.flatnonzero(other.asked.wanted).tolist() == [0, 2]  # k1 and k3

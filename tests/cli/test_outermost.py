@@ -15,11 +15,8 @@ from typing import Any
 
 import pytest
 
-import algid
 import algid.cli
-from algid.cli import _StoppedError
 from algid.cli.output import console
-from algid.construction import new_folder, under_construction
 from algid.faults import EXIT_INTERNAL
 from algid.text import printable
 from tests.cli.commands import call
@@ -123,87 +120,11 @@ def test_a_fault_of_algid_is_called_one(
     assert told.endswith(line)
 
 
-@pytest.mark.parametrize(("raised", "code"), [(_StoppedError(15), 143), (SystemExit(3), 3)])
 def test_an_end_that_is_meant_keeps_its_meaning(
-    raised: BaseException, code: int, run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.inspection.report.format_of", raising(raised))
-    found, told = run("inspect", "log.csv")
-    assert found == code
-    assert told in ("", "algid: stopped; nothing half-written is left\n")
-
-
-def in_a_class(_path: object) -> object:
-    """A signal comes as a class is made: Python 3.11 raises a RuntimeError in its place."""
-
-    class Named:
-        def __set_name__(self, _owner: type, _name: str) -> None:
-            raise _StoppedError(14)
-
-    return type("Owner", (), {"field": Named()})
-
-
-def in_a_library(_path: object) -> object:
-    """A signal comes where a library turns every exception into its own."""
-    try:
-        raise _StoppedError(14)
-    except BaseException:
-        raise OSError("cannot read") from None
-
-
-@pytest.mark.parametrize("stopped", [in_a_class, in_a_library])
-def test_a_stop_in_another_exception_is_a_stop(
-    stopped: Callable[[object], object], run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("algid.inspection.report.format_of", stopped)
-    said = "algid: stopped; nothing half-written is left\n"
-    assert run("inspect", "log.csv") == (142, said)
-
-
-def test_a_stop_between_a_with_and_its_block_leaves_nothing(
-    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """The folder is made, and nobody is to take it away yet, when the signal comes."""
-
-    def entered(_path: object) -> None:
-        making = under_construction(tmp_path / "result", new_folder)
-        making.__enter__()
-        assert left() != []
-        raise _StoppedError(15)
-
-    def left() -> list[str]:
-        return [place.name for place in tmp_path.iterdir() if "result" in place.name]
-
-    found = []
-    monkeypatch.setattr("algid.inspection.report.format_of", entered)
-    monkeypatch.setattr("algid.cli.output.complain", lambda line: found.append((line, left())))
-    assert run("inspect", "log.csv") == (143, "")
-    assert found == [("stopped; nothing half-written is left", [])]
-
-
-def test_a_stop_waits_for_the_end_of_an_import(tmp_path: Path) -> None:
-    """An exception within an import may leave its lock taken."""
-    (tmp_path / "slow.py").write_text("import os, time; os.kill(os.getpid(), 15); time.sleep(0.2)")
-    script = """
-import sys, time
-import algid.cli, algid.cli.app
-def called(_arguments):
-    import slow
-    print("imported", flush=True)
-    time.sleep(5)
-algid.cli.app.called = lambda _: called
-algid.cli.main()
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env={**os.environ, "PYTHONPATH": f"{tmp_path}:{Path(algid.__file__).parents[1]}"},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    stopped = "algid: stopped; nothing half-written is left\n"
-    assert (done.returncode, done.stdout, done.stderr) == (143, "imported\n", stopped)
+    monkeypatch.setattr("algid.inspection.report.format_of", raising(SystemExit(3)))
+    assert run("inspect", "log.csv") == (3, "")
 
 
 def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from algid.files import read_whole
 from algid.limits import LIMITS
 from tests.cli.commands import app
 
-WRITTEN = {"out", "save_plots", "scratch"}
+WRITTEN = {"out", "scratch"}
 """Options that name what is written, not what is read."""
 
 

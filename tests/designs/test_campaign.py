@@ -255,27 +255,12 @@ def test_the_campaign_can_be_rehearsed(folder: Path, tmp_path: Path) -> None:
         assert np.sqrt(np.mean(error**2)) == pytest.approx(1e-3, rel=0.1)
 
 
-def test_an_open_loop_is_written_as_a_log_whose_torque_synth_replays(tmp_path: Path) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("algid.designs.torque.GENERATIONS", 3)
-        patch.setattr("algid.designs.torque.POPULATION", 8)
-        limits = ["--range", "1.5", "--speed", "9", "--torque", "1.9,0"]  # joint 2 has no drive
-        code, text = run(
-            "case1", *limits, *SENSORS, "--drive", "torque", "--duration", "2", "-o", str(tmp_path)
-        )
-    assert code in (0, 3), text
-    assert "velocity at the end" in text
-    folder = tmp_path / "case1.design"
-    assert not (folder / "joint_trajectory.yaml").exists()
-    log = read_log(folder / "trajectory.csv")
-    assert not log.tau[1].any()
-    assert np.abs(log.tau[0]).max() > 0
-
-
 REFUSED = [
     (["case1", *SENSORS, "--speed", "3", "--torque", "2"], "--range: it must be given"),
     (["case1", *LIMITS], "--position-noise: case1 does not tell"),
     (["case1", *SENSORS, *LIMITS, "--range", "x"], "--range: expected rad like 1.2"),
+    (["case1", *SENSORS, *LIMITS, "--range=-60:60,-60:60"], "for 60° give 1.047"),
+    (["case1", *SENSORS, *LIMITS, "--range", "7,inf"], "found 7, more than a turn"),
     (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "LOW below HIGH for joint 1"),
     (["case1", *SENSORS, *LIMITS, "--speed=-3"], "--speed: expected rad/s"),
     (
@@ -292,7 +277,7 @@ REFUSED = [
     ),
     (
         ["case1", *SENSORS, *LIMITS, "--torque", "1.9,0"],
-        "--torque: position control asks for a drive at either joint, found 0 for joint 2",
+        "--torque: expected N m like 5 or 5,2",
     ),
     (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),

@@ -14,7 +14,7 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.designs.belief import Asked, Belief
 from algid.designs.campaign import Campaign, Design
-from algid.designs.figures import figures
+from algid.designs.figures import motion
 from algid.designs.information import Experiment
 from algid.designs.limits import Limits, Row, Usage
 from algid.designs.page import design_document, page_html
@@ -24,6 +24,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion
 from algid.notices import Notice
+from tests.report.pages import Page, named, typed
 from tests.terminals import shown
 
 RATE, COUNT = 120.0, 61
@@ -36,7 +37,7 @@ def moved(shift: float) -> Motion:
     return Motion(wave, wave + 1, wave + 2)
 
 
-def made_up(*, loaded: tuple[bool, ...] = (False, True), drive: str = "position") -> Design:
+def made_up(*, loaded: tuple[bool, ...] = (False, True)) -> Design:
     shared = Shared(Model())
     asked = Asked(np.maximum(MEAN, 0.1), MEAN > 0, np.array([True] * 6 + [False]))
     limits = Limits(
@@ -55,19 +56,15 @@ def made_up(*, loaded: tuple[bool, ...] = (False, True), drive: str = "position"
         limits=limits,
         asked=asked,
         duration=0.5,
-        drive="torque" if drive == "torque" else "position",
         margin=0.1,
         seed=3,
     )
-    motions = {one: moved(0.5 * one * (drive == "torque")) for one in loaded}
-    if drive == "position":
-        motions = dict.fromkeys(loaded, motions[loaded[0]])
     torque: dict[bool, FloatArray] = {one: np.stack([T + one, T - one]) for one in loaded}
     rows = (Row("range", 1, False), Row("speed", 0), Row("torque", 0, False, loaded=True))
     return Design(
         campaign=campaign,
         t=T,
-        motions=motions,
+        motion=moved(0.0),
         torque=torque,
         std=0.02 * np.maximum(MEAN, 0.1) * np.array([1, 2, 3, 40, 5, 6, 7]),
         worst=0.1 * np.ones(7),
@@ -81,28 +78,25 @@ BASE = ["t", "theta1", "theta2", "omega1", "omega2", "alpha1", "alpha2", "tau1",
 
 
 @pytest.mark.parametrize(
-    ("loaded", "drive", "more"),
+    ("loaded", "more"),
     [
-        ((False,), "position", []),
-        ((True,), "position", []),
-        ((False, True), "position", ["loaded_tau1", "loaded_tau2"]),
-        ((False, True), "torque", ["loaded_theta1", "loaded_theta2", "loaded_tau1", "loaded_tau2"]),
+        ((False,), []),
+        ((True,), []),
+        ((False, True), ["loaded_tau1", "loaded_tau2"]),
     ],
 )
 def test_a_trajectory_has_the_columns_that_its_runs_need(
-    loaded: tuple[bool, ...], drive: str, more: list[str]
+    loaded: tuple[bool, ...], more: list[str]
 ) -> None:
-    one = made_up(loaded=loaded, drive=drive)
+    one = made_up(loaded=loaded)
     columns = trajectory(one)
     assert list(columns) == BASE + more
     np.testing.assert_array_equal(columns["t"], T)
-    np.testing.assert_array_equal(columns["omega2"], one.motions[loaded[0]].omega[1])
-    np.testing.assert_array_equal(columns["alpha1"], one.motions[loaded[0]].alpha[0])
+    np.testing.assert_array_equal(columns["omega2"], one.motion.omega[1])
+    np.testing.assert_array_equal(columns["alpha1"], one.motion.alpha[0])
     np.testing.assert_array_equal(columns["tau1"], one.torque[loaded[0]][0])
     if more:
         np.testing.assert_array_equal(columns["loaded_tau2"], one.torque[True][1])
-    if "loaded_theta1" in more:
-        np.testing.assert_array_equal(columns["loaded_theta1"], one.motions[True].theta[0])
 
 
 def test_points_of_the_joint_trajectory_come_fifty_times_a_second_and_at_the_end() -> None:
@@ -129,7 +123,7 @@ def test_a_zero_of_a_joint_trajectory_has_no_sign_and_few_samples_are_all_taken(
     still = Motion(*(np.full((2, 3), -1e-12) for _ in range(3)))
     slow = replace(one.campaign, experiment=replace(one.campaign.experiment, rate=2.0))
     text = joint_trajectory(
-        replace(one, t=np.array([0.0, 0.5, 1.0]), motions={False: still}, campaign=slow), ("a", "b")
+        replace(one, t=np.array([0.0, 0.5, 1.0]), motion=still, campaign=slow), ("a", "b")
     )
     assert text.count("positions: [0.0, 0.0]") == 3
     assert "-0.0" not in text
@@ -226,38 +220,45 @@ def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:
     assert stamps == [20_000_000 * place for place in range(6)]
 
 
-def test_a_kind_of_limit_has_one_row_with_its_tightest_joint_and_a_bar() -> None:
+def test_a_kind_of_limit_has_one_row_with_its_tightest_joint() -> None:
     table = limit_table(made_up())
-    assert [(row[0], row[1], row[5]) for row in table.rows] == [
-        ("speed", "joint 1, up", "90.0"),
-        ("torque, loaded", "joint 1, down", "70.0"),
-        ("range", "joint 2, down", "50.0"),
+    assert [(row[0], row[3], row[6]) for row in table.rows] == [
+        ("speed", "90.0", "joint 1, up"),
+        ("torque, loaded", "70.0", "joint 1, down"),
+        ("range", "50.0", "joint 2, down"),
     ]
-    (drawn,) = table.drawn
-    assert set(drawn.rows) == {row[0] for row in table.rows}
-    assert "speed: 90.0 %" in drawn.rows["speed"]
 
 
-def test_a_page_speaks_of_limits_that_are_drawn_alone() -> None:
+def test_the_page_draws_the_motion_within_its_limits() -> None:
     one = made_up()
-    motion, _ = figures(one)
-    assert "Limits hold" in motion.reading
-    free = replace(
-        one.campaign.limits,
-        low=np.full(2, -np.inf),
-        high=np.full(2, np.inf),
-        speed=np.full(2, np.inf),
-        torque=np.full(2, np.inf),
-    )
-    motion, _ = figures(replace(one, campaign=replace(one.campaign, limits=free)))
-    assert "Limits hold" not in motion.reading
-    assert "its limits" not in [entry.words for entry in motion.legend]
+    limits, plot = one.campaign.limits, motion(one)
+    titles = [each["text"] for each in plot.figure.layout["annotations"]]
+    assert titles[:2] == ["<b>Angles, rad</b>", "<b>Velocities, rad/s</b>"]
+    assert len(titles) == 2 + len(one.torque)
+    first, second = named(plot.figure.data, "joint 1")[0], named(plot.figure.data, "joint 2")[0]
+    assert typed(first["y"]) == pytest.approx(one.motion.theta[0], rel=1e-5)
+    assert typed(second["y"]) == pytest.approx(one.motion.theta[1], rel=1e-5)
+    levels = [each["y0"] for each in plot.figure.layout["shapes"] if each["yref"] == "y2"]
+    size = 3 * np.abs(one.motion.omega).max()
+    wanted = [side * speed for speed in limits.speed for side in (-1, 1) if speed < size]
+    assert levels == pytest.approx(wanted)
+    far = replace(limits, speed=np.full(2, 1.1 * size))  # it would flatten the motion
+    shapes = motion(replace(one, campaign=replace(one.campaign, limits=far))).figure.layout[
+        "shapes"
+    ]
+    assert not [each for each in shapes if each["yref"] == "y2"]
+
+
+def test_a_page_speaks_of_a_limit_of_the_tip_that_is_drawn_alone() -> None:
+    one = made_up()
     for height, said in ((-np.inf, False), (-0.5, True)):
         limits = replace(one.campaign.limits, height=height)
         bare = replace(one.campaign.experiment, runs=(2, 0))
         campaign = replace(one.campaign, limits=limits, experiment=bare)
         text = page_html(replace(one, campaign=campaign), "arm")
         assert ("the red one its limit" in text) is said
+        assert ('class="limit"' in text) is said
+        assert list(Page(text).figures) == ["motion", "information", "arm"]
 
 
 def test_a_design_fits_a_terminal_of_eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,8 +25,7 @@ GIVEN: dict[str, str | float | None] = {"range": "1.2", "speed": "3", "torque": 
         ("speed", "3,4.5", (3.0, 4.5)),
         ("speed", "inf,2", (np.inf, 2.0)),
         ("acceleration", "1e1", 10.0),
-        ("torque", "0", 0.0),
-        ("torque", "5,0", (5.0, 0.0)),
+        ("torque", "5,0.5", (5.0, 0.5)),
         ("range", " 1.2 , 1 ", (1.2, 1.0)),
         ("range", "-2.7:-0.4,-1.2:1.2", ((-2.7, -0.4), (-1.2, 1.2))),
         ("runs", "2,0", (2, 0)),
@@ -43,7 +42,7 @@ LIKE = {
     "range": "rad like 1.2 (to both sides of hanging), 1.2,1.0, or -2.7:-0.4,-1.2:1.2",
     "speed": "rad/s like 3 or 3,4",
     "acceleration": "rad/s² like 30 or 30,60",
-    "torque": "N m like 5 or 5,2; 0 is a joint without a drive",
+    "torque": "N m like 5 or 5,2",
     "runs": "numbers of runs without and with the payload like 2,1",
 }
 WRONG = {
@@ -63,7 +62,7 @@ WRONG = {
     ],
     "speed": ["0", "-3", "3,-3", "3,0", "1:2,3:4", "nan,1", "fast"],
     "acceleration": ["0", "1,2,3", "-0.0"],
-    "torque": ["-1", "1,-1", "0:1,0:1", "nan"],
+    "torque": ["-1", "0", "1,-1", "5,0", "0:1,0:1", "nan"],
     "runs": ["1", "1,1,1", "0,0", "1.5,1", "-1,1", "1:2,1:2", "inf,1", "nan,1"],
 }
 
@@ -118,11 +117,11 @@ def test_a_line_of_a_file_that_means_nothing_is_named(
 
 
 def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
-    limits = limits_of(request(None, {**GIVEN, "torque": "5,0", "range": "1.2,0.7"}), LENGTHS)
+    limits = limits_of(request(None, {**GIVEN, "torque": "5,0.5", "range": "1.2,0.7"}), LENGTHS)
     np.testing.assert_allclose(limits.low, [-np.pi / 2 - 1.2, -0.7])
     np.testing.assert_allclose(limits.high, [-np.pi / 2 + 1.2, 0.7])
     np.testing.assert_array_equal(limits.speed, [3, 3])
-    np.testing.assert_array_equal(limits.torque, [5, 0])
+    np.testing.assert_array_equal(limits.torque, [5, 0.5])
     np.testing.assert_array_equal(limits.acceleration, [np.inf, np.inf])
     assert limits.height == -np.inf
     np.testing.assert_array_equal(limits.lengths, LENGTHS)
@@ -155,8 +154,6 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
             LENGTHS,
             "--range: without any limit no motion is the best, found inf for all; give one",
         ),
-        ({"torque": 0}, LENGTHS, ("--torque: expected a drive at one joint at least, found 0 for "
-                                 "both")),
         ({"tip_height": 0.7}, LENGTHS, ("--tip-height: expected less than the arm's reach, 0.7 m, "
                                        "found 0.7 m")),
         (

@@ -67,15 +67,6 @@ def test_half_a_sample_that_moves_nothing_is_left_alone() -> None:
     assert late.hold == "foh"
 
 
-@pytest.mark.parametrize("odds", [-2000.0, -3.0, 3.0, 2000.0])
-def test_odds_that_are_known_by_themselves_are_the_odds(odds: float) -> None:
-    late = Lateness.by_odds(odds, HALF)
-    assert late.odds == pytest.approx(odds)
-    assert late.hold == ("zoh" if odds > SURE else "foh")
-    assert late.decided == (abs(odds) > SURE)
-    assert not late.another
-
-
 @pytest.mark.parametrize(("late", "least"), [(0.0, 0.95), (5e-4, 0.95), (1e-3, 0.88)])
 def test_where_a_faster_controller_may_hold_the_torque_the_error_is_within_what_is_said(
     late: float, least: float

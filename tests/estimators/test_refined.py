@@ -217,7 +217,7 @@ def test_a_pass_tells_what_one_at_its_better_noise_levels_would(bench: Bench) ->
     """To first order: where levels are a hundredth off, what is left is a hundredth of that."""
     source: weak.Source = partial(list, [bench.log(sigma=1e-3)])
     start = weak.fit([source])
-    (log,) = refined._opened([source], False, start.shared, WeakSettings(), None, coarse=False)
+    (log,) = refined._opened([source], False, start.shared, WeakSettings(), None)
     for _ in range(4):
         log.train(start.values)
     levels = log.noise

@@ -14,7 +14,8 @@ from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.window_scatter import scattered
 from algid.signals.segments import Segment
-from pipelines.run_to_run import _runs
+from pipelines.race_peers import even
+from pipelines.run_to_run import runs as runs_of
 
 from .conftest import Bench
 
@@ -84,7 +85,7 @@ def test_windows_that_are_too_long_are_passed_over(
 @pytest.mark.slow
 def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) -> None:
     """Run 7 of design A.0 was 3.9 standard deviations of the difference off."""
-    runs = _runs(shared_data / "dfki" / "A0_sysid")
+    runs = [even(log) for log in runs_of(shared_data, "A.0")]
     alone = [source_of(runs[6])]
     others = [source_of(run) for place, run in enumerate(runs) if place != 6]
     least, rest = (shrunk.fit(sources, (), SETTINGS) for sources in (alone, others))

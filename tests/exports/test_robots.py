@@ -154,7 +154,7 @@ def test_what_a_comment_may_not_hold_is_written_otherwise() -> None:
             assert "a--b * / " in text
         else:
             compile(text, "arm.py", "exec")
-            assert "a--b */ ''' /n.algid" in text
+            assert "a--b * / ''' /n.algid" in text
 
 
 @pytest.mark.parametrize("file", ["lab/arm-7.algid", "lab/arm-7.algid/result.json"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from collections.abc import Callable, Mapping
@@ -11,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import polars as pl
 import pytest
 from scipy.stats import norm
@@ -21,17 +19,15 @@ from algid.batches.discover import jobs_of
 from algid.batches.records import End, JobRecord, stat_of
 from algid.batches.run import Batch, Recipe
 from algid.errors import ResultError
-from algid.fleet.figures import overview, robot_figure
+from algid.fleet.figures import overview
 from algid.fleet.history import history_of
 from algid.fleet.page import fleet_document, verdict
-from algid.fleet.tables import drift_table, finding_table, robot_table
+from algid.fleet.tables import change_table, finding_table, robot_table
 from algid.settings import Settings
 from algid.stores import open_store
 from tests.cli.commands import app
+from tests.report.pages import Page, named, typed
 from tests.terminals import shown
-
-TABLES = (robot_table, drift_table, finding_table)
-
 
 START = 1_700_000_000 * 10**9
 DAY = 86_400 * 10**9
@@ -133,34 +129,22 @@ def test_logs_whose_stamps_have_no_date_still_show_their_robots(tmp_path: Path) 
 def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
     _batch(tmp_path)
     history = history_of(tmp_path / "jobs.parquet")
-    heads = [" | ".join(column.heading for column in table(history).columns) for table in TABLES]
-    assert heads == [
-        "Robot | Logs | From | To | Drift | Stand out",
-        "Robot | Parameter | Until | Logs | Mean | Slope, % a month | 95 % interval | p",
-        "Job | Robot | What | Parameter | Value | Expected | σ away",
-    ]
-    first, _ = robot_table(history).rows
-    assert first == ("r0", "10", "2023-11-14", "2023-11-23", "k6", "1")
-    (drift,) = drift_table(history).rows
-    assert drift[:4] == ("r0", "k6", "2023-11-23", "10")
-    assert drift_table(history).note == "1 found. A slope over 3 months is significant at p < 9e-4."
+    assert robot_table(history).columns.keys().isdisjoint({"Changed"})  # no robot did
+    first, second = robot_table(history).rows
+    assert first == ("r0", "10", "k6", "1", "2023-11-14", "2023-11-23")
+    assert second[2:4] == ("none", "0")
+    (drift,) = change_table(history).rows
+    row = history.drifts.row(0, named=True)
+    slope, half = (100 * row[name] / row["mean"] for name in ("slope", "slope_std"))
+    assert drift == (
+        "r0", "k6", "drift", f"{slope:+.3g} ± {1.96 * half:.1f}", "% a month", "2023-11-23",
+    )  # fmt: skip
+    assert "A drift is a slope over 3 months with p < 9e-4" in change_table(history).note
     (finding,) = finding_table(history).rows
     assert finding == (
-        "r0/0",
-        "r0",
-        "payload unlike its label",
-        "m_p",
-        "0.90000",
-        "0.50000",
-        "+400.0",
-    )
+        "r0/0", "m_p", "+400.0", "0.90000", "0.50000", "payload unlike its label", "r0",
+    )  # fmt: skip
     assert finding_table(history).note == "1 found."
-    # what a narrow terminal leaves out first
-    ranks = [
-        {column.heading: column.rank for column in table(history).columns if column.rank}
-        for table in TABLES
-    ]
-    assert ranks == [{"From": 2, "To": 1}, {"Until": 1, "Logs": 2, "Mean": 3, "p": 4}, {"Robot": 1}]
 
 
 def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -> None:
@@ -185,37 +169,42 @@ def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -
     assert "the clearest trend is k1 of r, +6" in verdict(zeroed).sentence
 
 
-def _typed(packed: dict[str, str]) -> Any:
-    return np.frombuffer(base64.b64decode(packed["bdata"]), f"<{packed['dtype']}").astype(float)
-
-
-def test_every_log_is_a_point_with_its_interval_and_leads_to_its_report(tmp_path: Path) -> None:
+def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
     _batch(tmp_path)
     history = history_of(tmp_path / "jobs.parquet")
     assert history.jobs is not None
     jobs = history.jobs.filter(pl.col("robot") == "r0")
-    figure = robot_figure(history, "r0", jobs, {"r0/3": "./there.html"}, "robot-1-logs")
-    panel = next(one for one in figure.panels if one.title.startswith("k6"))
-    mean, drift, points = panel.traces
-    assert _typed(points["x"]) == pytest.approx(jobs["time"].dt.epoch("ms").to_list(), rel=1e-12)
-    assert _typed(points["y"]) == pytest.approx(jobs["k6"].to_list(), rel=1e-6)
+    plot = overview(history)
+    assert plot is not None
+    assert plot.title == "What was found, log by log"
+    assert [one["text"] for one in plot.figure.layout["annotations"]] == [
+        "<b>r0: k6, N m s/rad</b>"
+    ]
+    (points,), (mean,), (drift,) = (
+        named(plot.figure.data, name) for name in ("log", "mean", "drift")
+    )
+    assert typed(points["x"]) == pytest.approx(jobs["time"].dt.epoch("ms").to_list(), rel=1e-9)
+    assert typed(points["y"]) == pytest.approx(jobs["k6"].to_list(), rel=1e-6)
     half = norm.ppf(0.975) * jobs["k6_std"]
-    assert _typed(points["error_y"]["array"]) == pytest.approx(half.to_list(), rel=1e-4)
-    assert points["text"] == jobs["job"].to_list()
-    assert [place for place in points["customdata"] if place] == ["./there.html"]
-    assert panel.layout["xaxis"]["type"] == "date"
+    assert points["error_y"]["array"] == pytest.approx(half.to_list(), rel=1e-6)
+    assert plot.figure.layout["xaxis"]["type"] == "date"
     windows = history.windows.filter((pl.col("robot") == "r0") & (pl.col("parameter") == "k6"))
-    assert _typed(mean["y"]) == pytest.approx(windows["mean"].to_list(), rel=1e-6)
-    first, last, _ = _typed(drift["y"])
-    start, end, _ = _typed(drift["x"])
-    (slope,) = windows["slope"].to_list()
-    assert (last - first) / ((end - start) / (86_400_000 * 30.4375)) == pytest.approx(slope)
-    whole = overview(history, {})
-    assert whole is not None
-    assert whole.title == "Every log of every robot"  # two robots fit into one panel
-    assert [entry.words for entry in whole.legend] == ["r0", "r1"]
-    groups = [[trace["legendgroup"] for trace in panel.traces] for panel in whole.panels]
-    assert groups == [["robot0", "robot1"], ["robot0", "robot1", "robot0"]]  # k6 of r0 drifts
+    assert typed(mean["y"]) == pytest.approx(windows["mean"].to_list(), rel=1e-6)
+    assert typed(drift["y"]) == pytest.approx(windows.filter("drift")["mean"].to_list(), rel=1e-6)
+    assert drift["marker"]["symbol"] != points["marker"]["symbol"]
+
+
+def test_an_outlier_has_a_ring(tmp_path: Path) -> None:
+    known: dict[str, Known] = {}
+    for number in range(20):
+        k1 = 1.0 + 0.001 * ((7 * number) % 5 - 2) + 0.5 * (number == 12)
+        known[f"r/{number}"] = "r", START + number * DAY, {"k1": (k1, 0.01, "OK")}
+    _written(tmp_path, known)
+    plot = overview(history_of(tmp_path / "jobs.parquet"))
+    assert plot is not None
+    (ring,) = named(plot.figure.data, "outlier")
+    assert typed(ring["y"]) == pytest.approx([1.502])
+    assert ring["marker"]["symbol"] == "circle-open"
 
 
 def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
@@ -230,21 +219,19 @@ def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
         CliRunner().invoke(app, ["fleet", str(tmp_path)], catch_exceptions=False)
 
 
-def test_the_page_shows_every_robot_and_leads_to_its_reports(tmp_path: Path) -> None:
+def test_the_page_is_three_tables_and_a_figure_and_leads_to_reports(tmp_path: Path) -> None:
     batch = _batch(tmp_path / "batch")
-    for job in ("r0/9", "r1/3"):
+    for job in ("r0/9", "r0/0", "r1/3"):
         (batch / f"{job}.algid").mkdir(parents=True)
         (batch / f"{job}.algid/report.html").write_text("a report")
     done = CliRunner().invoke(app, ["fleet", str(batch), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
-    page = (tmp_path / "page/fleet.html").read_text(encoding="utf-8")
-    robots = re.search(r"<caption>Robots</caption>.*?</table>", page, re.DOTALL)
-    assert robots is not None
-    assert '<a href="#robot-1">r0</a>' in robots[0]
-    assert '<a href="./../batch/r0/9.algid/report.html">r0/9</a>' in page
-    links = re.findall(r'href="(\./[^"]+)"', page)
-    assert links
-    assert all((tmp_path / "page" / link).is_file() for link in links)
+    page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
+    assert list(page.tables) == ["Drift and steps", "Logs that stand out", "Robots"]
+    assert list(page.figures) == ["logs"]
+    links = re.findall(r'href="(\./[^"]+)">([^<]*)<', page.text)
+    assert [name for _, name in links] == ["r0/0", "r0"]  # a finding, and a robot's latest log
+    assert all((tmp_path / "page" / link).is_file() for link, _ in links)
 
 
 def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> None:
@@ -263,10 +250,10 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
     assert "Good: 2 robots, 40 logs: 0 drifts and 0 findings; the clearest trend is k1 of r" in told
     assert "which does not pass p < 9e-4" in told
     history = history_of(tmp_path / "jobs.parquet")
-    figure = overview(history, {})
-    assert figure is not None
-    assert [len(panel.traces) for panel in figure.panels] == [2]  # two robots, nothing marked
-    assert figure.reading == "Read: a dot is a log with its 95 % interval."
+    plot = overview(history)
+    assert plot is not None
+    assert plot.title == "The clearest trends, which are no drift"
+    assert {one["name"] for one in plot.figure.data} == {"log", "mean"}
 
 
 def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:

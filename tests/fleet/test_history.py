@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -13,12 +12,12 @@ from scipy.stats import binom, linregress
 from scipy.stats import t as student
 
 from algid.errors import ResultError
-from algid.fleet.figures import courses, robot_figure, shown_in
+from algid.fleet.figures import overview
 from algid.fleet.history import History, history_of, write_history
-from algid.fleet.page import fleet_document, verdict
-from algid.fleet.tables import change_table, parameter_table, robot_table
-from algid.report.document import Depth, References
+from algid.fleet.page import verdict
+from algid.fleet.tables import change_table, robot_table
 from tests.intervals import holds_95
+from tests.report.pages import named, typed
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 NAMES = tuple(f"k{n}" for n in range(1, 8))
@@ -159,18 +158,20 @@ def test_few_logs_and_logs_of_one_instant_have_a_mean_with_its_error(
     assert not last["drift"]
 
 
-def test_the_page_of_robots_with_a_log_each_draws_no_point_that_is_none(tmp_path: Path) -> None:
-    """Nor a course, which one month has none of; two months have."""
+def test_robots_with_a_log_each_are_drawn_too(tmp_path: Path) -> None:
     history = _history(_jobs(3, 1, seed=13), tmp_path)
-    document = fleet_document(history, {})
-    assert [table.drawn for table in document.tables(Depth.PAGE) if table.title == "Robots"] == [()]
-    longer = _jobs(3, 40, seed=13).filter(pl.col("robot") != "r1")
-    one = _jobs(2, 1, seed=13).filter(pl.col("robot") == "r1")
-    drawn = courses(_history(pl.concat([longer, one]), tmp_path), 10)
-    assert [(column.heading, len(column.rows)) for column in drawn] == [(n, 3) for n in NAMES]
-    places = re.findall(r' (?:points|cx|cy)="([^"]*)"', " ".join(drawn[0].rows.values()))
-    assert places
-    assert "nan" not in " ".join(places)
+    plot = overview(history)
+    assert plot is not None
+    assert plot.title == "Log by log"
+    assert [one["text"] for one in plot.figure.layout["annotations"]][:3] == [
+        f"<b>r{n}: k1, kg m²</b>" for n in range(3)
+    ]
+    dots = named(plot.figure.data, "log")
+    assert len(dots) == 12
+    jobs = pl.read_parquet(tmp_path / "jobs.parquet")
+    assert [typed(one["y"])[0] for one in dots[:3]] == pytest.approx(jobs["k1"].to_list())
+    undated = _jobs(2, 2, seed=9).with_columns(time=pl.lit(None, dtype=pl.Datetime("us", "UTC")))
+    assert overview(_history(undated, tmp_path)) is None
 
 
 def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
@@ -223,7 +224,7 @@ def test_what_was_not_tested_is_said_and_its_robots_are_shown(tmp_path: Path) ->
     assert "2 robots · 4 logs" in page
     assert "for want of a robot" in page
     assert [row[0] for row in robot_table(history).rows] == ["r0", "r1"]
-    assert {row[4] for row in robot_table(history).rows} == {"not tested"}
+    assert {row[2] for row in robot_table(history).rows} == {"not tested"}
     assert all(f">{robot}<" in page for robot in ("r0", "r1"))
 
 
@@ -235,7 +236,7 @@ def test_a_robot_is_shown_with_what_was_found_of_it(tmp_path: Path) -> None:
     )
     first = dict(
         zip(
-            (c.heading for c in robot_table(history).columns),
+            robot_table(history).columns,
             robot_table(history).rows[0],
             strict=True,
         )
@@ -312,23 +313,23 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert "r1 changed at once between 2026-03-21 and 2026-03-22" in " ".join(
         one.text for one in verdict(history).reasons
     )
-    (row,) = [row for row in change_table(history).rows if row[2] == "k1"]
-    assert row[:2] == ("r1", "2026-03-21 and 2026-03-22")
-    assert history.jobs is not None
-    table = parameter_table(history, "r1", history.jobs.filter(pl.col("robot") == "r1"))
-    assert [row[0] for row in table.rows] == list(NAMES)
+    (row,) = [row for row in change_table(history).rows if row[1] == "k1"]
+    step = history.changes.filter(parameter="k1").row(0, named=True)
+    half = 1.96 * step["step_std"] * abs(step["share"] / step["step"]) * 100
+    assert row[2:] == (
+        "step", f"{100 * step['share']:+.3g} ± {half:.2g}", "%", "2026-03-21 to 2026-03-22",
+    )  # fmt: skip
+    assert robot_table(history).rows[1][3] == "2026-03-22"
     assert verdict(history).headline.startswith("2 robots, 240 logs: 0 drifts, 1 change and 0 ")
-    figure = robot_figure(history, "r1", history.jobs.filter(pl.col("robot") == "r1"), {}, "r1")
-    assert shown_in(figure.panels) == {"log", "mean", "change"}
-    assert [one.words for one in figure.legend] == [
-        "a log, ± 95 %",
-        "mean of 3 months",
-        "changed at once",
-    ]
-    assert figure.reading.endswith("at a red line the arm changed at once.")
-    assert not any(word in figure.reading for word in ("outlier", "drift", "report"))
-    assert table.rows[0][5].startswith("changed by +")
-    assert table.rows[1][5] == "–"
+    plot = overview(history)
+    assert plot is not None
+    panels = [one["text"] for one in plot.figure.layout["annotations"]]
+    assert panels == ["<b>r1: k1, kg m²</b>", "<b>r1: k3, kg m²</b>"]
+    lines = [one["x0"] for one in plot.figure.layout["shapes"]]
+    assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 2
+    mean = named(plot.figure.data, "mean")[0]
+    assert np.count_nonzero(np.isnan(typed(mean["y"]))) == 1  # no line leads across the change
+    assert {one["name"] for one in plot.figure.data} == {"log", "mean"}
 
 
 @pytest.mark.parametrize("scatter", [1.0, 3.0])
@@ -363,19 +364,3 @@ def test_many_robots_of_a_log_each_may_be_one_in_many_folders(tmp_path: Path) ->
     together = one.with_columns(time=pl.lit(START))  # robots of one moment are several
     assert _history(together, tmp_path).scattered is None
     assert _history(_jobs(3, 30, seed=24), tmp_path).scattered is None
-
-
-def test_every_robot_has_all_its_parameters_and_its_reports(tmp_path: Path) -> None:
-    history = _history(_jobs(3, 40, seed=25), tmp_path)
-    reports = {f"j{n}": f"./j{n}.html" for n in range(120)}
-    document = fleet_document(history, reports)
-    folded = [one for one in document.sections if one.fold and not one.listed]
-    assert [one.title.partition(" ")[0] for one in folded] == ["r0", "r1", "r2"]
-    for section in folded:
-        table, figure, links = section.content
-        assert isinstance(links, References)
-        assert [len(group) for group in links.groups.values()] == [40]
-        assert len(figure.panels) == len(NAMES)  # type: ignore[union-attr]
-        assert len(table.rows) == len(NAMES)  # type: ignore[union-attr]
-    (robots,) = [table for table in document.tables(Depth.PAGE) if table.title == "Robots"]
-    assert robots.links == {one.title.partition(" ")[0]: f"#{one.key}" for one in folded}

@@ -1,4 +1,4 @@
-"""Some sixty identifications, tracks and exports, each as the few numbers and codes that its users
+"""Some eighty identifications and exports, each as the few numbers and codes that its users
 rely on.
 
 The suite guards a rebuilding: whatever moves a number or a code shows here, meant or not. It
@@ -20,6 +20,7 @@ import numpy as np
 import algid
 from algid.log import Log
 from algid.synth.sensors import Sensors
+from tests.golden.scenes import SCENES
 from tests.processes import Outcome
 from tests.report.test_brief import held
 
@@ -148,6 +149,14 @@ def _several(count: int, **settings: Any) -> Callable[[Path], Summary]:
     return run
 
 
+def _scene(name: str) -> Callable[[Path], Summary]:
+    def run(_folder: Path) -> Summary:
+        unloaded, loaded = SCENES[name]()
+        return summary(algid.identify(unloaded, loaded or None, report=False))
+
+    return run
+
+
 def _known_arm(_folder: Path) -> Summary:
     unloaded, loaded = logs("case1")
     arm = algid.identify(unloaded, report=False)
@@ -219,7 +228,6 @@ def cases() -> Iterator[Case]:
     wrong: dict[str, Callable[[Log], Log]] = {
         "flipped torque": _scaled(tau1=-1.0),
         "mirrored": _scaled(theta1=-1.0, theta2=-1.0, tau1=-1.0, tau2=-1.0),
-        "in degrees": _scaled(theta1=57.29577951308232, theta2=57.29577951308232),
         "gain": _scaled(tau1=0.8),
         "hanging zero": _shifted(0, np.pi / 2),
         "zero of joint 2": _shifted(1, 0.1),
@@ -229,6 +237,8 @@ def cases() -> Iterator[Case]:
     }
     for label, change in wrong.items():
         yield Case(label, _changed(change))
+    for name in SCENES:
+        yield Case(f"scene {name}", _scene(name))
     for suffix in (".csv", ".parquet", ".mcap"):
         yield Case(f"read {suffix}", _read_back(suffix))
     for estimator in ("refined", "weak"):

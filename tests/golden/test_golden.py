@@ -35,8 +35,13 @@ def test_every_case_is_expected_and_every_name_stands_once() -> None:
     assert set(expected()) == set(names)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", ALL, ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.real else [])
+        for case in ALL
+    ],
+)
 def test_a_result_is_what_it_was(case: Case, tmp_path: Path) -> None:
     if case.real and not SHARED.is_dir():
         pytest.skip("../shared/data is absent")

@@ -343,9 +343,7 @@ def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
     } == found.settings
 
 
-def test_the_lines_of_a_profile_stand_before_those_of_its_channels() -> None:
-    found = mended(Convention(signs=(-1, 1), base=True, zero=(-HALF, 0.0)))
-    assert found.remedy.lines == 'drive = "base", zero = "hanging", sign = -1 of [theta1]'
+def test_an_arm_seen_from_behind_says_so() -> None:
     turned = mended(Convention(signs=(-1, -1), torque_signs=(-1, -1)))
     assert turned.words.startswith(
         "all signs are turned round, or θ1 counts from the other horizontal"
@@ -451,5 +449,5 @@ def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
     assert tomllib.loads(text) == {name: {} for name in CHANNELS}
     assert text.splitlines()[13].startswith("# ")
     assert str(tmp_path / "arm.csv") in text
-    assert "# in the log: angle \ufffda (Int64)" in text
+    assert "# in the log: angle \ufffda (int64)" in text
     assert '# source = "NAME"' in text

@@ -40,32 +40,23 @@ TOY = Term(
 '''
 READER = '''"""Logs that begin with a line TOYLOG: a table of text."""
 
-from algid.readers.arrays import Content, open_content
-from algid.readers.formats import Entry
+from dataclasses import replace
+
+import polars as pl
+
+from algid.readers.memory import open_columns
 
 
-def table(path):
-    import polars as pl
-
-    return pl.read_csv(path, skip_rows=1)
-
-
-def opened(path, profile):
-    frame = table(path)
-    return open_content(str(path), "toy", Content(frame, len(frame)), profile)
-
-
-def entries(path):
-    frame = table(path)
-    return tuple(Entry(name, str(kind), len(frame)) for name, kind in frame.schema.items())
+def opened(path):
+    table = open_columns(pl.read_csv(path, skip_rows=1))
+    return replace(table, path=str(path), kind="toy")
 '''
 FORMAT = """    FileFormat(
         "toy",
         "Toy log",
         (".toy",),
         begins(b"TOYLOG"),
-        lambda path, profile: import_module("algid.readers.toy").opened(path, profile),
-        lambda path: import_module("algid.readers.toy").entries(path),
+        lambda path, _: import_module("algid.readers.toy").opened(path),
     ),
 """
 CHECK = '''"""A check that always finds something."""

@@ -92,7 +92,11 @@ def write_mcap(
         writer.finish()  # type: ignore[no-untyped-call]
 
 
-NO_INDEX = {"index_types": IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}
+NO_INDEX: dict[str, Any] = {
+    "index_types": IndexType.NONE,
+    "use_statistics": False,
+    "use_summary_offsets": False,
+}
 
 
 def messages_of(log: Log, **options: Any) -> list[tuple[str, int, bytes]]:

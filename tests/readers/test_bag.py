@@ -172,11 +172,15 @@ def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> No
 
 
 def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
-    for name in ("run_10.db3", "run_9.db3", "run.db3", "a_9.db3", "run_0.txt"):
+    for name in ("run_10.db3", "run_9.db3", "run.db3", "run_0.txt"):
         (tmp_path / name).touch()
     found = bag_files(tmp_path)
-    assert [path.name for path in found.paths] == ["run.db3", "a_9.db3", "run_9.db3", "run_10.db3"]
+    assert [path.name for path in found.paths] == ["run.db3", "run_9.db3", "run_10.db3"]
     assert (found.kind, found.notices) == ("db3", ())
+    (tmp_path / "other_9.db3").touch()
+    with pytest.raises(LogError, match="not the numbered parts of one bag"):
+        bag_files(tmp_path)
+    (tmp_path / "other_9.db3").unlink()
     (tmp_path / "run_11.mcap").touch()
     with pytest.raises(
         LogError, match=r"the bag mixes files of \.db3, \.mcap; read one file of it"

@@ -17,7 +17,6 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
 from pipelines.mutations import damage
-from tests.conftest import Limited
 
 N = 300
 T = np.arange(N) / 100
@@ -40,7 +39,6 @@ REFUSED = {
     "interval": pa.array([(1, 2, 3)] * N, pa.month_day_nano_interval()),
     "list view": pa.array([[1.0]] * N, pa.list_view(pa.float64())),
     "map": pa.array([[("a", 1)]] * N, pa.map_(pa.string(), pa.int64())),
-    "struct": pa.array([{"a": 1.0}] * N),
     "binary": pa.array([b"x"] * N),
     "nothing": pa.nulls(N),
 }
@@ -93,40 +91,6 @@ def test_two_columns_of_one_name_are_refused(name: str, tmp_path: Path) -> None:
     columns = {**LOG, "a": T, "b": T}
     with pytest.raises(LogError, match=f"the column '{name}' stands in the file twice; rename one"):
         read_log(write(tmp_path / "log.feather", columns, [*list(LOG)[:4], "tau2", name, name]))
-
-
-@pytest.mark.parametrize("packing", [None, "lz4", "zstd"])
-@pytest.mark.parametrize(
-    ("bounds", "said"),
-    [
-        ({"whole_bytes": 500}, "it claims"),
-        ({"free_text_bytes": 0, "text_a_byte": 0}, "it claims"),
-        ({"message_indexes": 5}, "it claims"),
-        ({"spans": 2}, "more than 2 messages"),
-        ({"record_bytes": 100}, "it claims a footer of"),
-        ({"columns": 4}, "5 columns; expected 4 at most"),
-    ],
-)
-def test_claims_beyond_a_bound_are_refused(
-    packing: str | None, bounds: dict[str, int], said: str, tmp_path: Path, limited: Limited
-) -> None:
-    path = write(tmp_path / "log.feather", LOG, compression=packing)
-    assert right(read_log(path))
-    limited(**bounds)
-    with pytest.raises(LogError, match=said):
-        read_log(path)
-
-
-def test_zeros_that_unpack_to_more_than_any_log_are_not_unpacked(tmp_path: Path) -> None:
-    zeros = pa.array(np.zeros(50_000_000))
-    table = pa.table(dict.fromkeys(LOG, zeros))
-    with pa.OSFile(str(tmp_path / "log.feather"), "wb") as sink:
-        options = pa.ipc.IpcWriteOptions(compression="zstd")
-        with pa.ipc.new_file(sink, table.schema, options=options) as file:
-            file.write_table(table)
-    assert (tmp_path / "log.feather").stat().st_size < 1 << 20
-    with pytest.raises(LogError, match=r"it claims 2,000,000,000 bytes"):
-        read_log(tmp_path / "log.feather")
 
 
 @pytest.mark.parametrize("packing", [None, "lz4"])

@@ -156,7 +156,7 @@ def test_an_index_of_dates_without_a_name_is_the_time(name: str, form: str, tmp_
 def test_days_are_no_clock(form: str, tmp_path: Path) -> None:
     frame = arm(9, 2).with_columns(pl.Series("t", [date(2024, 3, day) for day in range(1, 10)]))
     WRITERS[form](frame, tmp_path / f"log.{form}")
-    with pytest.raises(LogError, match="column 't' for t holds Date; expected numbers"):
+    with pytest.raises(LogError, match=r"column 't' for t holds date32.*; expected numbers"):
         read_log(tmp_path / f"log.{form}")
 
 
@@ -165,7 +165,7 @@ def test_a_date_is_no_angle(form: str, tmp_path: Path) -> None:
     frame = arm(9, 2).with_columns(pl.Series("q2", [START] * 9))
     WRITERS[form](frame, tmp_path / f"log.{form}")
     with pytest.raises(
-        LogError, match=r"column 'q2' for theta2 holds Datetime.*; expected numbers"
+        LogError, match=r"column 'q2' for theta2 holds timestamp.*; expected numbers"
     ):
         read_log(tmp_path / f"log.{form}")
 
@@ -188,11 +188,11 @@ def test_more_columns_than_any_log_has_are_refused_in_every_format(tmp_path: Pat
     frame = arm(3, 2).with_columns(pl.lit(0.0).alias(f"c{place}") for place in range(4093))
     for form, write in WRITERS.items():
         write(frame, tmp_path / f"log.{form}")
-        with pytest.raises(LogError, match="4,098 columns; expected 4096 at most"):
+        with pytest.raises(LogError, match="more than 4096 columns"):
             read_log(tmp_path / f"log.{form}")
     matrices: dict[str, Any] = {f"q{place}": np.zeros((5, 64)) for place in range(64)}
     np.savez(tmp_path / "log.npz", t=np.arange(5), **matrices)
-    with pytest.raises(LogError, match="4,097 columns; expected 4096 at most"):
+    with pytest.raises(LogError, match="more than 4096 columns"):
         read_log(tmp_path / "log.npz")
 
 
@@ -210,7 +210,7 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
     text = (
         f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm "
         "in motion: "
-        'if they are in ms: --set time_unit=ms (profile: time_unit = "ms")'
+        "if they are in ms: --set time_unit=ms"
     )
     assert [(notice.code, notice.clause) for notice in said] == [("SLOW_CLOCK", text)] * told
     assert read_log(path, Profile(time_unit="s")).notices == ()
@@ -276,14 +276,16 @@ def test_a_look_at_other_joints_does_not_stand_for_the_check_of_all_pages(tmp_pa
     path.write_bytes(content)
     reader = open_log(path, Profile(joints=("1", "2")))
     assert [notice.code for notice in reader.notices] == ["OTHER_JOINTS"]
-    with pytest.raises(LogError, match="the checksum of a page at byte"):
+    with pytest.raises(LogError, match="CRC checksum"):
         reader.whole()
 
 
 def test_an_angle_that_is_a_date_holds_no_number(tmp_path: Path) -> None:
     rows = [f"{row},2024-03-01 00:00:{row:02d},2,3,4" for row in range(10)]
     (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
-    with pytest.raises(LogError, match="no row has a value in every column that is needed"):
+    with pytest.raises(
+        LogError, match=r"column 'q1' for theta1 holds timestamp.*; expected numbers"
+    ):
         read_log(tmp_path / "log.csv")
 
 

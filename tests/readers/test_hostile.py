@@ -11,13 +11,9 @@ import math
 import os
 import random
 import struct
-import subprocess
-import sys
 import tempfile
-import tracemalloc
 import zlib
 from dataclasses import asdict
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +29,6 @@ from algid.batches.manifest import is_manifest
 from algid.errors import LogError
 from algid.files import read_whole, sha256_of
 from algid.readers import read_log
-from algid.readers.mcap.framing import DamagedError, unpack
 from algid.writers import write_log
 from pipelines.mutations import clean_files, clean_log, damage
 from tests.conftest import Limited
@@ -64,44 +59,6 @@ def test_damage_is_refused_told_or_harmless(seed: int, kind: str, clean: dict[st
         assert "\n" not in told
     else:
         assert found.notices or same(found, clean_log())
-
-
-def chunk(size: int, packed: bytes, name: bytes = b"zstd", crc: int = 0) -> bytes:
-    head = struct.pack("<QQQII", 0, 0, size, crc, len(name)) + name
-    return head + struct.pack("<Q", len(packed)) + packed
-
-
-def test_chunks_are_bounded_before_they_are_unpacked() -> None:
-    import lz4.frame
-
-    bomb = bytes(1 << 24)
-    tracemalloc.start()
-    for packed, name in ((zstandard.compress(bomb), b"zstd"), (lz4.frame.compress(bomb), b"lz4")):
-        for claimed in (100, 1 << 40, 1 << 63):
-            with pytest.raises(DamagedError):
-                unpack(chunk(claimed, packed, name))
-    # a frame that does not tell its size
-    stream = zstandard.ZstdCompressor().compressobj()
-    packed = stream.compress(bomb) + stream.flush()
-    with pytest.raises(DamagedError):
-        unpack(chunk(100, packed))
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 1 << 26
-    assert unpack(chunk(1 << 24, zstandard.compress(bomb), crc=zlib.crc32(bomb))) == bomb
-    with pytest.raises(DamagedError, match="checksum"):
-        unpack(chunk(1 << 24, zstandard.compress(bomb), crc=1))
-    with pytest.raises(DamagedError, match="bz2"):
-        unpack(chunk(1, b"x", b"bz2"))
-
-
-def test_a_bomb_of_text_is_refused_in_bounded_memory(tmp_path: Path) -> None:
-    text = b"t,theta1,theta2,tau1,tau2\n0,1,2,3,4\n1,1,2,3,4\n" + b"5" * (1 << 25)
-    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text, 1))
-    (tmp_path / "log.csv.zst").write_bytes(zstandard.compress(text))
-    for name in ("log.csv.gz", "log.csv.zst"):
-        with pytest.raises(LogError, match="line of more than"):
-            read_log(tmp_path / name)
 
 
 @pytest.mark.parametrize("columns", [5_000, 1_000_000])
@@ -160,19 +117,6 @@ def test_frames_of_zstd_behind_one_another_are_one_table(tmp_path: Path) -> None
     (tmp_path / "log.csv.zst").write_bytes(zstandard.compress(TABLE) + b"no frame")
     with pytest.raises(LogError, match="damaged or cut off"):
         read_log(tmp_path / "log.csv.zst")
-
-
-@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
-def test_empty_lines_without_end_take_no_memory(end: bytes, tmp_path: Path) -> None:
-    text = TABLE.replace(b"\n", end)
-    packed = zstandard.compress(b"# a log" + end * 3 + text + end * 500_000 + b"9999,1,1,1,1" + end)
-    (tmp_path / "log.csv.zst").write_bytes(packed)
-    (tmp_path / "small.csv").write_bytes(TABLE)
-    read_log(tmp_path / "small.csv")  # what is loaded once is not counted, nor traced
-    tracemalloc.start()
-    assert len(read_log(tmp_path / "log.csv.zst")) == 3001
-    assert tracemalloc.get_traced_memory()[1] < 1 << 24
-    tracemalloc.stop()
 
 
 def test_text_that_unpacks_to_more_than_any_table_is_refused(
@@ -255,7 +199,7 @@ def test_checksums_of_parquet_pages_are_verified(options: dict[str, Any], tmp_pa
     content = bytearray(path.read_bytes())
     content[content.index(struct.pack("<d", clean_log(2000).theta[0, 1234]))] ^= 1
     path.write_bytes(content)
-    with pytest.raises(LogError, match="the checksum of a page at byte"):
+    with pytest.raises(LogError, match="CRC checksum"):
         read_log(path)
 
 
@@ -269,71 +213,12 @@ class Keys(encryption.KmsClient):  # type: ignore[misc]
         return base64.b64decode(key)
 
 
-def read_alone(*paths: Path) -> list[str]:
-    """What a process of its own says of each file, which may end it: nothing, or the error's type
-    and text.
-    """
-    code = (
-        "import sys; from algid.readers import read_log\n"
-        "for path in sys.argv[1:]:\n"
-        "    try: print(len(read_log(path)))\n"
-        "    except Exception as error: print(type(error).__name__, error)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *paths], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr  # not -6, an abort
-    told = done.stdout.splitlines()
-    assert len(told) == len(paths)
-    return told
-
-
 KEYS: list[dict[str, Any]] = [
     {"column_keys": {"k": ["theta1"]}},
     {"column_keys": {"k": ["note"]}},
 ]
 if hasattr(encryption.EncryptionConfiguration, "uniform_encryption"):  # not in older pyarrow
     KEYS.append({"uniform_encryption": True})
-
-
-def test_encrypted_parquet_is_refused_and_ends_no_process(tmp_path: Path) -> None:
-    factory = encryption.CryptoFactory(lambda _: Keys())
-    table = arm_table(50).append_column("note", pa.array(["x"] * 50))
-    made = [
-        (tmp_path / f"{place}{plain}.parquet", plain, keys)
-        for place, keys in enumerate(KEYS)
-        for plain in (True, False)
-    ]
-    for path, plain, keys in made:
-        configuration = encryption.EncryptionConfiguration(
-            footer_key="k", plaintext_footer=plain, double_wrapping=False, **keys
-        )
-        properties = factory.file_encryption_properties(
-            encryption.KmsConnectionConfig(), configuration
-        )
-        with pq.ParquetWriter(path, table.schema, encryption_properties=properties) as writer:
-            writer.write_table(table)
-    for (path, plain, _), told in zip(
-        made, read_alone(*(path for path, _, _ in made)), strict=True
-    ):
-        assert told.startswith(f"LogError {path}: ")
-        assert "encrypt" in told or not plain
-
-
-def test_a_footer_that_is_none_is_refused(tmp_path: Path) -> None:
-    for footer in (
-        b"\x15\x02",
-        b"\xff" * 40,
-        b"\x19\xfc\xff\xff\xff\xff\x0f",
-        b"\x1c" * 100,
-        b"\x1b\x00",
-        b"\x18\xff\xff\x03",
-    ):
-        (tmp_path / "log.parquet").write_bytes(
-            b"PAR1" + footer + len(footer).to_bytes(4, "little") + b"PAR1"
-        )
-        with pytest.raises(LogError, match="footer is damaged"):
-            read_log(tmp_path / "log.parquet")
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, 10**400])
@@ -360,50 +245,3 @@ def test_lines_that_end_in_carriage_returns_alone_are_refused(
         read_log(tmp_path / "log.csv")
     (tmp_path / "log.csv").write_bytes(("\r\n".join([header, *rows]) + "\r\n").encode())
     assert len(read_log(tmp_path / "log.csv")) == 30
-
-
-def test_a_footer_that_claims_pages_beyond_the_file_is_refused(tmp_path: Path) -> None:
-    whole = BytesIO()
-    pq.write_table(arm_table(), whole, compression="none", use_dictionary=False)
-    content = whole.getvalue()
-    start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
-    for cut in (100, start // 2):
-        (tmp_path / "log.parquet").write_bytes(
-            b"PAR1" + content[start - cut : start] + content[start:]
-        )
-        with pytest.raises(LogError, match="pages beyond the end of the file"):
-            read_log(tmp_path / "log.parquet")
-
-
-def test_statistics_that_contradict_their_column_do_not_end_the_process(tmp_path: Path) -> None:
-    path = tmp_path / "log.parquet"
-    pq.write_table(arm_table(), path, write_page_checksum=True, row_group_size=500)
-    content = path.read_bytes()
-    start = len(content) - 8 - int.from_bytes(content[-8:-4], "little")
-    # SizeStatistics (field 16): a histogram of two repetition levels where a flat column has none
-    levels = b"<)\x06\x19&"
-    if levels not in content[start:-8]:
-        pytest.skip("this pyarrow writes no SizeStatistics")
-    footer = content[start:-8].replace(levels, b"<)&\x00\x00\x19&")
-    path.write_bytes(content[:start] + footer + len(footer).to_bytes(4, "little") + b"PAR1")
-    (told,) = read_alone(path)
-    assert told == "2000" or told.startswith("LogError")
-
-
-def test_a_page_that_claims_impossible_values_does_not_end_the_process(tmp_path: Path) -> None:
-    options: list[dict[str, Any]] = [
-        {"use_dictionary": False},
-        {"use_dictionary": True},
-        {"data_page_version": "2.0"},
-    ]
-    paths = [tmp_path / f"{place}.parquet" for place in range(3)]
-    for path, own in zip(paths, options, strict=True):
-        pq.write_table(arm_table(60), path, compression="none", **own)
-        content = bytearray(path.read_bytes())
-        values = bytes([0x15, 120, 0x15])  # 60 values, zigzag, in a data page's header
-        place = content.index(values, 4) + 1
-        content[place] = 119  # -60
-        path.write_bytes(content)
-    for told in read_alone(*paths):
-        assert told.startswith("LogError")
-        assert "claims -60 values" in told

@@ -11,7 +11,7 @@ import pytest
 from algid.errors import LogError
 from algid.notices import Notice
 from algid.readers import read_log
-from algid.readers.frames import time_unit, to_nanoseconds
+from algid.readers.flat import time_unit, to_nanoseconds
 from algid.readers.names import take_apart
 from algid.readers.table import SampleTable
 from algid.readers.timebase import in_order
@@ -136,7 +136,7 @@ def test_dialects(text: str, tmp_path: Path) -> None:
     found = read_log(tmp_path / "log.csv")
     assert found.theta.tolist() == [[1.5, 1.5], [2, 2]]
     assert found.tau.tolist() == [[3, 3], [4, 4]]
-    cut = [Notice("CUT_OFF", numbers={"case": "row", "row": 3}, lossy=True)]
+    cut = [Notice("NO_LINE_END", lossy=True)]
     assert [one for one in found.notices if one.lossy] == (cut if text.endswith("2") else [])
 
 

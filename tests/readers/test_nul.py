@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from pathlib import Path
 
@@ -9,7 +10,6 @@ import numpy as np
 import pytest
 
 from algid.errors import LogError
-from algid.inspection.report import contents
 from algid.readers import read_log
 from tests.readers.logs import noise_log
 
@@ -40,11 +40,22 @@ def test_rows_before_nul_bytes_are_kept_and_the_loss_is_counted(
     log = read_log(path)
     assert np.array_equal(log.theta, LOG.theta[:, :kept])
     assert np.array_equal(log.tau, LOG.tau[:, :kept])
-    (notice,) = [one for one in log.notices if one.code == "CUT_OFF"]
-    assert notice.lossy
-    if kind != "jsonl":
-        assert notice.numbers["bytes"] == 11 + nul
-        assert {entry.count for entry in contents(path)[1]} == {kept}
+    assert [(one.code, one.lossy) for one in log.notices] == [
+        ("CUT_OFF" if kind == "jsonl" else "NO_LINE_END", True)
+    ]
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("kind", ["csv", "blanks"])
+def test_a_last_row_without_a_line_end_is_left_out_and_told(
+    kind: str, packed: bool, tmp_path: Path
+) -> None:
+    """Its last number may lack digits: 0.4 may have been 0.4711, or 0.4e-05."""
+    path, text = tmp_path / "log.csv", text_of(kind)[:-4]
+    path.write_bytes(gzip.compress(text) if packed else text)
+    log = read_log(path)
+    assert np.array_equal(log.tau, LOG.tau[:, :-1])
+    assert [(one.code, one.lossy) for one in log.notices] == [("NO_LINE_END", True)]
 
 
 def test_a_file_of_nul_bytes_is_no_log(tmp_path: Path) -> None:

@@ -74,10 +74,13 @@ def profile_without_first(law: dict[str, object]) -> Profile:
     return with_settings(Profile(), {"tau1": law, "tau2": LAWS["tau2"]})
 
 
-def test_a_law_that_brakes_needs_velocities(tmp_path: Path) -> None:
-    path, _ = written(tmp_path, velocities=False)
-    with pytest.raises(LogError, match="kd of tau1 needs the joint's velocity"):
-        read_log(path, profile())
+def test_without_velocities_a_law_differentiates_the_angles(tmp_path: Path) -> None:
+    path, tau = written(tmp_path, velocities=False)
+    log = read_log(path, profile())
+    assert log.omega is None
+    # kd h² / 6 of the third derivative, 8 rad/s³ at most; first order at both ends
+    np.testing.assert_allclose(log.tau[:, 1:-1], tau[:, 1:-1], atol=2.0 * 0.01**2 / 6 * 8)
+    np.testing.assert_allclose(log.tau, tau, atol=2.0 * 0.01 / 2 * 4)
 
 
 def test_a_log_without_torque_names_the_law(tmp_path: Path) -> None:

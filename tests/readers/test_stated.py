@@ -11,10 +11,8 @@ import pyarrow.feather as feather
 import pyarrow.parquet as pq
 import pytest
 
-from algid.errors import LogError
 from algid.profile import Profile, Torque
 from algid.readers import open_log, read_log
-from algid.readers.stated import in_text
 
 COLUMNS = ("time", "q1", "q2", "tau1", "tau2")
 ROWS = 50
@@ -27,68 +25,79 @@ def table(above: str, header: str = ",".join(COLUMNS)) -> str:
 
 
 @pytest.mark.parametrize(
-    ("line", "units"),
+    ("line", "settings"),
     [
-        ("tau in mNm", {"tau1": "mNm", "tau2": "mNm"}),
-        (
-            "on Monday; tau1, tau2 in mN m, q1 and q2 in deg",
-            {"q1": "deg", "q2": "deg", "tau1": "mN m", "tau2": "mN m"},
-        ),
-        ("torques are in mNm.", {"tau1": "mNm", "tau2": "mNm"}),
-        ("angles: degrees", {"q1": "degrees", "q2": "degrees"}),
-        ("q [deg], tau [mNm]", dict(zip(COLUMNS[1:], ("deg", "deg", "mNm", "mNm"), strict=True))),
-        ("tau2 = mNm", {"tau2": "mNm"}),
-        (
-            "units: s, deg, deg, mNm, Nm",
-            dict(zip(COLUMNS, ("s", "deg", "deg", "mNm", "Nm"), strict=True)),
-        ),
-        (
-            "units: ms, deg, mNm",
-            dict(zip(COLUMNS, ("ms", "deg", "deg", "mNm", "mNm"), strict=True)),
-        ),
-        ("torque (Nm)", {"tau1": "Nm", "tau2": "Nm"}),
-        ("time in ms", {"time": "ms"}),
-        ("position in inch", {"q1": "inch", "q2": "inch"}),
-        ("a robot in a lab, payload: 2 kg, q1 was greased in June, temperature in degrees", {}),
-        ("currents in mA", {}),
+        ("tau in mNm", {"tau1.unit": "mN m", "tau2.unit": "mN m"}),
+        ("note: tau1, tau2 in mNm", {"tau1.unit": "mN m", "tau2.unit": "mN m"}),
+        ("effort is logged in mN m.", {"tau1.unit": "mN m", "tau2.unit": "mN m"}),
+        ("torque in lbf in", {"tau1.unit": "lbf in", "tau2.unit": "lbf in"}),
+        ("motor current [A]", {"tau1.unit": "A", "tau2.unit": "A"}),
+        ("Torque unit: mNm", {"tau1.unit": "mN m", "tau2.unit": "mN m"}),
+        ("angles: degrees", {"theta1.unit": "deg", "theta2.unit": "deg"}),
+        ('units: {"q1": "deg"}', {"theta1.unit": "deg", "theta2.unit": "deg"}),
+        ("time in ms", {"time_unit": "ms"}),
+        ("position in inch", {"theta1.unit": None, "theta2.unit": None}),
+        ("effort: gravity-compensated", {"effort": "gravity-compensated"}),
+        ("zero = hanging", {"zero": "hanging"}),
+        ("a robot in a lab, payload: 2 kg, q1 was greased in June", {}),
+        ("tau in Nm, q in rad, time in s", {}),
+        ("arm A swings by 30 deg every 5 ms, a turn to the left", {}),
     ],
-)  # fmt: skip
-def test_statements(line: str, units: dict[str, str]) -> None:
-    assert in_text([line], COLUMNS) == units
+)
+def test_what_a_comment_states_is_told_and_not_used(
+    line: str, settings: dict[str, str | None], tmp_path: Path
+) -> None:
+    (tmp_path / "log.csv").write_text(table(f"# {line}"))
+    log = read_log(tmp_path / "log.csv")
+    assert log.tau[0, 0] == 5
+    said = [notice for notice in log.notices if notice.code == "STATED_UNUSED"]
+    found: dict[str, object] = {}
+    for notice in said:
+        for remedy in notice.remedies:
+            found |= remedy.settings
+    assert found == settings
+    assert len(said) == bool(settings)
+
+
+def test_what_a_user_says_is_not_told_again(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(table("# tau in mNm\n# zero: hanging"))
+    torque = Torque(unit="mN m")
+    log = read_log(tmp_path / "log.csv", Profile(tau1=torque, tau2=torque, zero="horizontal"))
+    assert "STATED_UNUSED" not in {notice.code for notice in log.notices}
+
+
+@pytest.mark.parametrize(("rate", "told"), [("100", 0), ("50 Hz", 1)])
+def test_a_rate_that_stamps_contradict_is_told(rate: str, told: int, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(table(f"# fs: {rate}"))
+    said = [one for one in read_log(tmp_path / "log.csv").notices if one.code == "STATED_UNUSED"]
+    assert len(said) == told
 
 
 @pytest.mark.parametrize(
-    "above", ["# tau in mNm\n# q in deg", "A title, of the log\nunits: s, deg, deg, mNm, mNm"]
+    "settings",
+    [
+        {"rate": 100.0},
+        {"topic": "/joint_states"},
+        {"clock": "log"},
+        {"columns": ("a", "b", "c", "d", "e")},
+        {"velocity": True},
+        {"omega1": {"unit": "deg"}},
+    ],
+    ids=str,
 )
-def test_units_above_a_table_are_used(above: str, tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table(above))
-    log = read_log(tmp_path / "log.csv")
-    assert np.allclose(np.rad2deg(log.theta[1]), 2 * np.arange(ROWS), rtol=1e-12)
-    assert np.allclose(1000 * log.tau[0], 10 * np.arange(ROWS) + 5, rtol=1e-12)
-    assert log.origin.reading.channels["tau1"].told == "names"
+def test_a_setting_of_no_use_is_told(settings: dict[str, object], tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(table("#"))
+    log = read_log(tmp_path / "log.csv", Profile.model_validate(settings))
+    (said,) = [one for one in log.notices if one.code == "STATED_UNUSED"]
+    assert set(settings) <= set(said.numbers["said"].split(", "))
 
 
-def test_a_flag_beats_a_statement_and_says_so(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table("# tau in mNm"))
-    log = read_log(tmp_path / "log.csv", Profile(tau1=Torque(unit="N m"), tau2=Torque(unit="mN m")))
-    assert log.tau[:, 0].tolist() == [5, -0.005]
-    said = [notice.text for notice in log.notices if notice.code == "OTHER_UNIT"]
-    assert said == [
-        "the file states the unit mN m for tau1 ('tau1'), which is taken for N m, as told"
-    ]
-
-
-def test_a_name_beats_a_line_and_says_so(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table("# tau in mNm", "time,q1,q2,tau1 [Nm],tau2 [Nm]"))
-    log = read_log(tmp_path / "log.csv")
-    assert log.tau[0, 0] == 5
+def test_a_unit_in_a_name_beats_an_attribute_and_says_so() -> None:
+    columns = {name: np.arange(ROWS) + 1.0 for name in COLUMNS} | {"time": np.arange(ROWS) / 100}
+    named = pa.table(columns).rename_columns(["time", "q1", "q2", "tau1 [Nm]", "tau2 [Nm]"])
+    log = read_log(named.replace_schema_metadata({"tau.unit": "mNm"}))
+    assert log.tau[0, 0] == 1
     assert sum(notice.code == "OTHER_UNIT" for notice in log.notices) == 2
-
-
-def test_a_foreign_unit_above_a_table_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table("# position in inch"))
-    with pytest.raises(LogError, match="'q1' for theta1 is in 'inch', which is no unit of a joint"):
-        read_log(tmp_path / "log.csv")
 
 
 def test_a_current_in_mA_is_not_one_in_A(tmp_path: Path) -> None:
@@ -123,7 +132,6 @@ def arrow(field_units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
             {"q1": "deg", "q2": "deg"},
             {"unit:tau1": "mNm", "tau2.unit": "mNm", "author": "A. N. Other"},
         ),
-        ({}, {"units": "time in s, q in deg, tau in mNm"}),
     ],
 )
 def test_units_of_a_schema_are_used(

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import struct
 import sys
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import polars as pl
 import pytest
 import scipy.io
 
@@ -122,7 +120,7 @@ def test_lines_that_lie_deep_within_themselves_are_refused(opened: str, tmp_path
         kept[30] = kept[30][:-1] + ', "x": ' + opened * depth + "1" + closed * depth + "}"
         path.write_text("\n".join(kept))
         if refused:
-            with pytest.raises(LogError, match=r"a\.jsonl: line 31: lists and objects within"):
+            with pytest.raises(LogError, match=r"a\.jsonl: lists and objects within"):
                 read_log(path)
         else:
             assert len(read_log(path)) == 60
@@ -246,24 +244,6 @@ def test_hdf5_that_is_damaged_or_leads_elsewhere_is_refused(tmp_path: Path) -> N
         read_log(path)
 
 
-def test_hdf5_that_breaks_its_library_is_refused(tmp_path: Path) -> None:
-    """A chunk of three bytes, of which a checksum takes four, is a segmentation fault
-    in libhdf5.
-    """
-    h5py = pytest.importorskip("h5py")
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w") as file:
-        for name, values in {"t": LOG.t, "q": LOG.theta.T, "tau": LOG.tau.T}.items():
-            file.create_dataset(name, data=values, chunks=values.shape, fletcher32=True)
-        size = file["t"].id.get_chunk_info(0).size
-    read_log(path)
-    key = struct.pack("<II", size, 0)  # a chunk's size in bytes, and its filters' mask
-    path.write_bytes(path.read_bytes().replace(key, struct.pack("<II", 3, 0)))
-    with pytest.raises(LogError, match=r"a\.h5: the HDF5 file is damaged: .* broke on it") as told:
-        read_log(path)
-    assert "\n" not in str(told.value)
-
-
 @pytest.mark.parametrize("chunks", [None, 30])
 def test_hdf5_of_which_a_part_is_missing_is_refused(tmp_path: Path, chunks: int | None) -> None:
     """HDF5 fills up with zeros what was never written; an array cut short keeps its bytes."""
@@ -276,36 +256,6 @@ def test_hdf5_of_which_a_part_is_missing_is_refused(tmp_path: Path, chunks: int 
         if chunks:
             tau[:30] = LOG.tau.T[:30]
     with pytest.raises(LogError, match=r"'tau' has (0 of 960 bytes|1 of 2 chunks)"):
-        read_log(path)
-
-
-def test_a_feather_batch_that_claims_fewer_rows_than_its_columns_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.feather"
-    names = ("t", "theta1", "theta2", "tau1", "tau2")
-    pl.DataFrame(dict(zip(names, (LOG.t, *LOG.theta, *LOG.tau), strict=True))).write_ipc(path)
-    content = path.read_bytes()
-    read_log(path)
-    rows, node = struct.pack("<q", 60), struct.pack("<qq", 60, 0)
-    places = [at for at in range(len(content)) if content.startswith(rows, at)]
-    lone = [at for at in places if not content.startswith(node, at)]
-    assert len(places) > len(lone) >= 1
-    told = []
-    for at in lone:
-        path.write_bytes(content[:at] + struct.pack("<q", 59) + content[at + 8 :])
-        with pytest.raises(LogError) as refused:
-            read_log(path)
-        told.append(str(refused.value))
-    assert any("claims 59 rows, and its first column 60" in text for text in told)
-
-
-def test_a_numpy_array_of_fewer_rows_than_its_file_holds_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.npy"
-    table = np.zeros(60, [(name, float) for name in ("t", "theta1", "theta2", "tau1", "tau2")])
-    table["t"] = LOG.t
-    np.save(path, table)
-    assert len(read_log(path)) == 60
-    path.write_bytes(path.read_bytes().replace(b"(60,)", b"(59,)"))
-    with pytest.raises(LogError, match="its head says 59 rows, and there is more behind them"):
         read_log(path)
 
 

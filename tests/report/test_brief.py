@@ -30,7 +30,7 @@ def held(result: Result) -> str:
 def test_verdict_reasons_estimates_terms_and_fit_stand_in_25_lines(result: Result) -> None:
     text = held(result)
     assert text.startswith("Good: ")
-    for words in ("gravity moment of link 2", "k7", "m_p", "R²", "Terms kept"):
+    for words in ("gravity moment of link 2", "k7", "m_p", "R²"):
         assert words in text
     noted = [
         Notice(code, "said " * 40, logs=(f"{code}.csv",))
@@ -85,28 +85,21 @@ def test_a_real_arm_fits_too(shared_data: Path) -> None:
     assert "gravity moment of link 2" in held(found)
 
 
-def test_of_many_coefficients_as_many_are_shown_as_fit_and_the_rest_is_counted(
-    result: Result,
-) -> None:
-    """No number is cut."""
+def test_the_terms_are_named(result: Result) -> None:
     assert result.fit is not None
+    model = TorqueModel(terms=[], coulomb_speed=0.1, stribeck_speed=0.1, chosen_by="logs")
+    bare = result.model_copy(update={"fit": result.fit.model_copy(update={"model": model})})
+    assert "Optional torque terms: none" in held(bare)
     terms = ["coulomb", "offset", "stribeck", "load"]
-    model = TorqueModel(terms=terms, coulomb_speed=0.1, stribeck_speed=0.1, chosen_by="logs")
-    one = result.parameters["k1"].model_copy(update={"unit": "N m"})
-    others = {f"{name}{joint}": one for name in ("f", "o", "s", "e") for joint in (1, 2)}
-    many = result.model_copy(
-        update={
-            "parameters": result.parameters | others,
-            "fit": result.fit.model_copy(update={"model": model}),
-        }
+    fit = result.fit.model_copy(update={"model": model.model_copy(update={"terms": terms})})
+    late = {**result.parameters, "delay": result.parameters["k1"]}
+    text = held(result.model_copy(update={"fit": fit, "parameters": late}))
+    assert "Optional torque terms: coulomb, offset, stribeck, load, delay (delay " in " ".join(
+        text.split()
     )
-    lines = brief(many)
-    first = next(place for place, line in enumerate(lines) if line.startswith("Terms kept: "))
-    kept = re.fullmatch(
-        r"Terms kept: coulomb, offset, stribeck, load \((.*), (\d) more with -v\)",
-        " ".join(lines[first : first + 2]),
-    )
-    assert kept is not None
-    shown = kept[1].split(", ")
-    assert len(shown) + int(kept[2]) == len(others)
-    assert all(re.fullmatch(r"\w\d \S+ ± \S+", number) for number in shown)
+    several = {f"{name}{joint}": result.parameters["k1"] for name in "fose" for joint in (1, 2)}
+    text = held(result.model_copy(update={"fit": fit, "parameters": result.parameters | several}))
+    shown = text.partition("Optional torque terms: ")[2].partition(")")[0].replace("\n", " ")
+    numbers = re.findall(r"[fose]\d \S+ ± [\d.e-]+(?=,)", shown)  # no number is cut
+    assert shown.endswith(f", {8 - len(numbers)} more with -v")
+    assert numbers

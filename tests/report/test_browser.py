@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from algid.report.page import write_report
+from algid.report.page import write_pages
 from algid.results import Estimate, Result, Status, write_result
 from tests.report.browser import DRIVER, Browser, Seen
 from tests.report.folders import build_recorded, hostile
@@ -49,14 +49,16 @@ def assert_sound(seen: Seen, page: Path, title: str) -> None:
 
 @pytest.mark.parametrize(("width", "dark"), [(1400, False), (400, True)])
 def test_a_complete_report(browser: Browser, folder: Path, width: int, dark: bool) -> None:
-    page = write_report(folder)
+    page = write_pages(folder)[0]
     seen = browser.look(page, width, dark)
-    assert_sound(seen, page, "case1-unloaded.mcap · algid")
-    assert seen.drawn == 39
-    written = browser.driver.execute_script(
-        "return document.getElementById('correlation-0').data[0].texttemplate"
-    )
-    assert (written is None) == (width == 400)  # where the cells have no room for numbers
+    assert_sound(seen, page, "case1-unloaded.mcap and 1 more · algid")
+    # a phone shows the intervals and the torque; what is folded is drawn as it is opened
+    assert seen.drawn == (10 if width > 640 else 2)
+    run = browser.driver.execute_script
+    run("for (const part of document.querySelectorAll('details.part')) part.open = true")
+    browser.until("return document.documentElement.dataset.drawn === '12'")
+    assert run("return document.documentElement.dataset.failed") == "0"
+    assert run("return document.documentElement.scrollWidth") <= width
     assert seen.background == ("rgb(16, 21, 28)" if dark else "rgb(255, 255, 255)")
 
 
@@ -76,16 +78,18 @@ def test_a_parameter_that_cannot_be_identified_and_the_library_beside(
         update={"parameters": {**result.parameters, "k5": lost}, "fit": fit}
     )
     write_result(changed, folder / "result.json")
-    page = write_report(folder, shared_library=True)
+    page = write_pages(folder, shared_library=True)[0]
     seen = browser.look(page)
     library = (folder.parent / "plotly.min.js").resolve().as_uri()
     assert seen.requests == [page.resolve().as_uri(), library]
-    assert_sound(replace(seen, requests=seen.requests[:1]), page, "case1-unloaded.mcap · algid")
+    assert_sound(
+        replace(seen, requests=seen.requests[:1]), page, "case1-unloaded.mcap and 1 more · algid"
+    )
 
 
 def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result) -> None:
     write_result(hostile(result), folder / "result.json")
-    page = write_report(folder)
+    page = write_pages(folder)[0]
     seen = browser.look(page, 400)
     assert_sound(seen, page, seen.title)
     # the path's last part, shown; what it would run sets another title
@@ -96,38 +100,33 @@ def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result
 def test_a_real_log(browser: Browser, tmp_path: Path) -> None:
     folder = tmp_path / "run.algid"
     build_recorded(folder, RUN)
-    page = write_report(folder)
+    page = write_pages(folder)[0]
     assert_sound(browser.look(page), page, f"{RUN.name} · algid")
 
 
-def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Path) -> None:
-    browser.look(write_report(folder))
+def test_figures_follow_keys_theme_and_paper(browser: Browser, folder: Path) -> None:
+    browser.look(write_pages(folder)[0])
     run = browser.driver.execute_script
-    shown = (
-        "return document.getElementById('torque-0').data.map((trace) => trace.visible !== false)"
-    )
-    ink = "return document.getElementById('torque-0')._fullLayout.font.color"
-    assert run(shown) == [True, True, True]
-    run("document.querySelector('button[data-figure=torque][data-group=measured]').click()")
-    assert run(shown) == [False, True, True]
-
+    ink = "return document.getElementById('plot-torque')._fullLayout.font.color"
     press = (
-        "document.getElementById('torque-0').dispatchEvent(new KeyboardEvent('keydown', {key: "
+        "document.getElementById('plot-torque').dispatchEvent(new KeyboardEvent('keydown', {key: "
         "arguments[0]}))"
     )
     ranges = (
-        "return ['torque-0', 'torque-1'].map((id) => "
-        "[...document.getElementById(id)._fullLayout.xaxis.range])"
+        "return ['xaxis', 'xaxis3'].map((axis) => "
+        "[...document.getElementById('plot-torque')._fullLayout[axis].range])"
     )
     whole = run(ranges)[0]
     run(press, "+")
     browser.until(
-        "return document.getElementById('torque-1')._fullLayout.xaxis.range[0] > arguments[0]",
+        "return document.getElementById('plot-torque')._fullLayout.xaxis3.range[0] > arguments[0]",
         whole[0],
     )
     one, two = run(ranges)
-    assert one == two
+    assert one == two  # panels of one figure move together
     assert whole[0] < one[0] < one[1] < whole[1]
+    run(press, "ArrowRight")
+    assert run(ranges)[0][0] > one[0]
     run(press, "0")
     assert run(ranges)[0] == pytest.approx(whole)
 
@@ -135,10 +134,23 @@ def test_figures_follow_legend_theme_keys_and_paper(browser: Browser, folder: Pa
     dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
     browser.until(f"{ink} === '#e7ecf3'")
-    assert run(shown) == [False, True, True]
 
     run("dispatchEvent(new Event('beforeprint'))")
-    assert run("return document.getElementById('torque-0')._fullLayout.width") == 690
+    assert run("return document.getElementById('plot-torque')._fullLayout.width") == 690
     assert run(ink) == "#1a2230"
+    opened = "return [...document.querySelectorAll('details.part')].every((part) => part.open)"
+    assert run(opened)
     run("dispatchEvent(new Event('afterprint'))")
     assert run(ink) == "#e7ecf3"
+
+
+def test_the_arm_plays(browser: Browser, folder: Path) -> None:
+    browser.look(write_pages(folder)[0])
+    run = browser.driver.execute_script
+    turned = "return document.querySelector('.link1').getAttribute('transform')"
+    before = run(turned)
+    run("document.querySelector('.player button').click()")
+    browser.until("return Number(document.querySelector('.player input').value) > 0.02")
+    assert run(turned) != before
+    run("document.querySelector('.player button').click()")
+    assert run("return document.querySelector('.player button').textContent") == "Play"

@@ -1,561 +1,358 @@
-"""Figures against what they are drawn from: closed forms, NumPy's own linear algebra, files
-written by hand.
-"""
+"""What the figures draw: against the files, closed forms and numpy."""
 
 from __future__ import annotations
 
-import base64
-from itertools import pairwise
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from scipy.stats import norm
 
-from algid.arm import FloatArray
-from algid.errors import ResultError
-from algid.report.figures.base import Figure, Missing, Panel, between, label, packed, times
-from algid.report.figures.convergence import convergence
-from algid.report.figures.correlation import correlation, correlation_matrix
-from algid.report.figures.coverage import coverage
-from algid.report.figures.inertia import inertia
-from algid.report.figures.information import information
-from algid.report.figures.innovations import (
-    CORRELATION,
-    SPECTRUM,
-    TORQUE,
-    Curve,
-    _round_ticks,
-    innovations,
+from algid.arm import mass_matrix
+from algid.report.figures import (
+    closeup,
+    convergence,
+    correlation,
+    coverage,
+    inertia,
+    information,
+    intervals,
+    measured,
+    residual,
+    running,
+    shares_of_time,
+    signals,
 )
-from algid.report.figures.running import running
-from algid.report.figures.timeline import chained, offsets, separators, short, views
-from algid.report.figures.torque import Scored, closeup, signals, torque
-from algid.report.gallery import drawable
-from algid.report.series import LogRange, TorqueLog, read_scored, read_torque
+from algid.report.plot import Panels, Plot, label, packed
+from algid.report.series import Drawn, drawn
 from algid.results import Estimate, Result, TorquePrediction
+from algid.text import significant
+from tests.report.folders import estimate
+from tests.report.pages import named, typed
 
 
-def values(typed: dict[str, str]) -> FloatArray:
-    """What stands behind a typed array, by NumPy alone."""
-    return np.frombuffer(base64.b64decode(typed["bdata"]), dtype=f"<{typed['dtype']}").astype(
-        np.float64
-    )
+@pytest.fixture(scope="module")
+def raw(case_folder: Path) -> Drawn:
+    return drawn(case_folder / "torque.parquet")
 
 
-def drawn(made: Figure | Missing) -> Figure:
-    assert isinstance(made, Figure)
-    return made
+def traces(plot: Plot | None, name: str) -> list[dict[str, Any]]:
+    assert plot is not None
+    return named(plot.figure.data, name)
 
 
-def with_fit(result: Result, **changes: object) -> Result:
+def finite(values: np.ndarray) -> np.ndarray:
+    return values[np.isfinite(values)]
+
+
+def test_intervals_are_in_percent_of_the_estimate(result: Result) -> None:
     assert result.fit is not None
-    return result.model_copy(update={"fit": result.fit.model_copy(update=changes)})
+    own = {"k1": estimate(2.0, 0.1, ""), "k2": estimate(-4.0, 0.04, ""), "k3": estimate(1, 5, "")}
+    logs = [{"k1": estimate(2.2, 0.1, "")}, {"k1": estimate(9.0, 0.1, "")}]
+    fit = result.fit.model_copy(update={"by_log": logs})
+    known = {"parameters": own, "payload": {}, "table4": [], "truth": {"k2": -4.4}, "fit": fit}
+    plot = intervals(result.model_copy(update=known))
+    (bars,) = traces(plot, "estimate with its interval")
+    assert bars["y"] == ["k1", "k2", "k3"]
+    assert bars["error_x"]["array"] == pytest.approx([9.8, 1.96, 980.0])
+    (dots,) = traces(plot, "each log by itself")  # the loaded log's k1 holds its payload's share
+    assert (dots["x"], dots["y"]) == ([pytest.approx(10.0)], ["k1"])
+    (ring,) = traces(plot, "truth")
+    assert (ring["x"], ring["y"]) == ([pytest.approx(-10.0)], ["k2"])
+    assert ring["marker"]["symbol"] == "circle-open"
+    low, high = plot.figure.layout["xaxis"]["range"]
+    assert high == -low == pytest.approx(1.15 * 4 * 9.8)  # four times the median interval
+    bare = intervals(result.model_copy(update={"parameters": {}, "payload": {}}))
+    assert traces(bare, "truth") == []
 
 
-def with_parameters(result: Result, **numbers: float | None) -> Result:
-    found = {name: Estimate(estimate=value, unit="kg m^2") for name, value in numbers.items()}
-    return result.model_copy(update={"parameters": {**result.parameters, **found}})
-
-
-@given(st.lists(st.floats(-1e30, 1e30), min_size=1, max_size=20))
-def test_numbers_travel_in_single_precision_and_double_where_that_is_not_enough(
-    numbers: list[float],
-) -> None:
-    given_values = np.array(numbers)
-    np.testing.assert_allclose(values(packed(given_values)), given_values, rtol=6e-8, atol=1e-38)
-    np.testing.assert_array_equal(values(packed(given_values, precise=True)), given_values)
-    beyond = np.append(given_values, 1e300)
-    np.testing.assert_array_equal(values(packed(beyond)), beyond)
-
-
-@pytest.mark.parametrize(
-    ("start", "period", "kind"), [(0.0, 1e-3, "f4"), (1e5, 1e-3, "f8"), (1e5, 10.0, "f4")]
-)
-def test_neighbouring_times_stay_apart(start: float, period: float, kind: str) -> None:
-    x = start + period * np.arange(100)
-    made = times(x)
-    assert made["dtype"] == kind
-    np.testing.assert_allclose(np.diff(values(made)), period, rtol=0.02)
-    assert times(np.empty(0))["dtype"] == "f4"
-
-
-def test_an_area_lies_between_its_two_edges() -> None:
-    x, low, high = np.arange(3.0), np.array([0.0, 1.0, 2.0]), np.array([1.0, 3.0, 5.0])
-    first, second = between(x, low, high, "@blue", "band")
-    np.testing.assert_array_equal(values(first["y"]), low)
-    np.testing.assert_array_equal(values(second["y"]), high)
-    assert ("fill" in first, second["fill"], second["fillcolor"]) == (False, "tonexty", "@blue")
-    assert first["legendgroup"] == second["legendgroup"] == "band"
-    assert "legendgroup" not in between(x, low, high, "@blue")[0]
-
-
-def test_a_label_is_never_markup_and_never_long() -> None:
-    assert label("a<b>&c") == "a&lt;b&gt;&amp;c"
-    assert label("x" * 41) == "x" * 39 + "…"
-    assert label("x" * 40) == "x" * 40
-    assert label("y" * 9, 8) == "y" * 7 + "…"
-
-
-RANGES = {0: LogRange(0.0, 2.0, 200), 1: LogRange(5.0, 8.0, 300), 2: LogRange(1.0, 1.5, 50)}
-
-
-def test_logs_follow_one_another_a_hundredth_of_the_whole_apart(result: Result) -> None:
-    moved = offsets(RANGES)
-    ends = [(moved[log] + span.first, moved[log] + span.last) for log, span in RANGES.items()]
-    assert ends[0] == (0.0, 2.0)
-    space = 0.01 * (2.0 + 3.0 + 0.5)
-    assert [after[0] - before[1] for before, after in pairwise(ends)] == pytest.approx([space] * 2)
-    logs = [result.log.model_copy(update={"path": f"{name}.csv"}) for name in "ab"]
-    # more series than logs
-    assert [name for name, *_ in views(RANGES, logs)] == [
-        "a.csv",
-        "b.csv",
-        "log 3",
-    ]
-    shown = separators(RANGES, moved, logs)
-    assert [shape["x0"] for shape in shown["shapes"]] == pytest.approx([end[0] for end in ends[1:]])
-    assert [note["text"] for note in shown["annotations"]] == ["a.csv", "b.csv", "log 3"]
-    assert shown["margin"]["t"] > 22  # the template's
-    many = {log: LogRange(0.0, 1.0) for log in range(30)}
-    runs = [result.log.model_copy(update={"path": f"/d/run_{n:02}.csv"}) for n in range(30)]
-    crowded = separators(many, offsets(many), runs)
-    assert len(crowded["shapes"]) == 29
-    # every log keeps its name, less what all names share
-    assert [note["text"] for note in crowded["annotations"]] == [f"{n:02}" for n in range(30)]
-    assert short(["a.csv", "b.csv"]) == ["a", "b"]
-    assert short(["run", "run-1"]) == ["run", "run-1"]
-    assert short(["x-143339.csv", "x-143524.csv"]) == ["143339", "143524"]
-    assert separators({0: RANGES[0]}, moved, logs) == {}
-
-
-def test_a_chained_line_breaks_between_logs() -> None:
-    series = {
-        1: (np.array([5.0, 6.0]), np.array([3.0, 4.0])),
-        0: (np.array([0.0, 1.0]), np.array([1.0, 2.0])),
-    }
-    x, y = chained(series, {0: 0.0, 1: -3.0})
-    np.testing.assert_array_equal(x, [0, 1, 1, 2, 3, 3])
-    np.testing.assert_array_equal(y, [1, 2, np.nan, 3, 4, np.nan])
-    assert chained({}, {})[0].size == 0
-
-
-def test_correlations_are_those_of_numpy_and_unknown_where_a_variance_is() -> None:
-    root = np.random.default_rng(3).normal(size=(4, 4))
-    covariance = root @ root.T
-    std = np.sqrt(np.diag(covariance))
-    np.testing.assert_allclose(
-        correlation_matrix(covariance.tolist()), covariance / np.outer(std, std), rtol=1e-12
-    )
-    known: list[list[float | None]] = [[4.0, 3.0, None], [3.0, 9.0, 0.0], [None, 0.0, -1.0]]
-    found = correlation_matrix(known)
-    np.testing.assert_allclose(found[:2, :2], [[1.0, 0.5], [0.5, 1.0]], rtol=1e-12)
-    assert np.isnan(found[2]).all()
-    assert np.isnan(found[:, 2]).all()
-
-
-def test_strong_pairs_are_named_once_with_their_sign(result: Result) -> None:
-    names = ["k1", "k2", "k3"]
-    covariance = [[1.0, -0.96, 0.2], [-0.96, 1.0, 0.95], [0.2, 0.95, 1.0]]
-    figure = drawn(correlation(with_fit(result, covariance=covariance, covariance_names=names)))
-    assert figure.note == "Correlated beyond 0.95: k1 and k2 (-0.960)."  # 0.95 itself is not beyond
-    trace = figure.panels[0].traces[0]
-    np.testing.assert_allclose(values(trace["z"]).reshape(3, 3), covariance, rtol=1e-7)
-    assert trace["x"] == trace["y"] == names
-    assert (trace["zmin"], trace["zmax"], trace["texttemplate"]) == (-1, 1, "%{z:.2f}")
-    lost: list[list[float | None]] = [[1.0, None, 0.0], [None, None, None], [0.0, None, 1.0]]
-    figure = drawn(correlation(with_fit(result, covariance=lost, covariance_names=names)))
-    assert (
-        figure.note
-        == "No pair is correlated beyond 0.95. What is not identifiable has no correlation."
-    )
-    many = [f"k{place}" for place in range(15)]
-    figure = drawn(
-        correlation(with_fit(result, covariance=np.eye(15).tolist(), covariance_names=many))
-    )
-    assert "texttemplate" not in figure.panels[0].traces[0]
-
-
-@pytest.mark.parametrize(("k1", "k3", "k5"), [(0.05, 0.2, 0.3), (0.4, 0.1, 0.1), (0.0, 0.03, 0.02)])
-def test_the_smallest_eigenvalue_is_that_of_numpy_over_all_of_theta2(
-    result: Result, k1: float, k3: float, k5: float
-) -> None:
-    figure = drawn(inertia(with_parameters(result, k1=k1, k3=k3, k5=k5), None))
-    theta2 = np.linspace(-np.pi, np.pi, 181)
-    cosine = np.cos(theta2)
-    m11, m12, m22 = k5 + k3 + 2 * k1 * cosine, k3 + k1 * cosine, np.full(181, k3)  # eq. (2)
-    matrices = np.stack([np.stack([m11, m12], axis=-1), np.stack([m12, m22], axis=-1)], axis=-2)
-    smallest = float(np.linalg.eigvalsh(matrices).min())
-    definite = "M is positive definite for every θ2"
-    expected = (
-        definite if smallest > 0 else "M is not positive definite for every θ2, which no arm is"
-    )
-    assert figure.note.startswith(expected + ";")
-    assert float(figure.note.split("eigenvalue is ")[1].split()[0]) == pytest.approx(
-        smallest, rel=6e-3
-    )
-    curves = [trace for trace in figure.panels[0].traces if "fill" not in trace]
-    for trace, part in zip(curves, (m11, m12, m22), strict=True):
-        np.testing.assert_allclose(values(trace["y"]), part, rtol=1e-6, atol=1e-9)
-    assert figure.panels[0].layout["shapes"] == []  # no log tells where it went
-
-
-def test_bands_of_the_mass_matrix_are_as_wide_as_draws_of_the_constants(result: Result) -> None:
+def test_torque_is_drawn_above_its_residual(case_folder: Path, result: Result, raw: Drawn) -> None:
     assert result.fit is not None
-    covariance: FloatArray = np.zeros((7, 7))
-    place = [result.fit.covariance_names.index(name) for name in ("k1", "k3", "k5")]
-    root = np.array([[1e-2, 0, 0], [5e-3, 8e-3, 0], [-4e-3, 2e-3, 6e-3]])
-    covariance[np.ix_(place, place)] = root @ root.T
-    made = with_fit(
-        with_parameters(result, k1=0.05, k3=0.2, k5=0.3), covariance=covariance.tolist()
+    rows = pl.read_parquet(case_folder / "torque.parquet")
+    score = TorquePrediction(
+        rmse=(0.1, 0.2), nrmse=(0.01, 0.02), r2=(0.9, 0.8), filter="", bandwidth=60.0
     )
-    traces = [
-        trace
-        for trace in drawn(inertia(made, None)).panels[0].traces
-        if trace.get("fill") == "toself"
-    ]
-    draws = np.array([0.05, 0.2, 0.3]) + np.random.default_rng(8).normal(size=(4_000, 3)) @ root.T
-    cosine = np.cos(np.linspace(-np.pi, np.pi, 181))
-    k1, k3, k5 = draws.T[:, :, None]
-    for trace, part in zip(
-        traces, (k5 + k3 + 2 * k1 * cosine, k3 + k1 * cosine, k3 + 0 * cosine), strict=True
-    ):
-        edge = values(trace["y"])
-        half = 0.5 * (edge[:181] - edge[:180:-1])
-        # 4,000 draws: a standard error of 1.1 %
-        np.testing.assert_allclose(half, 1.96 * part.std(axis=0), rtol=0.06)
-    lost: list[list[float | None]] = covariance.tolist()
-    lost[place[0]][place[1]] = None
-    bare = drawn(inertia(with_fit(made, covariance=lost), None))
-    assert len(bare.panels[0].traces) == 3
-    assert isinstance(inertia(with_parameters(result, k3=None), None), Missing)
-
-
-def test_where_the_logs_went_is_grey(result: Result, case_folder: Path) -> None:
-    found = read_torque(case_folder / "torque.parquet")
-    (shape,) = drawn(inertia(result, found)).panels[0].layout["shapes"]
-    theta2 = np.degrees(pl.read_parquet(case_folder / "torque.parquet")["theta2"].to_numpy())
-    assert (shape["x0"], shape["x1"]) == pytest.approx(
-        (max(theta2.min(), -180), min(theta2.max(), 180))
-    )
-
-
-def _log(motion: FloatArray) -> TorqueLog:
-    names = ("theta1", "theta2", "omega1", "omega2")
-    ends = {
-        name: (float(row.min()), float(row.max())) for name, row in zip(names, motion, strict=True)
-    }
-    return TorqueLog({}, {}, motion, ends, (1.0, 1.0), (0.1, 0.1), 0, {}, reduced=False)
-
-
-def test_an_angle_that_turned_round_is_shown_within_a_turn_and_another_is_not() -> None:
-    turns = np.linspace(0.0, 4 * np.pi, 400)
-    figure = coverage(_log(np.stack([turns, 1.4 * np.pi * np.sin(turns), turns, -turns])))
-    cloud = figure.panels[0].traces[0]
-    shown = values(cloud["x"])
-    assert -180 <= shown.min() < shown.max() <= 180
-    difference = np.radians(shown) - turns
-    np.testing.assert_allclose(difference, 2 * np.pi * np.rint(difference / (2 * np.pi)), atol=1e-5)
-    np.testing.assert_allclose(
-        values(cloud["y"]), np.degrees(1.4 * np.pi * np.sin(turns)), rtol=1e-6, atol=1e-4
-    )
-    assert "θ1 0 to 720°" in figure.note
-    assert "Angles that turned round are shown within ±180°." in figure.note
-    still = coverage(_log(np.stack([turns / 8] * 4)))
-    assert "turned" not in still.note
-
-
-def test_an_angle_of_which_no_sample_is_a_number_is_drawn_without_a_warning() -> None:
-    turns = np.linspace(0.0, 4 * np.pi, 400)
-    figure = coverage(_log(np.stack([np.full(400, np.nan), turns, turns, turns])))
-    assert np.isnan(values(figure.panels[0].traces[0]["x"])).all()
-
-
-def _parquet(path: Path, **columns: Any) -> Path:
-    pl.DataFrame(columns).write_parquet(path)
-    return path
-
-
-def test_information_adds_up_and_the_note_tells_the_poorest(result: Result, tmp_path: Path) -> None:
-    t = np.arange(1300.0)
-    even, late = np.ones(1300), np.where(t >= 1287, 1.0, 0.0)
-    path = _parquet(
-        tmp_path / "information.parquet",
-        log=np.zeros(1300, np.int32),
-        t=t,
-        k1=even,
-        k2=late,
-        k3=0 * t,
-    )
-    figure = drawn(information(path, result))
-    trace = figure.panels[0].traces[0]
-    rows, columns = (int(part) for part in trace["z"]["shape"].split(","))
-    assert (rows, columns) == (3, 434)  # three seconds a cell, so that 600 are not passed
-    shares = values(trace["z"]).reshape(rows, columns)
-    np.testing.assert_allclose(shares.sum(axis=1), [100.0, 100.0, 0.0], rtol=1e-4)
-    np.testing.assert_allclose(values(trace["x"])[:3], [1.5, 4.5, 7.5])
-    assert trace["y"] == ["k1", "k2", "k3"]
-    # 3 of 434 cells
-    assert figure.note == "Half of what is known of k2 comes from 0.69 % of the time."
-    short = _parquet(
-        tmp_path / "short.parquet", log=[0, 0], t=[0.0, 1.0], k1=[1.0, 2.0], k2=[2.0, 1.0]
-    )
-    assert drawn(information(short, result)).note == ""
-    bare = _parquet(tmp_path / "bare.parquet", log=[0], t=[0.0])
-    assert information(bare, result) == Missing(
-        "information", "Information per second of log", "bare.parquet holds no second"
-    )
-
-
-def test_what_has_no_prediction_shows_its_spectra_and_ticks(result: Result, tmp_path: Path) -> None:
-    x = np.array([1.0, 10.0, 100.0])
-    rows = [
-        (quantity, joint, float(at), value, low, high)
-        for joint in (1, 2)
-        for quantity, series, low, high in (
-            (TORQUE, (1.0, 0.1, 0.01 / joint**20), np.nan, np.nan),
-            (SPECTRUM, (1e-3, 1e-3, 1e-3), np.nan, np.nan),
-            (CORRELATION, (0.5, 0.0, -0.5), -0.1, 0.1),
+    fit = result.fit.model_copy(update={"residual": score})
+    plot = measured(case_folder / "none", raw, result.model_copy(update={"fit": fit}))
+    assert plot.title == "Measured and predicted torque below 60 Hz"
+    assert "joint 2 0.200 N m RMS, R² 80.00 %" in plot.note
+    for joint, one in enumerate(traces(plot, "measured"), start=1):
+        y = finite(typed(one["y"]))
+        assert (y.min(), y.max()) == pytest.approx(
+            (rows[f"tau{joint}"].min(), rows[f"tau{joint}"].max()), rel=1e-6
         )
-        for at, value in zip(x, series, strict=True)
-    ]
-    names = ["quantity", "joint", "x", "value", "low", "high"]
-    path = tmp_path / "innovations.parquet"
-    pl.DataFrame(rows, schema=names, orient="row").write_parquet(path)
-    figure = drawn(innovations(path, with_fit(result, whiteness={}, intervals="sandwich")))
-    assert [panel.title for panel in figure.panels][:2] == [
-        "Joint 1: spectrum",
-        "Joint 1: autocorrelation",
-    ]
-    assert "far below grey" in figure.reading
-    assert [entry.words for entry in figure.legend][
-        1
-    ] == "measured torque, through the same windows"
-    few, many = (figure.panels[place].layout["yaxis"] for place in (0, 2))
-    assert few["nticks"] == 5  # three powers of ten
-    assert many["dtick"] == 2  # joint 2: eight
-    assert figure.panels[0].layout["xaxis"]["range"] == [0.0, 2.0]
-    assert figure.note == (
-        "Inside the band: 1 of 3 and 1 of 3 correlations of joints 1 and 2. "
-        "The refined estimator takes no noise to be white: the intervals allow for colour."
-    )
-    assert figure.panels[1].layout["xaxis"]["title"]["text"] == "lag, s"  # the last ends at 100 s
-    no_fit = drawn(innovations(path, result.model_copy(update={"fit": None})))
-    assert no_fit.note == "Inside the band: 1 of 3 and 1 of 3 correlations of joints 1 and 2."
-    pl.DataFrame(rows, schema=names, orient="row").filter(
-        pl.col("quantity") == TORQUE
-    ).write_parquet(path)
-    short = innovations(path, result)
-    assert isinstance(short, Missing)
-    assert short.why == "the logs are too short to tell noise from colour"
+    axes = [[trace["yaxis"] for trace in traces(plot, name)] for name in ("measured", "residual")]
+    assert axes == [["y", "y3"], ["y2", "y4"]]
+    names = [one["text"] for one in plot.figure.layout["annotations"][4:]]
+    assert names == ["case1-unloaded.mcap", "case1-loaded.mcap"]
+    starts = sorted({shape["x0"] for shape in plot.figure.layout["shapes"]})
+    assert starts == pytest.approx([0.0, 1.01 * 3.999])
+    assert [plot.figure.layout[f"xaxis{n}"]["matches"] for n in (2, 3, 4)] == ["x"] * 3
 
 
-@pytest.mark.parametrize(("joint", "moment"), [(1, 1.234), (2, 0.1)])
-def test_the_worst_moment_is_shown_sample_by_sample(
-    case_folder: Path, result: Result, tmp_path: Path, joint: int, moment: float
-) -> None:
+def test_the_worst_moment_has_every_sample(case_folder: Path, result: Result, raw: Drawn) -> None:
     rows = pl.read_parquet(case_folder / "torque.parquet")
-    knock = (pl.col("t") - moment).abs() < 5e-4
-    name = f"tau{joint}"
-    changed = rows.with_columns(
-        pl.when(knock & (pl.col("log") == 1))
-        .then(pl.col(name) + 9.0)
-        .otherwise(pl.col(name))
-        .alias(name)
-    )
-    path = tmp_path / "torque.parquet"
-    changed.write_parquet(path)
-    found = read_torque(path)
-    panel = drawn(closeup(path, found, result.logs)).panels[joint - 1]
-    near = changed.filter((pl.col("log") == 1) & pl.col("t").is_between(moment - 0.5, moment + 0.5))
-    measured, predicted, residual = (values(trace["y"]) for trace in panel.traces)
-    np.testing.assert_allclose(measured, near[name].to_numpy(), rtol=1e-6, atol=1e-7)
-    np.testing.assert_allclose(
-        residual, (near[name] - near[f"{name}_predicted"]).to_numpy(), rtol=1e-5, atol=1e-6
-    )
-    assert measured.size == predicted.size == (1001 if moment > 0.5 else 601)
-    assert panel.says.startswith(f"Joint {joint}, largest residual ")
-    assert panel.says.endswith(f" at {moment:.3f} s of case1-loaded.mcap")
-    path.write_bytes(b"PAR1 nothing")
-    with pytest.raises(ResultError, match="cannot read it"):
-        closeup(path, found, result.logs)
+    plot = closeup(case_folder / "torque.parquet", raw, result)
+    for joint, one in enumerate(traces(plot, "residual"), start=1):
+        left = (rows[f"tau{joint}"] - rows[f"tau{joint}_predicted"]).abs()
+        t, y = typed(one["x"]), typed(one["y"])
+        assert np.abs(y).max() == pytest.approx(left.max(), rel=1e-6)
+        moment = float(rows["t"][int(left.arg_max() or 0)])
+        assert np.median(np.diff(t)) == pytest.approx(1e-3, rel=1e-2)
+        assert t[0] == pytest.approx(max(moment - 0.5, 0.0), abs=2e-3)
+        assert t[-1] == pytest.approx(min(moment + 0.5, 3.999), abs=2e-3)
+    assert plot is not None
+    assert f"at {moment:.3f} s" in plot.figure.layout["annotations"][1]["text"]
 
 
-def test_torques_and_signals_hold_the_extremes_of_their_logs(
-    case_folder: Path, result: Result
-) -> None:
-    found = read_torque(case_folder / "torque.parquet")
-    rows = pl.read_parquet(case_folder / "torque.parquet")
-    made = signals(found, result.logs)
-    for panel, name in zip(made.panels, ("theta", "omega", "tau"), strict=True):
-        for joint, trace in enumerate(panel.traces, start=1):
-            shown, whole = values(trace["y"]), rows[f"{name}{joint}"].to_numpy()
-            assert (np.nanmin(shown), np.nanmax(shown)) == pytest.approx(
-                (whole.min(), whole.max()), rel=1e-6
-            )
-        both = rows.select(f"{name}1", f"{name}2").to_numpy()
-        assert f"{both.min():.4g} to {both.max():.4g}" in panel.says
-    first, _ = torque(found, result.logs).panels
-    assert [trace.get("yaxis", "y") for trace in first.traces] == ["y", "y", "y2"]
-    rms = float(np.sqrt(np.mean(rows["tau1"].to_numpy() ** 2)))
-    assert f"RMS {rms:.3g} N m; residual" in first.says
+def test_residuals_stand_against_the_band_of_white_noise(case_folder: Path, result: Result) -> None:
+    rows = pl.read_parquet(case_folder / "innovations.parquet")
+    plot = residual(case_folder / "innovations.parquet", result)
+    assert plot is not None
+    one = rows.filter((pl.col("quantity") == "autocorrelation") & (pl.col("joint") == 1))
+    stems = traces(plot, "residual")[1]
+    assert finite(typed(stems["y"])[1::3]) == pytest.approx(one["value"].to_numpy(), rel=1e-5)
+    inside = one.filter(pl.col("value").is_between(pl.col("low"), pl.col("high"))).height
+    assert f"inside the band: {inside} of {one.height} and " in plot.note
+    assert plot.note.endswith("No significant residual autocorrelation.")
+    assert plot.figure.layout["xaxis"]["type"] == plot.figure.layout["yaxis"]["type"] == "log"
+    band = traces(plot, "95 % band of white noise")[0]
+    white = rows.filter((pl.col("quantity") == "whitened spectrum") & (pl.col("joint") == 1))
+    assert typed(band["y"]).max() == pytest.approx(white["high"].max(), rel=1e-6)
+    assert typed(band["y"]).min() == pytest.approx(white["low"].min(), rel=1e-6)
 
 
-def test_the_first_figure_draws_what_is_scored_and_hides_what_was_recorded(
+def test_a_spectrum_without_a_band_stands_beside_the_torques(
     case_folder: Path, result: Result, tmp_path: Path
 ) -> None:
-    found = read_torque(case_folder / "torque.parquet")
-    t = np.arange(0.3, 9.7, 0.02)
-    predicted = {f"tau{j}_predicted": np.sin(t + j) for j in (1, 2)}
-    measured = {f"tau{j}": np.sin(t + j) + 0.1 * j for j in (1, 2)}
-    path = _parquet(
-        tmp_path / "scored.parquet", log=np.zeros(t.size, np.int32), t=t, **measured, **predicted
+    assert result.fit is not None
+    rows = pl.read_parquet(case_folder / "innovations.parquet")
+    spectrum = rows.filter(pl.col("quantity") == "whitened spectrum").with_columns(
+        quantity=pl.lit("spectrum"), low=pl.lit(None, pl.Float64), high=pl.lit(None, pl.Float64)
     )
-    score = TorquePrediction(
-        rmse=(0.1, 0.2), nrmse=(0.1, 0.2), r2=(0.99, 0.98), filter="", bandwidth=5.0
-    )
-    made = torque(found, result.logs, Scored(read_scored(path), score))
-    assert made.title == "Measured and predicted torque below 5 Hz"
-    assert [(entry.group, entry.shown) for entry in made.legend] == [
-        ("measured", True),
-        ("predicted", True),
-        ("residual", True),
-        ("as recorded", False),
-    ]
-    for joint, panel in enumerate(made.panels, start=1):
-        by_group: dict[str, list[Any]] = {}
-        for trace in panel.traces:
-            by_group.setdefault(trace["legendgroup"], []).append(trace)
-        (residual,) = by_group["residual"]
-        drawn = values(residual["y"])
-        np.testing.assert_allclose(drawn[np.isfinite(drawn)], 0.1 * joint, rtol=1e-5)
-        raw = values(by_group["as recorded"][1]["y"])
-        assert np.nanmax(np.abs(raw)) == pytest.approx(
-            max(map(abs, found.extremes[f"residual{joint}"])), rel=1e-6
-        )
-    assert "below 5 Hz, which the table of predictions scores: joint 1 0.100 N m RMS" in made.note
-    assert "As recorded: joint 1" in made.note
-
-
-def test_a_noisy_prediction_says_why() -> None:
-    base = _log(np.zeros((4, 3)))
-    extremes = {**base.extremes, "tau1": (0.0, 0.0), "tau2": (0.0, 0.0)}
-    for residual, told in ((0.49, False), (0.51, True)):
-        noisy = TorqueLog(
-            {}, {}, base.motion, extremes, (1.0, 1.0), (0.1, residual), 0, {}, reduced=False
-        )
-        note = torque(noisy, []).note
-        assert note.startswith(
-            f"Residual of joint 1: 0.100 of 1.00 N m RMS; of joint 2: {residual:.3f} of 1.00 N m "
-            "RMS."
-        )
-        assert ("differentiates angles twice" in note) is told
-
-
-def test_a_band_that_misses_its_end_is_told_with_the_last_moment(
-    result: Result, tmp_path: Path
-) -> None:
-    t = np.arange(1.0, 6.0)
-    k1 = np.array([9.0, 1.0, 1.5, 1.0, 1.0])
-    columns = {
-        "k1": k1,
-        "k1_half": np.full(5, 0.2),
-        "k2": np.full(5, 2.0),
-        "k2_half": np.full(5, 0.1),
+    torque = spectrum.with_columns(pl.lit("torque spectrum").alias("quantity"))
+    other = rows.filter(pl.col("quantity") == "autocorrelation")
+    pl.concat([spectrum, torque, other]).write_parquet(tmp_path / "i.parquet")
+    tests = {
+        name: one.model_copy(update={"white": False}) for name, one in result.fit.whiteness.items()
     }
-    path = _parquet(tmp_path / "running.parquet", log=np.zeros(5, np.int32), t=t, **columns)
-    real = with_parameters(result, k1=1.0, k2=2.0).model_copy(update={"table4": [], "truth": {}})
-    figure = drawn(running(path, real))
-    assert (
-        figure.note
-        == "The last band to miss its final estimate was that of k1, at 3.00 s of 5.00 s."
-    )
-    low, high = figure.panels[0].layout["yaxis"]["range"]
-    # four half widths about the end hold the later part too
-    assert (low, high) == pytest.approx((0.2, 1.8))
-    known = drawn(running(path, real.model_copy(update={"truth": {"k1": 1.0, "k2": 2.3}})))
-    assert known.note.endswith(" The bands hold the truth 30.0 % of the time.")  # 3 of 5, and none
-    level = figure.panels[1]
-    steady = _parquet(
-        tmp_path / "steady.parquet",
-        log=np.zeros(5, np.int32),
-        t=t,
-        k2=np.full(5, 2.0),
-        k2_half=[0.1] * 5,
-    )
-    assert drawn(running(steady, real)).note == "Every band held the final estimate from the start."
-    assert level.says == "k2 over time, in the end 2.0000 kg m²"
-    lost = running(steady, with_parameters(real, k2=None))
-    assert lost == Missing("running", "Running estimate", "no parameter is determined")
-    bare = _parquet(tmp_path / "bare.parquet", log=[0], t=[0.0])
-    assert running(bare, real) == Missing(
-        "running", "Running estimate", "bare.parquet holds no series"
+    fit = result.fit.model_copy(update={"whiteness": tests})
+    plot = residual(tmp_path / "i.parquet", result.model_copy(update={"fit": fit}))
+    assert plot is not None
+    assert len(traces(plot, "measured torque")) == 2
+    assert plot.figure.layout["yaxis"]["title"]["text"] == "(N m)²/Hz"
+    assert plot.note.endswith(" Significant residual autocorrelation.")
+    spectrum.write_parquet(tmp_path / "i.parquet")  # too short to tell
+    assert residual(tmp_path / "i.parquet", result) is None
+
+
+def test_the_running_estimate_ends_at_its_last_value(case_folder: Path, result: Result) -> None:
+    rows = pl.read_parquet(case_folder / "running.parquet")
+    plot = running(case_folder / "running.parquet", result)
+    assert plot is not None
+    every = traces(plot, "estimate from all samples so far")
+    assert len(every) == 7
+    for place, (name, one) in enumerate(zip(result.parameters, every, strict=True)):
+        assert typed(one["y"]) == pytest.approx(rows[name].to_numpy(), rel=1e-5)
+        final, half = rows[name][-1], rows[f"{name}_half"][-1]
+        assert plot.figure.layout["shapes"][place]["y0"] == pytest.approx(final)
+        low, high = plot.figure.layout["yaxis" if not place else f"yaxis{place + 1}"]["range"]
+        assert low <= final - 4 * half < final + 4 * half <= high
+        late = slice(rows.height // 3, None)
+        assert low <= (rows[name] - rows[f"{name}_half"])[late].min()
+        assert high >= (rows[name] + rows[f"{name}_half"])[late].max()
+    lost = dict.fromkeys(result.parameters, Estimate(estimate=None, unit=""))
+    assert running(case_folder / "running.parquet", result.model_copy(
+        update={"parameters": {}, "payload": {}})) is None  # fmt: skip
+    assert running(case_folder / "running.parquet", result.model_copy(
+        update={"parameters": lost})) is not None  # fmt: skip
+
+
+def test_signals_tell_the_joints_apart_without_colour(result: Result, raw: Drawn) -> None:
+    plot = signals(raw, result)
+    dashes = {one["line"]["dash"] for one in traces(plot, "joint 2")}
+    assert len(dashes) == 1
+    assert dashes.isdisjoint(one["line"]["dash"] for one in traces(plot, "joint 1"))
+    assert [one["yaxis"] for one in traces(plot, "joint 1")] == ["y", "y2", "y3"]
+    assert [one["showlegend"] for one in plot.figure.data] == [True, True] + [False] * 4
+
+
+def test_coverage_holds_angles_that_turned_round(raw: Drawn) -> None:
+    angles, speeds = traces(coverage(raw), "samples")
+    x = np.degrees(raw.samples["theta2"])
+    assert np.ptp(x) < 540
+    assert typed(angles["y"]) == pytest.approx(x, rel=1e-5)
+    assert typed(speeds["y"]) == pytest.approx(raw.samples["omega2"], rel=1e-5)
+    turned = Drawn(raw.columns, raw.logs, raw.samples | {"theta1": np.linspace(0, 20, x.size)})
+    wrapped = typed(traces(coverage(turned), "samples")[0]["x"])
+    assert wrapped.min() >= -180
+    assert wrapped.max() <= 180
+    np.testing.assert_allclose(
+        np.cos(np.radians(wrapped)), np.cos(np.linspace(0, 20, x.size)), atol=1e-4
     )
 
 
-def _series_panel(result: Result, path: Path, name: str) -> Panel:
-    return next(panel for panel in drawn(convergence(path, result)).panels if panel.title == name)
-
-
-def test_a_series_is_framed_by_what_is_known_of_it(result: Result, tmp_path: Path) -> None:
-    t = np.arange(4000) / 1000
-    k1 = np.where(t < 0.05, 1e6, 2.0) + 0.1 * np.sin(40 * t)
-    path = _parquet(tmp_path / "estimates.parquet", t=t, k1=k1, kx=np.full(4000, np.nan))
-    found = Estimate(estimate=2.0, std=0.05, ci95=(1.9, 2.1), unit="kg m^2")
-    made = result.model_copy(
-        update={"parameters": {"k1": found}, "table4": [], "truth": {"k1": 3.0}}
+def test_the_matrix_of_correlations_is_the_covariance_scaled(result: Result) -> None:
+    assert result.fit is not None
+    C = np.array([[4.0, 1.96, 0.0], [1.96, 1.0, 0.0], [0.0, 0.0, np.nan]])
+    listed = [[None if np.isnan(one) else one for one in row] for row in C]
+    plot = correlation(result.fit.model_copy(
+        update={"covariance": listed, "covariance_names": ["a", "b", "c"]}))  # fmt: skip
+    assert plot is not None
+    R = typed(plot.figure.data[0]["z"])
+    assert R[:2, :2] == pytest.approx(np.array([[1, 0.98], [0.98, 1]]))
+    assert np.isnan(R[2]).all()
+    assert plot.note == "Correlated beyond 0.95: a and b (+0.980)."
+    whole = correlation(result.fit)
+    assert whole is not None
+    assert whole.figure.data[0]["texttemplate"] == "%{z:.2f}"
+    many = result.fit.model_copy(
+        update={"covariance": np.eye(15).tolist(), "covariance_names": list("abcdefghijklmno")}
     )
-    panel = _series_panel(made, path, "k1")
-    low, high = panel.layout["yaxis"]["range"]
-    assert low < 1.9 < 2.1 < 3.0 < high < 4.0  # the spike is left out, the truth is not
-    kinds = [
-        (shape["type"], shape["y0"])
-        for shape in panel.layout["shapes"]
-        if shape.get("xref") == "paper"
+    crowded = correlation(many)
+    assert crowded is not None
+    assert "texttemplate" not in crowded.figure.data[0]
+    assert crowded.note == "Correlated beyond 0.95: no pair."
+    none = result.fit.model_copy(update={"covariance": [], "covariance_names": []})
+    assert correlation(none) is None
+
+
+def test_information_is_summed_not_thinned(case_folder: Path, tmp_path: Path) -> None:
+    plot = information(case_folder / "information.parquet")
+    assert plot is not None
+    z = typed(plot.figure.data[0]["z"])
+    assert z.shape == (7, 4)
+    assert z.sum(axis=1) == pytest.approx(100)
+    assert typed(plot.figure.data[0]["x"]) == pytest.approx([0.5, 1.5, 2.5, 3.5])
+    gained = np.arange(2000.0).reshape(2, 1000) * np.array([[1.0], [0.0]])
+    summed = shares_of_time(("a", "b"), gained, 0.5).figure.data[0]
+    z = typed(summed["z"])
+    assert z.shape == (2, 500)
+    assert z[0, -1] == pytest.approx(100 * (998 + 999) / gained[0].sum(), rel=1e-5)
+    assert not z[1].any()
+    assert typed(summed["x"])[:2] == pytest.approx([0.5, 1.5])
+    pl.DataFrame({"log": [0], "t": [0.0]}).write_parquet(tmp_path / "i.parquet")
+    assert information(tmp_path / "i.parquet") is None
+
+
+def test_the_mass_matrix_has_its_band_and_where_the_logs_went(result: Result, raw: Drawn) -> None:
+    assert result.fit is not None
+    plot = inertia(result, raw)
+    assert plot is not None
+    k = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
+    theta2 = np.linspace(-np.pi, np.pi, 181)
+    m = mass_matrix(k, np.stack([0 * theta2, theta2]))
+    for name, values in zip(("M11", "M12 = M21", "M22"), m, strict=True):
+        (one,) = traces(plot, name)
+        assert typed(one["y"]) == pytest.approx(np.broadcast_to(values, 181), rel=1e-5)
+    # M22 = k3: its band is that of k3 alone
+    band = typed(traces(plot, "95 % interval")[2]["y"])
+    k3 = result.parameters["k3"]
+    assert k3.estimate is not None
+    assert k3.std is not None
+    half = norm.ppf(0.975) * k3.std
+    assert (band.min(), band.max()) == pytest.approx((k3.estimate - half, k3.estimate + half))
+    (reached,) = plot.figure.layout["shapes"]
+    assert reached["x0"] == pytest.approx(max(np.degrees(np.nanmin(raw["theta2"])), -180))
+    least = min(np.linalg.eigvalsh(np.array([[a, b], [b, c]])).min() for a, b, c in zip(
+        m[0], m[1], np.broadcast_to(m[2], 181), strict=True))  # fmt: skip
+    words = "M is positive definite for every θ2; its smallest eigenvalue is"
+    assert plot.note == f"{words} {significant(float(least), 3)} kg m²."
+    negative = {**result.parameters, "k5": estimate(-1.0, 0.1, "kg m^2")}
+    bent = inertia(result.model_copy(update={"parameters": negative}), None)
+    assert bent is not None
+    assert bent.note.startswith("M is not positive definite for every θ2, which no arm is")
+    assert bent.figure.layout["shapes"] == []
+    lost = {**result.parameters, "k5": Estimate(estimate=None, unit="")}
+    assert inertia(result.model_copy(update={"parameters": lost}), raw) is None
+
+
+def test_convergence_shows_result_truth_and_what_settles(
+    case_folder: Path, result: Result, tmp_path: Path
+) -> None:
+    rows = pl.read_parquet(case_folder / "estimates.parquet")
+    plot = convergence(case_folder / "estimates.parquet", result)
+    titles = [one["text"] for one in plot.figure.layout["annotations"]]
+    assert titles[:2] == ["<b>k1</b>", "<b>k2</b>"]
+    assert titles[-1] == "<b>condition</b>"
+    assert plot.figure.layout["yaxis8"]["type"] == "log"
+    k1 = result.parameters["k1"].estimate
+    own = [one for one in plot.figure.layout["shapes"] if one["yref"] == "y"]
+    assert [one["y0"] for one in own] == [k1, result.table4[0].truth]
+    settled = rows["k1"].drop_nans().drop_nulls().to_numpy()
+    settled = settled[settled.size // 4 :]
+    low, high = plot.figure.layout["yaxis"]["range"]
+    inside = np.quantile(settled, [0.1, 0.9])
+    assert low < inside[0] < inside[1] < high
+    shutil.copy(case_folder / "loaded.parquet", tmp_path / "loaded.parquet")
+    loaded = convergence(tmp_path / "loaded.parquet", result)
+    assert loaded.title == "Convergence, loaded log"
+    assert result.paper_payload["m_p"].estimate in [
+        one.get("y0") for one in loaded.figure.layout["shapes"]
     ]
-    assert kinds == [("rect", 1.9), ("line", 2.0), ("line", 3.0)]
-    windows = [shape["x0"] for shape in panel.layout["shapes"] if shape.get("xref") != "paper"]
-    assert windows == pytest.approx([0.2, 2.2])  # ε after each window's start
-    assert panel.says == "k1 over time; final estimate 2.000 kg m²; truth 3.0000 kg m²"
-    empty = _series_panel(made, path, "kx")
-    assert empty.layout["yaxis"]["range"] is None
-    assert empty.says == "kx over time"
-    words = [entry.words for entry in drawn(convergence(path, made)).legend]
-    assert "result and its 95 % interval" in words
-    assert "truth" in words
-    plain = made.model_copy(
-        update={"parameters": {"k1": found.model_copy(update={"ci95": None, "std": None})}}
-    )
-    words = [entry.words for entry in drawn(convergence(path, plain)).legend]
-    assert "result" in words
-    bare = _parquet(tmp_path / "bare.parquet", t=t)
-    assert isinstance(convergence(bare, made), Missing)
 
 
-def test_numbers_too_large_to_draw_are_left_out_of_figures_alone(result: Result) -> None:
-    assert drawable(result).parameters == result.parameters
-    huge = Estimate(estimate=1.0, std=1e101, ci95=(0.0, 1.0), unit="kg m^2")
-    kept = drawable(
-        with_fit(
-            result.model_copy(update={"payload": {"m_p": huge}}),
-            covariance=[[1e101, 1.0], [1.0, None]],
-        )
-    )
-    assert kept.payload["m_p"].estimate is None
-    assert kept.payload["m_p"].unit == "kg m^2"
-    assert kept.fit is not None
-    assert kept.fit.covariance == [[None, 1.0], [1.0, None]]
-    assert kept.table4 == result.table4
+def test_panels_lie_beside_and_below_one_another() -> None:
+    panels = Panels(["a", "b", "c"], 2, 200, together=True)
+    layout = panels.layout
+    assert layout["height"] == 2 * 200 + 40
+    assert layout["xaxis"]["domain"][1] < layout["xaxis2"]["domain"][0] < 1
+    assert layout["xaxis2"]["domain"][1] == pytest.approx(1.0)
+    assert layout["xaxis3"]["domain"] == layout["xaxis"]["domain"]
+    assert layout["yaxis3"]["domain"][1] == pytest.approx(0.5)
+    assert layout["yaxis3"]["domain"][0] == pytest.approx(55 / 400)
+    assert layout["yaxis"]["domain"] == layout["yaxis2"]["domain"]
+    assert [layout[f"xaxis{n}"].get("matches") for n in ("", 2, 3)] == [None, "x", "x"]
+    single = Panels(["one"], 1, 300).layout
+    assert single["xaxis"]["domain"] == [0, 1]
 
 
-@pytest.mark.parametrize("lowest", [0.3, 1e-2, 1e-6, 1e-13])
-def test_ticks_of_a_spectrum_stand_apart_however_wide_it_is(lowest: float) -> None:
-    value = np.geomspace(lowest, 20.0, 50)
-    ticks = _round_ticks(Curve(value, value, np.full(50, 0.5), np.full(50, 2.0)))
-    low, high = ticks["range"]
-    shown = [at for at in np.log10(ticks["tickvals"]) if low <= at <= high]
-    assert len(shown) >= 3
-    assert np.diff(shown).min() > (high - low) / 12
+def test_a_band_breaks_at_gaps() -> None:
+    panels = Panels([""])
+    x = np.arange(6.0)
+    high = np.array([1.0, 1, np.nan, 2, 2, 2])
+    panels.band(0, x, -high, high, "band")
+    first, second = (typed(one["x"]).tolist() for one in panels.data)
+    assert first == [0, 1, 1, 0]
+    assert second == [3, 4, 5, 5, 4, 3]
+    assert typed(panels.data[0]["y"]).tolist() == [1, 1, -1, -1]
+    assert [one["showlegend"] for one in panels.data] == [True, False]
+
+
+def test_lines_and_stretches_reach_over_the_whole_panel() -> None:
+    panels = Panels(["a", "b"])
+    panels.line(1, y=3.0)
+    panels.line(0, x=2.0)
+    panels.stretch(1, 4.0, 5.0)
+    level, upright, stretch = panels.layout["shapes"]
+    assert (level["xref"], level["x0"], level["x1"]) == ("x2 domain", 0, 1)
+    assert (level["yref"], level["y0"], level["y1"]) == ("y2", 3.0, 3.0)
+    assert (upright["yref"], upright["y1"], upright["x0"]) == ("y domain", 1, 2.0)
+    assert (stretch["type"], stretch["x0"], stretch["x1"]) == ("rect", 4.0, 5.0)
+    assert stretch["yref"] == "y2 domain"
+
+
+def test_numbers_travel_in_single_precision_unless_steps_would_be_lost() -> None:
+    short = packed(np.arange(1000) / 1000, exact=True)
+    assert short["dtype"] == "f4"
+    late = 1e6 + np.arange(1000) / 1000
+    assert packed(late)["dtype"] == "f4"
+    assert packed(late, exact=True)["dtype"] == "f8"
+    assert typed(packed(late, exact=True)).tolist() == late.tolist()
+    assert packed(np.array([1e300, 1.0]))["dtype"] == "f8"
+    assert packed(np.array([np.nan, np.nan]), exact=True)["dtype"] == "f4"
+    assert packed(np.ones((2, 3)))["shape"] == "2, 3"
+    assert packed(["a"]) == ["a"]
+
+
+def test_names_are_no_markup_for_plotly() -> None:
+    assert label("<b>x</b>&") == "&lt;b&gt;x&lt;/b&gt;&amp;"
+    assert label("x" * 80) == "x" * 55 + "…"
+    panels = Panels(["<i>"])
+    panels.text(0, "<a href=x>", 1.0)
+    panels.dots(0, [1], [2], "<u>")
+    panels.heat(["<s>"], [1], np.ones((1, 1)))
+    assert "<" not in str(panels.data) + str(panels.layout).replace("<b>", "").replace("</b>", "")

@@ -8,7 +8,7 @@ import pytest
 from algid.model import Model
 from algid.report.brief import HEIGHT, WIDTH, brief
 from algid.report.phasors import moments
-from algid.report.tables import estimate_tables
+from algid.report.tables import arm_tables
 from algid.results import Result
 from tests.exports.arms import ODD, result_of, values_of
 
@@ -45,7 +45,7 @@ def test_the_terminal_and_the_page_show_size_and_angle() -> None:
     assert "0.050" in line
     assert "at 20.00° ± " in line
     assert not any(line.startswith("k1") for line in lines)
-    (table,) = [one for one in estimate_tables(bent()) if one.title.startswith("Moments")]
+    (table,) = [one for one in arm_tables(bent()) if one.title.startswith("Moments")]
     assert [row[0] for row in table.rows] == ["|K1|", "|K2|", "|K4|"]
     assert table.rows[0][-1].startswith("20.00° ± ")
 
@@ -58,4 +58,4 @@ def test_a_straight_arm_and_shrunk_phases_show_none() -> None:
     model = result.fit.model.model_copy(update={"shrunk": ["k1s", "k2s", "k4s"]})
     shrunk = result.model_copy(update={"fit": result.fit.model_copy(update={"model": model})})
     assert moments(shrunk) == {}
-    assert not [one for one in estimate_tables(shrunk) if one.title.startswith("Moments")]
+    assert not [one for one in arm_tables(shrunk) if one.title.startswith("Moments") and one.rows]

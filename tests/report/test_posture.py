@@ -2,85 +2,81 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from algid.report.arm import ArmDrawing, arm_html, arm_of
-from algid.report.gallery import gallery
+from algid.report.arm import ArmDrawing, arm_of
+from algid.report.series import Drawn, drawn
 from algid.results import Estimate, Result
 
 
-def drawn(result: Result, folder: Path) -> str:
-    """The drawing of the arm of that result, as it stands in the folder's torques."""
-    arm = arm_of(result, gallery(folder, result).torque)
-    assert arm is not None
-    return arm_html(arm)
+@pytest.fixture(scope="module")
+def raw(case_folder: Path) -> Drawn:
+    return drawn(case_folder / "torque.parquet")
 
 
-def links(drawing: str) -> tuple[float, float]:
-    found = [
-        float(x) for x in re.findall(r'class="link[^"]*" x1="0" y1="0" x2="([\d.]+)"', drawing)
-    ]
-    assert len(found) == 2
-    return found[0], found[1]
+def arm(result: Result, raw: Drawn) -> ArmDrawing:
+    found = arm_of(result, raw)
+    assert found is not None
+    return found
 
 
-def test_links_are_as_long_as_the_payload_tells_or_as_the_constants_do(
-    result: Result, case_folder: Path
+def test_links_are_as_long_as_the_payload_or_the_constants_have_it(
+    result: Result, raw: Drawn
 ) -> None:
-    torque = gallery(case_folder, result).torque
     known = {name: Estimate(estimate=value, unit="m") for name, value in (("l1", 0.3), ("l2", 0.2))}
-    assert links(drawn(result.model_copy(update={"payload": known}), case_folder)) == (0.3, 0.2)
+    long = arm(result.model_copy(update={"payload": known}), raw)
+    assert (long.l1, long.l2, long.payload) == (0.3, 0.2, "")
     k1, k2 = (Estimate(estimate=value, unit="") for value in (0.2, 9.81 * 0.2 / 0.25))
     bare = {
         "payload": {},
         "settings": {"gravity": 9.81},
         "parameters": {**result.parameters, "k1": k1, "k2": k2},
     }
-    drawing = drawn(result.model_copy(update=bare), case_folder)
-    assert links(drawing)[0] == pytest.approx(0.25)  # l1 = g k1 / k2
-    assert "not known" in drawing
+    drawing = arm(result.model_copy(update=bare), raw)
+    assert drawing.l1 == drawing.l2 == pytest.approx(0.25)  # l1 = g k1 / k2
+    assert "Link 2's length is not known" in drawing.reading
+    bare["settings"] = {"gravity": 9.81, "l2": 0.7}
+    assert arm(result.model_copy(update=bare), raw).l2 == 0.7
     upside_down = k2.model_copy(update={"estimate": -7.0})
     bare["parameters"] = {**result.parameters, "k1": k1, "k2": upside_down}
-    assert arm_of(result.model_copy(update=bare), torque) is None
+    assert arm_of(result.model_copy(update=bare), raw) is None
     assert arm_of(result, None) is None
 
 
-def test_the_arm_stands_as_the_log_begins(result: Result, case_folder: Path) -> None:
-    torque = gallery(case_folder, result).torque
-    known = {name: Estimate(estimate=0.5, unit="m") for name in ("l1", "l2")}
-    drawing = drawn(result.model_copy(update={"payload": known}), case_folder)
-    turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
-    assert turned is not None
-    assert torque is not None
-    first = torque.series[0]["theta1"][1]
-    # SVG turns clockwise
-    assert float(turned[1]) == pytest.approx(-np.degrees(first[np.isfinite(first)][0]), abs=1e-3)
+def test_the_arm_stands_as_the_log_begins_and_moves_as_it_does(result: Result, raw: Drawn) -> None:
+    drawing = arm(result, raw)
+    theta1 = raw.samples["theta1"][0]
+    assert drawing.start[0] == pytest.approx(-np.degrees(theta1))  # SVG turns clockwise
+    t, theta = drawing.frames
+    assert t.size == round(3.999 * 30) + 1
+    assert (t[0], t[-1]) == pytest.approx((0.0, 3.998), abs=2e-3)
+    assert theta[1, -1] == pytest.approx(raw.samples["theta2"][raw.samples["log"] == 0][-1])
+    assert drawing.payload.startswith("payload of 0.352 kg")
+    long = ArmDrawing(1, 1, np.linspace(0, 1e4, 10_000), np.zeros((2, 10_000)), "")
+    assert long.frames[0].size == 6001
 
 
 def test_the_drawing_holds_the_arm_all_along_its_motion_and_its_limit_and_little_more() -> None:
     t = np.linspace(0.0, 4.0, 200)
     hanging = np.stack([-np.pi / 2 + 0.3 * np.sin(3 * t), 0.4 * np.cos(2 * t)])
-    drawing = arm_html(ArmDrawing(0.3, 0.2, t, hanging, "Read it.", height=-0.6))
-    box = re.search(r'viewBox="([-\d.e]+) ([-\d.e]+) ([-\d.e]+) ([-\d.e]+)"', drawing)
-    assert box is not None
-    left, top, width, height = map(float, box.groups())
+    drawing = ArmDrawing(0.3, 0.2, t, hanging, "Read it.", height=-0.6)
+    left, top, width, height = drawing.box
     both = hanging[0] + hanging[1]
     x = 0.3 * np.cos(hanging[0]) + 0.2 * np.cos(both)
     y = -(0.3 * np.sin(hanging[0]) + 0.2 * np.sin(both))  # SVG's y points down
     assert left < x.min() < x.max() < left + width
     assert top < 0 < y.max() < 0.6 < top + height
     assert top > -0.1  # nothing but the margin above the base of an arm that hangs
+    assert width >= 0.5
+    first = [float(one) for one in drawing.path.split()[0].split(",")]
+    assert first == pytest.approx([x[0], y[0]], rel=1e-3)
 
 
-def test_a_bent_arm_shows_where_its_loads_lie_and_stands_by_gravity(
-    result: Result, case_folder: Path
-) -> None:
-    """K1 at 20°, K2 at 25°, K4 at 15°: θ1's zero is off by 5°, joint 1's load by 10°."""
-    torque = gallery(case_folder, result).torque
+def test_a_bent_arm_stands_by_gravity(result: Result, raw: Drawn) -> None:
+    """K1 at 20°, K2 at 25°, K4 at 15°: θ1's zero is off by 5°."""
     moments = {"k1": (0.2, 20.0), "k2": (7.0, 25.0), "k4": (20.0, 15.0)}
     parameters = dict(result.parameters)
     for name, (size, angle) in moments.items():
@@ -89,22 +85,8 @@ def test_a_bent_arm_shows_where_its_loads_lie_and_stands_by_gravity(
             name: Estimate(estimate=float(K.real), unit=""),
             f"{name}s": Estimate(estimate=float(K.imag), unit=""),
         }
-    payload = {
-        name: Estimate(estimate=value, unit="m")
-        for name, value in (("l1", 0.5), ("l2", 0.4), ("y_p", 0.05))
-    }
-    payload["m_p"] = Estimate(estimate=1.0, unit="kg")
-    bent = result.model_copy(update={"parameters": parameters, "payload": payload})
-    drawing = drawn(bent, case_folder)
-    assert [float(angle) for angle in re.findall(r"joint \d lies ([-\d.]+)° off", drawing)] == [
-        10.0,
-        20.0,
-    ]
-    assert 'class="payload" cx="0.4" cy="-0.05"' in drawing  # SVG's y points down
-    turned = re.search(r'class="link1" transform="rotate\(([-\d.]+)\)"', drawing)
-    assert turned is not None
-    assert torque is not None
-    first = torque.series[0]["theta1"][1]
-    start = np.degrees(first[np.isfinite(first)][0])
-    assert float(turned[1]) == pytest.approx(-start - 5, abs=1e-3)
-    assert 'class="load"' not in drawn(result.model_copy(update={"payload": payload}), case_folder)
+    payload = {**result.payload, "y_p": Estimate(estimate=0.05, unit="m")}
+    bent = arm(result.model_copy(update={"parameters": parameters, "payload": payload}), raw)
+    start = np.degrees(raw.samples["theta1"][0])
+    assert bent.start[0] == pytest.approx(-start - 5, abs=1e-3)
+    assert bent.aside == 0.05

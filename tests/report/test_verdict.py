@@ -4,10 +4,8 @@ import pytest
 from rich.console import Console
 
 from algid.notices import Notice, Remedy
-from algid.report.document import Depth
-from algid.report.frame import page
-from algid.report.markdown import markdown
 from algid.report.page import result_document
+from algid.report.render import markdown, page
 from algid.report.terminal import print_document
 from algid.results import (
     Bound,
@@ -60,7 +58,8 @@ def test_one_reservation_is_told_in_the_sentence(result: Result) -> None:
     assert found.grade == "reservations"
     assert (
         found.sentence
-        == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable."
+        == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable: "
+        "record a run in which both joints move."
     )
     assert [reason.code for reason in found.reasons] == ["NOT_IDENTIFIABLE"]
 
@@ -199,7 +198,9 @@ def test_nothing_but_what_may_be_zero_is_a_failure(result: Result) -> None:
 def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     told = with_parameter(result, "k5", lost)
-    assert [reason.text for reason in told.verdict.reasons] == ["k5 is not identifiable"]
+    assert [reason.text for reason in told.verdict.reasons] == [
+        "k5 is not identifiable: record a run in which both joints move"
+    ]
 
 
 def test_many_estimates_far_from_the_truth_are_one_reason(result: Result) -> None:
@@ -259,7 +260,7 @@ def test_nothing_of_a_failed_result_is_green(result: Result) -> None:
             print_document(result_document(shown), console)
         assert ("\x1b[32mOK" in printed.get()) is green
         whole = page(result_document(shown), shared_library=True)
-        assert ('class="status ok"' in whole) is green
+        assert ('class="status whole ok"' in whole) is green
     assert "✅" not in markdown(result_document(failed))
 
 
@@ -271,11 +272,12 @@ def test_one_document_holds_what_every_format_shows(result: Result) -> None:
     shown = printed.get()
     text = markdown(made)
     folded = text.partition("<details>")[2]
-    for table in made.tables(*Depth):
-        assert (f"**{table.title}**" in text) is (table.depth <= Depth.FOLDED)
-        assert (f"**{table.title}**" in folded) is (table.depth is Depth.FOLDED)
-        assert (table.title in shown) is (table.depth is Depth.TERMINAL)
-    assert {table.depth for table in made.tables(*Depth)} == set(Depth)
+    for away in (False, True):
+        assert made.tables(folded=away)
+        for table in made.tables(folded=away):
+            assert f"**{table.title}**" in text
+            assert (f"**{table.title}**" in folded) is away
+            assert (table.title in shown) is not away
     assert made.verdict.sentence.partition(":")[0] in shown
 
 
@@ -362,6 +364,35 @@ def test_praise_tells_the_widest_interval_in_percent(result: Result) -> None:
     assert "the least certain, k2, to ±9.8 % (95 %)" in found.sentence  # 1.96 times 5 %
 
 
+def test_a_look_at_the_log_takes_the_flags_that_say_how_it_is_read(result: Result) -> None:
+    typed = "algid identify a.csv --set tau1.sign=-1 --joints=elbow,wrist -o out --l1 0.2 --force"
+    told = result.model_copy(update={"settings": {"command": typed}})
+    command = f"algid inspect {result.log.path} --set tau1.sign=-1 --joints=elbow,wrist"
+    assert implausible(told).verdict.command == command
+    python = result.model_copy(update={"profile": {"zero": "hanging", "tau1": {"sign": -1}}})
+    assert implausible(python).verdict.command == (
+        f"algid inspect {result.log.path} --zero hanging --set tau1.sign=-1"
+    )
+
+
+def test_what_the_call_has_said_is_not_advised_again(result: Result) -> None:
+    told = result.model_copy(update={"notices": [HANGING], "profile": {"zero": "hanging"}})
+    assert implausible(told).verdict.command is None
+
+
+def test_what_changed_the_estimator_comes_before_what_is_of_a_log(result: Result) -> None:
+    jitter = {"jitter": 0.06, "period": 2.0, "error": 1e-6}
+    notices = [
+        Notice("JITTER", numbers=jitter, logs=("a.csv",)),
+        Notice("LOGS_APART", numbers={"distance": 9.0}),
+        Notice("REFUTED", numbers={"kept": "weak"}),
+    ]
+    found = result.model_copy(update={"notices": notices}).verdict
+    codes = [one.code for one in found.reasons]
+    assert codes[0] == "REFUTED"
+    assert codes[-2:] == ["LOGS_APART", "JITTER"]
+
+
 def test_a_command_is_forced_once(result: Result) -> None:
     told = result.model_copy(
         update={"notices": [HANGING], "settings": {"command": "algid identify a.csv --force"}}
@@ -387,7 +418,7 @@ def test_joints_that_move_beside_those_read_lead_the_reasons(result: Result) -> 
     others = Notice("OTHER_JOINTS", numbers={"count": 1, "joints": "wrist", "samples": 9})
     found = implausible(result.model_copy(update={"notices": [HANGING, others]})).verdict
     assert [reason.code for reason in found.reasons[:2]] == ["OTHER_JOINTS", "WRONG_ZERO"]
-    assert found.command == f"algid inspect {result.log.path}"
+    assert found.command is None
 
 
 @pytest.mark.parametrize(("chosen_by", "doubted"), [("logs", False), ("settings", True)])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from algid.arm import FloatArray
 from algid.notices import Notice
-from algid.report.document import Depth
-from algid.report.frame import page
-from algid.report.markdown import markdown
+from algid.report.render import page
 from algid.results import LogSummary
-from algid.tracks.figures import MOST_MARKS, figures
+from algid.tracks.figures import MOST_MARKS, POINTS, payload_figure
 from algid.tracks.page import track_document
 from algid.tracks.payload import Stretch, Track
 from algid.tracks.result import TrackResult
@@ -31,13 +25,7 @@ from algid.tracks.tables import (
     stretch_table,
     verdict,
 )
-
-
-def values(typed: dict[str, str]) -> FloatArray:
-    return np.frombuffer(base64.b64decode(typed["bdata"]), dtype=f"<{typed['dtype']}").astype(
-        np.float64
-    )
-
+from tests.report.pages import named, typed
 
 LOG = LogSummary(
     path="logs/pick.csv",
@@ -110,35 +98,31 @@ def test_a_payload_that_may_be_nothing_is_zero_with_one_digit_of_its_error() -> 
 def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
     made = track([0.1, 0.35, 0.2], schedule=((0.0, 0.1), (1.02, 0.35), (1.9, 0.2)))
     rows = change_table(made).rows
-    assert [row[3] for row in rows] == ["+0.2500", "-0.1500"]
-    assert [row[1:3] for row in rows] == [("1.000", "[0.900, 1.100]"), ("2.000", "[1.900, 2.100]")]
+    assert [row[2] for row in rows] == ["+0.2500", "-0.1500"]
+    between = [("1.000", "[0.900, 1.100]"), ("2.000", "[1.900, 2.100]")]
+    assert [(row[1], row[4]) for row in rows] == between
     # what the arm held at the start is no change
     assert [row[5] for row in rows] == [
         "1.020",
         "1.900",
     ]
-    assert "Truth at, s" not in [
-        column.heading for column in change_table(track([0.1, 0.2])).columns
-    ]
+    assert "Truth at, s" not in change_table(track([0.1, 0.2])).columns
     uneven = track([0.1, 0.2])
     coarse = replace(uneven.track.stretches[1], std=0.04)
     made = replace(
         uneven, track=replace(uneven.track, stretches=[uneven.track.stretches[0], coarse])
     )
-    assert change_table(made).rows[0][3] == "+0.100"  # as fine as the coarser of both
+    assert change_table(made).rows[0][2] == "+0.100"  # as fine as the coarser of both
 
 
 def test_stretches_stand_against_the_schedule() -> None:
     made = track([0.1, 0.35], schedule=((0.0, 0.09), (1.0, 0.35)))
     rows = {row[0]: row for row in stretch_table(made).rows}
     assert rows["1"] == (
-        *("1", "0.000", "1.000", "0.1000", "0.0020", "kg", "OK", "[0.0980, 0.1020]"),
-        *("0.0900", "0.0100"),
+        *("1", "0.000", "1.000", "0.1000", "0.0020", "kg", "OK", "0.0900", "0.0100"),
     )
     assert rows["2"][-2:] == ("0.3500", "0.0000")
-    bare = [column.heading for column in stretch_table(track([0.1])).columns]
-    assert bare[-1] == "95 % interval"
-    assert [column.kind for column in stretch_table(track([-0.1])).columns][6] == "doubtful status"
+    assert list(stretch_table(track([0.1])).columns)[-1] == "Status"
 
 
 def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
@@ -146,19 +130,20 @@ def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
     still = track([0.1], notices=(Notice("JITTER", "it jitters"), Notice("CUT", "cut", note=True)))
     assert [one.code for one in verdict(still).reasons] == ["JITTER"]
     assert [one.code for one in verdict(still).notes] == ["CUT"]
-    titles = [table.title for table in track_document(still).tables(*Depth)]
-    assert titles == ["Payload by stretch", "Fit", "Logs", "Channels", "Settings", "Provenance"]
+    titles = [[one.title for one in track_document(still).tables(away)] for away in (False, True)]
+    folded = ["Fit", "Logs", "Channels", "Settings", "Provenance"]
+    assert titles == [["Payload by stretch"], folded]
     moving = track([0.1, 0.3])
     holey = replace(moving, track=replace(moving.track, holes=np.array([[0.25, 0.5]])))
     document = track_document(holey)
-    titles = [table.title for table in document.tables(*Depth)]
+    titles = [[one.title for one in document.tables(away)] for away in (False, True)]
     assert titles == [
-        "Payload by stretch", "Changes", "Fit", "Logs", "Channels", "Times without samples",
-        "Settings", "Provenance",
-    ]  # fmt: skip
+        ["Payload by stretch", "Changes"],
+        [*folded[:3], "Times without samples", *folded[3:]],
+    ]
     assert quality_tables(holey)[-1].rows == (("0.250", "0.500"),)
     log, channels = quality_tables(holey)[1:3]
-    assert [column.heading for column in log.columns] == [
+    assert list(log.columns) == [
         "Log",
         "Format",
         "Samples",
@@ -166,56 +151,65 @@ def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
         "Rate, Hz",
     ]
     assert channels.rows == (("theta1", "q1"), ("tau1", "t1"))
-    shown = html.unescape(page(document, shared_library=True))
-    assert (
-        shown.index("Payload by stretch")
-        < shown.index('id="payload"')
-        < shown.index("<caption>Changes</caption>")
-    )
-    assert "The readers gave no warning." in shown
     assert "<li>it jitters</li>" in page(track_document(still), shared_library=True)
-    assert re.findall(r"^\*\*(.+)\*\*$", markdown(document), re.M) == [
-        "Payload by stretch", "Changes", "Fit", "Logs", "Provenance",
-    ]  # fmt: skip
     assert document.facts == "arm of arm.algid · 3.000 s of log at 1000 Hz · 3,000 samples"
 
 
 def test_the_figure_steps_where_the_payload_does() -> None:
     made = track([0.1, 0.35, 0.2], schedule=((0.0, 0.1), (1.02, 0.35), (1.9, 0.2), (9.0, 5.0)))
-    payload, left = figures(made)
-    by_name = {trace["name"]: trace for trace in payload.panels[0].traces}
-    np.testing.assert_allclose(values(by_name["stretch"]["x"]), [0, 1, 1, 2, 2, 3])
-    np.testing.assert_allclose(
-        values(by_name["stretch"]["y"]), [0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6
-    )
-    np.testing.assert_allclose(
-        values(by_name["truth"]["x"]), [0, 0, 0, 1.02, 1.02, 1.9, 1.9, 3], rtol=1e-6
-    )
-    np.testing.assert_allclose(
-        values(by_name["truth"]["y"]), [0, 0, 0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6
-    )
-    marks = [(shape["x0"], shape["x1"]) for shape in payload.panels[0].layout["shapes"]]
-    assert marks == [(0.9, 1.1), (1.9, 2.1)]
-    noise = left.panels[0].layout["shapes"][-1]
-    assert (noise["y0"], noise["y1"], noise["line"]["dash"]) == (1.0, 1.0, "dash")
-    low, high = payload.panels[0].layout["yaxis"]["range"]
-    assert low < 0.1 < 0.35 < 5.0 < high  # the whole schedule
-    band = values(by_name["band"]["y"])
-    assert np.count_nonzero(np.isnan(band)) == 3  # one closed area a stretch
-    inside = band[np.isfinite(band)]
-    assert (inside.min(), inside.max()) == pytest.approx(
+    plot = payload_figure(made)
+    data, layout = plot.figure.data, plot.figure.layout
+    (stretch,), (truth,) = named(data, "mass of each stretch"), named(data, "true schedule")
+    np.testing.assert_allclose(typed(stretch["x"]), [0, 1, 1, 2, 2, 3])
+    np.testing.assert_allclose(typed(stretch["y"]), [0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6)
+    np.testing.assert_allclose(typed(truth["x"]), [0, 0, 0, 1.02, 1.02, 1.9, 1.9, 3], rtol=1e-6)
+    np.testing.assert_allclose(typed(truth["y"]), [0, 0, 0.1, 0.1, 0.35, 0.35, 0.2, 0.2], rtol=1e-6)
+    marks = [(one["x0"], one["x1"]) for one in layout["shapes"] if one["type"] == "rect"]
+    assert marks == [(0.9, 1.1)] * 2 + [(1.9, 2.1)] * 2  # in both panels
+    (noise,) = [one for one in layout["shapes"] if one["type"] == "line"]
+    assert (noise["y0"], noise["yref"]) == (1.0, "y2")
+    low, high = layout["yaxis"]["range"]
+    assert low < 0.1 < 0.35 < high < 0.5  # what the log does not reach is not shown
+    bands = named(data, "its 95 % band")
+    assert len(bands) == 3  # one closed area a stretch
+    ends = np.concatenate([typed(one["y"]) for one in bands])
+    assert (ends.min(), ends.max()) == pytest.approx(
         (0.1 - 1.96 * 0.001, 0.35 + 1.96 * 0.001), rel=1e-4
     )
+    (left,) = named(data, "residual")
+    assert typed(left["y"])[:50] == pytest.approx(made.track.left[:50], rel=1e-6)
+    assert plot.note == f"Median of the residual over the noise: {np.median(made.track.left):.2f}."
+
+
+def test_a_long_track_keeps_its_extremes_and_breaks_at_holes() -> None:
+    made = track([0.1, 0.35] * 70)
+    m_p = made.track.m_p.copy()
+    m_p[40], m_p[90] = 0.9, -0.4
+    made = replace(made, track=replace(made.track, m_p=m_p))
+    assert made.track.t.size > 2 * POINTS / 2
+    data = payload_figure(made).figure.data
+    (curve,) = [one for one in data if one["name"].startswith("m_p(t)")]
+    y = typed(curve["y"])
+    assert y.size < made.track.t.size
+    assert (np.nanmin(y), np.nanmax(y)) == pytest.approx((-0.4, 0.9))
+    ends = np.concatenate([typed(one["y"]) for one in named(data, "its 95 % band")])
+    assert ends.max() == pytest.approx(0.9 + 1.96 * 0.001, rel=1e-4)
+    assert ends.min() == pytest.approx(-0.4 - 1.96 * 0.001, rel=1e-4)
+    still = track([0.1])
+    t = still.track.t + np.where(still.track.t > 0.5, 3.0, 0.0)
+    holey = replace(still, track=replace(still.track, t=t))
+    (curve,) = [
+        one for one in payload_figure(holey).figure.data if one["name"].startswith("m_p(t)")
+    ]
+    assert np.count_nonzero(np.isnan(typed(curve["y"]))) == 2  # in the hole, and at the end
 
 
 def test_many_changes_do_not_hide_the_payload() -> None:
     few, many = track([0.1, 0.2] * (MOST_MARKS // 2)), track([0.1, 0.2] * (MOST_MARKS // 2 + 1))
     assert len(few.track.changes) < MOST_MARKS < len(many.track.changes)
-    words = "95 % interval of a change's time"
     for made, marked in ((few, True), (many, False)):
-        payload, _ = figures(made)
-        assert (words in [entry.words for entry in payload.legend]) is marked
-        assert bool(payload.panels[0].layout["shapes"]) is marked
+        shapes = payload_figure(made).figure.layout["shapes"]
+        assert any(one["type"] == "rect" for one in shapes) is marked
 
 
 def test_a_jolt_leaves_the_frame_and_a_still_arm_does_too() -> None:
@@ -223,9 +217,6 @@ def test_a_jolt_leaves_the_frame_and_a_still_arm_does_too() -> None:
     m_p, std = made.track.m_p.copy(), made.track.std.copy()
     m_p[40] = 90.0  # a jolt: one sample in three hundred
     std[10:20] = 40.0  # the arm stood still
-    low, high = (
-        figures(replace(made, track=replace(made.track, m_p=m_p, std=std)))[0]
-        .panels[0]
-        .layout["yaxis"]["range"]
-    )
+    plot = payload_figure(replace(made, track=replace(made.track, m_p=m_p, std=std)))
+    low, high = plot.figure.layout["yaxis"]["range"]
     assert -1 < low < 0.1 < 0.35 < high < 2

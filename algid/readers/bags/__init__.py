@@ -5,29 +5,31 @@ Their messages are read by columns.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.readers.assemble import TableReader
 from algid.readers.bags.folder import bag_files
-from algid.readers.messages.reader import Opener, open_messages
+from algid.readers.messages.reader import MessageLog, Opener
 
 if TYPE_CHECKING:
     from algid.notices import Notice
-    from algid.profile import Profile
 
 
-def open_bag(path: Path, kind: str, profile: Profile | None = None) -> TableReader:
-    """Open a ROS 1 bag ("bag"), a SQLite file of rosbag2 ("db3"), or a folder of these ("rosbag2").
+def open_bag(path: Path, kind: str) -> MessageLog:
+    """A ROS 1 bag ("bag"), a SQLite file of rosbag2 ("db3"), or a folder ("rosbag2").
 
     Raises
     ------
     LogError
-        If the bag is damaged, or no topic holds the joint states of two joints.
+        If none of a folder's files is there.
     """
-    parts, said = parts_of(path, kind)
-    return open_messages(str(path), "bag", parts, profile, said)
+    if kind == "rosbag2" and (bag := bag_files(path)).kind == "mcap":
+        from algid.readers.mcap import open_mcap
+
+        return replace(open_mcap(bag.paths), notices=bag.notices)
+    return MessageLog(str(path), "bag", *parts_of(path, kind))
 
 
 def parts_of(path: Path, kind: str) -> tuple[list[Opener], tuple[Notice, ...]]:

@@ -36,6 +36,11 @@ def bag_files(folder: Path) -> Bag:
     else:
         parts = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
         names = sorted((path.name for path in parts), key=_numbered)
+        if len({re.sub(r"_\d+$", "", Path(name).stem) for name in names}) > 1:
+            raise LogError(
+                f"{folder}: {', '.join(names[:3])}: not the numbered parts of one bag, and no "
+                "metadata.yaml lists them; read each for itself"
+            )
     there, missing = [], []
     for name in names:
         path = folder / name

@@ -6,39 +6,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from algid.errors import LogError
 from algid.log import Truth
-from algid.readers.assemble import TableReader
 from algid.readers.mcap.catalogue import Catalogue, catalogue
 from algid.readers.mcap.framing import DamagedError, File
 from algid.readers.mcap.load import batches, look_beside
 from algid.readers.messages.batch import MessageBatch
+from algid.readers.messages.reader import MessageLog
 from algid.readers.messages.source import MessageChannel, Source
 
-if TYPE_CHECKING:
-    from algid.profile import Profile
 
-
-def open_mcap(paths: Sequence[Path], profile: Profile | None = None) -> TableReader:
-    """Open an MCAP log, or the splits of one in their order.
-
-    Raises
-    ------
-    LogError
-        If a message is encoded in an unknown way, or the file cannot be read or is damaged and
-        holds no joints.
-    NothingFoundError
-        If no topic of a sound file holds the joints.
-    """
-    from algid.readers.messages.reader import open_messages
-
+def open_mcap(paths: Sequence[Path]) -> MessageLog:
+    """An MCAP log, or the splits of one in their order."""
     known: Known = {}
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
-    return open_messages(
-        name, "mcap", [partial(messages_in, path, known) for path in paths], profile
-    )
+    return MessageLog(name, "mcap", [partial(messages_in, path, known) for path in paths])
 
 
 Known = dict[tuple[Path, int, int], Catalogue]
@@ -118,6 +101,7 @@ class McapSource(Source):
 def _channel(found: Catalogue, channel: object) -> MessageChannel:
     schema = found.schemas.get(channel.schema_id)  # type: ignore[attr-defined]
     topic, encoding = channel.topic, channel.message_encoding  # type: ignore[attr-defined]
+    metadata = channel.metadata  # type: ignore[attr-defined]
     if schema is None:
-        return MessageChannel(topic, "", encoding, "", b"")
-    return MessageChannel(topic, str(schema.name), encoding, schema.encoding, schema.data)
+        return MessageChannel(topic, "", encoding, "", b"", metadata)
+    return MessageChannel(topic, str(schema.name), encoding, schema.encoding, schema.data, metadata)

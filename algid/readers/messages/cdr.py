@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from algid.readers.messages.columnar import MisfitError, Numbers, Shape
 from algid.readers.messages.definitions import PRIMITIVES, TEXTS, Field, Types
+from algid.readers.stated import GROUPS
 from algid.words import counted
 
 _ENDINGS = {0: ">", 1: "<"}
@@ -53,6 +54,8 @@ class _Walk:
     def one(self, kind: str, path: str) -> None:
         if kind in PRIMITIVES:
             self.numbers(kind, path, 1)
+        elif kind in TEXTS and path.rpartition(".")[2] in GROUPS:
+            self.shape.labels[path] = self.text(kind)
         elif kind in TEXTS:
             self.skipped_text(kind)
         else:

@@ -55,6 +55,8 @@ class Shape:
     numbers: dict[str, Numbers] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     fixed: list[tuple[int, int]] = field(default_factory=list)
+    labels: dict[str, str] = field(default_factory=dict)
+    """Single texts: all of a JSON message, elsewhere those that name an arm or a recording."""
     flags: list[int] = field(default_factory=list)
     """Bytes of which only the highest bit is fixed: those of a varint."""
     absent: Callable[[str], bool] = lambda _: False
@@ -92,8 +94,10 @@ class Shape:
                 place += part
                 continue
             names = self._list_with(name, parent)  # a name first: joints may be called "1" and "2"
-            if names.count(name) > 1 or not (names or name.isdigit()):
+            if names.count(name) > 1:
                 return None
+            if not (names or name.isdigit()):
+                return self.numbers.get(path)  # of JSON, ``q1 [deg]``
             place += f"[{names.index(name)}]" if names else part
         if place in self.numbers:
             numbers = self.numbers[place]
@@ -245,6 +249,8 @@ class Decoder(ABC):
         Names of the numbers that one of those messages lacks.
     misfit : str
         Why the first of the last does not; empty where all fit.
+    labels : mapping
+        By path what a text names that says whose a message is.
     """
 
     wanted: Mapping[str, str]
@@ -254,6 +260,13 @@ class Decoder(ABC):
     lacks: tuple[str, ...] = ()
     misfits: int = 0
     misfit: str = ""
+    labels: dict[str, set[str]] = field(default_factory=dict)
+
+    def label(self, path: str, text: str) -> None:
+        """Note whose a message is; of very many names a few are enough."""
+        known = self.labels.setdefault(path, set())
+        if len(known) < LIMITS.joints:
+            known.add(text)
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
         """Which messages (N,) hold the wanted fields, and their numbers by name, in file order.
@@ -377,6 +390,8 @@ class ColumnDecoder(Decoder):
             self.spend(_WORK_A_WALK, _TOO_MANY)
             return None
         self.spend(_WORK_A_WALK + shape.parts, _TOO_MANY)
+        for path, text in shape.labels.items():
+            self.label(path, text)
         return layout(payload, shape, self.wanted)
 
 

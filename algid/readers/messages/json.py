@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from algid.limits import LIMITS
 from algid.readers.messages.batch import Messages
 from algid.readers.messages.columnar import Decoder, Fields, MisfitError, Numbers, Shape
-from algid.words import counted
+from algid.readers.stated import BAD, GOOD, GROUPS
+from algid.words import counted, repeated
 
 _BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
 """Cost of parsing: bytes of text, numbers of a list, and fields of an object, the slowest."""
@@ -34,18 +35,29 @@ def walk(payload: bytes) -> Shape:
         If the message is no JSON object.
     """
     shape = Shape()
-    _walk(_object(payload), "", shape)
+    _walk(_object(payload, _once), "", shape)
     return shape
 
 
-def _object(payload: bytes) -> dict[str, Any]:
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose names stand there once; of two alike the parser takes the last."""
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        twice = repeated(name for name, _ in pairs)
+        raise MisfitError(f"a JSON message that names {twice[0][:80]!r} twice")
+    return content
+
+
+def _object(
+    payload: bytes, pairs: Callable[[list[tuple[str, Any]]], dict[str, Any]] | None = None
+) -> dict[str, Any]:
     if len(payload) > LIMITS.json_bytes:
         raise MisfitError(
             f"a JSON message of {counted(len(payload), 'byte')}; expected {LIMITS.json_bytes} at "
             "most"
         )
     try:
-        content = json.loads(payload)
+        content = json.loads(payload, object_pairs_hook=pairs)
     except (ValueError, RecursionError) as error:
         raise MisfitError(f"a message that is no JSON ({type(error).__name__})") from error
     if not isinstance(content, dict):
@@ -63,6 +75,8 @@ def _walk(value: Any, path: str, shape: Shape) -> None:
             shape.texts[path] = tuple(value)
         for index, inner in enumerate(value):
             _walk(inner, f"{path}[{index}]", shape)
+    elif isinstance(value, str):
+        shape.labels[path] = value
     elif isinstance(value, (int, float)) and not isinstance(value, bool):
         shape.numbers[path] = Numbers(0, "json")
 
@@ -77,7 +91,7 @@ class JsonDecoder(Decoder):
         Notes in `held` (N,) which do.
         """
         self.spend(int(messages.sizes.sum()) // _BYTES_A_STEP, _TOO_MUCH)
-        paths = [_PART.findall(path) for path in self.wanted.values()]
+        paths = [(path, _PART.findall(path)) for path in self.wanted.values()]
         rows: list[list[Any]] = []
         for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
             payload = messages.content[start : start + size].tobytes()
@@ -90,7 +104,15 @@ class JsonDecoder(Decoder):
             except MisfitError as error:
                 self.misfitting(str(error))
                 continue
-            values = list(map(_Paths(content).value, paths))
+            if flags := _flagged(content):
+                self.without(flags)
+                continue
+            for place in (content, content.get("header")):
+                if isinstance(place, dict):
+                    for name in GROUPS & place.keys():
+                        self.label(name, str(place[name]))
+            found = _Paths(content)
+            values = [found.value([path] if path in content else parts) for path, parts in paths]
             held[row] = None not in values
             if held[row]:
                 rows.append(values)
@@ -111,6 +133,12 @@ class JsonDecoder(Decoder):
         self.spend(shape.parts, _TOO_MUCH)
         lacks = (name for name, value in zip(self.wanted, values, strict=True) if value is None)
         self.without(() if shape.of_others(self.wanted.values()) else tuple(lacks))
+
+
+def _flagged(content: dict[str, Any]) -> tuple[str, ...]:
+    """What a message says by which it is no measurement."""
+    bad = [name for name in GOOD & content.keys() if content[name] in (0, False)]
+    return (*bad, *(name for name in BAD & content.keys() if content[name] not in (0, False)))
 
 
 def _column(values: list[int | float]) -> NDArray[np.int64] | NDArray[np.float64]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from algid.errors import LogError
@@ -30,7 +31,9 @@ from algid.readers.messages.topic import (
     stamp_paths,
 )
 from algid.readers.names import CURRENTS, choose, take_apart
+from algid.readers.stated import in_json_schema, lines_of, units_in
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES
+from algid.units import unit_of
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -71,6 +74,8 @@ class Plan:
     notices: tuple[Notice, ...]
     units: dict[str, str]
     others: dict[str, str] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
+    """What definitions, schemas and metadata state in words."""
 
 
 def plan(source: Source, profile: Profile | None) -> Plan:
@@ -135,7 +140,31 @@ def plan(source: Source, profile: Profile | None) -> Plan:
     others: dict[str, str] = {}
     if usual is not None and usual.topic == main.name:
         others = usual.others
-    return Plan(topics, mapping, reading, notices, units, others)
+    said: list[str] = []
+    for one in topics:
+        stated, lines = _stated(source, one)
+        units = stated | units
+        said += lines
+    return Plan(topics, mapping, reading, notices, units, others, tuple(said))
+
+
+def _stated(source: Source, topic: Topic) -> tuple[dict[str, str], list[str]]:
+    """By channel the unit that a topic's schema or metadata state; what else is stated, as text."""
+    channel = source.channels[min(channels_of(source, topic.name, topic.type))]
+    text = channel.definition.decode("utf-8", errors="replace")
+    metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
+    if channel.encoding == "json":
+        units, descriptions = in_json_schema(text)
+        metadata |= units
+        lines += descriptions
+        for shape in islice(_shapes(source, topic.name, topic.type), 1):
+            lines += [f"{path}: {label}" for path, label in shape.labels.items() if "unit" in path]
+    elif channel.definition_encoding.startswith("ros"):
+        lines += [line for line in text.splitlines() if "#" in line or "//" in line]
+    fields = {name: path.partition("[")[0] for name, path in topic.fields.paths.items()}
+    by_field = units_in(metadata, list(dict.fromkeys(fields.values())))
+    units = {name: by_field[path] for name, path in fields.items() if path in by_field}
+    return {name: unit_of(unit) or unit for name, unit in units.items()}, lines
 
 
 def _reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:

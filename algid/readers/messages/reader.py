@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from algid.errors import LogError
@@ -26,25 +27,18 @@ _LOOKED = 1 << 14
 """Messages whose other joints are looked at."""
 
 
-def open_messages(
-    name: str,
-    form: str,
-    parts: Sequence[Opener],
-    profile: Profile | None,
-    said: tuple[Notice, ...] = (),
-) -> TableReader:
-    """Open a log of messages, or the parts of one in their order.
+@dataclass(frozen=True)
+class MessageLog:
+    """A log of messages: what messages call it, its format, and what opens its files in order."""
 
-    Parameters
-    ----------
-    name : str
-        Of the log, as its origin tells it.
-    form : str
-        Its format, likewise.
-    parts : sequence of Opener
-    profile : Profile, optional
-    said : tuple of Notice
-        What is to be said of the log as a whole.
+    path: str
+    kind: str
+    parts: Sequence[Opener]
+    notices: tuple[Notice, ...] = ()
+
+
+def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
+    """A reader of the topics and fields that a profile, or the messages themselves, choose.
 
     Raises
     ------
@@ -56,6 +50,7 @@ def open_messages(
     """
     from algid.readers.messages.plan import NothingFoundError, plan
 
+    name, parts = log.path, log.parts
     with parts[0]() as source:
         try:
             wanted = plan(source, profile)
@@ -75,7 +70,7 @@ def open_messages(
                 source, _LOOKED
             ),
         )
-    origin = Origin(name, form, wanted.mapping, truth, wanted.reading)
+    origin = Origin(name, log.kind, wanted.mapping, truth, wanted.reading)
 
     def read(topic: Topic, rows: int) -> Iterator[SampleTable]:
         for part in parts:
@@ -102,4 +97,12 @@ def open_messages(
             (needed if set(paths) - set(REFERENCES) else followed).append(series)
         return aligned(in_order(name, samples), needed, followed, left_out)
 
-    return reader_of(origin, tables, profile, wanted.units, (*said, *wanted.notices, *beside), rows)
+    return reader_of(
+        origin,
+        tables,
+        profile,
+        wanted.units,
+        (*log.notices, *wanted.notices, *beside),
+        rows,
+        wanted.said,
+    )

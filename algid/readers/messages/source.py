@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from algid.log import Truth
 from algid.notices import Notice
@@ -27,6 +27,7 @@ class MessageChannel:
     encoding: str
     definition_encoding: str
     definition: bytes
+    metadata: Mapping[str, str] = field(default_factory=dict, compare=False)
 
 
 class Source(ABC):

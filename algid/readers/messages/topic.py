@@ -20,6 +20,8 @@ from algid.readers.messages.batch import Account
 from algid.readers.messages.codec import decoder_for
 from algid.readers.messages.columnar import Decoder, ExcessError, Shape
 from algid.readers.messages.source import Source, channels_of
+from algid.readers.names import COMMANDED, CURRENTS, STEMS
+from algid.readers.stated import several
 from algid.readers.table import REFERENCES, VELOCITIES, SampleTable, stack
 
 JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
@@ -33,6 +35,7 @@ JOINT_REFERENCES = "/joint_references"
 _REFERENCES = ("reference.positions", "desired.positions", "position")
 """In the state of a trajectory controller (ROS 2 since Iron, and before), and in joint states."""
 _QUANTITIES = {"theta": "position", "tau": "effort", "omega": "velocity"}
+_NO_TORQUES = COMMANDED | CURRENTS
 _STAMPS = ("header.stamp", "stamp", "timestamp", "time", "header.timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "nsecs"))
 
@@ -132,10 +135,12 @@ def reference_fields(shape: Shape, joints: tuple[str, str]) -> dict[str, str]:
 def _path(shape: Shape, joint: str, quantity: str) -> str | None:
     """Path of a joint's number in this shape: in a list beside its name, or in its interfaces."""
     field = _QUANTITIES[quantity]
-    for path in (f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]"):
-        if shape.find(path) is not None:
-            return path
-    return None
+    paths = [f"{field}[{joint}]", f"interface_values[{joint}].values[{field}]"]
+    if not joint.isdigit():  # beside a list of names other lists may stand: {"joint_names", "q"}
+        for stem in STEMS[quantity]:
+            if (stem in shape.numbers or f"{stem}[0]" in shape.numbers) and stem not in _NO_TORQUES:
+                paths.append(f"{stem}[{joint}]")
+    return next((path for path in paths if shape.find(path) is not None), None)
 
 
 _STAMP = ("sec", "nanosec")
@@ -266,7 +271,7 @@ class Topic:
         """Notices of messages that lack a field, do not fit, or are otherwise typed or encoded."""
         said = []
         if decoder.lacking:
-            lacks = ", ".join(dict.fromkeys(decoder.wanted[name] for name in decoder.lacks))
+            lacks = ", ".join(dict.fromkeys(decoder.wanted.get(n, n) for n in decoder.lacks))
             numbers = {"count": decoder.lacking, "topic": self.name, "fields": lacks}
             said.append(Notice("LACKING_MESSAGES", numbers=numbers, lossy=True))
         if decoder.skipped:
@@ -275,6 +280,9 @@ class Topic:
         if decoder.misfits:
             numbers = {"count": decoder.misfits, "topic": self.name, "first": str(decoder.misfit)}
             said.append(Notice("MISFIT_MESSAGES", numbers=numbers, lossy=True))
+        said += [
+            several(path, values) for path, values in decoder.labels.items() if len(values) > 1
+        ]
         types = set()
         for number in source.used() - channels:
             channel = source.channels[number]

@@ -1,0 +1,91 @@
+"""Parquet and Feather (Arrow) files through pyarrow: only the needed columns, batch by batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from algid.errors import LogError
+from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
+from algid.notices import Notice
+from algid.readers.flat import BATCH_ROWS, TableFile, as_log_error
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def open_parquet(path: Path) -> TableFile:
+    """Open a Parquet file.
+
+    Raises
+    ------
+    LogError
+        If the file is damaged.
+    """
+    import pyarrow.parquet as pq
+
+    with as_log_error(path, "Parquet"):
+        about = pq.read_metadata(path)
+        schema = about.schema.to_arrow_schema()
+        text = (about.metadata or {}).get(KEY.encode())
+    companion = Companion(None, {})
+    notices: tuple[Notice, ...] = ()
+    if text is not None:
+        try:
+            companion = loads(text)
+        except ValueError as error:
+            raise LogError(
+                f"{path}: the truth in the file's metadata cannot be read ({error})"
+            ) from error
+    if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= set(schema.names):
+        notices = (Notice("NO_CHECKSUM", numbers={"case": "values"}),)
+
+    def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
+        left = about.num_rows if most is None else most
+        with (
+            as_log_error(path, "Parquet"),
+            pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file,
+        ):
+            for batch in file.iter_batches(BATCH_ROWS, columns=list(columns), use_threads=False):
+                yield batch.slice(0, left)
+                left -= batch.num_rows
+                if left <= 0:
+                    return
+
+    return TableFile(str(path), "parquet", schema, about.num_rows, batches, companion, notices)
+
+
+def open_feather(path: Path) -> TableFile:
+    """Open a Feather file.
+
+    Raises
+    ------
+    LogError
+        If the file is damaged.
+    """
+    import pyarrow as pa
+
+    def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
+        left = most
+        with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
+            places = [schema.names.index(name) for name in columns]
+            options = pa.ipc.IpcReadOptions(included_fields=places)
+            reader = pa.ipc.open_file(source, options=options)
+            for number in range(reader.num_record_batches):
+                batch = reader.get_batch(number)
+                batch.validate(full=True)
+                end = batch.num_rows if left is None else min(left, batch.num_rows)
+                for first in range(0, end, BATCH_ROWS):
+                    yield batch.slice(first, min(BATCH_ROWS, end - first))
+                left = None if left is None else left - end
+                if left == 0:
+                    return
+
+    with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
+        schema = pa.ipc.open_file(source).schema
+        # one column tells the rows; the others need not be unpacked for it
+        options = pa.ipc.IpcReadOptions(included_fields=[0])
+        reader = pa.ipc.open_file(source, options=options)
+        rows = sum(reader.get_batch(place).num_rows for place in range(reader.num_record_batches))
+    return TableFile(str(path), "feather", schema, rows, batches)

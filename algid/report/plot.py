@@ -1,0 +1,201 @@
+"""Panels for plotly's script: traces and layout as plain data, so that nothing is imported.
+
+Texts that plotly shows may hold a little HTML: every name passes through `label`.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from algid.arm import FloatArray
+from algid.quantiles import median
+from algid.text import visible
+
+BLUE, ORANGE, GREEN, GREY, RED = "#3b82c4", "#d9772b", "#2e9c6a", "#8b95a4", "#d0453c"
+"""Legible on white and on the dark page."""
+PALE = "rgba(59,130,196,.25)"
+LONGEST = 56
+FRAME, TICKS = 40, 55
+"""Pixels of a figure around its panels, and of a panel below its drawing."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure: its panels, how to read them, and what they show in words."""
+
+    key: str
+    title: str
+    figure: Panels
+    reading: str
+    note: str = ""
+
+
+class Panels:
+    """A grid of panels with a common legend; panels are counted row by row from 0.
+
+    Parameters
+    ----------
+    titles : one a panel
+    columns : int
+    height : int
+        Pixels of a panel.
+    together : bool
+        Whether they zoom together along x.
+    """
+
+    def __init__(
+        self, titles: Sequence[str], columns: int = 1, height: int = 240, together: bool = False
+    ) -> None:
+        rows = -(-len(titles) // columns)
+        self.data: list[dict[str, Any]] = []
+        self.layout: dict[str, Any] = {
+            "meta": {"columns": columns},
+            "shapes": [],
+            "annotations": [],
+            "height": height * rows + FRAME,
+        }
+        width, tall = 1 / columns, 1 / rows
+        for place, title in enumerate(titles):
+            row, column = divmod(place, columns)
+            left, top = column * (width + 0.04), 1 - row * tall
+            x, y = self.axes(place)
+            x |= {"domain": [left, left + width - 0.04 * (columns > 1)], "anchor": ref("y", place)}
+            y |= {"domain": [top - tall + TICKS / (height * rows), top], "anchor": ref("x", place)}
+            if together and place:
+                x["matches"] = "x"
+            self.text(place, title)
+
+    def axes(
+        self, place: int, x: dict[str, Any] | str = "", y: dict[str, Any] | str = ""
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Both axes of a panel, with their titles or more of their settings."""
+        both = []
+        for way, given in (("x", x), ("y", y)):
+            name = ref(f"{way}axis", place)
+            axis: dict[str, Any] = self.layout.setdefault(name, {})
+            if given:
+                axis |= {"title": {"text": given}} if isinstance(given, str) else given
+            both.append(axis)
+        return both[0], both[1]
+
+    def add(self, place: int, x: Any, y: Any, name: str, **more: Any) -> None:
+        """Add a trace; the first of a name stands in the legend."""
+        shown = label(name)
+        trace = {"type": "scatter", "x": packed(x, exact=True), "y": packed(y), "name": shown}
+        trace |= {"legendgroup": shown, "showlegend": all(o["name"] != shown for o in self.data)}
+        self.data.append(trace | {"xaxis": ref("x", place), "yaxis": ref("y", place)} | more)
+
+    def curve(
+        self,
+        place: int,
+        x: Any,
+        y: Any,
+        name: str,
+        colour: str = BLUE,
+        width: float = 1.4,
+        dash: str = "solid",
+        **more: Any,
+    ) -> None:
+        """Add a line."""
+        look = {"color": colour, "width": width, "dash": dash}
+        self.add(place, x, y, name, mode="lines", line=look, **more)
+
+    def dots(
+        self,
+        place: int,
+        x: Any,
+        y: Any,
+        name: str,
+        colour: str = BLUE,
+        size: int = 6,
+        symbol: str = "circle",
+        **more: Any,
+    ) -> None:
+        """Add points; `more` may hold error bars."""
+        marker = {"color": colour, "size": size, "symbol": symbol}
+        self.add(place, x, y, name, mode="markers", marker=marker, **more)
+
+    def band(self, place: int, x: FloatArray, low: FloatArray, high: FloatArray, name: str) -> None:
+        """Add the area between two series, an area for each stretch without a gap."""
+        known = np.flatnonzero(np.isfinite(low) & np.isfinite(high))
+        for part in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
+            around = np.concatenate([x[part], x[part][::-1]])
+            edge = np.concatenate([high[part], low[part][::-1]])
+            fill = {"fill": "toself", "fillcolor": PALE, "hoverinfo": "skip"}
+            self.curve(place, around, edge, name, width=0, **fill)
+
+    def line(
+        self, place: int, *, x: Any = None, y: Any = None, colour: str = GREY, dash: str = "dash"
+    ) -> None:
+        """Add a level line at `y`, or an upright one at `x`, over the whole panel."""
+        ends = self._over(place, x0=x, x1=x) if y is None else self._over(place, y0=y, y1=y)
+        look = {"color": colour, "width": 1.2, "dash": dash}
+        self.layout["shapes"].append(ends | {"type": "line", "line": look})
+
+    def stretch(self, place: int, low: float, high: float, colour: str = GREY) -> None:
+        """Add an upright band over the whole panel."""
+        look = {"fillcolor": colour, "opacity": 0.16, "line": {"width": 0}, "layer": "below"}
+        self.layout["shapes"].append(self._over(place, x0=low, x1=high) | look | {"type": "rect"})
+
+    def heat(self, names: Sequence[str], x: Any, z: FloatArray, **more: Any) -> None:
+        """Fill the only panel with a map of numbers, a row a name."""
+        rows = list(map(label, names))
+        self.add(0, x, rows, "map", type="heatmap", z=packed(z), ygap=3, **more)
+        self.data[-1]["showlegend"] = False
+        self.axes(0, y={"autorange": "reversed", "type": "category"})
+        self.layout["height"] = 110 + 30 * len(rows)
+
+    def text(self, place: int, words: str, x: Any = None) -> None:
+        """Add a text at the top of a panel, at `x`; without one it is the panel's title."""
+        at = {"x": x, "xref": ref("x", place), "yanchor": "top", "text": label(words)}
+        if x is None:
+            at |= {"x": 0, "xref": f"{ref('x', place)} domain", "yanchor": "bottom"}
+            at["text"] = f"<b>{at['text']}</b>"
+        at |= {"y": 1, "yref": f"{ref('y', place)} domain", "xanchor": "left", "showarrow": False}
+        self.layout["annotations"].append(at)
+
+    def _over(self, place: int, **ends: Any) -> dict[str, Any]:
+        """Where a shape lies that reaches over the whole panel along the axis not given."""
+        refs = {"xref": ref("x", place), "yref": ref("y", place)}
+        open_way = "y" if "x0" in ends else "x"
+        refs[f"{open_way}ref"] += " domain"
+        return refs | {f"{open_way}0": 0, f"{open_way}1": 1} | ends
+
+
+def ref(name: str, place: int) -> str:
+    """What plotly calls an axis of a panel: x, x2, x3."""
+    return f"{name}{place + 1}" if place else name
+
+
+def label(text: str) -> str:
+    """Foreign text for plotly, shown as it is, never as markup."""
+    shown = visible(text)
+    shown = shown if len(shown) <= LONGEST else shown[: LONGEST - 1] + "…"
+    return html.escape(shown, quote=False)
+
+
+def packed(values: Any, exact: bool = False) -> Any:
+    """Numbers as plotly's typed array.
+
+    In single precision, unless they are integers, such as dates, or beyond it, or are to be
+    `exact` and its error is over 1 % of their usual step, as that of times in a long log.
+    """
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+        return values
+    limits = np.finfo(np.float32)
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    kind = "f8" if values.dtype.kind in "iu" or largest > float(limits.max) else "f4"
+    if exact:
+        steps = np.abs(np.diff(values))
+        steps = steps[steps > 0]
+        if steps.size and median(steps) < 100 * float(limits.eps) * largest:
+            kind = "f8"
+    text = base64.b64encode(np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()).decode()
+    shape = {} if values.ndim == 1 else {"shape": ", ".join(map(str, values.shape))}
+    return {"dtype": kind, "bdata": text, **shape}

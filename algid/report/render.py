@@ -1,0 +1,174 @@
+"""A document as a page and as Markdown, and a result in a notebook: by the templates.
+
+A page is one offline file that carries the plotting library, packed. Only scripts with its nonce
+run, which follows from the whole content: a name out of a log could not run even if it slipped
+past the escaping, and the same document gives the same bytes. Jinja2 is imported where a page is
+made.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+import math
+import re
+import secrets
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from algid.files import whole_file
+from algid.report.document import Document, Table
+from algid.results import Result
+from algid.results.rows import rows_of
+from algid.text import visible
+from algid.verdict import MOST_REASONS
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+LIBRARY = "plotly.min.js"
+BUNDLE = "plotly.min.js.gz"
+HERE = resources.files("algid.report")
+SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~@&])")
+
+
+def page(document: Document, shared_library: bool = False) -> str:
+    """The text of `document`'s page.
+
+    It carries the plotting library; with `shared_library` it asks for the one beside the folder.
+    """
+    drawn: dict[str, Any] = {}
+    for plot in document.plots:
+        drawn[plot.key] = {"data": plot.figure.data, "layout": plot.figure.layout}
+    if document.arm is not None:
+        t, theta = document.arm.frames
+        rows = dict(zip(("t", "theta1", "theta2"), (t, *theta), strict=True))
+        drawn["arm"] = {name: values.round(4).tolist() for name, values in rows.items()}
+    place = secrets.token_hex(32)  # nobody who writes the content can predict it
+    text = (
+        _environment(_shown)
+        .get_template("page.html")
+        .render(
+            document=document,
+            most=MOST_REASONS,
+            drawn=packed_text(gzip.compress(strict_json(drawn).encode(), mtime=0)),
+            library="" if shared_library else packed_text(library()),
+            beside=LIBRARY,
+            nonce=place,
+        )
+    )
+    text = text.lstrip()  # the macros leave their line feeds
+    return text.replace(place, hashlib.sha256(text.replace(place, "").encode()).hexdigest())
+
+
+def markdown(document: Document) -> str:
+    """`document` as GitHub's Markdown: title, verdict, tables, and what is folded."""
+    from markupsafe import Markup
+
+    command = document.verdict.command or ""
+    # a block of code that no row of backticks in it can end
+    fence = "`" * (1 + max(map(len, re.findall("`+", command)), default=2))
+    code = Markup(f"{fence}sh\n{visible(command, len(command))}\n{fence}")
+    return _environment(_escaped).get_template("report.md").render(document=document, code=code)
+
+
+def markdown_table(table: Table) -> str:
+    """One table with its title and note."""
+    macros = _environment(_escaped).get_template("table.md").module
+    return str(macros.table(table))  # type: ignore[attr-defined]
+
+
+def notebook(result: Result, title: str) -> str:
+    """The verdict with its first reasons, and a table of the estimates under `title`."""
+    template = _environment(_shown).get_template("notebook.html")
+    rows = rows_of(result, result.estimates)
+    shown = {"result": result, "title": title, "rows": rows, "most": MOST_REASONS, "repr": repr}
+    return template.render(shown)
+
+
+@cache
+def _environment(finalize: Any) -> Environment:
+    """Templates in which every text passes through `finalize`, and then the escaping of HTML."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    return Environment(
+        loader=FileSystemLoader(str(HERE / "templates")),
+        autoescape=True,
+        finalize=finalize,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        optimized=False,  # a template is rendered once: to optimise it takes longer
+    )
+
+
+def _shown(value: object) -> object:
+    """Text with its control characters visible."""
+    if type(value) is not str or (value.isascii() and value.isprintable()):
+        return value
+    return visible(value, len(value))
+
+
+def _escaped(value: object) -> object:
+    """Text so that Markdown shows it as it is: no markup, no HTML, no mention of anybody."""
+    from markupsafe import Markup
+
+    if type(value) is not str:
+        return value
+    return Markup(SPECIAL.sub(r"\\\1", visible(value, len(value))))
+
+
+def strict_json(value: object) -> str:
+    """`value` as JSON; a number that is none is null, as a gap in a line is."""
+    try:
+        return json.dumps(value, allow_nan=False, separators=(",", ":"))
+    except ValueError:
+        return json.dumps(_of_numbers(value), separators=(",", ":"))
+
+
+def _of_numbers(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _of_numbers(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_of_numbers(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def packed_text(content: bytes) -> str:
+    """What gzip made, as the page's script unpacks it."""
+    return base64.b64encode(content).decode()
+
+
+@cache
+def library() -> bytes:
+    """The plotting library that this installation has, in gzip.
+
+    A build with npm at hand leaves plotly's bundle for figures with two axes among the assets;
+    without it the whole library comes out of the package `plotly`.
+    """
+    asset = HERE / "assets" / BUNDLE
+    if asset.is_file():
+        return asset.read_bytes()
+    from plotly.offline import get_plotlyjs
+
+    return gzip.compress(get_plotlyjs().encode(), mtime=0)
+
+
+def write_library(folder: Path) -> None:
+    """Write the library as a script beside the folders of many results, if it is not there."""
+    script, path = gzip.decompress(library()), folder / LIBRARY
+    if not path.is_file() or path.stat().st_size != len(script):
+        write_texts(folder, {LIBRARY: script.decode()})
+
+
+def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write each text into the file of its name, whole or not at all. Raises `OutputError`."""
+    for name, text in texts.items():
+        with whole_file(folder / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return [folder / name for name in texts]

@@ -1,0 +1,466 @@
+"""One log in each of the ways in which algid takes one: files, frames, arrays and messages."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pyarrow.feather as feather
+import pyarrow.parquet as parquet
+import scipy.io
+from mcap.writer import Writer
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from algid.log import Log
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from tests.readers.mcaps import joint_state, protobuf_schema
+
+EPOCH = 1_700_000_000_000_000_000
+FLAT = [
+    "csv", "tsv", "jsonl", "parquet", "feather", "npz", "mat", "h5",
+    "dict", "pandas", "polars", "arrays",
+]  # fmt: skip
+LISTS = ["parquet[]", "jsonl[]"]
+MESSAGES = ["cdr", "json", "pb", "bag1", "db3"]
+WAYS = FLAT + LISTS + MESSAGES
+_WITH_ATTRIBUTES = {"csv", "tsv", "parquet", "feather", "npz", "mat", "h5", "pandas"}
+_MASKED = {"parquet", "feather", "dict", "pandas", "polars", "arrays"}
+_ZONED = {"csv", "tsv", "jsonl", "parquet", "feather", "pandas", "polars"}
+CANONICAL = ["time", "q1", "q2", "tau1", "tau2"]
+_JSON_SCHEMA = b'{"type":"object"}'
+_STORES = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+
+
+class CannotSayError(Exception):
+    """A way has no place for a fact."""
+
+
+class Zoned:
+    """Stamps in ns since 1970 that have a zone."""
+
+    def __init__(self, stamp_ns: Any) -> None:
+        self.stamps = np.asarray(stamp_ns).astype("datetime64[ns]")
+
+
+@dataclass(frozen=True)
+class Flat:
+    """Columns by name, attributes by column, and metadata of the file."""
+
+    columns: Mapping[str, Any]
+    attributes: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Message:
+    """One joint state; stamps in ns."""
+
+    position: Sequence[float]
+    effort: Sequence[float]
+    stamp: int
+    log_stamp: int
+    name: Sequence[str] = ("j1", "j2")
+    velocity: Sequence[float] = ()
+    topic: str = "/joint_states"
+    frame: str = ""
+
+
+@dataclass(frozen=True)
+class States:
+    """Joint states, the text of their definition, and metadata of the file."""
+
+    messages: Sequence[Message]
+    definition: str = JOINT_STATE_DEFINITION
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+def written(way: str, folder: Path, log: Flat | States) -> Any:
+    """A path, a frame, a dict, or a function that gives a `Log`; raises `CannotSayError`."""
+    if isinstance(log, Flat):
+        values = log.columns.values()
+        if (
+            (log.attributes and way not in _WITH_ATTRIBUTES)
+            or (any(isinstance(one, np.ma.MaskedArray) for one in values) and way not in _MASKED)
+            or (any(isinstance(one, Zoned) for one in values) and way not in _ZONED)
+        ):
+            raise CannotSayError
+        return _FLAT_WAYS[way](folder, log)
+    if way in LISTS:
+        return _lists(way, folder, log)
+    return _MESSAGE_WAYS[way](folder, log)
+
+
+def _without_metadata(log: Flat) -> None:
+    if log.metadata:
+        raise CannotSayError
+
+
+def _kinds(log: Flat) -> set[str]:
+    return {np.asarray(one).dtype.kind for one in log.columns.values()}
+
+
+def cell_text(value: Any) -> str:
+    """A cell as text files write it."""
+    if value is None:
+        return ""
+    if isinstance(value, str | Decimal):
+        return str(value)
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, np.timedelta64):
+        return str(value / np.timedelta64(1, "s"))
+    if isinstance(value, np.datetime64):
+        return str(value.astype("datetime64[us]"))
+    if isinstance(value, int | np.integer):
+        return str(int(value))
+    return repr(float(value))
+
+
+def _json_value(value: Any) -> Any:
+    if isinstance(value, np.generic) and value.dtype.kind in "fiub":
+        return value.item()
+    if isinstance(value, np.generic | Decimal) and not isinstance(value, str):
+        return cell_text(value)
+    return value
+
+
+def _rows(log: Flat) -> Iterable[tuple[Any, ...]]:
+    columns = []
+    for values in log.columns.values():
+        if isinstance(values, Zoned):
+            stamps = values.stamps.astype("datetime64[us]")
+            columns.append([f"{stamp}+00:00" for stamp in stamps])
+        else:
+            columns.append(list(values))
+    return zip(*columns, strict=True)
+
+
+def csv_text(log: Flat, separator: str = ",") -> str:
+    """Comments of the metadata, header, units row where a column has a unit, rows."""
+    lines = [f"# {key}: {value}" if value else f"# {key}" for key, value in log.metadata.items()]
+    lines.append(separator.join(log.columns))
+    if log.attributes:
+        if any(set(said) != {"units"} for said in log.attributes.values()):
+            raise CannotSayError
+        units = [log.attributes.get(name, {}).get("units", "") for name in log.columns]
+        lines.append(separator.join(units))
+    lines += [separator.join(map(cell_text, row)) for row in _rows(log)]
+    return "\n".join(lines) + "\n"
+
+
+def _csv(folder: Path, log: Flat) -> Path:
+    path = folder / "log.csv"
+    path.write_text(csv_text(log))
+    return path
+
+
+def _tsv(folder: Path, log: Flat) -> Path:
+    path = folder / "log.tsv"
+    path.write_text(csv_text(log, "\t"))
+    return path
+
+
+def _jsonl(folder: Path, log: Flat) -> Path:
+    lines = [json.dumps(dict(log.metadata))] if log.metadata else []
+    for row in _rows(log):
+        lines.append(json.dumps(dict(zip(log.columns, map(_json_value, row), strict=True))))
+    path = folder / "log.jsonl"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def arrow_table(log: Flat) -> pa.Table:
+    """A table whose schema and fields have the metadata."""
+    arrays = []
+    for values in log.columns.values():
+        if isinstance(values, Zoned):
+            arrays.append(pa.array(values.stamps).cast(pa.timestamp("ns", tz="Europe/Berlin")))
+        elif isinstance(values, np.ma.MaskedArray):
+            arrays.append(pa.array(values.data, mask=values.mask))
+        elif isinstance(values, list):
+            arrays.append(pa.array(values))
+        elif values.dtype.byteorder == ">" or values.dtype.kind == "c":
+            raise CannotSayError
+        else:
+            arrays.append(pa.array(list(values)) if values.dtype == object else pa.array(values))
+    fields = []
+    for name, array in zip(log.columns, arrays, strict=True):
+        fields.append(pa.field(name, array.type, metadata=log.attributes.get(name)))
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=log.metadata or None))
+
+
+def _parquet(folder: Path, log: Flat) -> Path:
+    path = folder / "log.parquet"
+    parquet.write_table(arrow_table(log), path)
+    return path
+
+
+def _feather(folder: Path, log: Flat) -> Path:
+    path = folder / "log.feather"
+    feather.write_feather(arrow_table(log), path)
+    return path
+
+
+def _npz(folder: Path, log: Flat) -> Path:
+    if "O" in _kinds(log):
+        raise CannotSayError
+    path = folder / "log.npz"
+    arrays = {name: np.asarray(values) for name, values in log.columns.items()}
+    arrays |= {key: np.array(value) for key, value in log.metadata.items()}
+    for key in {key for said in log.attributes.values() for key in said}:
+        by_place = [log.attributes.get(name, {}).get(key, "") for name in log.columns]
+        arrays[key] = np.array(by_place)
+    np.savez(path, **arrays)  # type: ignore[arg-type]
+    return path
+
+
+def _mat(folder: Path, log: Flat) -> Path:
+    if _kinds(log) & set("OmM") or not all(map(str.isidentifier, log.columns)):
+        raise CannotSayError
+    content: dict[str, Any] = {name: np.asarray(values) for name, values in log.columns.items()}
+    content |= log.metadata
+    for key in {key for said in log.attributes.values() for key in said}:
+        by_name = {name: said[key] for name, said in log.attributes.items() if key in said}
+        content[key] = by_name
+    path = folder / "log.mat"
+    scipy.io.savemat(path, content)
+    return path
+
+
+def _h5(folder: Path, log: Flat) -> Path:
+    if _kinds(log) & set("OmM"):
+        raise CannotSayError
+    path = folder / "log.h5"
+    with h5py.File(path, "w") as file:
+        for name, values in log.columns.items():
+            array = np.asarray(values)
+            stored = array.astype("S") if array.dtype.kind == "U" else array
+            data = file.create_dataset(name.replace("/", "_"), data=stored)
+            for key, text in log.attributes.get(name, {}).items():
+                data.attrs[key] = text if key == "units" else float(text)
+        file.attrs.update(log.metadata)
+    return path
+
+
+def _dict(_: Path, log: Flat) -> dict[str, Any]:
+    _without_metadata(log)
+    return dict(log.columns)
+
+
+def _pandas(_: Path, log: Flat) -> pd.DataFrame:
+    columns: dict[str, Any] = {}
+    for name, values in log.columns.items():
+        columns[name] = values
+        if isinstance(values, Zoned):
+            index = pd.DatetimeIndex(values.stamps).tz_localize("UTC")
+            columns[name] = index.tz_convert("Europe/Berlin")
+        elif isinstance(values, np.ma.MaskedArray):
+            columns[name] = pd.arrays.FloatingArray(values.data.copy(), values.mask.copy())
+    frame = pd.DataFrame(columns)
+    if log.attributes:
+        units = {name: said.get("units") for name, said in log.attributes.items()}
+        frame.attrs["units"] = {name: unit for name, unit in units.items() if unit}
+        frame.attrs |= {name: dict(said) for name, said in log.attributes.items()}
+    frame.attrs |= log.metadata
+    return frame
+
+
+def _polars(_: Path, log: Flat) -> pl.DataFrame:
+    _without_metadata(log)
+    columns: dict[str, Any] = {}
+    for name, values in log.columns.items():
+        if isinstance(values, Zoned):
+            columns[name] = pl.Series(values.stamps).dt.replace_time_zone("UTC")
+        elif isinstance(values, np.ma.MaskedArray):
+            columns[name] = pl.Series(values.tolist())
+        elif isinstance(values, list):
+            columns[name] = pl.Series(values)
+        elif values.dtype.byteorder == ">" or values.dtype.kind == "c":
+            raise CannotSayError
+        elif values.dtype == object:
+            columns[name] = pl.Series(list(values), strict=False)
+        else:
+            columns[name] = pl.Series(values)
+    return pl.DataFrame(columns)
+
+
+def _arrays(_: Path, log: Flat) -> Callable[[], Log]:
+    _without_metadata(log)
+    if list(log.columns) != CANONICAL:
+        raise CannotSayError
+    time, q1, q2, tau1, tau2 = log.columns.values()
+    masked = any(isinstance(one, np.ma.MaskedArray) for one in log.columns.values())
+    stack: Any = np.ma.stack if masked else np.stack
+    return lambda: Log.from_arrays(time, stack([q1, q2]), stack([tau1, tau2]))
+
+
+def _json_columns(folder: Path, log: Flat) -> Path:
+    _without_metadata(log)
+    rows = []
+    for place, row in enumerate(_rows(log)):
+        text = json.dumps(dict(zip(log.columns, map(_json_value, row), strict=True)))
+        rows.append((place * 5_000_000, text.encode()))
+    return json_mcap(folder, rows)
+
+
+_FLAT_WAYS = {
+    "csv": _csv, "tsv": _tsv, "jsonl": _jsonl, "parquet": _parquet, "feather": _feather,
+    "npz": _npz, "mat": _mat, "h5": _h5, "dict": _dict, "pandas": _pandas,
+    "polars": _polars, "arrays": _arrays, "json": _json_columns,
+}  # fmt: skip
+
+
+def json_mcap(
+    folder: Path,
+    rows: Sequence[tuple[int, bytes]],
+    schema: bytes = _JSON_SCHEMA,
+    metadata: Mapping[str, str] | None = None,
+) -> Path:
+    """Objects on one topic with their log times in ns."""
+    topics = [("/arm", stamp, data) for stamp, data in rows]
+    return _mcap(folder, topics, ("arm", "jsonschema", schema), "json", metadata or {})
+
+
+def _mcap(
+    folder: Path,
+    rows: Sequence[tuple[str, int, bytes]],
+    schema: tuple[str, str, bytes],
+    encoding: str,
+    metadata: Mapping[str, str],
+) -> Path:
+    path = folder / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        number = writer.register_schema(*schema)
+        channels: dict[str, int] = {}
+        for topic, stamp, data in rows:
+            if topic not in channels:
+                channels[topic] = writer.register_channel(topic, encoding, number, dict(metadata))
+            writer.add_message(channels[topic], stamp, data, stamp)
+        if metadata:
+            writer.add_metadata("log", dict(metadata))
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def _cdr(folder: Path, log: States) -> Path:
+    rows = []
+    for one in log.messages:
+        message = joint_state(
+            one.stamp, one.name, one.position, one.velocity, one.effort, frame=one.frame
+        )
+        rows.append((one.topic, one.log_stamp, message.done()))
+    schema = (JOINT_STATE, "ros2msg", log.definition.encode())
+    return _mcap(folder, rows, schema, "cdr", log.metadata)
+
+
+def _usual_definition(log: States) -> None:
+    if log.definition is not JOINT_STATE_DEFINITION:
+        raise CannotSayError
+
+
+def _json(folder: Path, log: States) -> Path:
+    _usual_definition(log)
+    rows = []
+    for one in log.messages:
+        sec, nanosec = divmod(one.stamp, 10**9)
+        header = {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": one.frame}
+        content = {
+            "header": header,
+            "name": one.name,
+            "position": one.position,
+            "effort": one.effort,
+            "velocity": one.velocity,
+        }
+        rows.append((one.topic, one.log_stamp, json.dumps(content).encode()))
+    return _mcap(folder, rows, ("arm", "jsonschema", _JSON_SCHEMA), "json", log.metadata)
+
+
+def _pb(folder: Path, log: States) -> Path:
+    _usual_definition(log)
+    if any(one.frame for one in log.messages):
+        raise CannotSayError
+    schema, kind = protobuf_schema()
+    rows = []
+    for one in log.messages:
+        message = kind(
+            name=one.name, position=one.position, velocity=one.velocity, effort=one.effort
+        )
+        message.timestamp.seconds, message.timestamp.nanos = divmod(one.stamp, 10**9)
+        rows.append((one.topic, one.log_stamp, message.SerializeToString()))
+    return _mcap(folder, rows, ("arm.State", "protobuf", schema), "protobuf", log.metadata)
+
+
+def _lists(way: str, folder: Path, log: States) -> Path:
+    """Joint states as rows of a table whose cells are lists."""
+    _usual_definition(log)
+    if len({one.topic for one in log.messages}) > 1 or (log.metadata and way == "jsonl[]"):
+        raise CannotSayError
+    columns: dict[str, list[Any]] = {
+        "time": [(one.stamp - EPOCH) * 1e-9 for one in log.messages],
+        "name": [list(one.name) for one in log.messages],
+        "position": [list(one.position) for one in log.messages],
+        "effort": [list(one.effort) for one in log.messages],
+    }
+    if any(one.velocity for one in log.messages):
+        columns["velocity"] = [list(one.velocity) for one in log.messages]
+    if any(one.frame for one in log.messages):
+        columns["frame_id"] = [one.frame for one in log.messages]
+    if any(one.log_stamp != one.stamp for one in log.messages):
+        columns["log_time"] = [one.log_stamp for one in log.messages]
+    if way == "jsonl[]":
+        return _jsonl(folder, Flat(columns))
+    return _parquet(folder, Flat(columns, metadata=log.metadata))
+
+
+def _bag1(folder: Path, log: States) -> Path:
+    path = folder / "log.bag"
+    with Ros1Writer(path) as writer:
+        _fill(writer, _STORES[0], log, {"seq": 0})
+    return path
+
+
+def _db3(folder: Path, log: States) -> Path:
+    path = folder / "log"
+    with Ros2Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        _fill(writer, _STORES[1], log, {})
+    return path
+
+
+def _fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
+    _usual_definition(log)
+    if log.metadata:
+        raise CannotSayError
+    of_type = "sensor_msgs/msg/JointState"
+    names = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", of_type)
+    time, header, state = (store.types[name] for name in names)
+    serialize = store.serialize_ros1 if head else store.serialize_cdr
+    connections: dict[str, Any] = {}
+    for one in log.messages:
+        if one.topic not in connections:
+            connections[one.topic] = writer.add_connection(one.topic, of_type, typestore=store)
+        stamp = time(sec=one.stamp // 10**9, nanosec=one.stamp % 10**9)
+        message = state(
+            header=header(stamp=stamp, frame_id=one.frame, **head),
+            name=list(one.name),
+            position=np.array(one.position, float),
+            velocity=np.array(one.velocity, float),
+            effort=np.array(one.effort, float),
+        )
+        writer.write(connections[one.topic], one.log_stamp, serialize(message, of_type))
+
+
+_MESSAGE_WAYS = {"cdr": _cdr, "json": _json, "pb": _pb, "bag1": _bag1, "db3": _db3}

@@ -1,0 +1,322 @@
+"""The page of an identification: its numbers, its promises, what it makes of what is missing."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import html
+import json
+import re
+import shutil
+from importlib import resources
+from pathlib import Path
+
+import plotly.graph_objects as go
+import polars as pl
+import pytest
+
+from algid.errors import ResultError
+from algid.notices import Notice
+from algid.report.document import Document, Section, Table
+from algid.report.page import result_document, write_pages
+from algid.report.render import library, markdown, page, strict_json
+from algid.results import Estimate, Result, Status, TermCriterion, write_result
+from algid.results.rows import rows_of
+from algid.verdict import Verdict
+from tests.report.folders import HOSTILE, estimate, hostile
+from tests.report.pages import Page
+
+FIGURES = [
+    "intervals", "torque", "closeup", "residual", "running", "signals", "coverage",
+    "correlation", "information", "inertia", "estimates", "loaded",
+]  # fmt: skip
+
+
+@pytest.fixture
+def folder(case_folder: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(case_folder, tmp_path / "case1.algid"))
+
+
+def written(folder: Path, result: Result | None = None, shared: bool = False) -> Page:
+    if result is not None:
+        write_result(result, folder / "result.json")
+    return Page(write_pages(folder, shared)[0].read_text(encoding="utf-8"))
+
+
+def test_the_page_leads_with_the_arm_and_its_tables_hold_the_estimates(
+    folder: Path, result: Result
+) -> None:
+    shown = written(folder)
+    assert list(shown.tables)[:2] == ["Constants", "Payload"]
+    heads, rows = shown.tables["Constants"]
+    assert heads[:5] == ["Parameter", "Estimate", "± 95 %", "Unit", "Status"]
+    every = rows_of(result, result.parameters)
+    assert [row[:5] for row in rows] == [[o.name, o.value, o.half, o.unit, o.status] for o in every]
+    assert "7 of 7 constants identified · refined estimator · 7.998 s of log" in shown.text
+    heads, rows = shown.tables["Table 4"]
+    assert [row[0] for row in rows] == ["k1", "k3", "k6", "k4", "k2"]
+    assert rows[0][heads.index("Paper, %")] == "0.2449"
+    heads, rows = shown.tables["Samples that were used"]
+    assert [row[:2] for row in rows] == [
+        ["case1-unloaded.mcap", "4,000"], ["case1-loaded.mcap", "4,000"],
+    ]  # fmt: skip
+    assert shown.tables["Torque prediction"][1][0][:2] == ["logs used", "1"]
+    assert [row[1] for row in shown.tables["Whiteness of the residual"][1]] == ["yes", "yes"]
+
+
+def test_every_figure_is_there_and_plotly_takes_it(folder: Path) -> None:
+    figures = written(folder).figures
+    arm = figures.pop("arm")
+    assert list(figures) == FIGURES
+    assert len(arm["t"]) == len(arm["theta1"]) == len(arm["theta2"]) > 100
+    for figure in figures.values():
+        made = go.Figure(figure)  # which refuses what its script does not know
+        assert len(made.data) == len(figure["data"]) > 0
+        for trace in figure["data"]:
+            assert {f"{trace[way]}"[:1] for way in ("xaxis", "yaxis")} == {"x", "y"}
+
+
+def test_only_the_pages_own_scripts_run_and_nothing_is_asked_of_any_host(folder: Path) -> None:
+    shown = written(folder)
+    policy = dict(shown.tags)["meta"]
+    policy = next(a for t, a in shown.tags if t == "meta" and "http-equiv" in a)
+    nonce = re.search(r"script-src 'nonce-([0-9a-f]{64})'", policy["content"])
+    assert nonce is not None
+    assert policy["content"].startswith("default-src 'none'; script-src 'nonce-")
+    assert nonce[1] == hashlib.sha256(shown.text.replace(nonce[1], "").encode()).hexdigest()
+    scripts = [attrs for tag, attrs in shown.tags if tag == "script"]
+    assert [one.get("nonce") for one in scripts] == [None, None, nonce[1]]
+    assert [one.get("id") for one in scripts] == ["figures", "library", None]
+    assert not [attrs for _, attrs in shown.tags if "src" in attrs]
+    links = [attrs["href"] for _, attrs in shown.tags if "href" in attrs]
+    assert all(link.startswith(("#", "data:,")) for link in links)
+    assert written(folder).text == shown.text  # the same result gives the same bytes
+    changed = written(folder, hostile(result_of(folder)))
+    assert nonce[1] not in changed.text
+
+
+def result_of(folder: Path) -> Result:
+    return Result.model_validate_json((folder / "result.json").read_text(encoding="utf-8"))
+
+
+def test_every_link_leads_somewhere_and_no_id_stands_twice(folder: Path) -> None:
+    shown = written(folder)
+    ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    links = {a["href"][1:] for _, a in shown.tags if a.get("href", "").startswith("#")}
+    assert links <= set(ids)
+    assert {"numbers", "torque", "data", "settings", "paper"} <= links
+
+
+def test_foreign_text_stays_text(folder: Path, result: Result) -> None:
+    shown = written(folder, hostile(result))
+    tags = Page(shown.prose).tags
+    assert {"img", "b", "script"}.isdisjoint(tag for tag, _ in tags)
+    assert not [attrs for _, attrs in tags if any(name.startswith("on") for name in attrs)]
+    assert html.escape(HOSTILE).replace("&quot;", "&#34;").replace("&#x27;", "&#39;") in shown.text
+    assert shown.text.count("<script") == 3
+    assert shown.text.count("<svg") == 1  # the arm
+    texts = strict_json(shown.figures)
+    assert "<img" not in texts
+    assert "&lt;script" in texts or "script&gt;" in texts  # a log's name over its part
+    for character in "\x1b\x07\u202e":
+        assert character not in shown.text + texts
+    text = (folder / "report.md").read_text(encoding="utf-8")
+    assert r"\<script\>" in text
+    assert not re.search(r"(?<!\\)<(?!details|summary|/details|/summary)|(?<!\\)@", text)
+    assert "\x1b" not in text
+
+
+def test_one_library_serves_a_folder_of_reports(folder: Path) -> None:
+    shown = written(folder, shared=True)
+    script = folder.parent / "plotly.min.js"
+    assert script.read_bytes() == gzip.decompress(library())
+    (_, linked), *_ = [(t, a) for t, a in shown.tags if t == "script" and "src" in a]
+    assert linked["src"] == "../plotly.min.js"
+    assert linked["nonce"] in shown.text
+    assert 'id="library"' not in shown.text
+    script.write_text("another version")
+    written(folder, shared=True)
+    assert script.stat().st_size > 1_000_000
+    alone = written(folder).text
+    assert base64.b64encode(library()).decode() in alone
+
+
+@pytest.mark.skipif(
+    not (resources.files("algid.report") / "assets/plotly.min.js.gz").is_file(),
+    reason="built without npm: pages carry the whole of plotly",
+)
+def test_a_page_is_light(folder: Path) -> None:
+    assert len(written(folder).text.encode()) <= 1_100_000
+
+
+@pytest.mark.parametrize(
+    ("name", "figures"),
+    [
+        ("estimates", {"estimates"}), ("loaded", {"loaded"}), ("innovations", {"residual"}),
+        ("running", {"running"}), ("information", {"information"}),
+        ("torque", {"torque", "closeup", "signals", "coverage"}),
+    ],
+)  # fmt: skip
+def test_what_is_absent_or_broken_is_not_drawn(folder: Path, name: str, figures: set[str]) -> None:
+    path = folder / f"{name}.parquet"
+    path.write_bytes(b"PAR1 no parquet")
+    shown = written(folder)
+    assert set(FIGURES) - set(shown.figures) == figures
+    assert shown.text.count(f"{name}.parquet: cannot read it as Parquet") == 1
+    assert ("arm" in shown.figures) is (name != "torque")
+    path.unlink()
+    shown = written(folder)
+    assert set(FIGURES) - set(shown.figures) == figures
+    assert "Not shown" not in shown.text
+
+
+def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> None:
+    bare = tmp_path / "bare.algid"
+    shown = written(bare, result.model_copy(update={"fit": None, "more_logs": []}))
+    assert list(shown.figures) == ["inertia"]
+    assert 'class="first"' in shown.text  # nothing stands beside the numbers
+    with pytest.raises(ResultError, match="cannot read it"):
+        write_pages(tmp_path)
+
+
+def test_torque_that_is_scored_stands_before_what_was_recorded(folder: Path) -> None:
+    raw = pl.read_parquet(folder / "torque.parquet")
+    scored = raw.select("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
+    scored.with_columns(pl.col("tau1") * 0.5).write_parquet(folder / "scored.parquet")
+    data = written(folder).figures["torque"]["data"]
+    recorded = [one for one in data if one["name"] == "residual as recorded"]
+    assert [one["visible"] for one in recorded] == ["legendonly"] * 2
+    assert [one["yaxis"] for one in recorded] == ["y2", "y4"]
+
+
+def test_the_papers_method_comes_first_where_it_was_asked_for(folder: Path, result: Result) -> None:
+    other = result_document(result, folder)
+    assert [part.folded for part in other.parts if part.key == "paper"] == [True]
+    of_paper = result.model_copy(update={"estimator": "paper", "fit": None})
+    document = result_document(of_paper, folder)
+    assert [part.key for part in document.parts[:2]] == ["numbers", "paper"]
+    assert not document.parts[1].folded
+    assert [plot.key for plot in document.plots[:2]] == ["estimates", "loaded"]
+
+
+def test_nuisance_terms_that_may_be_zero_are_folded(result: Result) -> None:
+    terms = {
+        "f1": estimate(0.2, 0.01, "N m"),
+        "o1": estimate(0.01, 0.02, "N m", Status.NOT_SIGNIFICANT),
+    }
+    document = result_document(
+        result.model_copy(update={"parameters": {**result.parameters, **terms}})
+    )
+    parts = {part.key: part for part in document.parts}
+    (other,) = [one for one in parts["terms"].shown if isinstance(one, Table)]
+    assert [row[0] for row in other.rows] == ["f1"]
+    (zero,) = parts["zero"].shown
+    assert isinstance(zero, Table)
+    assert [row[0] for row in zero.rows] == ["o1"]
+    assert parts["zero"].folded
+    assert parts["zero"].title == "1 term of the torque may be zero"
+    assert not parts["terms"].folded
+
+
+def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> None:
+    poor = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
+    good = written(folder, result)
+    assert good.text.count("status whole ok") >= len(result.parameters)
+    failed = written(folder, result.model_copy(update={"parameters": {"k1": poor}}))
+    assert 'class="verdict failed"' in failed.text
+    assert "whole ok" not in failed.text
+
+
+def test_terms_are_shown_with_what_they_gain(folder: Path, result: Result) -> None:
+    assert result.fit is not None
+    why = "left out: not significant"
+    terms = [
+        TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept"),
+        TermCriterion(term="offset", kept=False, gain_heldout=-0.01, evidence=-4.0, why=why),
+        TermCriterion(term="rotor", kept=False, why=why),
+        TermCriterion(term="gain", kept=False, why=why),
+    ]
+    fit = result.fit.model_copy(update={"terms": terms})
+    shown = written(folder, result.model_copy(update={"fit": fit}))
+    heads, rows = shown.tables["Terms tried"]
+    assert heads == ["Term", "Held-out error, %", "Log odds", "Kept", "Why"]
+    assert rows == [
+        ["coulomb", "-50.00", "+40.0", "yes", "kept"],
+        ["offset", "+1.00", "-4.0", "no", why],
+        ["rotor, gain", "–", "–", "no", why],
+    ]
+
+
+def document(**more: object) -> Document:
+    reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
+    verdict = Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),))
+    table = Table("T & Co", {"A": "name", "N": "number"}, (("x|y", "1"),), "a note")
+    parts = (
+        Section("one", "One", (table,)),
+        Section("none", "None", (Table("empty", {"A": "name"}, ()), ())),
+        Section("two", "Two", ("a sentence", ("first", "second"), table), folded=True),
+    )
+    return Document("Title", verdict, parts, "kicker", "name", "facts", "made", **more)  # type: ignore[arg-type]
+
+
+def test_three_reasons_are_shown_and_the_rest_and_the_notes_are_folded() -> None:
+    first, _, rest = page(document()).partition("<details>")
+    assert [place for place in range(5) if f"reason {place}" in first] == [0, 1, 2]
+    assert "2 more reasons" in rest
+    assert "1 data notes" in rest
+    assert "a.csv: reason 4" in rest
+
+
+def test_sections_without_content_are_left_out_and_folded_ones_closed() -> None:
+    shown = Page(page(document()))
+    parts = {a["id"]: "open" in a for t, a in shown.tags if t == "details" and "id" in a}
+    assert parts == {"two": False}
+    assert "None" not in shown.prose
+    assert "<p>a sentence</p>" in shown.text
+    assert "<li>first</li><li>second</li>" in shown.text
+    assert shown.tables == {"T & Co": (["A", "N"], [["x|y", "1"]])}
+
+
+def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
+    command = "algid identify 'a `b` ```c```.csv' --force"
+    one = document()
+    text = markdown(
+        Document(one.title, Verdict("failed", "it failed", command=command), one.sections)
+    )
+    lines = text.splitlines()
+    assert lines[0] == "### Title"
+    assert "❌ **Failed**: it failed." in text
+    assert lines[lines.index("````sh") : lines.index("````sh") + 3] == ["````sh", command, "````"]
+    before, _, after = text.partition("<details>")
+    assert before.count(r"**T & Co**".replace("&", r"\&")) == 1
+    assert after.count(r"| x\|y | 1 |") == 1
+    assert after.rstrip().endswith("</details>")
+    assert "| :-- | --: |" in before
+
+
+def test_data_of_figures_are_strict_json() -> None:
+    text = strict_json({"a": [1.5, float("nan"), float("inf")], "b": ("x", None)})
+    assert json.loads(text) == {"a": [1.5, None, None], "b": ["x", None]}
+
+
+def test_a_result_shows_itself_in_a_notebook(result: Result) -> None:
+    import algid
+
+    shown = algid.Result.of(hostile(result))._repr_html_()
+    assert "<script" not in shown
+    cells = re.findall(r"<td>([^<]*)</td>", shown)
+    assert cells[:3] == ["k1", "inertia that couples the links, m2 l1 lc2", rows_of(
+        result, result.parameters)[0].value]  # fmt: skip
+    plot = algid.Result.of(result).plot()
+    assert list(plot.data[0].y) == [*result.parameters, *result.payload]
+
+
+def test_what_cannot_be_estimated_is_a_dash_and_counts(result: Result) -> None:
+    lost = Estimate(estimate=None, ci95=(None, None), unit="m", status=Status.NOT_IDENTIFIABLE)
+    changed = result.model_copy(update={"parameters": {**result.parameters, "k5": lost}})
+    made = result_document(changed)
+    assert made.facts.startswith("6 of 7 constants identified")
+    row = rows_of(changed, {"k5": lost})[0]
+    assert (row.value, row.half, row.with_half, row.error) == ("–", "–", "–", "–")

@@ -1,0 +1,137 @@
+"""Series made short for drawing lose no extreme, whatever the blocks and the logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from algid.errors import ResultError
+from algid.report import series
+from algid.report.series import between, blocks, by_log, drawn
+
+RATE = 100.0
+
+
+def write(path: Path, rows: tuple[int, ...] = (5000, 3000), seed: int = 0) -> pl.DataFrame:
+    """Torques of logs of so many rows at 100 Hz; the second one begins at 7 s."""
+    rng, frames = np.random.default_rng(seed), []
+    for log, count in enumerate(rows):
+        t = 7.0 * log + np.arange(count) / RATE
+        columns = {"log": np.full(count, log, np.int32), "t": t}
+        for name in ("theta", "omega", "tau"):
+            columns |= {f"{name}{joint}": rng.standard_normal(count) for joint in (1, 2)}
+        columns |= {f"tau{joint}_predicted": rng.standard_normal(count) for joint in (1, 2)}
+        frames.append(pl.DataFrame(columns))
+    frame = pl.concat(frames)
+    frame.write_parquet(path)
+    return frame
+
+
+@pytest.mark.parametrize("block", [317, 1 << 18])
+def test_every_bucket_keeps_its_smallest_and_its_largest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
+    frame = write(tmp_path / "a.parquet")
+    monkeypatch.setattr(series.blocks, "__defaults__", ((), block))
+    short = drawn(tmp_path / "a.parquet", points=400)
+    assert short["t"].size < 1.3 * 400
+    residual = (frame["tau1"] - frame["tau1_predicted"]).to_numpy()
+    for log in (0, 1):
+        own = frame.filter(pl.col("log") == log)
+        kept = short["tau1"][short["log"] == log]
+        assert np.nanmin(kept) == own["tau1"].min()
+        assert np.nanmax(kept) == own["tau1"].max()
+        facts = short.logs[log]
+        assert (facts.samples, facts.first, facts.last) == (own.height, own["t"][0], own["t"][-1])
+        assert facts.period == pytest.approx(1 / RATE)
+        assert facts.gaps == 0
+        size, t = facts.worst[0]
+        left = np.abs(residual[(frame["log"] == log).to_numpy()])
+        assert (size, t) == (left.max(), own["t"][int(left.argmax())])
+    # a bucket of 40: its first pair is its smallest and its largest value
+    if block > 8000:
+        first = frame["theta2"].to_numpy()[:40]
+        assert short["theta2"][:2].tolist() == [first.min(), first.max()]
+        assert short["t"][:2].tolist() == [0.0, 0.39]
+
+
+def test_short_series_are_left_as_they_are_and_logs_follow_one_another(tmp_path: Path) -> None:
+    frame = write(tmp_path / "a.parquet", (50, 60))
+    short = drawn(tmp_path / "a.parquet", points=1000)
+    known = np.isfinite(short["tau2"])
+    np.testing.assert_array_equal(short["tau2"][known], frame["tau2"].to_numpy())
+    assert np.count_nonzero(~known) == 1  # the line breaks between the logs
+    assert np.all(np.diff(short["x"]) >= 0)
+    starts = short.starts
+    assert starts[0] == 0.0
+    assert starts[1] == pytest.approx(1.01 * 0.49)
+    np.testing.assert_array_equal(short.samples["theta1"], frame["theta1"].to_numpy())
+
+
+def test_a_gap_breaks_the_line_and_is_counted(tmp_path: Path) -> None:
+    frame = write(tmp_path / "a.parquet", (500,))
+    frame.filter(~pl.col("t").is_between(1.0, 1.5)).write_parquet(tmp_path / "a.parquet")
+    short = drawn(tmp_path / "a.parquet", points=2000)
+    (facts,) = short.logs.values()
+    assert facts.gaps == 1
+    assert facts.largest_step == pytest.approx(0.52)
+    (place,) = np.flatnonzero(np.isnan(short["tau1"]))
+    assert short["x"][place - 1] == pytest.approx(0.99)
+    assert short["x"][place + 1] == pytest.approx(1.51)
+
+
+def test_samples_are_whole_rows_and_never_in_step_with_the_motion(tmp_path: Path) -> None:
+    t = np.arange(200_000) / 1000
+    angle = np.sin(2 * np.pi * t)  # a period a thousand rows; every hundredth row is kept
+    columns = {"log": np.zeros(t.size), "t": t, "theta1": angle, "theta2": 3 * angle}
+    pl.DataFrame(columns).write_parquet(tmp_path / "a.parquet")
+    samples = drawn(tmp_path / "a.parquet").samples
+    assert samples["t"].size == 2000
+    np.testing.assert_array_equal(samples["theta2"], 3 * samples["theta1"])
+    phase = np.sort(np.mod(samples["t"], 1.0))
+    assert np.diff(phase).max() < 0.02
+    assert np.unique(samples["t"]).size == 2000
+
+
+def test_progress_hears_every_sample(tmp_path: Path) -> None:
+    write(tmp_path / "a.parquet", (50, 60))
+    heard: list[tuple[str, int, int]] = []
+    drawn(tmp_path / "a.parquet", progress=lambda *told: heard.append(told))
+    assert heard == [("report", 50, 110), ("report", 110, 110)]
+
+
+def test_what_lies_between_two_moments_is_read_alone(tmp_path: Path) -> None:
+    frame = write(tmp_path / "a.parquet")
+    frame.write_parquet(tmp_path / "a.parquet", row_group_size=100)
+    found = between(tmp_path / "a.parquet", 1, 8.0, 8.5)
+    wanted = frame.filter((pl.col("log") == 1) & pl.col("t").is_between(8.0, 8.5))
+    assert found["t"].size == 51
+    np.testing.assert_array_equal(found["tau1"], wanted["tau1"].to_numpy())
+    ends = between(tmp_path / "a.parquet", 0, 49.9, 60.0)["t"]
+    np.testing.assert_allclose(ends, [49.9 + 0.01 * place for place in range(10)])
+
+
+def test_blocks_are_split_where_the_log_changes(tmp_path: Path) -> None:
+    write(tmp_path / "a.parquet", (50, 60))
+    parts = list(by_log(blocks(tmp_path / "a.parquet", ["log", "t"], 40)))
+    assert [(log, part["t"].size) for log, part in parts] == [(0, 40), (0, 10), (1, 30), (1, 30)]
+
+
+def test_what_is_no_series_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    frame = write(path, (50,))
+    with pytest.raises(ResultError, match=r"a\.parquet: expected a column 'x', found none"):
+        list(blocks(path, ["t", "x"]))
+    gone = pl.when(pl.col("t") > 0.3).then(None).otherwise(pl.col("t")).alias("t")
+    frame.with_columns(gone).write_parquet(path)
+    with pytest.raises(ResultError, match=r"column 't': expected a number in every row"):
+        list(blocks(path))
+    frame.clear().write_parquet(path)
+    with pytest.raises(ResultError, match="it holds no rows"):
+        drawn(path)
+    path.write_bytes(b"PAR1")
+    with pytest.raises(ResultError, match="cannot read it as Parquet"):
+        drawn(path)
