@@ -423,8 +423,8 @@ def test_rows_of_a_frame_that_lack_a_value_go_with_a_notice(
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"tau2": "a"}, "^log: column 'tau2' for tau2 holds String; expected numbers$"),
-        ({"tau2": None}, "^log: column 'tau2' for tau2 holds Null; expected numbers$"),
+        ({"tau2": "a"}, "^log: column 'tau2' for tau2 holds string; expected numbers$"),
+        ({"tau2": None}, "^log: column 'tau2' for tau2 holds null; expected numbers$"),
         ({"theta1 [deg]": float("nan")}, "^log: theta1 .* expected a finite number"),
     ],
 )

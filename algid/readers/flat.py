@@ -266,9 +266,8 @@ def open_table(table: TableFile, profile: Profile) -> TableReader:
     for name, source in columns.sources.items():
         kind = cells[source].type
         if not (_is_number(kind) or (name == "t" and _is_clock(kind))):
-            raise LogError(
-                f"{path}: column {source!r} for {name} holds {str(kind)[:80]}; expected numbers"
-            )
+            held = str(kind).removeprefix("large_").removesuffix("_view")[:80]  # layouts of memory
+            raise LogError(f"{path}: column {source!r} for {name} holds {held}; expected numbers")
     joints = {joint: one for joint, one in columns.others.items() if _is_number(cells[one].type)}
     columns = replace(columns, others=joints)
     if _is_clock(cells[columns.sources["t"]].type):

@@ -226,8 +226,8 @@ def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
     assert (
         first.text
-        == f"l1 of {l1 + 5.6 * s1:g} m lies 6 σ from the result's {l1:.5g} ± {s1:.2g} m; one is "
-        "wrong"
+        == f"l1 is given as {l1 + 5.6 * s1:g} m, but identified as {l1:.5g} ± {s1:.2g} m "
+        "(6 σ apart)"
     )
     assert (second.numbers["name"], second.numbers["distance"]) == ("l2", pytest.approx(7.2))
     bare = weighed.model_copy(update={"payload": {}})
