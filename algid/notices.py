@@ -252,8 +252,8 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "CONSTRAINED": "{flag[constrain]} enforces {bounds}, which the logs contradict",
     "NOT_FEASIBLE": "{flag[constrain]} cannot obey {bounds}: no estimates within the bounds were "
     "found",
-    "REFINED_FAILED": "the refined estimator did not converge; the weak estimate is reported "
-    "instead",
+    "REFINED_FAILED": "the refined estimator did not converge, and the {kept} estimate with robust "
+    "intervals stands in its place",
     "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight",
     "ENDOGENEITY": (
         "instruments and least squares are {distance:.1f} standard deviations apart: torque that "

@@ -178,8 +178,11 @@ class Fit:
 
     @property
     def refuted(self) -> bool:
-        """Whether the refined estimator rejected its likelihood and returned another estimate."""
-        return has_code(self.notes, "REFUTED", "MISFIT", "SLOW_SAMPLING")
+        """True if the refined estimator returned another estimate.
+
+        It rejected its likelihood, or did not converge.
+        """
+        return has_code(self.notes, "REFUTED", "MISFIT", "SLOW_SAMPLING", "REFINED_FAILED")
 
     @property
     def beyond_errors(self) -> bool:

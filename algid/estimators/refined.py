@@ -93,7 +93,8 @@ def fit(
     Returns
     -------
     Fit
-        With `converged` false and the weak estimate in its place where the iteration failed.
+        The weak estimate, with the reason among its notes, where the likelihood does not hold or
+        the iteration did not converge.
 
     Raises
     ------
@@ -135,7 +136,8 @@ def fit(
     except np.linalg.LinAlgError:
         settled, iterations = False, 0
     if not settled:
-        return replace(start.marked("NOT_CONVERGED"), converged=False, iterations=iterations)
+        failed = start.noted(Notice("REFINED_FAILED", numbers={"kept": start.estimator}))
+        return replace(failed, iterations=iterations)
     deviance = sum(outcome.deviance for outcome in outcomes)
     whiteness = judge(reduce(add, [outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]

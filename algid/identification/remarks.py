@@ -13,7 +13,7 @@ from algid.identification.phases import phase_note
 from algid.identification.source import LogSource
 from algid.methods import estimator_of
 from algid.model import K4
-from algid.notices import Notice, Remedy, has_code
+from algid.notices import Notice, Remedy
 from algid.significance import CERTAIN, LEVEL, ONE_SIDED, chance, sigmas
 from algid.units import TORQUE
 
@@ -56,8 +56,6 @@ def torque_unit(logs: Sequence[LogSource]) -> float | None:
 def fit_warnings(fit: Fit, unit: float | None = None) -> Iterator[Notice]:
     """What a user should know about a fit, whose torques were read in a `unit` of so many N m."""
     yield from fit.notes
-    if not fit.converged and not has_code(fit.notes, "NOT_FEASIBLE"):
-        yield Notice("REFINED_FAILED")
     yield from fit.unidentifiable
     if fit.shared.model.gravity == 0:
         needed = fit.shared.payload and not fit.shared.lengths

@@ -26,8 +26,9 @@ def test_steps_that_do_not_settle_leave_the_weak_estimate(
     monkeypatch.setattr(refined, "_STEPS", 1)
     fit = refined.fit([source])
     before = weak.fit([source])
-    assert (fit.estimator, fit.converged, fit.iterations) == ("weak", False, 1)
-    assert fit.status == ("NOT_CONVERGED",) * 7
+    assert (fit.estimator, fit.refuted, fit.iterations) == ("weak", True, 1)
+    assert fit.status == before.status == ("OK",) * 7
+    assert [note.code for note in fit.notes] == ["REFINED_FAILED"]
     np.testing.assert_array_equal(fit.values, before.values)
     np.testing.assert_array_equal(fit.covariance, before.covariance)
 
@@ -42,8 +43,8 @@ def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(
     still = Segment(0.0, DT, np.stack([log.theta[0], np.full(len(log), 0.2)]), log.tau)
     monkeypatch.setattr(refined, "_train", fails)
     fit = refined.fit([lambda: [still]])
-    assert (fit.estimator, fit.converged, fit.iterations) == ("weak", False, 0)
-    assert set(fit.status) == {"NOT_CONVERGED", "NOT_IDENTIFIABLE"}
+    assert (fit.estimator, fit.refuted, fit.iterations) == ("weak", True, 0)
+    assert set(fit.status) == {"OK", "NOT_IDENTIFIABLE"}
 
 
 def test_a_covariance_that_is_none_has_no_factor() -> None:

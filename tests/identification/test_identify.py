@@ -13,7 +13,9 @@ import pytest
 
 import algid
 from algid import results
+from algid.arm import CONSTANT_NAMES
 from algid.errors import LogError, OutputError, ResultError, SettingError
+from algid.estimators import refined
 from algid.identification.identify import identify
 from algid.identification.source import open_source
 from algid.inspection.checks import noticed
@@ -75,6 +77,32 @@ def test_noise_lies_within_the_intervals(noisy: tuple[Log, Log]) -> None:
         assert found.estimate is not None
         assert found.std is not None
         assert abs(found.estimate - true) < 4.5 * found.std  # 7 draws of a normal: 1 in 20,000
+
+
+def test_the_robust_estimate_has_its_own_verdict_where_the_likelihood_does_not_converge(
+    noisy: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(refined, "_STEPS", 1)
+    failed = identify(*noisy, Settings(model="plain"), report=False)
+    weak = identify(*noisy, WEAK, report=False)
+    assert failed.estimates == weak.estimates
+    assert (failed.verdict.grade, failed.verdict.reasons[0].code) == (
+        "reservations",
+        "REFINED_FAILED",
+    )
+    # with no terms chosen it is the fit of shrunk ones, whose intervals hold the truth
+    result = identify(*noisy, report=False)
+    assert (result.verdict.grade, result.verdict.reasons[0].code) == (
+        "reservations",
+        "REFINED_FAILED",
+    )
+    assert noisy[0].origin.truth is not None
+    truth = noisy[0].origin.truth.arm.constants()
+    for name, true in zip(CONSTANT_NAMES, truth, strict=True):
+        one = result.parameters[name]
+        assert one.estimate is not None
+        assert one.std is not None
+        assert abs(one.estimate - true) < 4.5 * one.std
 
 
 def test_folder_holds_schema_valid_result_and_flat_series(

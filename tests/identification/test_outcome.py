@@ -297,10 +297,6 @@ def test_a_negative_mass_by_far_says_exchanged() -> None:
 def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
     note = Notice("REFUTED", numbers={"kept": "weak"})
     assert list(fit_warnings(replace(fit_of(), notes=(note,)))) == [note]
-    failed = replace(fit_of(), converged=False)
-    assert found(failed, "REFINED_FAILED")
-    infeasible = Notice("NOT_FEASIBLE", numbers={"bounds": ["k6 >= 0"]})
-    assert not found(replace(failed, notes=(infeasible,)), "REFINED_FAILED")
 
 
 def test_endogeneity_is_told_unless_instruments_already_stand_in() -> None:
