@@ -73,24 +73,32 @@ def lost_steps(log: Log) -> int:
 
     0 where noise or a slow motion leaves it open.
 
-    A velocity that is twice the mean of its neighbours' is a lost sample's. Noise makes one that
-    is zero as often.
+    A velocity that is twice the mean of its neighbours' is a lost sample's, if the angles' plain
+    step is twice theirs too: one alone is a stamp's jitter. Noise makes a step that is zero as
+    often.
     """
     count = len(log) - 3
 
-    def velocities(first: int) -> FloatArray:
-        part = slice(first, first + count + 1)
-        return differences(log.theta[:, part], 1) / (differences(log.stamp_ns[part], 1) * 1e-9)
+    def steps(first: int) -> FloatArray:
+        return np.asarray(differences(log.theta[:, first : first + count + 1], 1))
 
-    own = velocities(1)
-    around = 0.5 * (velocities(0) + velocities(2))
-    power = np.sum(around**2, axis=0)
-    share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
-    off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
-    clear = (power > quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
+    def seconds(first: int) -> FloatArray:
+        return np.asarray(differences(log.stamp_ns[first : first + count + 1], 1) * 1e-9)
+
+    shares, clear = [], np.True_
+    for by in ([seconds(first) for first in range(3)], [1.0, 1.0, 1.0]):
+        own, around = steps(1) / by[1], 0.5 * (steps(0) / by[0] + steps(2) / by[2])
+        power = np.sum(around**2, axis=0)
+        share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
+        off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
+        clear = clear & (power > quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
+        shares.append(share)
     each = count / max(1, power.size)  # of a long log some steps stand for all
-    lost = round(each * np.count_nonzero(clear & (np.abs(share - 2) < _LOST)))
-    chance = round(each * np.count_nonzero(clear & (np.abs(share) < _LOST)))
+    velocity, plain = shares
+    double = (np.abs(velocity - 2) < _LOST) & (np.abs(plain - 2) < _LOST)
+    none = (np.abs(velocity) < _LOST) & (np.abs(plain) < _LOST)
+    lost = round(each * np.count_nonzero(clear & double))
+    chance = round(each * np.count_nonzero(clear & none))
     if lost <= max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance):
         return 0
     return lost

@@ -274,6 +274,23 @@ def test_lost_samples_with_new_numbers_are_told(rate: float, sigma: float) -> No
 
 
 @pytest.mark.usefixtures("signals_alone")
+@pytest.mark.parametrize("share", [0.08, 0.1, 0.15])
+def test_stamps_that_jitter_have_lost_nothing_and_hide_no_loss(share: float) -> None:
+    """A short step of the clock makes a velocity twice its neighbours', and no longer step."""
+    log = moving(1000.0, 3e-4)
+    rng = np.random.default_rng(2)
+    jitter = share * 1e6 * np.clip(rng.standard_normal(len(log)), -3, 3)
+    log = replace(log, stamp_ns=log.stamp_ns + np.round(jitter).astype(np.int64))
+    assert "LOST_SAMPLES" not in found_codes(log)
+    kept = rng.random(len(log)) > 0.05
+    some = int(kept.sum())
+    lost = replace(
+        log, stamp_ns=log.stamp_ns[:some], theta=log.theta[:, kept], tau=log.tau[:, kept]
+    )
+    assert "LOST_SAMPLES" in found_codes(lost)
+
+
+@pytest.mark.usefixtures("signals_alone")
 def test_encoders_and_rest_make_no_lost_samples() -> None:
     log = moving()
     step = 2 * np.pi / 4096
