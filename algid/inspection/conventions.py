@@ -27,7 +27,7 @@ from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.dynamics import Suspicion
 from algid.log import ZEROS, Log, Origin, Reading
 from algid.notices import Notice, Remedy, flat
-from algid.signals.segments import Segment, append, segments
+from algid.signals.segments import stretches
 from algid.words import counted
 
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
@@ -97,13 +97,7 @@ def judged_together(logs: Iterable[Recorded | None], *, gravity: bool = True) ->
 
 def recorded(log: Log, seconds: float = math.inf) -> Recorded | None:
     """The beginning of the longest stretch of a log without a gap; None of an empty one."""
-    stretches: list[Segment] = []
-    for segment in segments([log]):
-        if segment.continues and stretches:
-            stretches[-1] = append(stretches[-1], segment)
-        else:
-            stretches.append(segment)
-    longest = max(stretches, key=len, default=None)
+    longest = max(stretches([log]), key=len, default=None)
     if longest is None:
         return None
     part = longest.part(0, int(min(len(longest), seconds / longest.dt)))

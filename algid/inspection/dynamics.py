@@ -8,6 +8,7 @@ zero from a right one.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +17,11 @@ from algid.arm import FloatArray, regressor
 from algid.estimators.conventions import Convention
 from algid.log import Log
 from algid.notices import Notice
+from algid.signals.segments import stretches
 
 _RATE = 100.0
 _MOST_ROWS = 20_000
-_EDGE = 10
+_EDGE, _SHORTEST = 10, 20  # samples at 100 Hz: at either end of a stretch, and what is left
 _K2, _K3, _K4, _K5 = 1, 2, 3, 4
 _OF_LEFT = 0.1
 """Share of the rough fit's residual that gravity's columns fit by differentiation errors."""
@@ -65,16 +67,10 @@ class DynamicFigures:
 
 def dynamic_figures(log: Log) -> DynamicFigures | None:
     """Figures of a log, or None where it is too short to smooth (40 samples at 100 Hz)."""
-    smooth = _smoothed(log)
-    if smooth is None:
+    parts = list(_smoothed(log))
+    if not parts or sum(part.shape[-1] for part in parts) < _SHORTEST:
         return None
-    theta, tau, dt = smooth
-    omega, alpha = (
-        np.gradient(theta, dt, axis=1),
-        np.gradient(np.gradient(theta, dt, axis=1), dt, axis=1),
-    )
-    inner = slice(_EDGE, -_EDGE)
-    theta, omega, alpha, tau = theta[:, inner], omega[:, inner], alpha[:, inner], tau[:, inner]
+    theta, omega, alpha, tau = np.concatenate(parts, axis=-1)[..., :_MOST_ROWS]
     rows = _rows(regressor(theta, omega, alpha))
     turned = _rows(regressor(theta - np.array([[np.pi / 2], [0.0]]), omega, alpha))[:, [_K2, _K4]]
     zeros, one = np.zeros_like(omega[0]), np.ones_like(omega[0])
@@ -163,18 +159,24 @@ def _of_turn(figures: DynamicFigures) -> Suspicion | None:
     return Suspicion(Notice("WRONG_ZERO", numbers={"turn": turn}), (zero,), free_zero=True)
 
 
-def _smoothed(log: Log) -> tuple[FloatArray, FloatArray, float] | None:
-    """Angles and torques averaged to 100 Hz at most, over what a gap does not break."""
-    width = max(1, round(1 / (_RATE * log.period)))
-    count = min(len(log) // width, _MOST_ROWS)
-    if count < 40:
-        return None
-    used = count * width
-    theta = log.theta[:, :used].reshape(2, count, width).mean(axis=2)
-    tau = log.tau[:, :used].reshape(2, count, width).mean(axis=2)
+def _smoothed(log: Log) -> Iterator[FloatArray]:
+    """Angles, velocities, accelerations and torques (4, 2, N) of each stretch without a gap.
+
+    They are averaged to 100 Hz at most, on the even time base that estimators use.
+    """
     kernel = np.hanning(9)[1:-1] / np.hanning(9).sum()
-    smooth = np.stack([np.convolve(row, kernel, "same") for row in (*theta, *tau)])
-    return smooth[:2], smooth[2:], log.period * width
+    for stretch in stretches([log]):
+        width = max(1, round(1 / (_RATE * stretch.dt)))
+        count = len(stretch) // width
+        if count <= 2 * _EDGE:
+            continue
+        signals = np.concatenate([stretch.theta, stretch.tau])[:, : count * width]
+        thin = signals.reshape(4, count, width).mean(axis=2)
+        smooth = np.stack([np.convolve(row, kernel, "same") for row in thin])
+        theta, tau = smooth[:2], smooth[2:]
+        omega = np.gradient(theta, stretch.dt * width, axis=1)
+        alpha = np.gradient(omega, stretch.dt * width, axis=1)
+        yield np.stack([theta, omega, alpha, tau])[..., _EDGE:-_EDGE]
 
 
 def _rows(columns: FloatArray) -> FloatArray:

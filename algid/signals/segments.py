@@ -103,6 +103,17 @@ def segments(blocks: Iterable[Log]) -> Iterator[Segment]:
     yield from sampler.finish()
 
 
+def stretches(blocks: Iterable[Log]) -> list[Segment]:
+    """The same segments, each with those that continue it: one from gap to gap."""
+    whole: list[Segment] = []
+    for segment in segments(blocks):
+        if segment.continues and whole:
+            whole[-1] = append(whole[-1], segment)
+        else:
+            whole.append(segment)
+    return whole
+
+
 def _first_stamps(blocks: Iterable[Log]) -> IntArray:
     """The first `PERIOD_SAMPLES` stamps; the other signals are not copied."""
     stamps: list[IntArray] = []

@@ -80,6 +80,23 @@ def test_a_rough_fit_finds_the_weights_of_the_arm(rate: float) -> None:
     assert gravity_findings(found) is None
 
 
+@pytest.mark.parametrize("uneven", ["gaps", "jitter"])
+def test_a_rough_fit_goes_by_the_stamps(uneven: str) -> None:
+    """Averaged as if they were even, the samples of these logs turn gravity by more than 2°."""
+    log, rng = swung(), np.random.default_rng(6)
+    if uneven == "gaps":
+        kept = np.ones(len(log), dtype=bool)
+        for start in rng.uniform(1, 19, 8):
+            kept[(log.t > start) & (log.t < start + rng.uniform(0.05, 0.5))] = False
+    else:  # a recorder that drops six samples of ten
+        kept = rng.random(len(log)) > 0.6
+    log = replace(log, stamp_ns=log.stamp_ns[kept], theta=log.theta[:, kept], tau=log.tau[:, kept])
+    found = figures_of(log)
+    assert found.turn == pytest.approx(0, abs=1)
+    assert found.weight1 == pytest.approx(K[3], rel=0.01)
+    assert found.explained > 0.999
+
+
 @pytest.mark.parametrize(
     ("degrees", "told"),
     [(0, None), (30, None), (60, "WRONG_ZERO"), (-90, "WRONG_ZERO"), (170, "FLIPPED_SIGN")],
