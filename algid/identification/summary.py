@@ -6,10 +6,13 @@ from pathlib import PurePath
 
 from algid import __version__
 from algid.identification.outcome import Identified
+from algid.identification.remarks import FAR_APART
 from algid.identification.survey import Survey
 from algid.log import Truth
+from algid.model import K4
 from algid.notices import Notice, has_code, merged
 from algid.results import Result
+from algid.results.verdict import LEAST_R2
 from algid.settings import Settings
 from algid.table4 import paper_errors, table4, true_parameters, true_rows
 
@@ -30,6 +33,30 @@ def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]
     return tuple(codes)
 
 
+_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO")
+"""Checks of single logs by a rough fit, on which the estimator's own has the last word."""
+
+
+def _pulled_down(outcome: Identified, count: int) -> list[bool]:
+    """True for each of `count` logs if gravity pulls down in its part of the fit, beyond doubt.
+
+    The fit has to explain the torques and to break no bound. A zero that is off turns k4 into its
+    sine part k4s: the model must have had that to choose from.
+    """
+    fit = outcome.fit
+    if fit is None or fit.model is None or fit.residual is None or len(fit.by_log) != count:
+        return [False] * count
+    if fit.model.chosen_by != "logs" or fit.broken_bounds or fit.residual.unexplained(LEAST_R2):
+        return [False] * count
+    down = []
+    for own in fit.by_log:
+        along, across = own.get(K4), own.get(f"{K4}s")
+        turned = across.estimate or 0.0 if across is not None else 0.0
+        pull, std = (along.estimate, along.std) if along is not None else (None, None)
+        down.append(bool(pull and std and pull > max(FAR_APART * std, abs(turned))))
+    return down
+
+
 def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
     """The result of `outcome` on a survey's logs, the first log first."""
     truth = survey.logs[0].origin.truth
@@ -37,11 +64,12 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
     if survey.loaded and survey.loaded[0].origin.truth:
         payload = survey.loaded[0].origin.truth.payload
     replaced = _replaced_by_fit(outcome, settings)
+    down = _pulled_down(outcome, len(survey.logs))
     of_logs: list[Notice] = []
     lost = contradicted = False
-    for log in survey.logs:
+    for log, is_down in zip(survey.logs, down, strict=True):
         for notice in survey.notices(log):
-            if notice.code in replaced:
+            if notice.code in replaced or (is_down and notice.code in _OF_GRAVITY):
                 continue
             of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
             lost |= notice.lossy

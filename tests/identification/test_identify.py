@@ -20,6 +20,7 @@ from algid.identification.identify import identify
 from algid.identification.source import open_source
 from algid.inspection.checks import noticed
 from algid.log import Log
+from algid.notices import Notice, has_code
 from algid.profile import Profile
 from algid.results import Status, read_result, result_schema
 from algid.settings import Settings
@@ -103,6 +104,22 @@ def test_the_robust_estimate_has_its_own_verdict_where_the_likelihood_does_not_c
         assert one.estimate is not None
         assert one.std is not None
         assert abs(one.estimate - true) < 4.5 * one.std
+
+
+def test_what_a_rough_fit_says_of_gravity_yields_to_the_fit(
+    noisy: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    upwards = Notice("FLIPPED_SIGN", numbers={"weight": -1.0})
+    monkeypatch.setattr("algid.inspection.checks.is_right", lambda _: False)
+    monkeypatch.setattr("algid.inspection.checks.mend", lambda *_: None)
+    monkeypatch.setattr("algid.inspection.checks._of_gravity", lambda _: [upwards])
+    sound = noisy[0]
+    assert identify(sound, report=False).verdict.grade == "good"
+    flipped = identify(replace(sound, tau=-sound.tau), report=False)
+    assert has_code(flipped.notices, "FLIPPED_SIGN")
+    # a model without phases has no place for a zero that is off
+    chosen = identify(sound, settings=Settings(model="plain"), report=False)
+    assert has_code(chosen.notices, "FLIPPED_SIGN")
 
 
 def test_folder_holds_schema_valid_result_and_flat_series(
