@@ -18,21 +18,12 @@ import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from algid.construction import (
-    beside,
-    new_file,
-    new_folder,
-    own_folder,
-    put_file_in_place,
-    put_in_place,
-    remove_left,
-    under_construction,
-)
 from algid.errors import OutputError, SettingError
 from algid.limits import LIMITS
 from algid.options import flag
+from algid.staging import delete_leftovers, put, staged, temporary_name
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
@@ -85,7 +76,7 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
     ----------
     path : Path
     sweep : bool
-        Remove first what killed runs have left of it: this looks through the folder.
+        Delete first what killed runs left there: this looks through the folder.
     force : bool
         Replace one that exists, also one that another process has made meanwhile.
 
@@ -94,40 +85,35 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
     OutputError
         If the folder cannot be made or written to, or the file exists and `force` is not set.
     """
-    with _whole(path, new_file, _put_open_file, sweep=sweep, force=force) as temporary:
+
+    def make(place: Path) -> None:
+        place.touch(mode=0o600, exist_ok=False)
+
+    with _whole(path, make, sweep=sweep, force=force) as temporary:
         yield temporary
+        mask = os.umask(0)  # others may read it as far as the user's mask allows
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
 
 
 @contextmanager
 def _whole(
-    place: Path, make: Callable[[Path], None], put: _Put, *, sweep: bool, force: bool
+    place: Path, make: Callable[[Path], None], *, sweep: bool, force: bool
 ) -> Iterator[Path]:
-    """A temporary file or folder by `make`; `put` gives it its place when the block ends well."""
+    """A temporary file or folder by `make`, which becomes `place` when the block ends well."""
     refuse_existing(place, force)
     with ExitStack() as stack:
         with writing(place, "cannot write there"):
             place.parent.mkdir(parents=True, exist_ok=True)
             if sweep:
-                remove_left(place.parent, place.name)
-            temporary = stack.enter_context(under_construction(place, make))
+                delete_leftovers(place.parent)
+            temporary = stack.enter_context(staged(place, make))
         with writing(place):
             yield temporary
             try:
                 put(temporary, place, replace=force)
             except FileExistsError as error:
                 raise OutputError(EXISTS.format(place)) from error
-
-
-class _Put(Protocol):
-    def __call__(self, temporary: Path, target: Path, *, replace: bool) -> None: ...
-
-
-def _put_open_file(temporary: Path, target: Path, *, replace: bool) -> None:
-    """Put a file in its place, which others may read as far as the user's mask allows."""
-    mask = os.umask(0)
-    os.umask(mask)
-    temporary.chmod(0o666 & ~mask)
-    put_file_in_place(temporary, target, replace=replace)
 
 
 def sha256_of(path: Path) -> str:
@@ -290,8 +276,6 @@ EXISTS = (
     f"{{}}: exists already; choose another folder with {flag('out')}, or replace it with "
     f"{flag('force')}"
 )
-TEMPORARY = "algid"
-"""The name for which things are made in the system's temporary folder."""
 
 
 def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path:
@@ -339,7 +323,7 @@ def whole_folder(folder: Path, force: bool, *, sweep: bool = True) -> Iterator[P
         If the folder cannot be made or written to, or exists and `force` is not set, at the start
         or at the end.
     """
-    with _whole(folder, new_folder, put_in_place, sweep=sweep, force=force) as temporary:
+    with _whole(folder, Path.mkdir, sweep=sweep, force=force) as temporary:
         yield temporary
 
 
@@ -351,7 +335,7 @@ def remove_whole(place: Path) -> None:
     OSError
         If it cannot be removed.
     """
-    aside = beside(place)
+    aside = temporary_name(place)
     with suppress(FileNotFoundError):
         place.rename(aside)
         if aside.is_dir() and not aside.is_symlink():
@@ -373,9 +357,9 @@ def temporary_folder() -> Iterator[Path]:
     """
     with ExitStack() as stack:
         try:
-            place = Path(tempfile.gettempdir())
-            remove_left(place, TEMPORARY)
-            folder = stack.enter_context(under_construction(place / TEMPORARY, own_folder))
+            place = Path(tempfile.gettempdir(), "algid")
+            delete_leftovers(place.parent)
+            folder = stack.enter_context(staged(place, lambda own: own.mkdir(mode=0o700)))
         except OSError as error:
             raise OutputError(
                 f"no temporary folder can be made ({reason_of(error)}); name one in TMPDIR"

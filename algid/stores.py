@@ -11,6 +11,7 @@ them is `public`.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,7 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from algid.construction import folders_below
 from algid.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.files import read_whole, refuse_links, remove_whole, whole_file
 
@@ -158,7 +158,7 @@ def _names_below(root: Path, under: str) -> list[str]:
     """Names in a local folder; links to folders and unreadable entries are skipped."""
     start = len(str(root)) + 1
     below = []
-    for folder, names in folders_below(root / under):
+    for folder, _, names in os.walk(root / under):
         for name in names:
             path = f"{folder}/{name}"
             if name[0] != "." and Path(path).is_file():

@@ -28,7 +28,7 @@ BUDGETS = {
 """Syntax nodes and files that a part of the house may have."""
 
 PARTS = {
-    "input, output, batches": """readers writers batches log files stores construction staging
+    "input, output, batches": """readers writers batches log files stores staging
     limits runtime threads faults crash_report compiled names items ros2 arrow blocks guard""",
     "core": """physics model arm signals estimators identification tracks designs synth
     significance quantiles criteria methods table4 cases""",

@@ -21,9 +21,9 @@ from algid.guard import Notes
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = """
-import contextlib, os, signal, sys, time
+import contextlib, os, pathlib, signal, sys, time
 import algid.cli, algid.cli.app, algid.guard
-from algid.construction import new_folder, under_construction
+from algid.staging import staged
 from algid.faults import during
 
 def spin(seconds):
@@ -43,7 +43,7 @@ def hang_on(_number, _frame):
 
 def work(kind):
     if kind == "half":
-        with under_construction(__import__("pathlib").Path("result"), new_folder) as temporary:
+        with staged(pathlib.Path("result"), pathlib.Path.mkdir) as temporary:
             (temporary / "part").write_text("x")
             print("making", flush=True)
             spin(60)

@@ -18,7 +18,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "errors": room(),
     "exits": room(),
     "guard": room("exits"),
-    "construction": room("guard"),
+    "staging": room("guard"),
     "limits": room(),
     "units": room(),
     "options": room("limits units"),
@@ -46,8 +46,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "significance", "numpy scipy", PURE
     ),
     "methods": room("estimators progress"),
-    "files": room("construction errors limits options", "pydantic"),
-    "stores": room("construction errors files", "pyarrow"),
+    "files": room("errors limits options staging", "pydantic"),
+    "stores": room("errors files", "pyarrow"),
     "runtime": room(packages="threadpoolctl"),
     "profile": room("errors files options units", "pydantic"),
     "settings": room("errors limits methods model options physics signals"),
@@ -78,8 +78,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pyarrow",
     ),
     "batches": room(
-        "construction errors files identification limits options profile readers results "
-        "runtime settings stores text verdict words",
+        "errors files identification limits options profile readers results "
+        "runtime settings staging stores text verdict words",
         "distributed polars pyarrow pydantic",
     ),
     "tracks": room(

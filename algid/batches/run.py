@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fnmatch
+import os
 import signal
 import threading
 from collections import Counter, deque
@@ -30,12 +32,12 @@ from algid.batches.records import (
 )
 from algid.batches.table import write_jobs
 from algid.batches.workers import CallFailedError, WorkerDiedError, WorkersGoneError
-from algid.construction import MARK, folders_below, remove_left
 from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.options import flag
 from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
+from algid.staging import TEMPORARY, delete_leftovers
 from algid.stores import Store
 
 MOST_KILLS = 3
@@ -365,9 +367,9 @@ def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
 
 
 def sweep(store: Store) -> None:
-    """Remove what a killed run has left half-written; links are not followed."""
+    """Delete what a killed run left half-written; links are not followed."""
     if store.folder is None:
         return
-    for folder, names in folders_below(store.folder):
-        if any(MARK in name for name in names):
-            remove_left(Path(folder))
+    for folder, inner, names in os.walk(store.folder):
+        if fnmatch.filter(inner + names, TEMPORARY):
+            delete_leftovers(Path(folder))

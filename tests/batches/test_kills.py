@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -108,20 +109,55 @@ def _wait_for_records(out: Path, count: int) -> None:
         time.sleep(0.005)
 
 
-def test_a_batch_killed_again_and_again_ends_as_an_undisturbed_one(
+FORKING = """
+import os, sys
+from pathlib import Path
+import algid.api.batch as door
+import algid.batches.run
+from tests.batches.test_run import Here
+import algid.identification.identify, polars, pyarrow.fs, pyarrow.parquet, scipy.optimize
+
+door._workers = lambda *_: __import__("contextlib").nullcontext((Here(), 1))
+for line in sys.stdin:
+    child = os.fork()
+    if child == 0:
+        logs, out = line.split()
+        quick = dict(estimator="weak", model="plain", report=False)
+        os._exit(len(door.batch(logs, out, **quick).failed))
+    print(child, flush=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+def test_batches_killed_sixty_times_at_random_end_as_undisturbed_ones(
     logs: Path, tmp_path: Path, undisturbed: Undisturbed
 ) -> None:
-    instants = random.Random(1)
-    for _ in range(4):
-        running = _start(logs, tmp_path / "out")
-        time.sleep(instants.uniform(0.4, 1.0) * undisturbed.lasts)
-        running.kill()
-        running.communicate()
-    last = _start(logs, tmp_path / "out")
-    told, _ = last.communicate()
-    assert last.returncode == 0
-    assert f"{JOBS} ok" in told
-    assert _digest(tmp_path / "out") == undisturbed.digest
+    """Forks of a process that has imported everything: a kill costs no second of imports."""
+    command = [sys.executable, "-W", "ignore", "-c", FORKING]
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    with subprocess.Popen(
+        command, env=env, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as server:
+        assert server.stdin is not None
+        assert server.stdout is not None
+        instants, kills, outs, code, longest = random.Random(1), 0, 0, 1, None
+        while kills < 60 or code:
+            out = tmp_path / f"out{outs}"
+            print(logs, out, file=server.stdin, flush=True)
+            pid, start = int(server.stdout.readline()), time.monotonic()
+            if longest is not None and kills < 60:
+                time.sleep(instants.uniform(0.0, 0.4) * longest)
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            code = int(server.stdout.readline())
+            kills += code == -signal.SIGKILL
+            for result in out.glob("*.algid"):
+                algid.read_result(result)  # whole, at any instant
+            if code == 0:
+                assert _digest(out) == undisturbed.digest
+                longest = longest or time.monotonic() - start
+                outs += 1
+    assert outs > 1
 
 
 def test_the_started_process_is_killed_and_the_batch_resumed_at_once(

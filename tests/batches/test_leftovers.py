@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from algid.construction import MARK
-
 
 @pytest.mark.slow
 def test_the_folder_of_a_killed_batch_is_removed_by_the_next_one(tmp_path: Path) -> None:
@@ -52,4 +50,4 @@ def test_the_folder_of_a_killed_batch_is_removed_by_the_next_one(tmp_path: Path)
 
 
 def _folders(place: Path) -> list[Path]:
-    return [found for found in place.glob(f".algid{MARK}*") if found.is_dir()]
+    return [found for found in place.glob(".algid.algid-*") if found.is_dir()]

@@ -1,6 +1,4 @@
-"""Files and folders under construction: what a killed run leaves goes, what another run makes
-stays.
-"""
+"""Staging: what a killed run leaves goes, what another run makes stays, nothing is seen in part."""
 
 from __future__ import annotations
 
@@ -8,7 +6,6 @@ import ctypes
 import errno
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -16,14 +13,13 @@ import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from algid import construction
-from algid.construction import remove_left
+from algid import staging
 from algid.errors import OutputError
 from algid.files import temporary_folder, whole_file, whole_folder
+from algid.staging import delete_leftovers
 
 KILLED = """
 import os, signal, sys
@@ -35,11 +31,27 @@ with makes[sys.argv[1]](Path(sys.argv[2])) as temporary, temporary_folder():
         (temporary / "half").write_text("written")
     os.kill(os.getpid(), signal.SIGKILL)
 """
-ROOT = str(Path(construction.__file__).parents[1])
+ROOT = str(Path(staging.__file__).parents[1])
 
 
 def _without_exchange(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(construction, "_renameat2", lambda: None)
+    """As with a file system that cannot exchange two names."""
+
+    class Library:
+        @staticmethod
+        def renameat2(*_arguments: object) -> int:
+            ctypes.set_errno(errno.EINVAL)
+            return -1
+
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: Library)
+
+
+def _without_renameat2(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: object())
+
+
+Prepare = Callable[[pytest.MonkeyPatch], None]
+SYSTEMS: list[Prepare] = [lambda _patch: None, _without_exchange, _without_renameat2]
 
 
 def _kill_while_making(*arguments: str | Path) -> None:
@@ -49,45 +61,36 @@ def _kill_while_making(*arguments: str | Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [("file",), ("folder",), ("folder", "half")])
-def test_the_next_run_removes_at_once_what_a_killed_one_left(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: tuple[str, ...]
-) -> None:
+def test_the_next_run_deletes_what_a_killed_one_left(tmp_path: Path, kind: tuple[str, ...]) -> None:
     path = tmp_path / "a[1].algid"
     _kill_while_making(kind[0], path, *kind[1:])
     assert len(list(tmp_path.iterdir())) == 2
-    with whole_file(tmp_path / "a.algid"):  # of another name
-        pass
-    assert len(list(tmp_path.iterdir())) == 3
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with temporary_folder(), whole_folder(path, force=False):
-        assert len(list(tmp_path.iterdir())) == 3
-    assert sorted(found.name for found in tmp_path.iterdir()) == ["a.algid", "a[1].algid"]
+    with whole_folder(path, force=False):
+        assert len(list(tmp_path.iterdir())) == 1
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_what_another_run_makes_stays(tmp_path: Path) -> None:
     with whole_folder(tmp_path / "a", force=False) as first, whole_file(tmp_path / "b") as second:
-        remove_left(tmp_path)
+        delete_leftovers(tmp_path)
         assert first.is_dir()
         assert second.is_file()
     assert {path.name for path in tmp_path.iterdir()} == {"a", "b"}
 
 
-def test_a_sweep_that_is_quicker_than_the_hold_takes_nothing_from_the_maker(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hold, swept = construction.held, list[Path]()
+def test_what_is_deleted_before_it_is_locked_is_made_again(tmp_path: Path) -> None:
+    made = list[Path]()
 
-    def late(place: Path) -> int:
-        if not swept:
-            swept.append(place)
-            remove_left(tmp_path)
-        return hold(place)
+    def make(place: Path) -> None:
+        place.mkdir()
+        made.append(place)
+        if len(made) == 1:
+            delete_leftovers(tmp_path)
 
-    monkeypatch.setattr(construction, "held", late)
-    with whole_folder(tmp_path / "a", force=False) as made:
-        assert swept
-        assert made != swept[0]
-    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    with staging.staged(tmp_path / "a", make) as temporary:
+        assert made == [temporary, temporary]
+        delete_leftovers(tmp_path)
+        assert temporary.is_dir()
 
 
 def test_folders_of_a_users_own_names_are_not_swept(
@@ -105,13 +108,13 @@ def test_folders_of_a_users_own_names_are_not_swept(
         (tmp_path / name).mkdir()
         os.utime(tmp_path / name, (0, 0))
     with temporary_folder(), whole_folder(tmp_path / "a", force=False):
-        remove_left(tmp_path)
+        delete_leftovers(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*names, "a"])
 
 
-@pytest.mark.parametrize("prepare", [lambda _patch: None, _without_exchange])
+@pytest.mark.parametrize("prepare", SYSTEMS)
 def test_of_two_writers_the_second_is_refused_and_with_force_the_last_one_stands(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare: Callable[[pytest.MonkeyPatch], None]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare: Prepare
 ) -> None:
     prepare(monkeypatch)
     path = tmp_path / "a"
@@ -133,11 +136,11 @@ def test_of_two_writers_the_second_is_refused_and_with_force_the_last_one_stands
 
 
 @pytest.mark.parametrize("kind", ["file", "link", "dangling link", "empty folder"])
-@pytest.mark.parametrize("prepare", [lambda _patch: None, _without_exchange])
+@pytest.mark.parametrize("prepare", SYSTEMS)
 def test_whatever_stands_there_is_replaced_by_force_alone_and_links_are_not_followed(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    prepare: Callable[[pytest.MonkeyPatch], None],
+    prepare: Prepare,
     kind: str,
 ) -> None:
     prepare(monkeypatch)
@@ -164,8 +167,8 @@ def test_a_result_that_is_replaced_is_never_absent(tmp_path: Path) -> None:
     path, absent, ended = tmp_path / "a", list[bool](), threading.Event()
     with whole_folder(path, force=False) as made:
         (made / "result.json").touch()
-    if not construction._exchanged(path, path):
-        pytest.skip("this file system cannot exchange names")
+    if sys.platform != "linux":
+        pytest.skip("this system cannot exchange names")
 
     def look() -> None:
         while not ended.is_set():
@@ -182,34 +185,7 @@ def test_a_result_that_is_replaced_is_never_absent(tmp_path: Path) -> None:
     assert [found.name for found in tmp_path.iterdir()] == ["a"]
 
 
-def test_an_old_result_goes_back_to_its_place_where_its_successor_never_came(
-    tmp_path: Path,
-) -> None:
-    aside = tmp_path / f".a.algid{construction.OLD}0123abcd"
-    aside.mkdir()
-    remove_left(tmp_path, "a.algid")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.algid"]
-    aside.mkdir()
-    remove_left(tmp_path, "a.algid")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.algid"]
-
-
-def test_a_file_system_that_refuses_the_exchange_is_served_in_two_steps(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def unable(*_arguments: object) -> int:
-        ctypes.set_errno(errno.EINVAL)
-        return -1
-
-    monkeypatch.setattr(construction, "_renameat2", lambda: unable)
-    for name in ("old", "new"):
-        with whole_folder(tmp_path / "a", force=True) as made:
-            (made / name).touch()
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["new"]
-    assert [path.name for path in tmp_path.iterdir()] == ["a"]
-
-
-def test_a_file_system_without_holds_is_written_to_and_not_swept(
+def test_a_file_system_without_locks_is_written_to_and_not_swept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def unable(*_arguments: object) -> None:
@@ -217,32 +193,9 @@ def test_a_file_system_without_holds_is_written_to_and_not_swept(
 
     monkeypatch.setattr("fcntl.flock", unable)
     with whole_folder(tmp_path / "a", force=False) as made:
-        remove_left(tmp_path)
+        delete_leftovers(tmp_path)
         assert made.is_dir()
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
-
-
-def test_a_signal_during_the_clearing_up_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rmtree, signals = shutil.rmtree, [KeyboardInterrupt]
-
-    def interrupted(path: Path, **more: Any) -> None:
-        if signals:
-            raise signals.pop()
-        rmtree(path, **more)
-
-    monkeypatch.setattr(shutil, "rmtree", interrupted)
-    with ExitStack() as stack:
-        made = stack.enter_context(whole_folder(tmp_path / "a", force=False))
-        (made / "half").touch()
-        (tmp_path / "a").mkdir()
-        (tmp_path / "a/theirs").touch()
-        with pytest.raises(KeyboardInterrupt):
-            stack.close()
-    (tmp_path / "a/theirs").unlink()
-    (tmp_path / "a").rmdir()
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
