@@ -48,17 +48,22 @@ def logs(name: str, duration: float = 4.0, exact: bool = False) -> tuple[Log, Lo
 def summary(result: algid.Result) -> Summary:
     """Estimates with their deviations, statuses, codes, terms and prediction of a result.
 
-    What a terminal shows of it is held to its 25 lines of 80 columns on the way.
+    What a terminal shows of it is held to its 25 lines of 80 columns on the way. Of a failed
+    result, whose numbers are not to be used and may hang on rounding, the reasons are kept alone.
     """
     held(result)
     content = result.model_dump(mode="json")
     estimates = {**content["parameters"], **content["payload"]}
     found: Summary = {
         "estimator": result.estimator,
-        "numbers": {name: [row["estimate"], row["std"]] for name, row in estimates.items()},
-        "status": {name: row["status"] for name, row in estimates.items()},
         "codes": sorted({notice["code"] for notice in content["notices"]}),
         "grade": content["verdict"]["grade"],
+    }
+    if found["grade"] == "failed":
+        return found
+    found |= {
+        "numbers": {name: [row["estimate"], row["std"]] for name, row in estimates.items()},
+        "status": {name: row["status"] for name, row in estimates.items()},
     }
     if content["fit"] and content["fit"].get("model"):
         found["terms"] = content["fit"]["model"]["terms"]
