@@ -575,7 +575,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "ARM_DOUBTFUL": "the arm's own result is {grade}: {headline}",
     "LENGTH_CONTRADICTED": {
         "identified": (
-            "{name} is given as {given:g} m, but identified as {estimate:.5g} ± {std:.2g} m "
+            "{name} is given as {given:g} m, but identified as {estimate:.5g} ± {half:.2g} m "
             "({distance:.0f} σ apart)"
         ),
         "stated": (

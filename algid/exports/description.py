@@ -40,7 +40,7 @@ from algid.text import joined
 
 @dataclass(frozen=True)
 class Coefficients:
-    """The torque's model, its coefficients by name, and their standard deviations where known.
+    """The torque's model, its coefficients by name, and half their 95 % intervals where known.
 
     `value` holds a zero for every coefficient that the model lacks; `conditioned` says whether l1
     moved them.
@@ -48,7 +48,7 @@ class Coefficients:
 
     model: Model
     value: Mapping[str, float]
-    std: Mapping[str, float]
+    half: Mapping[str, float]
     conditioned: bool = False
 
 
@@ -68,14 +68,15 @@ def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coeff
     if l1 is not None and conditioned:
         c, C = _conditioned(model, c, C, l1)
     value = model.values(c)
-    spread = dict(zip(model.names, np.sqrt(np.maximum(np.diag(C), 0.0)).tolist(), strict=True))
+    half = result.quantile * np.sqrt(np.maximum(np.diag(C), 0.0))
+    halves = dict(zip(model.names, half.tolist(), strict=True))
     wrong = wrong_inertia(value)
     if wrong is not None:
         mend = "identify it from more informative logs"
         if conditioned:
             mend = f"check {flag('l1')}"
         raise ResultError(f"{file}: {wrong}, so that masses would come out negative; {mend}")
-    return Coefficients(model, value, {name: spread[name] for name in known}, conditioned)
+    return Coefficients(model, value, {name: halves[name] for name in known}, conditioned)
 
 
 def _conditioned(
@@ -239,9 +240,9 @@ def _of_first_length(result: Result) -> str:
     """What tells the length of link 1, where it is not given."""
     by_payload, by_constants = payload_length(result), first_length(result)
     if by_payload is not None:
-        return f"identified with the payload, ± {by_payload[1]:.2g}"
+        return f"identified with the payload, ± {result.quantile * by_payload[1]:.2g} (95 %)"
     if by_constants is not None:
-        return f"identified, g k1 / k2, ± {by_constants[1]:.2g}"
+        return f"identified, g k1 / k2, ± {result.quantile * by_constants[1]:.2g} (95 %)"
     return "identified, g k1 / k2"
 
 
@@ -249,8 +250,8 @@ def _identified(coefficients: Coefficients) -> list[Number]:
     numbers = []
     for name in coefficients.model.names:
         origin = "identified"
-        if name in coefficients.std:
-            origin += f", ± {coefficients.std[name]:.2g}"
+        if name in coefficients.half:
+            origin += f", ± {coefficients.half[name]:.2g} (95 %)"
         if coefficients.conditioned:
             origin += ", conditioned on l1"
         numbers.append(Number(name, coefficients.value[name], UNITS[name], origin))

@@ -51,7 +51,8 @@ def overview(history: History) -> Plot | None:
     for place, (robot, name) in enumerate(pairs):
         _panel(panels, place, history, robot, name)
     reading = (
-        f"A dot is a log with its 95 % interval, grey the mean of the {SPAN} months before. "
+        f"A dot is a log ± {NORMAL:.2f} standard deviations, grey the mean of the {SPAN} months "
+        "before. "
         "A diamond ends a drift, a ring is an outlier, at a red line the arm changed at once."
     )
     return Plot("logs", title, panels, reading)

@@ -8,11 +8,11 @@ from datetime import datetime
 import numpy as np
 import polars as pl
 
+from algid.compiled import student_quantile
 from algid.fleet.changes import ALPHA as CHANGED
 from algid.fleet.drift import ALPHA, SPAN
 from algid.fleet.history import History
 from algid.report.document import Kind, Table
-from algid.significance import NORMAL
 from algid.text import ABSENT, joined, significant, visible
 from algid.words import counted
 
@@ -57,12 +57,14 @@ def change_table(history: History) -> Table:
     rows = []
     for row in history.drifts.head(MOST_ROWS).iter_rows(named=True):
         percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
-        half = significant(NORMAL * percent * row["slope_std"], 2)
+        half = significant(student_quantile(row["logs"] - 2) * percent * row["slope_std"], 2)
         trend = f"{percent * row['slope']:+.3g} ± {half}"
         rows.append((row["robot"], row["parameter"], "drift", trend, "% a month", _day(row["end"])))
     changes = history.changes if history.changes is not None else pl.DataFrame()
+    logs = dict(history.roster.select("robot", "logs").rows())
     for row in changes.head(MOST_ROWS).iter_rows(named=True):
-        half = significant(NORMAL * abs(row["share"] / row["step"]) * 100 * row["step_std"], 2)
+        percent = 100 * abs(row["share"] / row["step"])
+        half = significant(student_quantile(logs[row["robot"]] - 2) * percent * row["step_std"], 2)
         step = f"{100 * row['share']:+.3g} ± {half}"
         between = f"{_day(row['before'])} to {_day(row['after'])}"
         rows.append((row["robot"], row["parameter"], "step", step, "%", between))

@@ -244,7 +244,7 @@ def contradictions(result: Result, lengths: Mapping[str, float]) -> tuple[Notice
                 "given": given,
                 "distance": distance,
                 "estimate": estimate,
-                "std": std,
+                "half": result.quantile * std,
             }
             notices.append(Notice("LENGTH_CONTRADICTED", numbers=numbers))
     return tuple(notices)

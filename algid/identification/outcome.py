@@ -21,7 +21,7 @@ from algid.identification.predicted import prediction
 from algid.identification.remarks import fit_notes, fit_warnings, torque_unit
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
-from algid.model import DELAYS, K3, K5, UNITS
+from algid.model import DELAYS, UNITS
 from algid.names import outside, places_outside, within
 from algid.notices import Notice
 from algid.physics.effort import absent
@@ -30,9 +30,6 @@ from algid.settings import Settings
 from algid.significance import LEVEL, chance
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
-
-NEVER_ZERO = (K3, K5, "l1", "l2")
-"""Inertias and lengths: any other parameter of an arm may be zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +114,7 @@ def _loaded_rows(
             combined[name] = estimate(rows[name], stds[name], half, unit, status)
         else:
             combined[name] = unknown(unit)
-    return combined
+    return with_significance(combined)
 
 
 def is_implausible(summary: results.FitSummary) -> bool:
@@ -177,13 +174,10 @@ def estimate(value: float, std: float, half: float, unit: str, status: str) -> E
 
 
 def with_significance(group: Mapping[str, Estimate]) -> dict[str, Estimate]:
-    """The estimates; those whose interval holds zero and that may be zero are not significant.
-
-    An inertia or a length is never zero.
-    """
+    """The estimates; those whose 95 % interval contains zero are not significant."""
     changed = dict(group)
     for name, one in group.items():
-        if one.status is Status.OK and name not in NEVER_ZERO and _holds_zero(one):
+        if one.status is Status.OK and _holds_zero(one):
             changed[name] = one.model_copy(update={"status": Status.NOT_SIGNIFICANT})
     return changed
 

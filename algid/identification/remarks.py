@@ -14,7 +14,7 @@ from algid.identification.source import LogSource
 from algid.methods import estimator_of
 from algid.model import K4
 from algid.notices import Notice, Remedy
-from algid.significance import CERTAIN, LEVEL, ONE_SIDED, chance, sigmas
+from algid.significance import CERTAIN, LEVEL, chance, sigmas
 from algid.units import TORQUE
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
@@ -134,10 +134,10 @@ def _of_gains(fit: Fit) -> Iterator[Notice]:
 
 def _of_payload(fit: Fit) -> Iterator[Notice]:
     place = fit.names.index("m_p")
-    mass, std = float(fit.values[place]), float(fit.std[place])
-    if np.isfinite(std) and abs(mass) < fit.quantile * std:
-        yield Notice("NO_PAYLOAD", numbers={"most": max(mass + ONE_SIDED * std, 0.0)})
-    elif np.isinf(std) and not fit.shared.lengths:
+    low, high = fit.ci95[place].tolist()
+    if np.isfinite(high) and low < 0 < high:
+        yield Notice("NO_PAYLOAD", numbers={"most": high})
+    elif np.isinf(high) and not fit.shared.lengths:
         yield Notice("LENGTHS_NEEDED")
 
 

@@ -113,9 +113,8 @@ def _estimates(result: Result) -> list[str]:
         name, number, words, error = row.name, row.with_half, row.meaning.partition(", ")[0], ""
         if row.name in phasors:
             moment = phasors[row.name]
-            half = None if moment.std is None else moment.quantile * moment.std
             name, words = f"|{name.upper()}|", f"at {moment.angle_text}"
-            number = f"{resolved(moment.size, moment.std)} ± {significant(half, 2)}"
+            number = f"{resolved(moment.size, moment.std)} ± {significant(moment.half, 2)}"
             if row.status != Status.OK:
                 words += f" {row.status}"
         else:

@@ -45,8 +45,8 @@ LOOKS = tuple(
 class Comparison:
     """Results side by side: estimates, their distances from the first one's, other settings.
 
-    `sigma` holds, by parameter, the distance of each result from the first in combined standard
-    deviations; None where either has no estimate or no standard deviation.
+    `sigma` holds, by parameter, the distance of each result from the first; None where either has
+    no estimate or no interval.
     """
 
     labels: tuple[str, ...]
@@ -65,13 +65,14 @@ class Comparison:
         return self.estimates, self.settings
 
     def as_json(self) -> str:
-        """Estimates, standard deviations and distances in σ as the text of a JSON file."""
+        """Estimates, 95 % intervals and distances in σ as the text of a JSON file."""
         parameters = {}
         for name, distances in self.sigma.items():
             every = [result.estimates.get(name) for result in self.results]
             parameters[name] = {
                 "estimate": [None if one is None else one.estimate for one in every],
                 "std": [None if one is None else one.std for one in every],
+                "ci95": [None if one is None else one.ci95 for one in every],
                 "sigma": (None, *distances),
             }
         count = len(self.labels)
@@ -121,12 +122,16 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
 
 
 def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | None:
-    """Signed distance of `other` from `first` over their combined standard deviation."""
+    """Signed distance of `other` from `first` over their combined half intervals, in σ.
+
+    Of normal intervals that is their combined standard deviation. Of Student's it is larger, so
+    that 95 % of the differences that chance makes lie within 1.96 of either.
+    """
     if first is None or other is None or first.estimate is None or other.estimate is None:
         return None
-    if first.std is None or other.std is None:
+    if first.half is None or other.half is None:
         return None
-    combined = math.hypot(first.std, other.std)
+    combined = math.hypot(first.half, other.half) / NORMAL
     return (other.estimate - first.estimate) / combined if combined else None
 
 
@@ -149,8 +154,8 @@ def _estimates(
             ):
                 change = 100 * (one.estimate - first.estimate) / abs(first.estimate)
             off = (formatted(far, "+.1f"), formatted(change, "+.3g"))
-            rows.append((visible(name), label, with_std(one), unit_text(one.unit), *off))
-    note = f"Differences are against {labels[0]}; ± is one standard deviation, σ combines both."
+            rows.append((visible(name), label, _with_half(one), unit_text(one.unit), *off))
+    note = f"Differences are against {labels[0]}; ± is 95 %, σ combines both intervals."
     columns: dict[str, Kind] = {
         "Parameter": "name", "Result": "text", "Estimate": "number", "Unit": "text",
         "Δ/σ": "number", "Δ %": "number",
@@ -158,11 +163,11 @@ def _estimates(
     return Table("Estimates side by side", columns, tuple(rows), note)
 
 
-def with_std(estimate: Estimate) -> str:
-    """``estimate ± std``, and the status where it is not OK."""
+def _with_half(estimate: Estimate) -> str:
+    """``estimate ± half its 95 % interval``, and the status where it is not OK."""
     text = resolved(estimate.estimate, estimate.std)
-    if estimate.std is not None:
-        text += f" ± {significant(estimate.std, 2)}"
+    if estimate.half is not None:
+        text += f" ± {significant(estimate.half, 2)}"
     if estimate.status != Status.OK:
         text += f" ({estimate.status.value})"
     return text
@@ -262,7 +267,7 @@ def verdict(found: Comparison) -> Verdict:
 
 
 def _distances(found: Comparison) -> Plot:
-    """How far each result is from the first, in combined standard deviations."""
+    """How far each result is from the first, in σ of both intervals."""
     names = [name for name, row in found.sigma.items() if set(row) != {None}]
     panels = Panels([f"Distance from {found.labels[0]}, σ"], height=70 + 24 * len(names))
     for place, label in enumerate(found.labels[1:]):

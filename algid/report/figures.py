@@ -15,9 +15,8 @@ from algid.quantiles import median, quantile
 from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, Plot
 from algid.report.series import POINTS, Drawn, between, drawn, table
 from algid.results import Estimate, FitSummary, Result
-from algid.results.rows import half_width, known_truth
+from algid.results.rows import known_truth
 from algid.results.verdict import share_text
-from algid.significance import NORMAL
 from algid.text import file_name, joined, significant, unit_text
 
 STRONG = 0.95
@@ -70,10 +69,9 @@ def intervals(result: Result) -> Plot:
     known: dict[str, Estimate] = {}
     shares = []
     for name, one in (result.parameters | result.payload).items():
-        half = half_width(one)
-        if one.estimate and half is not None:
+        if one.estimate and one.half is not None:
             known[name] = one
-            shares.append(100 * half / abs(one.estimate))
+            shares.append(100 * one.half / abs(one.estimate))
     usual = USUAL * median(shares or [1.0])
     limit = 1.15 * max(min(max(shares, default=1.0), usual, WIDEST), 1e-6)
     names = list(known)
@@ -348,7 +346,8 @@ def inertia(result: Result, raw: Drawn | None) -> Plot | None:
     # M is linear in the constants: unit vectors give its derivatives
     slopes = np.stack([parts(*unit) for unit in np.eye(3).tolist()])
     C = np.full((3, 3), np.nan) if result.fit is None else result.fit.covariance_of(names)
-    half = NORMAL * np.sqrt(np.maximum(np.einsum("ipn,ij,jpn->pn", slopes, C, slopes), 0))
+    std = np.sqrt(np.maximum(np.einsum("ipn,ij,jpn->pn", slopes, C, slopes), 0))
+    half = result.quantile * std
     panels, degrees = Panels(["kg m² over θ2"], height=320), np.degrees(theta2)
     looks = (("M11", BLUE, "solid"), ("M12 = M21", ORANGE, "dash"), ("M22", GREEN, "dot"))
     for place, (name, colour, dash) in enumerate(looks):

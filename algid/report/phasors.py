@@ -22,8 +22,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.model import SINES
-from algid.results import Estimate, Result
-from algid.significance import NORMAL
+from algid.results import Result
 from algid.text import resolved, significant
 
 
@@ -43,15 +42,14 @@ class Moment:
 
     @property
     def half(self) -> float | None:
-        """Half the 95 % interval of the angle in degrees."""
-        if self.angle_std is None:
-            return None
-        return self.quantile * self.angle_std
+        """Half the 95 % interval of the size."""
+        return None if self.std is None else self.quantile * self.std
 
     @property
     def angle_text(self) -> str:
-        """The angle with its ±, in degrees."""
-        return f"{resolved(self.angle, self.angle_std)}° ± {significant(self.half, 2)}°"
+        """The angle with half its 95 % interval, in degrees."""
+        half = None if self.angle_std is None else self.quantile * self.angle_std
+        return f"{resolved(self.angle, self.angle_std)}° ± {significant(half, 2)}°"
 
 
 def moments(result: Result) -> dict[str, Moment]:
@@ -87,7 +85,7 @@ def _moment(result: Result, name: str, sine: str) -> Moment | None:
         std = math.sqrt(max(float(along @ C @ along), 0.0))
         angle_std = math.degrees(math.sqrt(max(float(across @ C @ across), 0.0)) / abs(K))
     angle = math.degrees(cmath.phase(K))
-    return Moment(abs(K), std, angle, angle_std, cosine_part.unit, _quantile(cosine_part))
+    return Moment(abs(K), std, angle, angle_std, cosine_part.unit, result.quantile)
 
 
 def _covariance(result: Result, *names: str) -> FloatArray | None:
@@ -98,10 +96,3 @@ def _covariance(result: Result, *names: str) -> FloatArray | None:
     if not np.isfinite(C).all():
         return None
     return C
-
-
-def _quantile(found: Estimate) -> float:
-    low, high = found.ci95 or (None, None)
-    if low is None or high is None or not found.std:
-        return NORMAL
-    return (high - low) / (2 * found.std)

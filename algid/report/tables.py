@@ -66,14 +66,14 @@ def arm_tables(result: Result) -> tuple[Table, ...]:
     constants = {name: one for name, one in result.parameters.items() if name in CONSTANT_NAMES}
     rows = []
     for name, one in moments(result).items():
-        size, std = resolved(one.size, one.std), significant(one.std, 2)
-        rows.append((f"|{name.upper()}|", size, std, unit_text(one.unit), one.angle_text))
+        size, half = resolved(one.size, one.std), significant(one.half, 2)
+        rows.append((f"|{name.upper()}|", size, half, unit_text(one.unit), one.angle_text))
     note = (
         "K = k + i k_s: the angle of K1 is θ2's zero or link 2's centre of mass, that of K2 less "
         "it θ1's zero, that of K4 less θ1's zero the load of joint 1 off link 1's line."
     )
     columns: dict[str, Kind] = {
-        "Moment": "name", "Size": "number", "± std": "number", "Unit": "text",
+        "Moment": "name", "Size": "number", "± 95 %": "number", "Unit": "text",
         "Angle, 95 %": "number",
     }  # fmt: skip
     return (
@@ -97,16 +97,17 @@ def nuisance_tables(result: Result) -> tuple[Table, Table]:
 def paper_tables(result: Result) -> tuple[Table, ...]:
     """The payload by the paper's route, the loaded arm, and its Table 4 where a truth is known."""
     columns: dict[str, Kind] = {
-        "Parameter": "name", "Estimate": "number", "± std": "number", "Unit": "text",
+        "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
         "Truth": "number", "Error, %": "number", "Paper, %": "number",
     }  # fmt: skip
     rows: list[tuple[str, ...]] = []
     for row in result.table4 if known_truth(result) else ():
+        half = None if row.std is None else result.quantile * row.std
         rows.append(
             (
                 visible(row.parameter),
                 resolved(row.estimate, row.std),
-                significant(row.std, 2),
+                significant(half, 2),
                 unit_text(row.unit),
                 significant(row.truth),
                 significant(row.error_percent, 4),

@@ -23,6 +23,7 @@ from algid.limits import LIMITS
 from algid.log import Reading
 from algid.model import DELAYS
 from algid.notices import Notice, from_flags, notes_of, warnings_of
+from algid.significance import NORMAL
 from algid.text import visible
 from algid.verdict import Verdict
 from algid.words import counted
@@ -35,7 +36,7 @@ READABLE = (1, 2, 3)
 class Status(StrEnum):
     """How far an estimate can be trusted.
 
-    NOT_SIGNIFICANT: the interval holds zero, which the parameter may be.
+    NOT_SIGNIFICANT: the 95 % interval contains zero.
     IMPLAUSIBLE: the estimates together break a bound of physics by more than three standard
     deviations, or predict the torque worse than a constant does.
     """
@@ -66,6 +67,14 @@ class Estimate(_Model):
     def usable(self) -> bool:
         """Whether number and interval can be used: also where zero lies within it."""
         return self.status in (Status.OK, Status.NOT_SIGNIFICANT) and self.estimate is not None
+
+    @property
+    def half(self) -> float | None:
+        """Half the 95 % interval; None where there is none, or it is unbounded."""
+        low, high = self.ci95 or (None, None)
+        if low is None or high is None:
+            return None
+        return (high - low) / 2
 
 
 class Table4Row(_Model):
@@ -407,6 +416,17 @@ class Result(_Model):
         return self.parameters | self.loaded | self.payload
 
     @property
+    def quantile(self) -> float:
+        """Half width of every 95 % interval in standard deviations, Student's or normal.
+
+        It is one number for all estimates: that of the fit's effective degrees of freedom.
+        """
+        for one in self.estimates.values():
+            if one.half and one.std:
+                return one.half / one.std
+        return NORMAL
+
+    @property
     def complete(self) -> bool:
         """Whether every estimate can be used: see `Estimate.usable`."""
         return all(estimate.usable for estimate in self.estimates.values())
@@ -480,14 +500,14 @@ class Result(_Model):
 
     def _rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         """The head of a table of the estimates, and its rows."""
-        yield "parameter", "estimate", "std", "unit", "status"
+        yield "parameter", "estimate", "± 95 %", "unit", "status"
         for name, one in self.estimates.items():
-            value = std = "-"
+            value = half = "-"
             if one.estimate is not None:
                 value = f"{one.estimate:.6g}"
-            if one.std is not None:
-                std = f"{one.std:.2g}"
-            yield name, value, std, one.unit, one.status.value
+            if one.half is not None:
+                half = f"{one.half:.2g}"
+            yield name, value, half, one.unit, one.status.value
 
 
 def _line(notice: Notice) -> str:

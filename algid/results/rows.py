@@ -40,14 +40,6 @@ class EstimateRow:
         return ABSENT if self.value == ABSENT else f"{self.value} ± {self.half}"
 
 
-def half_width(found: Estimate) -> float | None:
-    """Half the 95 % interval; None where there is none, or it is unbounded."""
-    low, high = found.ci95 or (None, None)
-    if low is None or high is None:
-        return None
-    return (high - low) / 2
-
-
 def known_truth(result: Result) -> dict[str, float]:
     """What a synthetic log was made with, by parameter."""
     truth = {row.parameter: row.truth for row in result.table4 if row.truth is not None}
@@ -62,7 +54,7 @@ def rows_of(result: Result, estimates: Mapping[str, Estimate]) -> list[EstimateR
 
 def row_of(name: str, found: Estimate, truth: float | None = None) -> EstimateRow:
     """The row of one estimate beside the truth, where that is known."""
-    value, half, error = found.estimate, half_width(found), ABSENT
+    value, half, error = found.estimate, found.half, ABSENT
     if value is not None and truth:
         off = 100 * (value - truth) / abs(truth)
         error = f"{off:+.2g}" if abs(off) >= LEAST_ERROR else f"<{LEAST_ERROR:g}"

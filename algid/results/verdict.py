@@ -30,9 +30,7 @@ CONSTANTS = (K1, K2, K3, K4, K5, K6, K7)
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
 WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
 LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
-LARGEST_SPREAD = (
-    0.1  # a standard deviation beyond a tenth of the estimate says little more than its size
-)
+WIDE = 0.2  # half an interval beyond a fifth of the estimate says little more than its size
 
 LONGEST_COMMAND = 4_000  # characters: a command is there to be copied
 
@@ -231,10 +229,10 @@ def replaced_estimator(result: Result) -> str | None:
 def _praise(result: Result) -> Iterator[str]:
     """What speaks for a result: certainty, explained torque, error against the truth."""
     praise = f"all {counted(len(result.estimates), 'parameter')} are identified"
-    spreads = {name: _spread(one) for name, one in result.estimates.items() if one.std is not None}
-    if spreads:
-        worst = max(spreads, key=spreads.__getitem__)
-        half = significant(196 * spreads[worst], 2)
+    widths = {name: _share(one) for name, one in result.estimates.items() if one.half is not None}
+    if widths:
+        worst = max(widths, key=widths.__getitem__)
+        half = significant(100 * widths[worst], 2)
         yield f"{praise}, the least certain, {visible(worst)}, to ±{half} % (95 %)"
     else:
         estimator = visible(result.estimator)
@@ -267,13 +265,13 @@ def share_text(share: float) -> str:
     return f"{100 * share:.2f} %"
 
 
-def _spread(found: Estimate) -> float:
-    """Standard deviation relative to the estimate's size."""
-    if found.std is None or found.estimate is None:
+def _share(found: Estimate) -> float:
+    """Half the 95 % interval relative to the estimate's size."""
+    if found.half is None or found.estimate is None:
         return 0.0
     if found.estimate == 0:
         return math.inf
-    return found.std / abs(found.estimate)
+    return found.half / abs(found.estimate)
 
 
 def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
@@ -332,9 +330,9 @@ def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:
             yield Notice(status, numbers=numbers)
     wide = []
     for name, one in estimates.items():
-        spread = _spread(one)
-        if one.status == "OK" and one.estimate and spread > LARGEST_SPREAD:
-            wide.append(f"{visible(name)} (±{significant(196 * spread, 2)} %)")
+        share = _share(one)
+        if one.status == "OK" and one.estimate and share > WIDE:
+            wide.append(f"{visible(name)} (±{significant(100 * share, 2)} %)")
     if wide:
         yield Notice("WIDE_INTERVAL", numbers={"names": wide})
 

@@ -18,6 +18,7 @@ from algid.exports.formats import FORMATS, exported
 from algid.exports.links import Knowns, Link, links_of
 from algid.model import Model
 from algid.results import Result, result_json
+from algid.significance import NORMAL
 from tests.cli.commands import app
 from tests.exports.arms import ODD, UNIFORM, result_of, values_of
 
@@ -149,8 +150,8 @@ def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
     line = np.array([l1 / 9.81, 1.0]) * weights  # k1 = l1 k2 / g, weighted least squares along it
     k2 = line @ (c * weights) / (line @ line)
     assert found.value["k2"] == pytest.approx(k2, rel=1e-12)
-    assert found.std["k1"] == pytest.approx(found.std["k2"] * l1 / 9.81, rel=1e-9)
-    assert found.std["k2"] == pytest.approx(1 / math.sqrt(line @ line), rel=1e-9)
+    assert found.half["k1"] == pytest.approx(found.half["k2"] * l1 / 9.81, rel=1e-9)
+    assert found.half["k2"] == pytest.approx(NORMAL / math.sqrt(line @ line), rel=1e-9)
     assert found.value["k3"] == ODD.constants()[2]
 
 
@@ -261,7 +262,7 @@ def test_the_payload_comes_with_its_error_bars() -> None:
     text, (warning,) = exported(result, "arm", "yaml", Knowns(l2=0.4))
     assert "[0.4, 0.0, 0.0]" in text
     assert "centre_of_gravity_std: [0.0," in text
-    assert warning.text == "l2 is given as 0.4 m, but identified as 0.3 ± 0.003 m (33 σ apart)"
+    assert warning.text == "l2 is given as 0.4 m, but identified as 0.3 ± 0.0059 m (33 σ apart)"
 
 
 def run(result: Result, folder: Path, *arguments: str) -> tuple[int, str, set[str]]:
@@ -285,7 +286,7 @@ def test_the_command_warns_refuses_and_never_overwrites(
     result = result_of(values_of(ODD))
     code, said, files = run(result, tmp_path, "--to", "urdf", "--l1", "0.41")
     assert (code, files) == (0, {"arm.urdf"})
-    told = "l1 is given as 0.41 m, but identified as 0.4 ± 0.00057 m (18 σ apart)"
+    told = "l1 is given as 0.41 m, but identified as 0.4 ± 0.0011 m (18 σ apart)"
     assert told in said
     assert told in (tmp_path / "arm.urdf").read_text(encoding="utf-8")
     code, said, _ = run(result, tmp_path, "--to", "urdf")

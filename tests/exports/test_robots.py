@@ -16,6 +16,7 @@ from algid.exports.formats import FORMATS, exported
 from algid.exports.links import Knowns
 from algid.model import Model
 from algid.results import Status
+from algid.significance import NORMAL
 from tests.exports.arms import ODD, UNIFORM, result_of, states, values_of
 
 XML = ("urdf", "sdf", "mjcf")
@@ -171,10 +172,10 @@ def test_every_number_is_listed_with_its_unit_and_reads_back() -> None:
         text = text_of(to, values_of(ODD, f1=0.4, f2=0.3), Model(("coulomb",)))
         value = values_of(ODD, f1=0.4, f2=0.3)
         for name, number in value.items():
-            found = re.search(rf"\b{name} +(\S+) +(.*?)  +identified, ± (\S+)", text)
+            found = re.search(rf"\b{name} +(\S+) +(.*?)  +identified, ± (\S+) \(95 %\)", text)
             assert found is not None, (to, name)
             assert float(found.group(1)) == number
-            assert float(found.group(3)) == float(f"{1e-3 * abs(number):.2g}")
+            assert float(found.group(3)) == float(f"{NORMAL * 1e-3 * abs(number):.2g}")
         assert re.search(r"\bg +9\.81 +m/s\^2 +given", text)
 
 
@@ -248,7 +249,8 @@ def test_lengths_that_the_result_was_told_are_taken_and_flags_beat_them() -> Non
     assert re.search(r"l1 +0\.41 +m +given", sdf)
     assert re.search(r"l2 +0\.33 +m +given", sdf)
     # k1 and k2, each to a thousandth, tell the same length then: k1 to a thousandth over √2
-    assert f"identified, ± {1e-3 * 0.7 * 0.4 * 0.11 / np.sqrt(2):.2g}, conditioned on l1" in sdf
+    half = NORMAL * 1e-3 * 0.7 * 0.4 * 0.11 / np.sqrt(2)
+    assert f"identified, ± {half:.2g} (95 %), conditioned on l1" in sdf
     assert re.search(r"l1 +0\.39 +m +given", exported(told, "a", "sdf", Knowns(l1=0.39))[0])
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import polars as pl
 import pytest
-from scipy.stats import norm
+from scipy.stats import norm, t
 from typer.testing import CliRunner
 
 from algid.batches.discover import jobs_of
@@ -135,9 +135,10 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
     assert second[2:4] == ("none", "0")
     (drift,) = change_table(history).rows
     row = history.drifts.row(0, named=True)
-    slope, half = (100 * row[name] / row["mean"] for name in ("slope", "slope_std"))
+    slope, std = (100 * row[name] / row["mean"] for name in ("slope", "slope_std"))
+    half = t.ppf(0.975, 10 - 2) * std  # ten logs, a mean and a slope
     assert drift == (
-        "r0", "k6", "drift", f"{slope:+.3g} ± {1.96 * half:.1f}", "% a month", "2023-11-23",
+        "r0", "k6", "drift", f"{slope:+.3g} ± {half:.1f}", "% a month", "2023-11-23",
     )  # fmt: skip
     assert "A drift is a slope over 3 months with p < 9e-4" in change_table(history).note
     (finding,) = finding_table(history).rows

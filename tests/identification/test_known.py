@@ -225,9 +225,8 @@ def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:
     assert contradictions(weighed, {"l1": l1 + 4.89 * s1, "l2": l2 - 4.89 * s2}) == ()
     first, second = contradictions(weighed, {"l1": l1 + 5.6 * s1, "l2": l2 - 7.2 * s2})
     assert (
-        first.text
-        == f"l1 is given as {l1 + 5.6 * s1:g} m, but identified as {l1:.5g} ± {s1:.2g} m "
-        "(6 σ apart)"
+        first.text == f"l1 is given as {l1 + 5.6 * s1:g} m, but identified as {l1:.5g} ± "
+        f"{weighed.quantile * s1:.2g} m (6 σ apart)"
     )
     assert (second.numbers["name"], second.numbers["distance"]) == ("l2", pytest.approx(7.2))
     bare = weighed.model_copy(update={"payload": {}})

@@ -263,13 +263,12 @@ def test_a_good_fit_is_passed_over_in_silence() -> None:
     assert list(fit_warnings(fit_of())) == []
 
 
-def test_a_payload_near_zero_has_its_one_sided_bound() -> None:
-    fit = with_stds(with_values(fit_of(), m_p=0.1), m_p=0.1)
-    assert [one.numbers["most"] for one in found(fit, "NO_PAYLOAD")] == [
-        pytest.approx(0.1 + 0.1 * norm.ppf(0.95))
-    ]
-    negative = with_stds(with_values(fit_of(), m_p=-0.2), m_p=0.1)
-    assert [one.numbers["most"] for one in found(negative, "NO_PAYLOAD")] == [0.0]
+def test_a_payload_near_zero_is_at_most_the_end_of_its_interval() -> None:
+    for mass in (0.1, -0.2):
+        fit = with_stds(with_values(fit_of(), m_p=mass), m_p=0.1)
+        assert [one.numbers["most"] for one in found(fit, "NO_PAYLOAD")] == [
+            pytest.approx(mass + 0.1 * QUANTILE)
+        ]
     assert not found(with_stds(with_values(fit_of(), m_p=0.26), m_p=0.1), "NO_PAYLOAD")
     lost = with_stds(fit_of(), m_p=np.inf)
     assert found(lost, "LENGTHS_NEEDED")
@@ -344,12 +343,21 @@ def test_cross_validation_that_could_not_be_done_is_told() -> None:
     assert [one.code for one in outcome.notices] == ["NO_CROSS_VALIDATION"]
 
 
-def test_what_may_be_zero_and_is_not_told_from_it_is_not_significant() -> None:
-    fit = with_stds(with_values(fit_of(), k6=0.1, k3=0.1), k6=1.0, k3=1.0)
-    outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
-    assert outcome.parameters["k6"].status is Status.NOT_SIGNIFICANT
-    assert outcome.parameters["k3"].status is Status.OK  # no inertia is zero
-    assert outcome.parameters["k4"].status is Status.OK
+def test_an_interval_that_contains_zero_is_never_ok() -> None:
+    """By the quantile of the fit, also of an inertia, a length, and the loaded arm's sums."""
+    wide = {"k3": 0.1, "k6": 0.1, "l2": 0.1, "m_p": 0.1}
+    for std, status in ((1.01, Status.NOT_SIGNIFICANT), (0.99, Status.OK)):
+        stds = {name: std * value / QUANTILE for name, value in wide.items()}
+        fit = with_stds(with_values(fit_of(), **wide), **stds)
+        outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+        every = outcome.parameters | outcome.payload | outcome.loaded
+        assert {every[name].status for name in wide} == {status}
+        assert every["k4"].status is Status.OK
+        for one in every.values():
+            low, high = one.ci95 or (None, None)
+            assert low is not None
+            assert high is not None
+            assert (one.status is Status.OK) is not (low <= 0 <= high)
 
 
 def test_a_bound_is_mentioned_from_the_level_of_the_intervals_on() -> None:

@@ -37,6 +37,7 @@ from algid.results import (
     WhitenessTest,
     write_result,
 )
+from algid.significance import NORMAL
 from algid.synth.cases import Case, load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
@@ -138,7 +139,7 @@ def estimate(value: float, std: float, unit: str, status: Status = Status.OK) ->
     return Estimate(
         estimate=value,
         std=std,
-        ci95=(value - 1.96 * std, value + 1.96 * std),
+        ci95=(value - NORMAL * std, value + NORMAL * std),
         unit=unit,
         status=status,
     )

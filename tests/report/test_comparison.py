@@ -11,12 +11,13 @@ from algid.errors import OutputError
 from algid.log import ChannelReading, Reading
 from algid.report.comparison import Comparison, compare, verdict, write_comparison
 from algid.results import Estimate, Result
+from algid.significance import NORMAL
 from tests.report.folders import estimate
 from tests.report.pages import Page, typed
 from tests.report.test_terminal import printed
 
 
-def test_the_difference_is_over_both_standard_deviations(result: Result) -> None:
+def test_intervals_are_those_of_identify_and_the_difference_is_over_both(result: Result) -> None:
     one = result.model_copy(
         update={"parameters": {"k6": estimate(1.0, 0.3, "N m s/rad")}, "payload": {}}
     )
@@ -27,9 +28,19 @@ def test_the_difference_is_over_both_standard_deviations(result: Result) -> None
     assert found.sigma["k6"][0] == pytest.approx(2.0, rel=1e-12)  # 1 over hypot(0.3, 0.4)
     assert found.largest_sigma == pytest.approx(2.0, rel=1e-12)
     assert found.estimates.rows == (
-        ("k6", "before", "1.00 ± 0.30", "N m s/rad", "–", "–"),
-        ("k6", "after", "2.00 ± 0.40", "N m s/rad", "+2.0", "+100"),
+        ("k6", "before", "1.00 ± 0.59", "N m s/rad", "–", "–"),
+        ("k6", "after", "2.00 ± 0.78", "N m s/rad", "+2.0", "+100"),
     )
+
+
+def test_students_intervals_make_a_difference_smaller(result: Result) -> None:
+    """Two estimates of one number, half intervals h apart by √2 h: chance alone at 5 %."""
+    wide = estimate(1.0, 0.1, "N m s/rad").model_copy(update={"ci95": (0.7, 1.3)})
+    off = wide.model_copy(
+        update={"estimate": 1.0 + 0.3 * 2**0.5, "ci95": (0.7 + 0.3 * 2**0.5, 1.3 + 0.3 * 2**0.5)}
+    )
+    one, two = (result.model_copy(update={"parameters": {"k6": k6}}) for k6 in (wide, off))
+    assert compare([one, two]).sigma["k6"][0] == pytest.approx(NORMAL, rel=1e-12)
 
 
 def test_only_settings_that_differ_are_shown(result: Result) -> None:
@@ -100,18 +111,19 @@ def test_json_has_every_number_and_every_setting_that_differs(result: Result) ->
     k1 = result.parameters["k1"]
     assert content["labels"] == ["a", "b"]
     assert content["parameters"]["k1"] == {
-        "estimate": [k1.estimate] * 2, "std": [k1.std] * 2, "sigma": [None, 0.0],
+        "estimate": [k1.estimate] * 2, "std": [k1.std] * 2,
+        "ci95": [list(k1.ci95 or ())] * 2, "sigma": [None, 0.0],
     }  # fmt: skip
     assert content["parameters"]["m_p"]["estimate"][1] is None
     assert content["settings"] == {"estimator": ["refined", "weak"]}
 
 
 def apart(result: Result, *sigmas: float) -> Comparison:
-    """Results whose k1 and k2 lie so many combined standard deviations from the first one's."""
+    """Results whose k1 and, by a hair less, k2 lie so many combined σ from the first one's."""
     several = [result]
-    for far in sigmas:
+    for sigma in sigmas:
         moved = dict(result.parameters)
-        for name in ("k1", "k2"):
+        for name, far in (("k1", sigma), ("k2", (1 - 1e-9) * sigma)):
             one = moved[name]
             assert one.estimate is not None
             assert one.std is not None

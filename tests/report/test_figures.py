@@ -29,6 +29,7 @@ from algid.report.figures import (
 from algid.report.plot import Panels, Plot, label, packed
 from algid.report.series import Drawn, drawn
 from algid.results import Estimate, Result, TorquePrediction
+from algid.significance import NORMAL
 from algid.text import significant
 from tests.report.folders import estimate
 from tests.report.pages import named, typed
@@ -57,14 +58,14 @@ def test_intervals_are_in_percent_of_the_estimate(result: Result) -> None:
     plot = intervals(result.model_copy(update=known))
     (bars,) = traces(plot, "estimate with its interval")
     assert bars["y"] == ["k1", "k2", "k3"]
-    assert bars["error_x"]["array"] == pytest.approx([9.8, 1.96, 980.0])
+    assert bars["error_x"]["array"] == pytest.approx([5 * NORMAL, NORMAL, 500 * NORMAL])
     (dots,) = traces(plot, "each log by itself")  # the loaded log's k1 holds its payload's share
     assert (dots["x"], dots["y"]) == ([pytest.approx(10.0)], ["k1"])
     (ring,) = traces(plot, "truth")
     assert (ring["x"], ring["y"]) == ([pytest.approx(-10.0)], ["k2"])
     assert ring["marker"]["symbol"] == "circle-open"
     low, high = plot.figure.layout["xaxis"]["range"]
-    assert high == -low == pytest.approx(1.15 * 4 * 9.8)  # four times the median interval
+    assert high == -low == pytest.approx(1.15 * 4 * 5 * NORMAL)  # four times the median interval
     bare = intervals(result.model_copy(update={"parameters": {}, "payload": {}}))
     assert traces(bare, "truth") == []
 

@@ -16,6 +16,7 @@ from algid.results import (
     TorquePrediction,
     WhitenessTest,
 )
+from algid.results.rows import row_of
 from tests.report.folders import estimate
 
 HANGING = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(Remedy({"zero": "hanging"}),))
@@ -114,6 +115,23 @@ def test_wide_intervals_and_distance_from_the_truth_are_reservations(result: Res
         "k1 (10 σ) lies far from the truth"
         in result.model_copy(update={"table4": [row]}).verdict.sentence
     )
+
+
+@pytest.mark.parametrize("quantile", [1.96, 2.776])
+def test_every_per_cent_of_an_interval_is_that_of_the_printed_interval(
+    result: Result, quantile: float
+) -> None:
+    """Student's interval is wider than 1.96 σ: terminal, notice and table print the same one."""
+    one = estimate(0.05, 0.01, "N m").model_copy(
+        update={"ci95": (0.05 - quantile * 0.01, 0.05 + quantile * 0.01)}
+    )
+    found = with_parameter(result, "k2", one)
+    share = row_of("k2", one).share
+    assert float(share) == pytest.approx(20 * quantile, rel=0.02)
+    assert f"k2 (±{share} %)" in found.verdict.sentence
+    assert f"± {0.01 * quantile:.2g}" in str(row_of("k2", one).with_half)
+    (line,) = [line for line in str(found).splitlines() if line.startswith("k2 ")]
+    assert line.split()[2] == f"{0.01 * quantile:.2g}"
 
 
 def test_an_estimator_that_did_not_converge_failed(result: Result) -> None:
