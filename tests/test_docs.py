@@ -168,14 +168,6 @@ def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     ]
 
 
-def test_the_short_page_states_what_the_whole_tables_state() -> None:
-    """Every decimal figure of it stands in one of the pages that it names."""
-    decimal = re.compile(r"\d+\.\d+(?:e-?\d+)?")
-    whole = [PAGES[f"measured-{name}"].read_text("utf-8") for name in ("arms", "real", "speed")]
-    short = set(decimal.findall(PAGES["measured"].read_text("utf-8")))
-    assert short - set(decimal.findall(" ".join(whole))) == set()
-
-
 def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path) -> None:
     pages(tmp_path / "pages")
     guide = {path.stem for path in (Path(algid.__file__).parent / "guide").glob("*.md")}

@@ -29,9 +29,6 @@ class GuideTopic(StrEnum):
     CI = "ci"
     PYTHON = "python"
     MEASURED = "measured"
-    MEASURED_ARMS = "measured-arms"
-    MEASURED_REAL = "measured-real"
-    MEASURED_SPEED = "measured-speed"
     CONTRIBUTING = "contributing"
 
 
@@ -51,10 +48,7 @@ SUMMARIES = {
     GuideTopic.BATCH: "thousands of logs, fleets, clusters",
     GuideTopic.CI: "an arm and its logs checked by a forge at every change",
     GuideTopic.PYTHON: "the Python API",
-    GuideTopic.MEASURED: "what was measured, with the command that measures it",
-    GuideTopic.MEASURED_ARMS: "whole tables: simulated arms",
-    GuideTopic.MEASURED_REAL: "whole tables: real arms",
-    GuideTopic.MEASURED_SPEED: "whole tables: speed, memory, damaged files",
+    GuideTopic.MEASURED: "accuracy, robustness and speed, each figure with its command",
     GuideTopic.CONTRIBUTING: "the house and its rules",
 }
 
