@@ -237,7 +237,8 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     ),
     "JOINTS_CONTRADICT": (
         "{name} is {first:.2g} {unit} from joint 1's equation alone and {second:.2g} from "
-        "joint 2's: one of them is hardly driven, or a term is missing; give a log that drives both"
+        "joint 2's: a torque constant is wrong, a joint is hardly driven, or a term is missing; "
+        "check both constants, and give a log that drives both joints"
     ),
     "HARDLY_DRIVEN": (
         "joint {joint} has less than {percent:.3g} % of the other's torque in every log: bearings "

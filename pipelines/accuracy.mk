@@ -1,4 +1,4 @@
-.PHONY: accuracy accuracy-quick run-to-run saturation
+.PHONY: accuracy accuracy-quick run-to-run contradictions saturation
 
 ACCURACY_DRAWS ?= 100
 ACCURACY_MODEL_DRAWS ?= 4
@@ -12,6 +12,9 @@ accuracy-quick: setup
 
 run-to-run: setup ## all splits of two real arms' runs into halves: whether intervals hold, and repeatability
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.run_to_run ../shared/data
+
+contradictions: setup ## real runs whose second torque is scaled: whether that is named, and from which factor on
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.contradictions ../shared/data
 
 saturation: setup ## torques cut off by a sensor or a drive: whether they are found and left out, and coverage
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.saturation

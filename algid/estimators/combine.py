@@ -74,6 +74,12 @@ class Prior:
         """Where its parameters stand among `names`."""
         return list(map(names.index, self.names))
 
+    def silent_on(self, name: str) -> Prior:
+        """The same without a parameter that it does not correlate with others."""
+        kept = [place for place, own in enumerate(self.names) if own != name]
+        precision = self.precision[np.ix_(kept, kept)]
+        return Prior(outside(self.names, (name,)), self.mean[kept], precision, self.absent)
+
 
 _NOTHING = 1e-6  # standard deviation of what is absent, in its unit: far below any estimate's
 

@@ -245,7 +245,6 @@ def _named(bounds: Sequence[BrokenBound]) -> list[str]:
 
 
 _SINGULAR = 1e-9  # of the largest eigenvalue of a correlation matrix
-_UNLIKE = 0.5  # of the larger of two values: more than any error of a model that is of use
 
 
 @dataclass(frozen=True)
@@ -257,7 +256,7 @@ class JointsApart:
     second: float
 
 
-def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
+def joints_apart(normals: Sequence[Normal], model: Model, unlike: float) -> JointsApart | None:
     """Whether the equations of the two joints contradict each other about the k1, k2 or k3 of both.
 
     Parameters
@@ -265,12 +264,14 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     normals : normal equations of logs of one kind, without a delay's column
     model : Model
         Of their columns.
+    unlike : float
+        Share of the larger value: what a model lacks makes smaller differences.
 
     Returns
     -------
     JointsApart or None
         The constant whose difference has the most standard deviations, `FAR_BEYOND` at least,
-        among those that differ by more than half of the larger value.
+        among those that differ by more than `unlike`.
 
     Notes
     -----
@@ -298,9 +299,9 @@ def joints_apart(normals: Sequence[Normal], model: Model) -> JointsApart | None:
     first, of_first = of_joint(0)
     second, of_second = of_joint(1)
     distance = np.abs(first - second) / np.sqrt(of_first + of_second + 1e-300)
-    unlike = np.abs(first - second) > _UNLIKE * np.maximum(np.abs(first), np.abs(second))
-    worst = int(np.argmax(np.where(unlike, distance, 0.0)))
-    if not unlike[worst] or distance[worst] < FAR_BEYOND:
+    differs = np.abs(first - second) > unlike * np.maximum(np.abs(first), np.abs(second))
+    worst = int(np.argmax(np.where(differs, distance, 0.0)))
+    if not differs[worst] or distance[worst] < FAR_BEYOND:
         return None
     return JointsApart(model.names[both[worst]], float(first[worst]), float(second[worst]))
 

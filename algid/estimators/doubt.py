@@ -1,7 +1,7 @@
 """When k1 … k5 get no error bar: a joint stood still or was hardly driven, or they disagree.
 
 Where a likelihood is refuted and there are few logs, what differs from run to run does not show by
-itself.
+itself. What is alike in every run, a wrong torque constant say, shows in no number of them.
 """
 
 from __future__ import annotations
@@ -30,20 +30,21 @@ def doubted(
     Parameters
     ----------
     fit : Fit
-        With `FEWEST_LOGS` logs or more it is returned as it is.
+        With `FEWEST_LOGS` logs or more it is the joints' contradiction alone that is asked for, a
+        smaller one: see `joints_apart`.
     unloaded, loaded : sequences of callables
         Each gives a fresh iterable of `Segment`.
     settings : WeakSettings
         Of the fit: its window, bandwidth, hold and delay; a model that is linear.
     """
-    if len(fit.logs) >= FEWEST_LOGS:
-        return fit
     doubt = _doubt(fit, unloaded, loaded, settings)
     if doubt is None:
         return fit
     return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
+UNLIKE, UNLIKE_IN_MANY = 0.5, 0.25
+"""Share of the larger of two values: more than what a model lacks makes in one run, and in many."""
 LEAST_ACTING = 0.02
 """Share of the other joint's torque: less at a joint without a motor is bearing or cable."""
 
@@ -96,15 +97,16 @@ def _doubt(
     fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
 ) -> Notice | None:
     """Why k1 … k5 are doubtful; None where nothing says so."""
+    few = len(fit.logs) < FEWEST_LOGS
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
-    if still:
+    if few and still:
         return Notice("JOINT_STILL", numbers={"joints": still})
     settings = _delayed(fit, settings)
     for sources in (unloaded, loaded):
         normals = weak.normals_of(sources, settings)
         if not normals:
             continue
-        apart = joints_apart(normals, settings.model)
+        apart = joints_apart(normals, settings.model, UNLIKE if few else UNLIKE_IN_MANY)
         if apart is not None:
             numbers = {
                 "name": apart.name,
@@ -114,7 +116,7 @@ def _doubt(
             }
             return Notice("JOINTS_CONTRADICT", numbers=numbers)
         hardly = _hardly_driven(normals)
-        if hardly is not None:
+        if few and hardly is not None:
             return Notice("HARDLY_DRIVEN", numbers={"joint": hardly, "percent": 100 * MOTORLESS})
     return None
 

@@ -157,7 +157,7 @@ def _estimated(
     burdened = [normal for loaded, normal in normals if loaded]
     beta, _ = weak.first_estimate(shared, bare, burdened, known)
     first = bare + burdened
-    driven = _driven([normal for _, normal in normals])
+    driven = _driven(bare) + _driven(burdened)
     groups = logs.groups([place for place, _, _ in placed])
     share: FloatArray = np.ones(0)
     for number in range(_ROUNDS):
@@ -185,20 +185,21 @@ def _estimated(
 
 
 _HARDLY = 0.2
-"""Share of the most torque that a joint has in any of the logs: with less it is hardly driven."""
+"""Share of the most torque that a joint has in any log of a kind: with less it is hardly driven."""
 
 
 def _driven(normals: Sequence[Normal]) -> list[NDArray[np.bool_]]:
-    """Which joints (2,) of each log are driven, those without a motor among them.
+    """Which joints (2,) of each log of one kind are driven, those without a motor among them.
 
     What moves a joint that is hardly driven is what the model lacks, and its equation is solved by
-    constants near nothing: the better, the more it would weigh.
+    constants near nothing: the better, the more it would weigh. An arm without its payload may need
+    a fifth of the torque and is driven nevertheless.
     """
-    torques = []
+    torques: list[FloatArray] = []
     for normal in normals:
         squares = normal.gram[:, :, -1, -1].sum(axis=0)
         torques.append(np.sqrt(squares / np.maximum(normal.rows, 1)))
-    most = np.max(torques, axis=0)
+    most = np.max(torques, axis=0, initial=0.0)
     return [(torque >= _HARDLY * most) for torque in torques]
 
 

@@ -78,6 +78,19 @@ def concluded(
     )
 
 
+def unshrunk(fit: Fit, name: str) -> Fit:
+    """The fit of the same likelihoods with one term's parameter free of its prior.
+
+    A parameter far outside its prior is drawn back into it, and the residual that this leaves makes
+    every error bar wider: what is free shows what the logs say of it.
+    """
+    prior, shrinkage = fit.prior, fit.shrinkage
+    if prior is None or shrinkage is None or name not in shrinkage.names:
+        return fit
+    prior, shrinkage = prior.silent_on(name), shrinkage.silent_on(name)
+    return concluded(fit.shared, fit.logs, fit.values, prior, shrinkage, fit.moved, fit.repeats)
+
+
 def _judged(
     names: Sequence[str],
     beta: FloatArray,

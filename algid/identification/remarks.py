@@ -9,11 +9,12 @@ import numpy as np
 from algid import results
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
+from algid.estimators.shrunk_fit import unshrunk
 from algid.identification.phases import phase_note
 from algid.identification.source import LogSource
 from algid.methods import estimator_of
 from algid.model import K4
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, has_code
 from algid.significance import CERTAIN, LEVEL, chance, sigmas
 from algid.units import TORQUE
 
@@ -123,11 +124,15 @@ def _of_mass(fit: Fit, unit: float | None) -> Iterator[Notice]:
 
 
 def _of_gains(fit: Fit) -> Iterator[Notice]:
-    """That the gains of the two torques differ, where the logs show a difference."""
-    if "gain2" not in fit.names:
+    """That the gains of the two torques differ, where the logs show a difference.
+
+    A prior hides the more of one the larger it is.
+    """
+    if "gain2" not in fit.names or has_code(fit.notes, "JOINTS_CONTRADICT"):
         return
-    place = fit.names.index("gain2")
-    gain, half = float(fit.values[place]), fit.quantile * float(fit.std[place])
+    free = unshrunk(fit, "gain2")
+    place = free.names.index("gain2")
+    gain, half = float(free.values[place]), free.quantile * float(free.std[place])
     if abs(gain) > half:
         yield Notice("UNLIKE_GAINS", numbers={"ratio": 1 + gain, "half": half})
 

@@ -24,6 +24,7 @@ from algid.estimators.diagnostics import (
     repeatability,
     term_worths,
 )
+from algid.estimators.doubt import UNLIKE
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source, WeakSettings
@@ -202,7 +203,7 @@ def test_joints_of_an_arm_in_a_plane_are_held_against_each_other_too(bench: Benc
         scaled = replace(log, tau=log.tau * np.array([[1.0], [share]]))
         normal = weak.normal_equations(partial(list, [scaled]), flat)
         assert normal is not None
-        found = joints_apart([normal], flat.model)
+        found = joints_apart([normal], flat.model, UNLIKE)
         assert (found is not None) is told
         if found is not None:
             truth = dict(zip(("k1", "k3"), k[[0, 2]], strict=True))[found.name]

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from algid.arm import Arm, FloatArray, forward_dynamics
+from algid.arm import Arm, FloatArray, forward_dynamics, with_payload
 from algid.log import Log, Origin, Reading
 from algid.synth.cases import load_case
 from algid.synth.excitation import SampledTorque, Torque, wide_multi_sine
@@ -65,12 +65,24 @@ def disturbance(t: FloatArray, size: FloatArray, seed: int) -> Torque:
     return SampledTorque(t, size * value, "foh")
 
 
-def open_loop(seed: int, own: Callable[..., FloatArray] | None = None, share: float = 0.0) -> Log:
-    """The arm under a wide torque, which the log holds, and what it does not: a disturbance of
-    `share` of its RMS, or `own` (angles, velocities, drive, RMS) in N m.
+def open_loop(
+    seed: int,
+    own: Callable[..., FloatArray] | None = None,
+    share: float = 0.0,
+    payload: float = 0.0,
+    factor: float = 1.0,
+) -> Log:
+    """The arm with a `payload` in kg under a wide torque times `factor`, which the log holds.
+
+    What it does not hold: a disturbance of `share` of its RMS, or `own` (angles, velocities, drive,
+    RMS) in N m.
     """
     t = times()
     wide = wide_multi_sine(ARM, seed)
+    wide = replace(
+        wide, amplitude=tuple(tuple(factor * a for a in joint) for joint in wide.amplitude)
+    )
+    k = with_payload(ARM.constants(), ARM.payload_constants(payload))
     size = np.sqrt(np.mean(wide(t) ** 2, axis=1, keepdims=True))
     push = disturbance(t, share * size, seed)
 
@@ -82,7 +94,14 @@ def open_loop(seed: int, own: Callable[..., FloatArray] | None = None, share: fl
 
         return torque
 
-    return log_of(steered(ARM.constants(), controller, t, HANGING, corners=t), wide(t), seed)
+    return log_of(steered(k, controller, t, HANGING, corners=t), wide(t), seed)
+
+
+def outweighed() -> Logs:
+    """A payload of five times link 2, whose logs need many times the torque; a disturbance each."""
+    unloaded = [open_loop(seed, share=0.05) for seed in (10, 11)]
+    heavy = 5 * ARM.m2
+    return unloaded, [open_loop(seed, share=0.05, payload=heavy, factor=6.0) for seed in (12, 13)]
 
 
 def disturbed() -> Logs:
@@ -258,6 +277,7 @@ SCENES: Mapping[str, Callable[[], Logs]] = {
     "held random binary torque": held,
     "bent links, payload beside the line": bent,
     "gears that rub": geared,
+    "payload that outweighs the arm": outweighed,
     "six repeats": repeated,
     "50 Hz": slow,
     "semi-implicit Euler": semi_implicit,
