@@ -87,11 +87,13 @@ class Remedy:
                 keywords[name] = value
         return keywords
 
+    @property
+    def words(self) -> str:
+        """Its flags as a shell takes them."""
+        return " ".join(map(_quoted, self.flags))
+
     def __str__(self) -> str:
-        text = " ".join(map(_quoted, self.flags))
-        if self.when:
-            text = f"{self.when}: {text}"
-        return text
+        return f"{self.when}: {self.words}" if self.when else self.words
 
     def __repr__(self) -> str:
         text = ", ".join(f"{name}={value!r}" for name, value in self.keywords.items())
@@ -322,7 +324,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "DATA_LOST": "samples of the log are lost",
     "FLIPPED_SIGN": "gravity pulls upwards (k4 = {weight:.3g} N m): the sign of torques or angles "
     "is wrong",
-    "WRONG_ZERO": "gravity is turned by {turn:.0f}°: θ1 is not from the horizontal",
+    "WRONG_ZERO": "gravity is turned by about {turn:.0f}°: θ1 is not from the horizontal",
     "GRAVITY_COMPENSATED": (
         "torques carry no weight of the arm: they are gravity-compensated, or the arm moves in a "
         "horizontal plane"
@@ -543,7 +545,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         ),
         "turn": (
             "a joint turns {turn:.2g} rad between samples, more than derivatives follow: the "
-            "{kept} estimate with robust intervals is reported; record {times:.2g} times as fast"
+            "{kept} estimate with robust intervals is reported; record at more than {rate:.3g} Hz"
         ),
     },
     "NEAR_STAMPS": (
@@ -676,8 +678,13 @@ class Notice:
 
     @property
     def advice(self) -> str:
-        """What mends it, in flags; empty where nothing is known."""
-        return "; ".join(map(str, self.remedies))
+        """What mends it, in flags, those of one case side by side; empty where nothing is known."""
+        cases: dict[str, list[str]] = {}
+        for one in self.remedies:
+            cases.setdefault(one.when, []).append(one.words)
+        return "; ".join(
+            f"{case}: {' or '.join(of)}" if case else " or ".join(of) for case, of in cases.items()
+        )
 
     @property
     def sentence(self) -> str:

@@ -113,7 +113,10 @@ def test_flags_of_an_earlier_schema_become_settings() -> None:
 
 def test_a_notice_is_plain_data() -> None:
     one = Notice("WRONG_ZERO", numbers={"turn": -90.0}, remedies=(REMEDIES[0],))
-    assert one.clause == "gravity is turned by -90°: θ1 is not from the horizontal: --zero hanging"
+    assert (
+        one.clause
+        == "gravity is turned by about -90°: θ1 is not from the horizontal: --zero hanging"
+    )
     assert json.dumps(dict(one.numbers)) == '{"turn": -90.0}'
 
 

@@ -112,9 +112,9 @@ def fit(
     shared, anchored = start.shared, _anchored(start)
     logs = _opened(unloaded, False, shared, settings, noise)
     logs += _opened(loaded, True, shared, settings, noise)
-    turn = max(largest_turn(log.kept) for log in logs)
+    turn, dt = max((largest_turn(log.kept), log.kept[0].dt) for log in logs)
     if turn > FAR:
-        numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "times": turn / FAR}
+        numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
         return start.noted(Notice("SLOW_SAMPLING", numbers=numbers))
     refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
     try:

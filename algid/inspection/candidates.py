@@ -14,7 +14,7 @@ from algid.readers.formats import Entry, entries_at
 _TORQUE = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
 _CURRENT = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
 _COMMANDED = re.compile(r"cmd|command|desired|target|limit|(?<![a-z])des(?![a-z])", re.IGNORECASE)
-_MOST = 4
+_MOST = 3
 
 
 def torques_beside(log: Log, channel: str) -> list[Remedy]:
@@ -24,11 +24,10 @@ def torques_beside(log: Log, channel: str) -> list[Remedy]:
     except LogError:  # a log in memory, or a file that is gone
         return []
     used = set(log.origin.mapping.values())
-    remedies = []
-    for source, remedy in _candidates(entries, channel):
-        if source not in used:
-            remedies.append(remedy)
-    return remedies[:_MOST]
+    unused = [(source, one) for source, one in _candidates(entries, channel) if source not in used]
+    # of the same joint first, by its number
+    unused.sort(key=lambda pair: channel[-1] not in pair[0])
+    return [remedy for _, remedy in unused[:_MOST]]
 
 
 def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str, Remedy]]:

@@ -44,8 +44,9 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
         other = Remedy({f"{name}.source": None}, "name the measured torque")
         largest, what = float(np.abs(tau).max()), _source(log, name)
         if largest == 0:
-            remedies = (other,) + tuple(torques_beside(log, name))
-            remedies += (Remedy({"passive": joint}, "for a joint without a motor"),)
+            remedies = tuple(torques_beside(log, name)) or (other,)
+            if log.tau[2 - joint].any() and not log.origin.reading.passive:
+                remedies += (Remedy({"passive": joint}, "for a joint without a motor"),)
             yield Notice("EFFORT_ZERO", numbers={"channel": what}, refuse=True, remedies=remedies)
         elif largest < _DENORMAL:
             seen = {"channel": what, "largest": largest}

@@ -127,13 +127,14 @@ def mend(log: Read, judgement: Judgement | None) -> Mend | None:
     if len(list(_clauses(mirrored))) < len(list(_clauses(convention))):
         convention = mirrored
     only_zeros = replace(convention, zero=(0.0, 0.0)) == AS_READ
+    small = max(abs(angle) for angle in convention.zero) < _SMALL
     words = " and ".join(_clauses(convention))
     if only_zeros and convention.mirrored().zero == (0.0, 0.0):
+        convention = convention.mirrored()
         words = (
-            "all signs are turned round, or θ1 counts from the other horizontal (the same arm "
-            "seen from behind)"
+            "both joints count the other way round, or θ1 counts from the other horizontal (the "
+            "same arm seen from behind)"
         )
-    small = max(abs(angle) for angle in convention.zero) < _SMALL
     settings = _settings(convention, log)
     if not settings:  # it is how the log was read
         return None

@@ -25,8 +25,8 @@ _EDGE, _SHORTEST = 10, 20  # samples at 100 Hz: at either end of a stretch, and 
 _K2, _K3, _K4, _K5 = 1, 2, 3, 4
 _OF_LEFT = 0.1
 """Share of the rough fit's residual that gravity's columns fit by differentiation errors."""
-_SAME_TURN = 10.0
-"""° between the turn of a rough fit and one that it stands for."""
+_SAME_TURN = 30.0
+"""° between the turn of a rough fit and one that it stands for: of runs of real arms up to 25."""
 _LEAST_PULL = 1.3
 """Weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m."""
 

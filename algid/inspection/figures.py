@@ -59,16 +59,16 @@ class ClockFigures:
 
 
 def signal_figures(values: FloatArray) -> SignalFigures:
-    """Figures of a channel (N,).
-
-    The noise floor is the robust deviation of its third differences over √20: smooth motion has
-    none.
-    """
-    noise = 0.0
-    if values.size > 3:
-        noise = robust_deviation(differences(values, 3)) / np.sqrt(20)
+    """Figures of a channel (N,)."""
     low, high = float(values.min()), float(values.max())
-    return SignalFigures(low, high, float(noise), grid_step(values), saturated_share(values))
+    return SignalFigures(low, high, noise_floor(values), grid_step(values), saturated_share(values))
+
+
+def noise_floor(values: FloatArray) -> float:
+    """Robust deviation of third differences over √20: smooth motion has none."""
+    if values.size < 4:
+        return 0.0
+    return float(robust_deviation(differences(values, 3)) / np.sqrt(20))
 
 
 def robust_deviation(values: FloatArray) -> float:

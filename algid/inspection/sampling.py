@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.inspection.figures import ENOUGH, clock_figures, differences, signal_figures
+from algid.inspection.figures import ENOUGH, clock_figures, differences, noise_floor, signal_figures
 from algid.log import Log
 from algid.notices import Notice, Remedy
 from algid.quantiles import median, medians, quantile
@@ -43,10 +43,10 @@ def sampling(log: Log) -> Iterator[Notice]:
     if clock.gaps:
         yield Notice("GAPS", numbers={"count": clock.gaps, "seconds": clock.longest_gap})
     if clock.jitter * clock.rate > 0.01:
-        bend = np.sqrt(np.mean(np.diff(log.theta, 2, axis=1) ** 2, axis=1))
-        error = float(bend.max()) / 8
-        seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": error}
-        yield Notice("JITTER", numbers=seen)
+        error = np.sqrt(np.mean(np.diff(log.theta, 2, axis=1) ** 2, axis=1)) / 8
+        small = all(error <= [noise_floor(theta) for theta in log.theta])
+        seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": float(error.max())}
+        yield Notice("JITTER", numbers=seen, note=small)
 
 
 def samples_a_period(log: Log) -> float:

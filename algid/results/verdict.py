@@ -295,7 +295,7 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     yield from causes
     changed = of_codes(doubts, *CHANGED)
     yield from changed
-    yield from _of_statuses(_asked_for(result))
+    yield from _of_statuses(_asked_for(result), caused=bool(causes))
     if result.fit is not None:
         yield from _of_fit(result.fit, failed=failed)
     yield from _far_from_truth(result)
@@ -320,13 +320,15 @@ def _asked_for(result: Result) -> dict[str, Estimate]:
     return {name: one for name, one in result.estimates.items() if name not in own}
 
 
-def _of_statuses(estimates: dict[str, Estimate]) -> Iterator[Notice]:
+def _of_statuses(estimates: dict[str, Estimate], *, caused: bool) -> Iterator[Notice]:
+    """What is not identified, and what to record unless a cause comes first."""
     for status in STATUS_WORDS:
         names = [visible(name) for name, one in estimates.items() if one.status == status]
         if names:
             numbers: dict[str, Any] = {"names": names}
-            if status == "NOT_IDENTIFIABLE" and not set(CONSTANTS).isdisjoint(names):
-                numbers["record"] = "record a run in which both joints move"
+            rigid = not set(CONSTANTS).isdisjoint(names)
+            if status == "NOT_IDENTIFIABLE" and rigid and not caused:
+                numbers["record"] = "record a run in which both joints move, further and faster"
             yield Notice(status, numbers=numbers)
     wide = []
     for name, one in estimates.items():

@@ -17,7 +17,7 @@ from algid.inspection import channels
 from algid.inspection.checks import examine, noticed
 from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling
 from algid.log import ChannelReading, IntArray, Log, Origin, Reading
-from algid.notices import Notice
+from algid.notices import Notice, of_codes
 
 ROWS = 2000
 T = np.arange(ROWS) * 1e-3
@@ -62,6 +62,10 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
         "without a motor: "
         "--passive 2"
     )
+    none = [*channels.efforts(logged(tau=0 * tau))]  # a joint that is passive needs another's motor
+    assert [one.advice for one in none] == [
+        f"name the measured torque: --set tau{joint}.source=NAME" for joint in (1, 2)
+    ]
     tiny = only([*channels.efforts(logged(tau=np.stack([tau[0], 3.14159e-7 * np.sin(T)])))])
     assert tiny.code == "EFFORT_DENORMAL"
     assert tiny.clause.startswith(
@@ -345,6 +349,10 @@ def test_jitter_is_told_with_what_resampling_costs() -> None:
         "rad at most, linearly"
     )
     assert codes(logged(angle, stamps=T + 0.2e-3 * tenth))["JITTER"] == told
+    noisy = angle + 1e-4 * np.random.default_rng(0).standard_normal(angle.shape)
+    for moved, note in ((angle, False), (noisy, True)):  # less than the angles' own noise
+        (one,) = of_codes(sampling(logged(moved, stamps=T + 0.2e-3 * tenth)), "JITTER")
+        assert one.note is note
     for late, jitters in ((0.022e-3, False), (0.0228e-3, True)):
         assert ("JITTER" in codes(logged(stamps=T + late * tenth))) == jitters
 

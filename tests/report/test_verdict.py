@@ -60,8 +60,12 @@ def test_one_reservation_is_told_in_the_sentence(result: Result) -> None:
     assert (
         found.sentence
         == "With reservations: 8 of 9 parameters are identified, but k5 is not identifiable: "
-        "record a run in which both joints move."
+        "record a run in which both joints move, further and faster."
     )
+    wrong = result.model_copy(update={"notices": [HANGING]})
+    assert [one.text for one in with_parameter(wrong, "k5", lost).verdict.reasons][1:] == [
+        "k5 is not identifiable"  # the cause is mended first
+    ]
     assert [reason.code for reason in found.reasons] == ["NOT_IDENTIFIABLE"]
 
 
@@ -217,7 +221,7 @@ def test_an_undetermined_parameter_is_told_once(result: Result) -> None:
     lost = Estimate(estimate=None, unit="kg m^2", status=Status.NOT_IDENTIFIABLE)
     told = with_parameter(result, "k5", lost)
     assert [reason.text for reason in told.verdict.reasons] == [
-        "k5 is not identifiable: record a run in which both joints move"
+        "k5 is not identifiable: record a run in which both joints move, further and faster"
     ]
 
 
