@@ -111,6 +111,7 @@ def test_every_block_says_what_it_is(page: str) -> None:
             "text",
             "text found",
             "python",
+            "python elsewhere",
             "csv",
             "yaml",
             "",

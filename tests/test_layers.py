@@ -94,11 +94,12 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pydantic scipy",
     ),
     "exports": room(
-        "arm errors files identification model notices options physics results text words",
-        "jinja2 numpy scipy",
+        "arm compiled errors estimators files identification model names notices options physics "
+        "results text words",
+        "jinja2 numpy polars scipy",
     ),
-    "fleet": room("arm errors files limits model notices physics progress report significance text "
-                  "verdict words", "numpy polars scipy"),
+    "fleet": room("arm compiled errors files limits model notices physics progress report "
+                  "significance text verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exports files fleet identification "
         "inspection limits log methods model notices options physics profile progress "

@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from algid.api.given import called, opened
 from algid.api.ranges import check
 from algid.errors import SettingError
-from algid.files import refuse_existing, whole_file
+from algid.files import refuse_existing, whole_file, whole_folder
 from algid.options import flag
 from algid.results import Result
 
 if TYPE_CHECKING:
     from algid.notices import Notice
 
-FORMATS = ("urdf", "mjcf", "sdf", "python", "c", "yaml")
+FORMATS = ("urdf", "mjcf", "sdf", "python", "c", "yaml", "csv", "parquet")
 
 
 @dataclass(frozen=True)
 class Exported:
-    """An arm as a model: its text, warnings of what does not fit, and its file, if written."""
+    """An arm as a model: its text, warnings of what does not fit, and its file, if written.
+
+    Of draws `text` is the manifest, `path` a folder, and `files` what that holds, by name.
+    """
 
     text: str
     warnings: tuple[Notice, ...]
     path: Path | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         codes = ", ".join(one.code for one in self.warnings) or "none"
@@ -36,13 +41,15 @@ class Exported:
 
 def export(
     result: Result | str | Path,
-    to: Literal["urdf", "mjcf", "sdf", "python", "c", "yaml"],
+    to: Literal["urdf", "mjcf", "sdf", "python", "c", "yaml", "csv", "parquet"],
     *,
     l1: float | None = None,
     l2: float | None = None,
     m1: float | None = None,
     m2: float | None = None,
     rotor1: float | None = None,
+    draws: int | None = None,
+    seed: int = 0,
     out: str | Path | None = None,
     force: bool = False,
 ) -> Exported:
@@ -51,17 +58,23 @@ def export(
     Parameters
     ----------
     result : Result or path of one
-    to : 'urdf', 'mjcf', 'sdf' (robot descriptions), 'python', 'c' (dynamics) or 'yaml' (payload)
+    to : 'urdf', 'mjcf', 'sdf' (robot descriptions), 'python', 'c' (dynamics), 'yaml' (payload), or
+        'csv' or 'parquet' (table of draws)
     l1, l2 : float, m
         Link lengths; what the result knows best by default.
     m1, m2 : float, kg
         Masses of the links.
     rotor1 : float, kg m²
         Joint 1's rotor at the joint, a part of k5.
+    draws : int
+        How many arms to draw from the joint distribution of the estimates, in place of the one
+        that they are.
+    seed : int
+        Of the draws; the first ones are the same however many there are.
     out : Path
-        File to write; None writes nothing.
+        File to write, or folder of draws; None writes nothing.
     force : bool
-        Replace a file that is there.
+        Replace what is there.
 
     Returns
     -------
@@ -91,26 +104,42 @@ def export(
 
     if to not in FORMATS:
         raise SettingError(f"{flag('to')}: expected one of {', '.join(FORMATS)}, found {to!r:.60}")
-    check("export", l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1)
+    if to in ("csv", "parquet") and draws is None:
+        raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
+    check("export", l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1, draws=draws, seed=seed)
     knowns = Knowns(l1, l2, m1, m2, rotor1)
+    path = None if out is None else Path(out)
+    if path is not None:
+        refuse_existing(path, force)
+    if draws is not None:
+        from algid.exports.draws import drawn_files
+
+        files, warnings = drawn_files(opened(result), called(result), to, knowns, draws, seed)
+        if path is not None:
+            with whole_folder(path, force) as folder:
+                for name, content in files.items():
+                    (folder / name).write_bytes(content)
+        return Exported(files["manifest.json"].decode(), warnings, path, files)
     text, warnings = exported(opened(result), called(result), to, knowns)
-    if out is None:
-        return Exported(text, warnings)
-    path = Path(out)
-    refuse_existing(path, force)
-    with whole_file(path, force=force) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    if path is not None:
+        with whole_file(path, force=force) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     return Exported(text, warnings, path)
 
 
-def file_of(result: Path, to: str) -> Path:
-    """The default file of a result's export: the result's name with the format's suffix."""
+def file_of(result: Path, to: str, draws: int | None = None) -> Path:
+    """The default file of a result's export: the result's name with the format's suffix.
+
+    Of draws it is a folder.
+    """
     from algid.exports.formats import FORMATS as WRITTEN
 
     folder = result
     if result.name == "result.json":
         folder = result.resolve().parent
     stem = folder.stem or "arm"
+    if draws is not None or to in ("csv", "parquet"):
+        return Path(f"{stem}-draws")
     if to == "python":
         stem = re.sub(r"\W", "_", stem)
     if to == "yaml":

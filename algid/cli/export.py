@@ -22,6 +22,8 @@ class To(StrEnum):
     PYTHON = "python"
     C = "c"
     YAML = "yaml"
+    CSV = "csv"
+    PARQUET = "parquet"
 
 
 def export(
@@ -31,7 +33,8 @@ def export(
     to: Annotated[
         To,
         typer.Option(
-            help="Robot description (urdf, mjcf, sdf), dynamics (python, c), or payload (yaml)."
+            help="Robot description (urdf, mjcf, sdf), dynamics (python, c), payload (yaml), or "
+            "table of draws (csv, parquet)."
         ),
     ],
     out: Annotated[
@@ -60,6 +63,14 @@ def export(
             help="Joint 1's rotor at the joint, kg m²: a part of k5.", **ends("export", "rotor1")
         ),
     ] = None,
+    draws: Annotated[
+        int | None,
+        typer.Option(
+            help="Draw so many arms from the estimates' joint distribution, into a folder.",
+            **ends("export", "draws"),
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the draws.", **ends("export", "seed"))] = 0,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -72,10 +83,22 @@ def export(
     from algid.api.export import export as run
     from algid.api.export import file_of
 
-    file = file_of(result, to.value)
+    file = file_of(result, to.value, draws)
     if out is not None:
-        file = out / file if out.is_dir() else out
-    made = run(result, to.value, l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1, out=file, force=force)
+        file = out / file if out.is_dir() and draws is None else out
+    made = run(
+        result,
+        to.value,
+        l1=l1,
+        l2=l2,
+        m1=m1,
+        m2=m2,
+        rotor1=rotor1,
+        draws=draws,
+        seed=seed,
+        out=file,
+        force=force,
+    )
     if quiet:
         return
     for warning in made.warnings:

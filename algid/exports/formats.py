@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -68,21 +68,31 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
         If what is known leaves no positive mass or inertia, is no positive number, or has no place
         in the format.
     """
-    takes = frozenset({"l2"}) if to == PAYLOAD else FORMATS[to].takes
+    takes(to, frozenset({"l2"}) if to == PAYLOAD else FORMATS[to].takes, knowns)
+    if to == PAYLOAD:
+        content = _payload(result, file, knowns)
+        return _template("payload.yaml").render(content), contradictions(result, knowns.given)
+    arm = describe(result, file, knowns, links=FORMATS[to].links)
+    return written(arm, to), arm.warnings
+
+
+def takes(to: str, names: frozenset[str], knowns: Knowns) -> None:
+    """Raise `SettingError` where what is known is no positive number, or none of `names`."""
     for name, value in knowns.given.items():
         if not 0 < value < float("inf") and not (name == "rotor1" and value == 0):
             raise SettingError(f"{flag(name)}: expected a positive number, found {value:g}")
-        if name not in takes:
+        if name not in names:
             raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
-    if to == PAYLOAD:
-        content = _payload(result, file, knowns)
-        return _rendered("payload.yaml", content), contradictions(result, knowns.given)
-    arm = describe(result, file, knowns, links=FORMATS[to].links)
-    return _rendered(FORMATS[to].template, FORMATS[to].content(arm)), arm.warnings
 
 
-def _rendered(template: str, content: dict[str, Any]) -> str:
-    """The template's text; no value in it comes from outside but numbers and cleaned names."""
+def written(arm: Description, to: str) -> str:
+    """The text of an arm in the format `to`."""
+    return _template(FORMATS[to].template).render(FORMATS[to].content(arm))
+
+
+@cache
+def _template(name: str) -> Any:
+    """A template; no value in its text comes from outside but numbers and cleaned names."""
     import jinja2
 
     environment = jinja2.Environment(
@@ -93,7 +103,7 @@ def _rendered(template: str, content: dict[str, Any]) -> str:
         undefined=jinja2.StrictUndefined,
     )
     environment.filters["n"] = numbers
-    return environment.get_template(f"{template}.j2").render(content)
+    return environment.get_template(f"{name}.j2")
 
 
 def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:

@@ -1,0 +1,182 @@
+"""Arms drawn from the joint distribution of a result's estimates, to randomise simulations by.
+
+With the estimates b, their covariance C and the fit's ν effective degrees of freedom, a draw is
+
+    c = b + z √(ν / χ²_ν),   z ~ N(0, C)
+
+Student's t, whose 95 % intervals are the result's: its covariance is C ν / (ν - 2). A draw that no
+arm is like is drawn again. Where l1 is given, each draw is moved onto g |K1| = l1 |K2| as the
+estimates are, which is a draw of the conditional distribution.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from algid import __version__
+from algid.compiled import student_quantile
+from algid.errors import ResultError, SettingError
+from algid.estimators.diagnostics import bounds
+from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
+from algid.exports.description import Description, describe
+from algid.exports.formats import FORMATS, takes, written
+from algid.exports.links import Knowns
+from algid.identification.known import given_lengths, model_of, prior_of, with_error_bar
+from algid.names import within
+from algid.notices import Notice
+from algid.options import flag
+from algid.results import Result
+
+TABLES = ("csv", "parquet")
+_HOPELESS = 100
+"""Draws in a row that no arm is like, which says that the estimates are none's."""
+
+
+def freedom_of(quantile: float) -> float:
+    """Degrees of freedom of Student's t whose 95 % interval is ± `quantile`; inf if normal."""
+    most = 1e6
+    if quantile <= student_quantile(most):
+        return inf
+    if quantile >= student_quantile(2.0):
+        return 2.0
+    return float(brentq(lambda nu: student_quantile(nu) - quantile, 2.0, most, rtol=1e-10))
+
+
+def draws_of(
+    result: Result, file: str, seed: int, knowns: Knowns, *, links: bool
+) -> Iterator[tuple[dict[str, float], Description, int]]:
+    """Possible arms without end: numbers by name, the arm, and how many were refused before it.
+
+    Raises
+    ------
+    ResultError
+        If the estimates have no error bars, or hardly an arm is like them.
+    SettingError
+        If what is known leaves no positive mass or inertia at the estimates themselves.
+    """
+    model = model_of(result)
+    arm = prior_of(result, model, file).names
+    others = [name for name in result.estimates if name not in (*model.names, *result.loaded)]
+    names = (*arm, *with_error_bar(result, others))
+    mean = np.array([result.estimates[name].estimate for name in names], dtype=np.float64)
+    best = describe(result, file, knowns, links=links)
+    assert result.fit is not None  # or there is no prior
+    covariance = result.fit.covariance_of(names)
+    size = np.sqrt(np.diag(covariance))
+    size[size == 0] = 1.0
+    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
+    shared = Shared(
+        model,
+        payload="m_p" in names,
+        lengths=given_lengths(result),
+        body=within(BODY_PARAMETERS, names),
+    )
+    limits = bounds(shared) if set(shared.names) <= set(names) else bounds(Shared(model))
+    whole = dict.fromkeys(shared.names, 0.0)
+    refused = 0
+    why: str | None = ""
+    while refused < _HOPELESS:
+        wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
+        drawn = mean + root @ random.standard_normal(len(names)) * wide
+        numbers = dict(zip(names, drawn.tolist(), strict=True))
+        beta = np.array(list({**whole, **numbers}.values())[: len(whole)])
+        why = next((name for name, limit in limits.items() if limit(beta) < 0), None)
+        try:
+            one = describe(_with(result, numbers), file, knowns, links=links)
+        except (ResultError, SettingError) as error:
+            why = str(error)
+        if why is not None:
+            refused += 1
+            continue
+        origins = []
+        for number in one.numbers:
+            origins.append(replace(number, origin=number.origin.replace("identified", "drawn")))
+        numbers |= {name: one.coefficients.value[name] for name in arm}  # as l1 moved them
+        yield numbers, replace(one, numbers=tuple(origins), warnings=best.warnings), refused
+        refused = 0
+    raise ResultError(
+        f"{file}: {_HOPELESS} draws in a row are no arm ({why}); identify it from more "
+        "informative logs"
+    )
+
+
+def _with(result: Result, numbers: dict[str, float]) -> Result:
+    """The result with these numbers as its estimates."""
+    moved = {}
+    for kind in ("parameters", "payload"):
+        estimates = dict(getattr(result, kind))
+        for name in within(estimates, numbers):
+            estimates[name] = estimates[name].model_copy(update={"estimate": numbers[name]})
+        moved[kind] = estimates
+    return result.model_copy(update=moved)
+
+
+def drawn_files(
+    result: Result, file: str, to: str, knowns: Knowns, count: int, seed: int
+) -> tuple[dict[str, bytes], tuple[Notice, ...]]:
+    """Files of `count` draws by name, ``manifest.json`` first, and what does not fit.
+
+    Parameters
+    ----------
+    to : str
+        A name in `FORMATS`, which gives a file a draw, or in `TABLES`, which gives a row.
+
+    Raises
+    ------
+    ResultError
+        As `draws_of`.
+    SettingError
+        If the format has no draws or no place for what is known, or that leaves no possible arm.
+    """
+    if to not in (*FORMATS, *TABLES):
+        raise SettingError(f"{flag('draws')}: {to} has no draws; leave it out")
+    table = to in TABLES
+    takes(to, frozenset({"l1"}) if table else FORMATS[to].takes, knowns)
+    files: dict[str, bytes] = {"manifest.json": b""}
+    rows: list[dict[str, Any]] = []
+    refused, warnings = 0, tuple[Notice, ...]()
+    links = not table and FORMATS[to].links
+    several = draws_of(result, file, seed, knowns, links=links)
+    for place, (numbers, arm, before) in zip(range(1, count + 1), several, strict=False):
+        refused, warnings = refused + before, arm.warnings
+        row: dict[str, Any] = {"draw": place}
+        if not table:
+            row["file"] = f"draw-{place:0{len(str(count))}d}{FORMATS[to].suffix}"
+            said = f"{arm.source}, draw {place} of seed {seed}"
+            files[row["file"]] = written(replace(arm, source=said), to).encode()
+        rows.append(row | numbers)
+    freedom = freedom_of(result.quantile)
+    names = list(numbers)
+    manifest = {
+        "algid": __version__,
+        "result": file,
+        "estimator": result.estimator,
+        "seed": seed,
+        "refused": refused,
+        "known": knowns.given,
+        "distribution": "normal" if freedom == inf else "Student's t",
+        "degrees_of_freedom": None if freedom == inf else freedom,
+        "names": names,
+        "estimates": [result.estimates[name].estimate for name in names],
+        "covariance": [] if result.fit is None else result.fit.covariance_of(names).tolist(),
+        "draws": rows,
+    }
+    files["manifest.json"] = (json.dumps(manifest, indent=1, ensure_ascii=False) + "\n").encode()
+    if table:
+        import polars as pl
+
+        content = io.BytesIO()
+        frame = pl.DataFrame(rows)
+        frame.write_csv(content) if to == "csv" else frame.write_parquet(content)
+        files[f"draws.{to}"] = content.getvalue()
+    return files, warnings

@@ -1,0 +1,188 @@
+"""Draws of an arm: as the estimates are distributed, possible, repeatable, and loaded by others."""
+
+from __future__ import annotations
+
+import io
+import json
+import xml.etree.ElementTree as ET
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+import algid
+from algid.arm import FloatArray, regressor
+from algid.compiled import student_quantile
+from algid.errors import ResultError, SettingError
+from algid.exports.draws import draws_of, freedom_of
+from algid.exports.links import Knowns
+from algid.model import Model
+from algid.results import Result, result_json
+from tests.cli.commands import call
+from tests.exports.arms import ODD, result_of, states, values_of
+
+VALUE = values_of(ODD, f1=0.4, f2=0.3)
+FRICTION = Model(("coulomb",))
+NU = 9.0
+
+
+def correlated(seed: int = 5, std: float = 0.01, value: dict[str, float] = VALUE) -> Result:
+    """A result of ν = 9 whose errors are correlated, payload included."""
+    made = result_of(value, FRICTION, payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=std)
+    assert made.fit is not None
+    size = np.sqrt(np.diag(made.covariance))
+    mixed = np.random.default_rng(seed).normal(size=(size.size, 3 * size.size))
+    correlation = np.corrcoef(mixed)
+    half = student_quantile(NU)
+    moved: dict[str, dict[str, algid.Estimate]] = {}
+    for kind in ("parameters", "payload"):
+        moved[kind] = {}
+        for name, one in getattr(made, kind).items():
+            ends = (one.estimate - half * one.std, one.estimate + half * one.std)
+            moved[kind][name] = one.model_copy(update={"ci95": ends})
+    fit = made.fit.model_copy(update={"covariance": (correlation * np.outer(size, size)).tolist()})
+    return made.model_copy(update={**moved, "fit": fit})
+
+
+def test_draws_are_students_with_the_estimates_covariance() -> None:
+    result, count = correlated(std=1e-3), 6000
+    several = list(islice(draws_of(result, "arm", 1, Knowns(), links=False), count))
+    assert sum(refused for *_, refused in several) == 0
+    assert result.fit is not None
+    names, covariance = result.fit.covariance_names, result.covariance
+    drawn = np.array([[numbers[name] for name in names] for numbers, *_ in several])
+    mean = np.array([result.estimates[name].estimate for name in names])
+    size = np.sqrt(np.diag(covariance))
+    z = (drawn - mean) / size
+    # of Student's t: the variance ν / (ν - 2), 95 % within its quantile; bounds are four deviations
+    wide = NU / (NU - 2)
+    np.testing.assert_allclose(z.mean(axis=0), 0, atol=4 * np.sqrt(wide / count))
+    kurtosis = 3 + 6 / (NU - 4)
+    found, expected = np.cov(z.T), wide * covariance / np.outer(size, size)
+    np.testing.assert_allclose(found, expected, atol=4 * wide * np.sqrt((kurtosis - 1) / count))
+    within = np.mean(np.abs(z) < student_quantile(NU), axis=0)
+    np.testing.assert_allclose(within, 0.95, atol=4 * np.sqrt(0.95 * 0.05 / count))
+
+
+def test_the_degrees_of_freedom_are_those_of_the_interval() -> None:
+    for nu in (2.0, 3.3, 40.0, 1e4):
+        assert freedom_of(student_quantile(nu)) == pytest.approx(nu, rel=1e-6)
+    assert freedom_of(1.9599) == np.inf
+
+
+def test_a_given_length_holds_in_every_draw() -> None:
+    for numbers, *_ in islice(draws_of(correlated(), "arm", 0, Knowns(l1=0.41), links=False), 20):
+        assert 9.81 * numbers["k1"] / numbers["k2"] == pytest.approx(0.41, rel=1e-9)
+
+
+def test_every_draw_is_a_possible_arm() -> None:
+    """Errors of 60 %: every other arm of the distribution has a friction or an inertia below 0."""
+    result = correlated(std=0.6)
+    several = list(islice(draws_of(result, "arm", 3, Knowns(), links=True), 50))
+    assert sum(refused for *_, refused in several) > 10
+    for numbers, arm, _ in several:
+        assert min(numbers[name] for name in ("k3", "k5", "k6", "k7", "f1", "m_p", "l2")) >= 0
+        assert numbers["k3"] * numbers["k5"] > numbers["k1"] ** 2
+        assert arm.links is not None
+        assert min(min(link.mass, link.length, link.inertia) for link in arm.links) > 0
+    with pytest.raises(ResultError, match=r"100 draws in a row are no arm .f1 >= 0.; identify"):
+        next(draws_of(correlated(value=VALUE | {"f1": -0.4}), "arm", 0, Knowns(), links=False))
+
+
+@pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf"])
+def test_each_file_loads_and_moves_as_its_row_says(to: str) -> None:
+    if to != "sdf":
+        library = pytest.importorskip({"mjcf": "mujoco", "urdf": "pinocchio"}[to])
+    made = algid.export(correlated(), to, draws=12, seed=4)  # type: ignore[arg-type]
+    rows = json.loads(made.text)["draws"]
+    assert [*made.files] == ["manifest.json", *(row["file"] for row in rows)]
+    theta = states(1)[0][:, 0]
+    for row in rows:
+        text = made.files[row["file"]].decode()
+        assert f"draw {row['draw']} of seed 4" in text
+        k = np.array([row[f"k{number}"] for number in range(1, 8)])
+        still = np.zeros((2, 1))
+        held = np.einsum("aqn,q->a", regressor(theta[:, None], still, still), k)
+        if to == "mjcf":
+            model = library.MjModel.from_xml_string(text)
+            data = library.MjData(model)
+            data.qpos[:] = theta
+            library.mj_forward(model, data)
+            np.testing.assert_allclose(data.qfrc_bias, held, rtol=1e-9)
+            np.testing.assert_allclose(model.dof_frictionloss, [row["f1"], row["f2"]])
+        elif to == "urdf":
+            robot = library.buildModelFromXML(text)
+            q = np.stack([np.cos(theta), np.sin(theta)], axis=1).ravel()
+            found = library.computeGeneralizedGravity(robot, robot.createData(), q)
+            np.testing.assert_allclose(found, held, rtol=1e-9)
+        else:
+            losses = [
+                float(one.findtext("damping") or 0) for one in ET.fromstring(text).iter("dynamics")
+            ]
+            assert losses == [row["k6"], row["k7"]]
+
+
+@pytest.mark.slow
+def test_draws_cover_held_out_torques_as_often_as_stated() -> None:
+    """Torques of an arm's truth at states of no log, within 95 % of what draws say of them."""
+    covered = []
+    theta, omega, alpha = states(40)
+    for seed in range(24):
+        log, _ = algid.synthesise(
+            "case1",
+            duration=3.0,
+            excitation="wide",
+            position_noise=1e-3,
+            torque_noise=1e-2,
+            seed=seed,
+        )
+        result = algid.identify(log, model="plain")
+        Y = regressor(theta, omega, alpha)
+        truth = np.array([result.truth[f"k{number}"] for number in range(1, 8)])
+        table = pl.read_csv(io.BytesIO(algid.export(result, "csv", draws=400).files["draws.csv"]))
+        drawn = table.select([f"k{number}" for number in range(1, 8)]).to_numpy()
+        torques: FloatArray = np.einsum("aqn,dq->dan", Y, drawn)
+        low, high = np.quantile(torques, [0.025, 0.975], axis=0)
+        true = np.einsum("aqn,q->an", Y, truth)
+        covered.append(np.mean((low <= true) & (true <= high)))
+    # of the share by arm, whose torques share their errors: three standard errors about 95 %
+    assert np.mean(covered) == pytest.approx(0.95, abs=3 * np.std(covered) / np.sqrt(len(covered)))
+
+
+def test_the_command_writes_a_folder_that_a_seed_repeats(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.json").write_text(result_json(correlated()), encoding="utf-8")
+    assert call("export", "arm.json", "--to", "mjcf", "--draws", "3").code == 0
+    folder = Path("arm-draws")
+    names = ["draw-1.xml", "draw-2.xml", "draw-3.xml", "manifest.json"]
+    assert sorted(path.name for path in folder.iterdir()) == names
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["degrees_of_freedom"] == pytest.approx(NU)
+    assert (manifest["seed"], manifest["known"]) == (0, {})
+    for to, name in (("csv", "more"), ("parquet", "same")):
+        assert call("export", "arm.json", "--to", to, "--draws", "9", "-o", name).code == 0
+    table = pl.read_csv("more/draws.csv")
+    assert table.equals(pl.read_parquet("same/draws.parquet"))
+    # the payload does not go by the links' lengths, as the constants do
+    for name in ("m_p", "l1", "l2"):
+        assert table[name][:3].to_list() == [row[name] for row in manifest["draws"]]
+    for arguments, said in (
+        (("csv",), "--to csv: a table of draws; say how many by --draws"),
+        (("yaml", "--draws", "2"), "--draws: yaml has no draws; leave it out"),
+        (("csv", "--draws", "2", "--m1", "1"), "--m1: csv holds no such number; leave it out"),
+        (("mjcf", "--draws", "3", "-o", "more"), "more: exists already"),
+    ):
+        done = call("export", "arm.json", "-o", "new", "--to", *arguments)
+        assert (done.code, said in done.err + done.boxed) == (2, True), done
+
+
+def test_draws_of_what_has_no_error_bars_are_refused() -> None:
+    bare = correlated().model_copy(update={"fit": None, "estimator": "paper"})
+    with pytest.raises(ResultError, match="the result of --estimator paper has no error bars"):
+        algid.export(bare, "csv", draws=2)
+    with pytest.raises(SettingError, match="--draws: expected a number from 1 to 100000, found 0"):
+        algid.export(bare, "csv", draws=0)
