@@ -65,38 +65,13 @@ class FileLimits:
     free_text_bytes: int = 256 << 20
     text_a_byte: int = 250
     """Unpacked bytes a byte of a table: numbers pack 3 to 20 times, a log at rest 100 times."""
-    zstd_window_bytes: int = 1 << 27
-
-    # Parquet
-    parquet_footer_bytes: int = 1 << 26
-    parquet_footer_values: int = 5_000_000
-    parquet_footer_depth: int = 16
-    parquet_header_bytes: int = 1 << 14
-    """Of a page's header."""
 
     # MCAP
-    record_bytes: int = 1 << 24
-    """Of a record that is neither a message, a chunk nor an attachment."""
     summary_bytes: int = 1 << 28
     chunk_bytes: int = 1 << 28
     """Of a chunk, packed and unpacked: recorders close one at some MiB; more is not genuine."""
-    other_records: int = 300_000
-    """Schemas, channels and the like side by side; ids end at 65,535."""
-    file_records: int = 1_000_000
-    """Records of a whole file that are neither messages, chunks nor message indexes."""
-    salvage_places: int = 50_000
-    """Places of a damaged file that are tried for a record."""
-    message_indexes: int = 2_000_000
-    spans: int = 100_000
-    """Chunks, and messages apart from each other."""
     index_gaps: int = 256
     """Gaps between messages of a chunk, beyond which its index is not followed."""
-    free_unpacked_bytes: int = 384 << 20
-    unpacked_a_byte: int = 250
-    """Unpacked bytes a byte of a file: joint logs pack 5 to 50 times, logs at rest up to 100."""
-    free_work: int = 1_500_000
-    work_a_byte: int = 4
-    """What a file may have done message by message, in steps of about a microsecond."""
 
     # messages
     message_bytes: int = 1 << 24
@@ -128,16 +103,6 @@ class FileLimits:
 
     # bags
     bag_metadata_bytes: int = 1 << 24
-    bag_topics: int = 1000
-    bag_header_bytes: int = 1 << 16
-    """Of a record's header in a ROS 1 bag; that of a message has some forty."""
-    bag_record_bytes: int = 1 << 28
-    """Of a record of a ROS 1 bag, a chunk packed and unpacked."""
-    bag_records: int = 10_000_000
-    """Records of a ROS 1 bag outside its chunks."""
-    free_sqlite_steps: int = 20_000_000
-    sqlite_steps_a_byte: int = 4
-    """Of SQLite's machine, for all that is asked of a database; a row takes some ten."""
 
     # batches
     name_bytes: int = 1000

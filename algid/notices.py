@@ -426,13 +426,6 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
             "goes"
         ),
         "end": "the file breaks off behind its last whole record",
-        "bag": (
-            "the bag breaks off at byte {place} ({why}); of what follows nothing is read: "
-            "{bytes:# byte|bytes}"
-        ),
-        "index": (
-            "the bag's index does not agree with what stands in it ({why}); every chunk was read"
-        ),
     },
     "DAMAGED_CHUNK": {
         "chunk": (
@@ -454,16 +447,12 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "values": "the file has no sums of its values, as algid's have: changes would go unseen",
     },
     "BROKEN_RECORD": (
-        "{bytes:# byte|bytes} in {places:# place|places}, the first at byte {first}, hold no "
-        "whole record"
+        "from byte {first} on the file is damaged ({why}): {bytes:# byte|bytes} left out; "
+        "mcap recover may bring more of them back"
     ),
     "MISSING_SPLIT": "{missing} of {files:# file|files} of the bag missing: {names}",
     "NO_INDEX": "the file has no usable index; read by scanning",
     "DAMAGED_SUMMARY": "the file's summary cannot be used ({why}); read by scanning",
-    "DAMAGED_RECORD": "{why}; left out",
-    "DAMAGED_INDEX": (
-        "the bag's index does not agree with what stands in it ({why}); every chunk was read"
-    ),
     "NOT_FINITE": "{count:# sample holds|samples hold} a number that is not finite; left out",
     "CUT": "{count:# sample|samples} before {start:g} s or behind {end} left out, as told",
     "UNSORTED_STAMPS": "{count:# sample|samples} came late, now in order",

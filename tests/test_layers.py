@@ -61,7 +61,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "
         "quantiles ros2 runtime units words",
-        "google h5py lz4 mcap numpy polars pyarrow rosbags scipy zstandard",
+        "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
                        "readers signals units words", "numpy"),

@@ -20,8 +20,8 @@ from algid.readers.text import GZIP, MCAP, NUL_AMONG_ROWS, ZSTD, head_of, looks_
 if TYPE_CHECKING:
     from algid.profile import Profile
     from algid.readers.flat import TableFile
+    from algid.readers.messages.message_file import MessageFile
     from algid.readers.messages.reader import MessageLog
-    from algid.readers.messages.source import Source
 
 _MOST_SHOWN = 64
 
@@ -304,23 +304,22 @@ def entries_of(opened: TableFile | MessageLog) -> Entries:
     from algid.readers.flat import TableFile, cells_of
 
     if not isinstance(opened, TableFile):
-        with opened.parts[0]() as source:
-            return tuple(_topics(source))
+        return tuple(_topics(opened.files[0]()))
     rows = opened.rows or None
     entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells_of(opened).items()]
     entries += [Entry(name, "of another length") for name in opened.others]
     return tuple(entries)
 
 
-def _topics(source: Source) -> Iterator[Entry]:
+def _topics(file: MessageFile) -> Iterator[Entry]:
     from algid.readers.messages.plan import fields_shown
 
-    first, last = source.span_ns or (0, 0)
-    for place, (number, channel) in enumerate(sorted(source.channels.items())):
+    first, last = file.span_ns or (0, 0)
+    for place, (number, channel) in enumerate(sorted(file.channels.items())):
         form = f"{channel.type or 'no schema'}, {channel.encoding}"
-        count = None if source.counts is None else source.counts.get(number, 0)
-        rate = 1e9 * (count - 1) / (last - first) if count and count > 1 and last > first else None
-        joints, fields = fields_shown(source, number) if place < _MOST_SHOWN else ((), ())
+        count = file.counts.get(number, 0)
+        rate = 1e9 * (count - 1) / (last - first) if count > 1 and last > first else None
+        joints, fields = fields_shown(file, number) if place < _MOST_SHOWN else ((), ())
         yield Entry(channel.topic, form, count, joints[:_MOST_SHOWN], fields[:_MOST_SHOWN], rate)
 
 

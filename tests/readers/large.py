@@ -134,7 +134,9 @@ _ROS1_DEFINITION = (
 
 def write_bag(path: Path, rows: int) -> None:
     """A ROS 1 bag without packing."""
-    told = _fields(type=b"sensor_msgs/JointState", message_definition=_ROS1_DEFINITION)[4:]
+    told = _fields(
+        type=b"sensor_msgs/JointState", md5sum=b"0" * 32, message_definition=_ROS1_DEFINITION
+    )[4:]
     connection = _part(told, op=b"\x07", conn=bytes(4), topic=TOPIC.encode())
     infos: list[bytes] = []
     with path.open("wb") as stream:

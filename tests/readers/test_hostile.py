@@ -154,7 +154,7 @@ def test_what_the_kernel_makes_up_is_an_empty_file(tmp_path: Path) -> None:
     assert sha256_of(tmp_path / "bag") == sha256_of(Path("/dev/null"))
     with pytest.raises(LogError, match="the file is empty"):
         read_log(endless)
-    with pytest.raises(LogError, match="no relative_file_paths"):
+    with pytest.raises(LogError, match="expected the metadata of a rosbag2 folder"):
         read_log(tmp_path / "bag")
     (tmp_path / "log.csv.truth.json").symlink_to(endless)
     with pytest.raises(LogError, match="the truth beside the log cannot be read"):

@@ -1,21 +1,31 @@
-"""Damaged MCAP files: what is left is read, and what is lost is told and counted."""
+"""Damaged MCAP files are read up to their first break, and what is lost is told and counted.
+
+A summary is believed only where it agrees with the file, a chunk where it is sound.
+"""
 
 from __future__ import annotations
 
 import re
 import struct
+import zlib
+from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from mcap.writer import CompressionType, IndexType
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, ChunkIndex, McapRecord, Schema, Statistics
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, IndexType, Writer
 
 from algid.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
-from algid.readers.mcap import opened
-from tests.readers.logs import EPOCH_NS, noise_log, same
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.writers import write_log
+from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
 from tests.readers.mcaps import (
     NO_INDEX,
     TOPIC,
@@ -26,32 +36,250 @@ from tests.readers.mcaps import (
     write_mcap,
 )
 
-LongLog = tuple[Log, list[tuple[str, int, bytes]]]
+LOG = noise_log(120, start_ns=EPOCH_NS)
+LONG = noise_log(2000, start_ns=EPOCH_NS)
+PLAIN = CompressionType.NONE
+Records = list[McapRecord]
+
+
+def lost(found: Log) -> dict[str, str]:
+    return {notice.code: notice.text for notice in found.notices if notice.lossy}
+
+
+def poked(content: bytes, place: int, kind: str, *values: int) -> bytes:
+    """The content with other numbers at a place, counted from the end where negative."""
+    changed = bytearray(content)
+    struct.pack_into(kind, changed, place % len(content), *values)
+    return bytes(changed)
 
 
 @pytest.fixture(scope="module")
-def long() -> LongLog:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A log in several chunks with message indexes, statistics and a summary."""
+    path = tmp_path_factory.mktemp("whole") / "log.mcap"
+    write_mcap(path, messages_of(LOG), chunk_size=4096)
+    assert len(chunks_of(path)) > 3
+    return path.read_bytes()
+
+
+def summarised(content: bytes, edit: Callable[[Records], Records], checksum: bool = True) -> bytes:
+    """The file with another summary under a checksum that is right for it, or none."""
+    start, _, _ = struct.unpack_from("<QQI", content, len(content) - 28)
+    records = list(StreamReader(BytesIO(content[start:]), skip_magic=True).records)
+    builder = RecordBuilder()
+    for record in edit(
+        [one for one in records if type(one).__name__ not in ("Footer", "SummaryOffset")]
+    ):
+        record.write(builder)
+    body = builder.end()  # type: ignore[no-untyped-call]
+    head = struct.pack("<BQQQ", 2, 20, start, 0)
+    crc = zlib.crc32(body + head) if checksum else 0
+    return content[:start] + body + head + struct.pack("<I", crc) + content[-8:]
+
+
+def changing(kind: type, change: Callable[[Any], object]) -> Callable[[Records], Records]:
+    """Changes the first record of a kind."""
+
+    def edit(records: Records) -> Records:
+        change(next(one for one in records if isinstance(one, kind)))
+        return records
+
+    return edit
+
+
+def without(*kinds: type) -> Callable[[Records], Records]:
+    return lambda records: [one for one in records if not isinstance(one, kinds)]
+
+
+def unindexed(records: Records) -> Records:
+    """No message indexes, so that the counts cannot be compared."""
+    for one in records:
+        if isinstance(one, ChunkIndex):
+            one.message_index_length, one.message_index_offsets = 0, {}
+    return records
+
+
+def hiding(records: Records) -> Records:
+    """The second chunk is in no list, and the statistics do not count it either."""
+    chunks = [one for one in unindexed(records) if isinstance(one, ChunkIndex)]
+    return [one for one in records if one is not chunks[1]]
+
+
+def overlapping(records: Records) -> Records:
+    """The second chunk is listed in place of the third too."""
+    chunks = [one for one in unindexed(records) if isinstance(one, ChunkIndex)]
+    chunks[2].chunk_start_offset, chunks[2].chunk_length = (
+        chunks[1].chunk_start_offset,
+        chunks[1].chunk_length,
+    )
+    return records
+
+
+def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
+    """A record of a kind stands there twice, and not the same."""
+
+    def edit(records: Records) -> Records:
+        first = next(one for one in records if isinstance(one, kind))
+        return [*records, kind(**{**vars(first), **change})]
+
+    return edit
+
+
+COUNTS = "its indexes and its statistics count different numbers of messages"
+TWICE = "it defines a channel twice, or counts messages of one it does not define"
+WRONG: dict[str, tuple[Callable[[Records], Records], str]] = {
+    "a chunk of another length": (
+        changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)),
+        "what stands at byte|its chunks overlap|it leaves out a record",
+    ),
+    "a chunk behind the end": (
+        changing(ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)),
+        COUNTS,
+    ),
+    "a count": (
+        changing(Statistics, lambda one: one.channel_message_counts.update({1: len(LOG) - 1})),
+        COUNTS,
+    ),
+    "a count of another channel": (
+        changing(Statistics, lambda one: one.channel_message_counts.update({7: 1})),
+        TWICE,
+    ),
+    "chunks over one another": (overlapping, r"its chunks overlap at byte \d+"),
+    "a chunk in no list": (hiding, r"it leaves out a record at byte \d+"),
+    "a channel without definition": (
+        changing(Channel, lambda one: setattr(one, "id", 5)),
+        TWICE,
+    ),
+    "a schema twice": (redefined(Schema, data=b"int8 x"), TWICE),
+    "a channel twice": (redefined(Channel, topic="/other"), TWICE),
+}
+
+
+@pytest.mark.parametrize("checksum", [True, False])
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_summary_that_does_not_agree_with_the_file_is_not_used(
+    fault: str, checksum: bool, whole: bytes, tmp_path: Path
+) -> None:
+    edit, told = WRONG[fault]
+    path = tmp_path / "log.mcap"
+    path.write_bytes(summarised(whole, edit, checksum))
+    found = read_log(path)
+    assert same(found, LOG)
+    (notice,) = found.notices
+    assert (notice.code, notice.lossy) == ("DAMAGED_SUMMARY", False)
+    assert re.search(rf"cannot be used \(({told})", notice.text)
+
+
+@pytest.mark.parametrize(
+    ("edit", "codes"),
+    [
+        (lambda records: records, []),
+        (unindexed, []),
+        (redefined(Schema), []),
+        (redefined(Channel), []),
+        (without(Statistics), ["NO_INDEX"]),
+        (without(ChunkIndex), ["NO_INDEX"]),
+        (without(Statistics, ChunkIndex, Channel, Schema), ["NO_INDEX"]),
+    ],
+)
+def test_a_summary_that_agrees_is_used_and_one_that_says_too_little_is_no_damage(
+    edit: Callable[[Records], Records], codes: list[str], whole: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(summarised(whole, edit))
+    found = read_log(path)
+    assert same(found, LOG)
+    assert [notice.code for notice in found.notices] == codes
+
+
+def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) -> None:
+    """The chunk holds another channel too, and the statistics are made to fit."""
+    path = tmp_path / "log.mcap"
+    messages = messages_of(LOG)
+    beside = [("/other", stamp, b"\0\1\0\0\7") for _, stamp, _ in messages[30:50]]
+    schema = {"/other": ("a/msg/B", "ros2msg", b"int8 x")}
+    write_mcap(path, [*messages[:30], *beside, *messages[30:]], schema, chunk_size=2000)
+
+    def hide(records: Records) -> Records:
+        (statistics,) = (one for one in records if isinstance(one, Statistics))
+        for chunk in (one for one in records if isinstance(one, ChunkIndex)):
+            if len(chunk.message_index_offsets) == 2:
+                end = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+                places = sorted([*chunk.message_index_offsets.values(), end])
+                start = chunk.message_index_offsets.pop(1)
+                size = places[places.index(start) + 1] - start
+                statistics.channel_message_counts[1] -= (size - 15) // 16
+        return records
+
+    path.write_bytes(summarised(path.read_bytes(), hide))
+    found = read_log(path)
+    assert same(found, LOG)
+    assert [notice.code for notice in found.notices] == ["DAMAGED_SUMMARY"]
+
+
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [
+        (lambda whole: poked(whole, -37, "<B", 7), "its footer is damaged"),
+        (lambda whole: poked(whole, -36, "<Q", 21), "its footer is damaged"),
+        (lambda whole: poked(whole, -28, "<Q", 7), "its footer claims a summary at byte 7"),
+        (lambda whole: poked(whole, -12, "<I", 1), "its checksum is wrong"),
+        (lambda whole: whole[:-1], "the file has no end: it was cut off"),
+    ],
+)
+def test_a_damaged_footer_is_told_and_the_file_is_walked(
+    damage: Callable[[bytes], bytes], told: str, whole: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(damage(whole))
+    found = read_log(path)
+    assert same(found, LOG)
+    first = found.notices[0]
+    assert first.text == f"the file's summary cannot be used ({told}); read by scanning"
+
+
+def test_two_files_behind_one_another_are_not_one(whole: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(whole + whole)
+    found = read_log(path)
+    assert same(found, LOG)
+    assert f"its end stands at byte {len(whole) - 8}" in lost(found)["BROKEN_RECORD"]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
+def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
+    write_mcap(tmp_path / "whole.mcap", messages_of(LONG))
+    content = (tmp_path / "whole.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: int(share * len(content))])
+    found = read_log(tmp_path / "cut.mcap")
+    assert share - 0.15 < len(found) / len(LONG) <= 1
+    assert same(found, LONG.part(0, len(found)))
+    assert "CUT_OFF" in lost(found)
+
+
+def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(LONG))
+    path.write_bytes(path.read_bytes()[: chunks_of(path)[5].chunk_start_offset])
+    found = read_log(path)
+    assert same(found, LONG.part(0, len(found)))
+    assert lost(found) == {"CUT_OFF": "the file breaks off behind its last whole record"}
+
+
+@pytest.fixture(scope="module")
+def long() -> tuple[Log, list[tuple[str, int, bytes]]]:
     """Twenty thousand samples and their messages: about 3 MB, many blocks of zstd and lz4."""
     log = noise_log(20_000, start_ns=EPOCH_NS)
     return log, messages_of(log)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
-def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "whole.mcap", messages_of(log))
-    content = (tmp_path / "whole.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(content[: int(share * len(content))])
-    found = read_log(tmp_path / "cut.mcap")
-    assert share - 0.15 < len(found) / len(log) <= 1
-    assert same(found, log.part(0, len(found)))
-    assert any(notice.lossy for notice in found.notices)
-
-
 @pytest.mark.parametrize("compression", list(CompressionType))
 @pytest.mark.parametrize("options", [{}, {"enable_crcs": False}])
 def test_a_chunk_that_breaks_off_yields_its_whole_messages(
-    compression: CompressionType, options: dict[str, Any], long: LongLog, tmp_path: Path
+    compression: CompressionType,
+    options: dict[str, Any],
+    long: tuple[Log, list[tuple[str, int, bytes]]],
+    tmp_path: Path,
 ) -> None:
     log, messages = long
     write_mcap(
@@ -66,14 +294,13 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     # zstd and lz4 lose the block that breaks off, 128 and 64 KiB of about 3 MB
     assert 0.53 < len(found) / len(log) < 0.61
     assert same(found, log.part(0, len(found)))
-    notices = {notice.code: notice for notice in found.notices if notice.lossy}
-    assert notices.keys() == {"CUT_OFF", "TORN_CHUNK"}
-    assert f"{len(found):,} messages" in notices["TORN_CHUNK"].text
-    assert "could not be checked" in notices["TORN_CHUNK"].text
-    told = re.search(r"about ([\d,]+) are lost", notices["TORN_CHUNK"].text)
-    assert told is not None
+    told = lost(found)
+    assert told.keys() == {"CUT_OFF", "TORN_CHUNK"}
+    assert f"{len(found):,} messages" in told["TORN_CHUNK"]
+    count = re.search(r"about ([\d,]+) are lost", told["TORN_CHUNK"])
+    assert count is not None
     # all messages are of one size, the schema and the channel are the rest
-    assert abs(int(told[1].replace(",", "")) - (len(log) - len(found))) < 200
+    assert abs(int(count[1].replace(",", "")) - (len(log) - len(found))) < 200
 
 
 def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
@@ -86,63 +313,142 @@ def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
     (tmp_path / "cut.mcap").write_bytes(content[: last.chunk_start_offset + last.chunk_length // 2])
     found = read_log(tmp_path / "cut.mcap")
     assert same(found, log.part(0, len(found)))
-    assert {"CUT_OFF", "DAMAGED_CHUNK"} <= {notice.code for notice in found.notices if notice.lossy}
+    assert lost(found).keys() == {"CUT_OFF", "DAMAGED_CHUNK"}
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize("length", [0, 3, 1 << 20, (1 << 64) - 1])
+def test_a_file_is_read_up_to_its_first_broken_record(
+    length: int, chunked: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    options: dict[str, Any] = {"compression": PLAIN} if chunked else NO_INDEX
+    write_mcap(path, messages_of(LONG), use_chunking=chunked, **options)
+    content = path.read_bytes()
+    if chunked:
+        place = chunks_of(path)[len(chunks_of(path)) // 2].chunk_start_offset
+        content = content[:-8] + b"no magic"
+    else:
+        size = len(messages_of(LONG)[1000][2])
+        before = content.index(struct.pack("<d", LONG.theta[0, 1000]))
+        place = content.rindex(struct.pack("<BQ", 5, 22 + size), 0, before)
+    path.write_bytes(poked(content, place + 1, "<Q", length))
+    found = read_log(path)
+    assert same(found, LONG.part(0, len(found)))
+    # a chunk that claims more bytes than the file has is torn, and whole
+    assert 960 < len(found) < 1040
+    told = lost(found)
+    assert told.keys() & {"BROKEN_RECORD", "CUT_OFF"}
+    assert any(
+        str(number) in "".join(told.values()).replace(",", "")
+        for number in (place, len(content) - place)
+    ) or length in (0, 3)
 
 
 def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
-    content = bytearray((tmp_path / "log.mcap").read_bytes())
-    place = content.index(struct.pack("<d", log.theta[0, 1000]))
-    content[place] ^= 1
-    (tmp_path / "log.mcap").write_bytes(content)
-    found = read_log(tmp_path / "log.mcap")
-    assert len(found) > 1900
-    assert log.theta[0, 1000] not in found.theta
-    (notice,) = found.notices
-    assert notice.code == "DAMAGED_CHUNK"
-    assert notice.lossy
-    assert f"{len(log) - len(found):,} messages are missing" in notice.text
+    for statistics in (True, False):  # without, the chunk's own index tells how many are lost
+        path = tmp_path / "log.mcap"
+        write_mcap(path, messages_of(LONG), compression=PLAIN, use_statistics=statistics)
+        content = bytearray(path.read_bytes())
+        content[content.index(struct.pack("<d", LONG.theta[0, 1000]))] ^= 1
+        path.write_bytes(content)
+        found = read_log(path)
+        assert len(found) > 1900
+        assert LONG.theta[0, 1000] not in found.theta
+        assert lost(found).keys() == {"DAMAGED_CHUNK"}
+        missing = f"{len(LONG) - len(found):,} messages are missing"
+        assert missing in lost(found)["DAMAGED_CHUNK"]
 
 
-def test_a_message_index_that_lies_is_not_believed(tmp_path: Path) -> None:
-    log = noise_log(300, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log), compression=CompressionType.NONE)
-    content = bytearray((tmp_path / "log.mcap").read_bytes())
-    (index,) = chunks_of(tmp_path / "log.mcap")[0].message_index_offsets.values()
-    struct.pack_into("<Q", content, index + 15 + 8, 31)  # the first message's offset
-    (tmp_path / "log.mcap").write_bytes(content)
-    assert same(read_log(tmp_path / "log.mcap"), log)
+def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    small_chunks(path, compression=PLAIN)
+    content = bytearray(path.read_bytes())
+    content[content.index(struct.pack("<d", np.sin(500 * 0.01)))] ^= 1
+    path.write_bytes(content)
+    log = read_log(path)
+    assert len(log) == 999
+    assert 500 * 10**6 not in log.stamp_ns
+    assert "1 message is missing" in lost(log)["DAMAGED_CHUNK"]
+
+
+@pytest.mark.parametrize("size", [0, 1 << 60])
+def test_a_chunk_that_claims_another_size_is_left_out(size: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    small_chunks(path, rows=50, index_types=IndexType.NONE)
+    content = path.read_bytes()
+    place = content.index(b"\x04\0\0\0zstd", content.index(b"\x04\0\0\0zstd") + 1) - 12
+    path.write_bytes(poked(content, place, "<Q", size))
+    log = read_log(path)
+    assert len(log) == 49
+    assert lost(log).keys() == {"DAMAGED_CHUNK"}
+
+
+@pytest.mark.parametrize("offset", [31, 1 << 40, -8])
+def test_a_message_index_that_lies_is_not_believed(offset: int, tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(LONG), compression=PLAIN, chunk_size=1 << 15)
+    (index,) = chunks_of(path)[0].message_index_offsets.values()
+    path.write_bytes(poked(path.read_bytes(), index + 15 + 8, "<q", offset))  # the first message's
+    found = read_log(path)
+    assert same(found, LONG)
+    assert found.notices == ()
+
+
+@pytest.mark.parametrize("summary", [True, False])
+@pytest.mark.parametrize("code", [3, 4])
+def test_behind_a_definition_that_changes_nothing_of_it_is_read(
+    code: int, summary: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=600, compression=PLAIN, enable_crcs=False)
+        writer.start()
+        one = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
+        writer.register_channel(TOPIC, "cdr", one)
+        for row, (_, stamp, data) in enumerate(messages_of(LOG)):
+            if row == 50:
+                other = writer.register_schema("a/msg/B", "ros2msg", b"int8 x")
+                writer.add_message(
+                    writer.register_channel("/other", "cdr", other), stamp, b"\0\1\0\0\7", stamp
+                )
+            writer.add_message(1, stamp, data, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+    content = path.read_bytes()
+    place = next(  # the second of its kind, in the chunk of the fifty-first message
+        place for place in range(content.index(b"/other") - 200, len(content))
+        if content[place] == code and content[place + 9 : place + 11] == b"\2\0"
+    )  # fmt: skip
+    end = chunks_of(path)[-1]
+    changed = poked(content, place + 9, "<H", 1)
+    path.write_bytes(changed if summary else changed[: end.chunk_start_offset + end.chunk_length])
+    found = read_log(path)
+    assert 46 <= len(found) <= 50  # the chunk itself goes too
+    assert same(found, LOG.part(0, len(found)))
+    told = lost(found)
+    assert "defined anew and differently" in told["DAMAGED_CHUNK"]
+    assert told.keys() == ({"DAMAGED_CHUNK"} if summary else {"DAMAGED_CHUNK", "CUT_OFF"})
+    assert f"{len(LOG) - len(found)} messages are missing" in told["DAMAGED_CHUNK"]
 
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
-    log = noise_log(100, start_ns=EPOCH_NS)
-    write_mcap(
-        tmp_path / "log.mcap",
-        messages_of(log),
-        compression=CompressionType.NONE,
-        chunk_size=1 << 20,
-    )
-    whole = (tmp_path / "log.mcap").read_bytes()
-    (chunk,) = chunks_of(tmp_path / "log.mcap")
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(LOG), compression=PLAIN, chunk_size=1 << 20)
+    whole = path.read_bytes()
+    (chunk,) = chunks_of(path)
     content = bytearray(whole)
-    content[content.index(struct.pack("<d", log.theta[0, 50]))] ^= 1
-    (tmp_path / "log.mcap").write_bytes(content)
-    with pytest.raises(
-        LogError, match=rf"damaged \(.*checksum.*byte {chunk.chunk_start_offset + 9}\).*no topic"
-    ):
-        read_log(tmp_path / "log.mcap")
+    content[content.index(struct.pack("<d", LOG.theta[0, 50]))] ^= 1
+    path.write_bytes(content)
+    place = chunk.chunk_start_offset
+    with pytest.raises(LogError, match=rf"damaged \(.*checksum.*byte {place + 9}\).*no topic"):
+        read_log(path)
     content[content.rindex(b"JointState")] ^= 1  # in the summary
-    (tmp_path / "log.mcap").write_bytes(content)
-    with pytest.raises(
-        LogError, match=r"damaged \(its summary: its checksum is wrong; .*\).*no topic"
-    ):
-        read_log(tmp_path / "log.mcap")
-    (tmp_path / "log.mcap").write_bytes(whole[: chunk.chunk_start_offset + 100])
-    with pytest.raises(
-        LogError, match=rf"damaged \(.*breaks off at byte {chunk.chunk_start_offset}\).*no topic"
-    ):
-        read_log(tmp_path / "log.mcap")
+    path.write_bytes(content)
+    with pytest.raises(LogError, match=r"damaged \(its summary: its checksum is wrong; .*no topic"):
+        read_log(path)
+    path.write_bytes(whole[: place + 100])
+    with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {place}.*no topic"):
+        read_log(path)
 
 
 def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> None:
@@ -150,7 +456,7 @@ def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> No
     messages = [
         (TOPIC, row, joint_state(row, names, [0.0] * 7, (), [1.0] * 7).done()) for row in range(100)
     ]
-    write_mcap(tmp_path / "log.mcap", messages, compression=CompressionType.NONE)
+    write_mcap(tmp_path / "log.mcap", messages, compression=PLAIN)
     content = (tmp_path / "log.mcap").read_bytes()
     (tmp_path / "log.mcap").write_bytes(content[: len(content) // 2])
     with pytest.raises(LogError, match="has 7 joints") as caught:
@@ -158,113 +464,12 @@ def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> No
     assert "damaged" not in str(caught.value)
 
 
-def test_a_chunk_that_claims_too_much_is_left_out_unread(tmp_path: Path) -> None:
-    log = noise_log(500, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "log.mcap", messages_of(log))
-    content = bytearray((tmp_path / "log.mcap").read_bytes())
-    place = content.index(b"\x04\0\0\0zstd")
-    struct.pack_into("<Q", content, place - 12, 1 << 60)
-    (tmp_path / "log.mcap").write_bytes(content)
-    found = read_log(tmp_path / "log.mcap")
-    assert 0 < len(found) < len(log)
-    assert any(notice.code == "DAMAGED_CHUNK" and notice.lossy for notice in found.notices)
-
-
-@pytest.mark.parametrize("chunked", [True, False])
-@pytest.mark.parametrize("length", [0, 3, 1 << 20, 1 << 63, (1 << 64) - 1])
-def test_behind_a_broken_record_the_next_whole_one_is_found(
-    length: int, chunked: bool, tmp_path: Path
-) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
+def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    options: dict[str, Any] = {} if chunked else NO_INDEX
-    write_mcap(path, messages_of(log), use_chunking=chunked, **options)
-    content = bytearray(path.read_bytes())
-    if chunked:
-        place = chunks_of(path)[len(chunks_of(path)) // 2].chunk_start_offset
-        content[-8:] = b"no magic"
-    else:
-        size = len(messages_of(log)[1000][2])
-        place = content.rindex(
-            struct.pack("<BQ", 5, 22 + size),
-            0,
-            content.index(struct.pack("<d", log.theta[0, 1000])),
-        )
-    struct.pack_into("<Q", content, place + 1, length)
-    path.write_bytes(content)
-    found = read_log(path)
-    lost = len(log) - len(found)
-    assert 1 <= lost <= (40 if chunked else 8)
-    assert np.isin(found.theta, log.theta).all()
-    assert found.stamp_ns[0] == log.stamp_ns[0]
-    assert found.stamp_ns[-1] == log.stamp_ns[-1]
-    assert any(notice.lossy and f"byte {place}" in notice.text for notice in found.notices)
-
-
-def test_a_chunk_that_claims_to_go_on_yields_its_messages_and_those_behind_it(
-    tmp_path: Path,
-) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(log), compression=CompressionType.NONE)
-    content = bytearray(path.read_bytes())
-    chunk = chunks_of(path)[3]
-    more = len(content)  # both lengths lie, and agree with one another
-    struct.pack_into("<Q", content, chunk.chunk_start_offset + 1, chunk.chunk_length - 9 + more)
-    (size,) = struct.unpack_from("<Q", content, chunk.chunk_start_offset + 9 + 32)
-    struct.pack_into("<Q", content, chunk.chunk_start_offset + 9 + 32, size + more)
-    content[-8:] = b"no magic"
-    path.write_bytes(content)
-    found = read_log(path)
-    assert same(found, log)
-    assert any(notice.code == "BROKEN_RECORD" and notice.lossy for notice in found.notices)
-
-
-def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(log))
-    chunk = chunks_of(path)[5]
-    path.write_bytes(path.read_bytes()[: chunk.chunk_start_offset])
-    found = read_log(path)
-    assert same(found, log.part(0, len(found)))
-    assert any(notice.code == "CUT_OFF" and notice.lossy for notice in found.notices)
-
-
-def test_messages_of_a_damaged_chunk_are_counted_by_its_index(tmp_path: Path) -> None:
-    log = noise_log(2000, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_mcap(path, messages_of(log), compression=CompressionType.NONE, use_statistics=False)
-    content = bytearray(path.read_bytes())
-    content[content.index(struct.pack("<d", log.theta[0, 1000]))] ^= 1
-    path.write_bytes(content)
-    found = read_log(path)
-    assert any(
-        f"{len(log) - len(found):,} messages are missing" in notice.text for notice in found.notices
-    )
-
-
-def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    small_chunks(path, compression=CompressionType.NONE)
-    content = bytearray(path.read_bytes())
-    content[content.index(struct.pack("<d", np.sin(500 * 0.01)))] ^= 1
-    path.write_bytes(content)
-    log = read_log(path)
-    assert len(log) == 999
-    assert 500 * 10**6 not in log.stamp_ns
-    assert [(one.code, one.lossy) for one in log.notices if one.lossy] == [("DAMAGED_CHUNK", True)]
-    assert "1 message is missing" in next(one.text for one in log.notices if one.lossy)
-
-
-def test_a_chunk_that_claims_to_be_empty_and_is_not_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    small_chunks(path, rows=50, index_types=IndexType.NONE)
-    with opened(path) as (_, found):
-        place = found.spans[3].start + 16
-    content = bytearray(path.read_bytes())
-    content[place : place + 8] = bytes(8)
-    path.write_bytes(content)
-    log = read_log(path)
-    assert len(log) == 49
-    assert [notice.code for notice in log.notices if notice.lossy] == ["DAMAGED_CHUNK"]
+    write_log(path, LOG, truth=TRUTH)
+    assert read_log(path).origin.truth == TRUTH
+    path.write_bytes(path.read_bytes().replace(b'"arm"', b'"mra"'))
+    with pytest.raises(
+        LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"
+    ):
+        read_log(path)

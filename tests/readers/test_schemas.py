@@ -6,13 +6,11 @@ from __future__ import annotations
 
 import json
 import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import zstandard
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.writer import Writer
 
@@ -20,10 +18,9 @@ from algid.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.mcap.framing import DamagedError, File
-from algid.readers.mcap.records import records_in
 from algid.readers.messages import cdr, protobuf
-from algid.readers.messages.columnar import ColumnDecoder, ExcessError, MisfitError
+from algid.readers.messages.batch import Messages
+from algid.readers.messages.columnar import ColumnDecoder, MisfitError
 from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
 from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from tests.readers.logs import EPOCH_NS, noise_log, same
@@ -160,45 +157,27 @@ def test_messages_that_do_not_fit_are_left_out_and_counted(tmp_path: Path) -> No
         read_log(tmp_path / "log.mcap")
 
 
-def test_messages_each_of_another_layout_are_read_as_far_as_a_file_may_ask() -> None:
+def side_by_side(payloads: list[bytes]) -> Messages:
+    """Messages in one content, each behind eight bytes."""
+    sizes = np.array([len(one) for one in payloads], np.int64)
+    content = np.frombuffer(b"".join(bytes(8) + one for one in payloads), np.uint8)
+    return Messages(content, np.cumsum(sizes + 8) - sizes, sizes, np.zeros(sizes.size, np.int64))
+
+
+def test_messages_each_of_another_layout_are_read() -> None:
     rows = range(2000)
     names = [["joint1", "joint2", f"{row:06d}"] for row in rows]
     messages = [
         joint_state(row, names[row], (row, 1.0, 0.0), (), (1.0, 2.0, 0.0)).done() for row in rows
     ]
-    content = b"".join(
-        struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages
-    )
     types = parse_msg(JOINT_STATE, JOINT_STATE_DEFINITION)
-    wanted, spent = {"theta1": "position[joint1]"}, [0]
-
-    def works(steps: int) -> bool:
-        spent[0] += steps
-        return spent[0] < 1_000_000
-
     decoder = ColumnDecoder(
-        wanted, works, walk=lambda payload: cdr.walk(payload, JOINT_STATE, types)
+        {"theta1": "position[joint1]"},
+        walk=lambda payload: cdr.walk(payload, JOINT_STATE, types),
     )
-    found = records_in(content).of({1})
-    held, columns = decoder.columns(found)
+    held, columns = decoder.columns(side_by_side(messages))
     assert held.all()
     assert columns["theta1"].tolist() == list(rows)
-    assert spent[0] > 2000 * 10
-    with pytest.raises(ExcessError, match="so many layouts"):
-        [decoder.columns(found) for _ in range(4)]
-
-
-def test_what_a_file_may_ask_for_grows_with_its_size(tmp_path: Path) -> None:
-    (tmp_path / "small").write_bytes(b"0")
-    (tmp_path / "large").write_bytes(bytes(1 << 20))
-    with File(tmp_path / "small") as small, File(tmp_path / "large") as large:
-        assert small.works(1_400_000)
-        assert not small.works(200_000)
-        assert large.works(5_000_000)
-        small.unpacks(1 << 28)
-        with pytest.raises(DamagedError, match="claim"):
-            small.unpacks(1 << 28)
-        large.unpacks(1 << 29)
 
 
 def test_countless_topics_are_refused_and_one_can_be_chosen(tmp_path: Path) -> None:
@@ -359,13 +338,8 @@ def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(
     written = message_factory.GetMessageClass(pool.FindMessageTypeByName("n.N"))
     messages = [written(value=value).SerializeToString() for value in values]
     types = protobuf.parse("n.N", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
-    content = b"".join(
-        struct.pack("<BQHIQQ", 5, 22 + len(one), 1, 0, 0, 0) + one for one in messages
-    )
-    decoder = ColumnDecoder(
-        {"value": "value"}, bool, walk=lambda data: protobuf.walk(data, "n.N", types)
-    )
-    held, columns = decoder.columns(records_in(content).of({1}))
+    decoder = ColumnDecoder({"value": "value"}, walk=lambda data: protobuf.walk(data, "n.N", types))
+    held, columns = decoder.columns(side_by_side(messages))
     assert held.all()
     parsed = [float(written.FromString(one).value) for one in messages]
     assert (
@@ -373,56 +347,6 @@ def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(
         == parsed
         == np.array(values, "f4" if kind == 2 else "f8").tolist()
     )
-
-
-def bomb(content: bytes) -> bytes:
-    """An MCAP file with the joints' schema and channel, and one chunk that unpacks to `content`."""
-
-    def record(code: int, *parts: bytes) -> bytes:
-        return struct.pack("<BQ", code, sum(map(len, parts))) + b"".join(parts)
-
-    def text(value: str) -> bytes:
-        return struct.pack("<I", len(value)) + value.encode()
-
-    schema = record(3, b"\1\0", text(JOINT_STATE), text("ros2msg"), text(JOINT_STATE_DEFINITION))
-    channel = record(4, b"\1\0\1\0", text(TOPIC), text("cdr"), bytes(4))
-    packed = zstandard.compress(content)
-    head = (
-        struct.pack("<QQQI", 0, 0, len(content), zlib.crc32(content))
-        + text("zstd")
-        + struct.pack("<Q", len(packed))
-    )
-    return (
-        b"\x89MCAP0\r\n"
-        + record(1, text(""), text(""))
-        + schema
-        + channel
-        + record(6, head, packed)
-    )
-
-
-MESSAGES = [struct.pack("<BQHIQQ", 5, 22 + size, 1, 0, 0, 0) + bytes(size) for size in (0, 1)]
-
-
-@pytest.mark.parametrize(
-    ("content", "size", "reason"),
-    [
-        (b"\x4d" + bytes(8), 10_000_000, "records that are no messages"),
-        (MESSAGES[0], 10_000_000, "a message of 0 bytes"),
-        (
-            MESSAGES[0] + MESSAGES[1],
-            50_000_000,
-            "of 0 bytes|of more parts than|more small messages",
-        ),
-    ],
-    ids=["others", "alike", "mixed"],
-)
-def test_a_chunk_of_countless_small_records_is_bounded(
-    content: bytes, size: int, reason: str, tmp_path: Path
-) -> None:
-    (tmp_path / "log.mcap").write_bytes(bomb(content * (size // len(content))))
-    with pytest.raises(LogError, match=reason):
-        read_log(tmp_path / "log.mcap")
 
 
 def proto_class(file: descriptor_pb2.FileDescriptorProto, name: str) -> Any:
@@ -578,9 +502,8 @@ def test_a_list_in_several_runs_is_one_list(kinds: str, *, nested: bool) -> None
     wanted |= {
         f"counts[{place}]": f"{prefix}counts[{place}]" for place in range(len(expected.counts))
     }
-    content = struct.pack("<BQHIQQ", 5, 22 + len(data), 1, 0, 0, 0) + data
-    decoder = ColumnDecoder(wanted, bool, walk=lambda data: protobuf.walk(data, "r.R", types))
-    held, columns = decoder.columns(records_in(content).of({1}))
+    decoder = ColumnDecoder(wanted, walk=lambda data: protobuf.walk(data, "r.R", types))
+    held, columns = decoder.columns(side_by_side([data]))
     assert held.all()
     found = [float(columns[name][0]) for name in wanted]
     assert found == [*expected.values, *expected.counts]

@@ -80,10 +80,8 @@ class MessageBatch:
     reason: str = ""
     torn: tuple[int, int] | None = None
     """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
-    lost: int = 0
-    """Messages that the index of a damaged chunk lists, where it has one."""
-    what: str = "chunk"
-    """What is damaged: a chunk of messages, or rows of one each."""
+    rows: int = 0
+    """Damaged rows of one message each, where it is not a chunk that is damaged."""
 
 
 @dataclass
@@ -91,20 +89,18 @@ class Account:
     """What was lost on the way, for the notices at the end."""
 
     spans: int = 0
-    what: str = "chunk"
+    rows: int = 0
     reason: str = ""
     unchecked: bool = False
     found: int = 0
-    lost: int = 0
     torn: tuple[int, int, int] | None = None
     """Of a torn chunk: messages taken, and bytes of its records present and expected."""
 
     def add(self, batch: MessageBatch) -> None:
         """Count one batch."""
         if batch.messages is None:
-            self.what = batch.what
-            self.spans += batch.lost if batch.what == "row" else 1
-            self.lost += batch.lost
+            self.spans += not batch.rows
+            self.rows += batch.rows
             self.reason = self.reason or batch.reason
         else:
             self.found += len(batch.messages)
@@ -112,15 +108,18 @@ class Account:
             if batch.torn:
                 self.torn = (len(batch.messages), *batch.torn)
 
-    def notices(self, promised: int | None) -> list[Notice]:
-        """What to say; `promised` is how many messages the statistics promise."""
+    def notices(self, promised: int) -> list[Notice]:
+        """What to say; `promised` is how many messages the file counts."""
         said = []
-        if self.spans:
-            missing = self.lost if promised is None else promised - self.found
-            damage = {"case": self.what, "count": self.spans, "why": self.reason}
-            numbers: dict[str, Any] = {**damage, "missing": missing}
+        if self.spans or self.rows:
+            numbers: dict[str, Any] = {
+                "case": "chunk" if self.spans else "row",
+                "count": self.spans or self.rows,
+                "why": self.reason,
+                "missing": promised - self.found,
+            }
             said.append(Notice("DAMAGED_CHUNK", numbers=numbers, lossy=True))
-        elif promised is not None and promised != self.found:
+        elif promised != self.found:
             numbers = {"promised": promised, "found": self.found}
             said.append(Notice("MISSING_MESSAGES", numbers=numbers, lossy=True))
         if self.torn:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from algid.errors import LogError
 from algid.readers.messages import cdr, protobuf
 from algid.readers.messages import json as jsontext
 from algid.readers.messages.columnar import ColumnDecoder, Decoder, Walk
 from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg, parse_ros1
-from algid.readers.messages.source import MessageChannel
+from algid.readers.messages.message_file import MessageChannel
 
 _PARSERS = {
     ("cdr", "ros2msg"): (parse_msg, cdr.walk),
@@ -43,7 +43,7 @@ def walk_for(path: str, channel: MessageChannel) -> Walk:
     if encoding == ("cdr", ""):
         raise LogError(
             f"{place}: the file holds no definition of {channel.type}, and none is known; "
-            "install what knows the usual ones, pip install 'algid[bags]', or record with MCAP"
+            "record with MCAP"
         )
     raise LogError(
         f"{place}: message encoding {encoding[0]!r} with schema encoding {encoding[1]!r}; "
@@ -51,12 +51,8 @@ def walk_for(path: str, channel: MessageChannel) -> Walk:
     )
 
 
-def decoder_for(
-    path: str, channel: MessageChannel, wanted: Mapping[str, str], works: Callable[[int], bool]
-) -> Decoder:
+def decoder_for(path: str, channel: MessageChannel, wanted: Mapping[str, str]) -> Decoder:
     """What reads the numbers `wanted`, by name a path each, out of a channel's messages.
-
-    `works` as in `Decoder`.
 
     Raises
     ------
@@ -65,5 +61,5 @@ def decoder_for(
     """
     walk = walk_for(path, channel)
     if channel.encoding == "json":
-        return jsontext.JsonDecoder(wanted, works)
-    return ColumnDecoder(wanted, works, walk=walk)
+        return jsontext.JsonDecoder(wanted)
+    return ColumnDecoder(wanted, walk=walk)

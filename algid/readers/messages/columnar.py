@@ -22,17 +22,11 @@ from algid.log import IntArray
 from algid.readers.messages.batch import Messages, gather, lead_of
 from algid.words import counted
 
-_WORK_A_WALK, _WORK_A_SIZE = 200, 20
-_TOO_MANY = "messages of so many layouts that no recorder writes them"
 _NAMED = re.compile(r"[^\[\]]*\[([^\]]*)\]")
 
 
 class MisfitError(Exception):
     """A message that is not what its schema says."""
-
-
-class ExcessError(Exception):
-    """Messages that ask for more work than any recorder's."""
 
 
 @dataclass(frozen=True)
@@ -237,8 +231,6 @@ class Decoder(ABC):
     ----------
     wanted : mapping
         By name the path of a number; a message without one of them is left out.
-    works : callable
-        Counts steps of some microsecond; False where these are too many.
 
     Attributes
     ----------
@@ -254,7 +246,6 @@ class Decoder(ABC):
     """
 
     wanted: Mapping[str, str]
-    works: Callable[[int], bool]
     skipped: int = 0
     lacking: int = 0
     lacks: tuple[str, ...] = ()
@@ -269,13 +260,7 @@ class Decoder(ABC):
             known.add(text)
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
-        """Which messages (N,) hold the wanted fields, and their numbers by name, in file order.
-
-        Raises
-        ------
-        ExcessError
-            If the messages ask for more work than any recorder's.
-        """
+        """Which messages (N,) hold the wanted fields, and their numbers by name, in file order."""
         before = self.misfits + self.lacking
         held = np.zeros(len(messages), np.bool_)
         fields = self.read(messages, held)
@@ -302,11 +287,6 @@ class Decoder(ABC):
             self.lacking += messages
             self.lacks = self.lacks or lacks
 
-    def spend(self, steps: int, what: str) -> None:
-        """Count work; `what` asks for too much of it is what the error says."""
-        if not self.works(steps):
-            raise ExcessError(what)
-
 
 @dataclass
 class ColumnDecoder(Decoder):
@@ -329,7 +309,6 @@ class ColumnDecoder(Decoder):
         parts: list[tuple[NDArray[np.intp], Fields]] = []
         for rows in _by_size(messages.sizes):
             size = int(messages.sizes[rows[0]])
-            self.spend(_WORK_A_SIZE, _TOO_MANY)
             if size > LIMITS.message_bytes:
                 self.misfitting(f"messages of {counted(size, 'byte')}", rows.size)
                 continue
@@ -387,9 +366,7 @@ class ColumnDecoder(Decoder):
             shape = self.walk(payload)
         except MisfitError as error:
             self.misfitting(str(error))
-            self.spend(_WORK_A_WALK, _TOO_MANY)
             return None
-        self.spend(_WORK_A_WALK + shape.parts, _TOO_MANY)
         for path, text in shape.labels.items():
             self.label(path, text)
         return layout(payload, shape, self.wanted)

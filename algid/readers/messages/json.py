@@ -19,9 +19,6 @@ from algid.readers.messages.columnar import Decoder, Fields, MisfitError, Number
 from algid.readers.stated import BAD, GOOD, GROUPS
 from algid.words import counted, repeated
 
-_BYTES_A_STEP, _COMMAS_A_STEP, _STEPS_A_COLON = 64, 8, 2
-"""Cost of parsing: bytes of text, numbers of a list, and fields of an object, the slowest."""
-_TOO_MUCH = "more text than any recorder's file of this size"
 _BEYOND = 2**1024 - 2**970
 """From here on an integer rounds to more than the largest float64."""
 
@@ -90,15 +87,10 @@ class JsonDecoder(Decoder):
 
         Notes in `held` (N,) which do.
         """
-        self.spend(int(messages.sizes.sum()) // _BYTES_A_STEP, _TOO_MUCH)
         paths = [(path, _PART.findall(path)) for path in self.wanted.values()]
         rows: list[list[Any]] = []
         for row, (start, size) in enumerate(zip(messages.starts, messages.sizes, strict=True)):
             payload = messages.content[start : start + size].tobytes()
-            self.spend(
-                payload.count(b":") * _STEPS_A_COLON + payload.count(b",") // _COMMAS_A_STEP,
-                _TOO_MUCH,
-            )
             try:
                 content = _object(payload)
             except MisfitError as error:
@@ -130,7 +122,6 @@ class JsonDecoder(Decoder):
         except MisfitError as error:
             self.misfitting(str(error))
             return
-        self.spend(shape.parts, _TOO_MUCH)
         lacks = (name for name, value in zip(self.wanted, values, strict=True) if value is None)
         self.without(() if shape.of_others(self.wanted.values()) else tuple(lacks))
 

@@ -14,7 +14,7 @@ from algid.notices import Notice, Remedy
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.messages.codec import walk_for
 from algid.readers.messages.columnar import MisfitError, Shape
-from algid.readers.messages.source import Source, channels_of, kinds, listed
+from algid.readers.messages.message_file import MessageFile, channels_of, kinds, listed
 from algid.readers.messages.topic import (
     DYNAMIC_JOINT_STATE,
     JOINT_REFERENCES,
@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from algid.profile import Profile
 
 _SAMPLES = 64
-_LETTERS_A_STEP, _BYTES_A_STEP = 4, 4
-"""Letters of a definition, and bytes of a message, that are read in a step of work."""
 _TOPIC = Remedy({"topic": None})
 _JOINTS = Remedy({"joints": None})
 _USUAL = "/joint_states"
@@ -78,7 +76,7 @@ class Plan:
     """What definitions, schemas and metadata state in words."""
 
 
-def plan(source: Source, profile: Profile | None) -> Plan:
+def plan(file: MessageFile, profile: Profile | None) -> Plan:
     """What to read out of a file.
 
     Raises
@@ -95,7 +93,7 @@ def plan(source: Source, profile: Profile | None) -> Plan:
                 named[channel] = (topic, path)
     usual = None
     if not set(needed) <= named.keys():
-        usual = _usual_topic(source, profile)
+        usual = _usual_topic(file, profile)
     sources: dict[str, tuple[str, str]] = {}
     units: dict[str, str] = {}
     reading = Reading(joints_told="profile")
@@ -109,13 +107,13 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         reading, notices = _reading(usual, profile)
         notices += _choice_notice(usual)
         if usual.named and reading.joints and named.keys().isdisjoint(REFERENCES):
-            sources |= _reference(source, reading.joints)
+            sources |= _reference(file, reading.joints)
         units = {name: unit for name, unit in usual.units.items() if name not in named}
     for channel, (own, path) in named.items():
         place = own or home
         if place is None:
             raise LogError(
-                f"{source.path}: {channel} is taken from {path!r} without a topic: {_TOPIC}"
+                f"{file.path}: {channel} is taken from {path!r} without a topic: {_TOPIC}"
             )
         sources[channel] = (place, path)
     _leave_out_halves(sources)
@@ -128,7 +126,7 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         mapping[channel] = f"{topic}: {path}"
         if topic not in homes:
             homes.append(topic)
-    topics = tuple(_topic(source, one, sources, profile) for one in homes)
+    topics = tuple(_topic(file, one, sources, profile) for one in homes)
     main = topics[0]
     if main.clock == "log" or main.fields.stamp is None:
         mapping["t"] = "log time"
@@ -142,22 +140,22 @@ def plan(source: Source, profile: Profile | None) -> Plan:
         others = usual.others
     said: list[str] = []
     for one in topics:
-        stated, lines = _stated(source, one)
+        stated, lines = _stated(file, one)
         units = stated | units
         said += lines
     return Plan(topics, mapping, reading, notices, units, others, tuple(said))
 
 
-def _stated(source: Source, topic: Topic) -> tuple[dict[str, str], list[str]]:
+def _stated(file: MessageFile, topic: Topic) -> tuple[dict[str, str], list[str]]:
     """By channel the unit that a topic's schema or metadata state; what else is stated, as text."""
-    channel = source.channels[min(channels_of(source, topic.name, topic.type))]
+    channel = file.channels[min(channels_of(file, topic.name, topic.type))]
     text = channel.definition.decode("utf-8", errors="replace")
     metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
     if channel.encoding == "json":
         units, descriptions = in_json_schema(text)
         metadata |= units
         lines += descriptions
-        for shape in islice(_shapes(source, topic.name, topic.type), 1):
+        for shape in islice(_shapes(file, topic.name, topic.type), 1):
             lines += [f"{path}: {label}" for path, label in shape.labels.items() if "unit" in path]
     elif channel.definition_encoding.startswith("ros"):
         lines += [line for line in text.splitlines() if "#" in line or "//" in line]
@@ -193,14 +191,14 @@ def _channels(profile: Profile | None) -> tuple[tuple[str, ...], tuple[str, ...]
     return profile.channels, profile.needed
 
 
-def _reference(source: Source, joints: tuple[str, str]) -> dict[str, tuple[str, str]]:
+def _reference(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[str, str]]:
     """By reference channel topic and path of what joints follow, if one topic alone tells it."""
     by_topic = {}
-    for topic, kind in kinds(source):
+    for topic, kind in kinds(file):
         if kind not in TRAJECTORY_STATE and (topic != JOINT_REFERENCES or kind not in JOINT_STATE):
             continue
         try:
-            shape = next(_shapes(source, topic, kind), None)
+            shape = next(_shapes(file, topic, kind), None)
         except LogError:  # the log is read without it
             continue
         if shape is not None:
@@ -222,7 +220,7 @@ def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
 
 
 def _topic(
-    source: Source, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
+    file: MessageFile, name: str, sources: dict[str, tuple[str, str]], profile: Profile | None
 ) -> Topic:
     """A topic by its name, with its own `sources`, of the type that lacks the fewest of them."""
     paths = {}
@@ -230,11 +228,11 @@ def _topic(
         if home == name:
             paths[channel] = path
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
-    for topic, kind in kinds(source):
+    for topic, kind in kinds(file):
         if topic != name:
             continue
         missing, known, stamp, messages = list(paths), list[str](), None, 0
-        for shape in _shapes(source, topic, kind):
+        for shape in _shapes(file, topic, kind):
             messages += 1
             missing = [channel for channel in missing if not shape.find(paths[channel])]
             known = known or list(shape.numbers)[:12]
@@ -243,21 +241,21 @@ def _topic(
             best = (kind, missing, known, stamp)
     if best is None:
         text = (
-            f"there is no message on topic {name!r}; found {listed(source)}; name another: {_TOPIC}"
+            f"there is no message on topic {name!r}; found {listed(file)}; name another: {_TOPIC}"
         )
         one = Remedy({"tau1.topic": None}, "for one channel")
-        raise NothingFoundError(f"{source.path}: {text}; {one}", f"{text}; {one}")
+        raise NothingFoundError(f"{file.path}: {text}; {one}", f"{text}; {one}")
     kind, missing, known, stamp = best
     if missing:
         channel = missing[0]
         raise LogError(
-            f"{source.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
+            f"{file.path}: messages on {name!r} have no {paths[channel]!r} for {channel}; found "
             f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
         )
     clock = None if profile is None else profile.clock
     if clock == "header" and stamp is None:
         log_clock = Remedy({"clock": "log"})
-        raise LogError(f"{source.path}: messages on {name!r} carry no stamp: {log_clock}")
+        raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
     return Topic(name, kind, Fields(paths, stamp), clock)
 
 
@@ -275,16 +273,16 @@ class _Usual:
     """Other topics that hold two joints too."""
 
 
-def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
+def _usual_topic(file: MessageFile, profile: Profile | None) -> _Usual | None:
     """The one topic with joint states; None where there is none and a profile names the fields."""
     fitting: dict[str, _Usual] = {}
     many: dict[str, dict[str, None]] = {}
     lacking: list[str] = []
     refused: list[LogError] = []
     _, needed = _channels(profile)
-    for name, kind in _candidates(source, profile):
+    for name, kind in _candidates(file, profile):
         try:
-            for shape in _shapes(source, name, kind):
+            for shape in _shapes(file, name, kind):
                 joints, names = joint_names(shape, needed), names_in(shape)
                 if usual := _fitting(name, shape, joints, profile):
                     fitting.setdefault(name, usual)
@@ -294,7 +292,7 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
                     by_place = Remedy(
                         {"theta1.source": "position[0]"}, "name the fields by their places"
                     )
-                    refused.append(LogError(f"{source.path}: {text}; {by_place} …"))
+                    refused.append(LogError(f"{file.path}: {text}; {by_place} …"))
                 if len(joints) > 2 or (joints and profile and profile.joints):
                     many.setdefault(name, {}).update(dict.fromkeys(joints))
                 elif len(joints) < 2 and names:
@@ -307,11 +305,11 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
     if len(fitting) == 1:
         return fitting.popitem()[1]
     if fitting:
-        raise LogError(f"{source.path}: joint states on {', '.join(fitting)}; choose: {_TOPIC}")
+        raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose: {_TOPIC}")
     if many:
         name, own = next(iter(many.items()))
         text = f"{name!r} has {counted(len(own), 'joint')} ({', '.join(list(own)[:12])})"
-        raise LogError(f"{source.path}: {text}; choose: {_JOINTS}")
+        raise LogError(f"{file.path}: {text}; choose: {_JOINTS}")
     if refused:
         raise refused[0]
     if profile is not None and all(profile.channel(name).source for name in needed):
@@ -321,9 +319,9 @@ def _usual_topic(source: Source, profile: Profile | None) -> _Usual | None:
         wanted = f"the joints {profile.joints}"
     both = Remedy({"topic": None, "joints": None})
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
-    there = "; ".join(list(dict.fromkeys(lacking))[:4]) or listed(source)
+    there = "; ".join(list(dict.fromkeys(lacking))[:4]) or listed(file)
     why = f"no topic holds {wanted}; found {there}; name topics and fields: {both}; {each}"
-    raise NothingFoundError(f"{source.path}: {why}", why)
+    raise NothingFoundError(f"{file.path}: {why}", why)
 
 
 def _lacking(shape: Shape, names: Sequence[str], needed: Sequence[str]) -> str:
@@ -384,7 +382,7 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     return _Usual(topic, choice.joints or ("1", "2"), choice.joints is not None, path_of, units)
 
 
-def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]]:
+def _candidates(file: MessageFile, profile: Profile | None) -> list[tuple[str, str]]:
     """Topics, each with a type of its messages, that may hold joint states.
 
     A profile's alone, where it names one.
@@ -394,28 +392,28 @@ def _candidates(source: Source, profile: Profile | None) -> list[tuple[str, str]
     LogError
         Where several topics may hold them and no profile names one.
     """
-    places = kinds(source)
+    places = kinds(file)
     if profile and profile.topic:
         return [place for place in places if place[0] == profile.topic]
     some = []
     for place, numbers in places.items():
-        channel = source.channels[min(numbers)]
+        channel = file.channels[min(numbers)]
         known = channel.type in JOINT_STATE + DYNAMIC_JOINT_STATE
         known = known or any(word in channel.definition for word in _TELLING)
         if known or channel.encoding == "json":
             some.append(place)
     if len(some) > LIMITS.topics:
         raise LogError(
-            f"{source.path}: {counted(len(some), 'topic')} may hold joint states: {_TOPIC}"
+            f"{file.path}: {counted(len(some), 'topic')} may hold joint states: {_TOPIC}"
         )
     return some
 
 
-def fields_shown(source: Source, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Joints in a channel's first message, and its numbers' paths as a profile writes them."""
-    channel = source.channels[number]
+    channel = file.channels[number]
     try:
-        shape = next(_shapes(source, channel.topic, channel.type), None)
+        shape = next(_shapes(file, channel.topic, channel.type), None)
     except LogError:
         return (), ()
     if shape is None:
@@ -440,29 +438,27 @@ def _paths(shape: Shape, joints: tuple[str, ...]) -> Iterator[str]:
                 yield f"{name}[{place}]"
 
 
-def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
+def _shapes(file: MessageFile, topic: str, type_name: str) -> Iterator[Shape]:
     """Shapes of the topic's first messages that fit their schema.
 
     Raises
     ------
     LogError
-        If none of them does, or they ask for more work than those of any recorder.
+        If none of them does.
     """
-    channels = channels_of(source, topic, type_name)
+    channels = channels_of(file, topic, type_name)
     if not channels:
         return
-    channel = source.channels[min(channels)]
-    _work(source, topic, len(channel.definition) // _LETTERS_A_STEP)
-    walk = walk_for(source.path, channel)
-    for batch in source.batches(channels):
+    channel = file.channels[min(channels)]
+    walk = walk_for(file.path, channel)
+    for batch in file.batches(channels):
         messages = batch.messages
         if messages is None:
-            source.damage.append(batch.reason)
+            file.damage.append(batch.reason)
         if messages is None or not len(messages):
             continue
         fitting, misfit = 0, None
         for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
-            _work(source, topic, size // _BYTES_A_STEP)
             end = start + min(size, LIMITS.message_bytes)
             try:
                 shape = walk(messages.content[start:end].tobytes())
@@ -470,18 +466,7 @@ def _shapes(source: Source, topic: str, type_name: str) -> Iterator[Shape]:
                 misfit = error
                 continue
             fitting += 1
-            _work(source, topic, shape.parts)
             yield shape
         if misfit and not fitting:
-            raise LogError(
-                f"{source.path}: topic {topic!r}: {misfit}; it cannot be read"
-            ) from misfit
+            raise LogError(f"{file.path}: topic {topic!r}: {misfit}; it cannot be read") from misfit
         return
-
-
-def _work(source: Source, topic: str, steps: int) -> None:
-    if not source.works(steps):
-        raise LogError(
-            f"{source.path}: topic {topic!r}: messages or definitions of more parts than any "
-            "recorder's"
-        )

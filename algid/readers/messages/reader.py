@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from algid.log import Origin
 from algid.notices import Notice
 from algid.readers.assemble import TableReader, reader_of
 from algid.readers.joints import moving_joints
-from algid.readers.messages.source import Source
+from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Fields, Topic
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable
 from algid.readers.timebase import Series, aligned, in_order, whole_topic
@@ -20,20 +19,20 @@ from algid.readers.timebase import Series, aligned, in_order, whole_topic
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-Opener = Callable[[], AbstractContextManager[Source]]
-"""Opens a file of messages: several passes go over a log."""
-
 _LOOKED = 1 << 14
 """Messages whose other joints are looked at."""
 
 
 @dataclass(frozen=True)
 class MessageLog:
-    """A log of messages: what messages call it, its format, and what opens its files in order."""
+    """A log of messages: what messages call it, its format, and what opens its files in order.
+
+    Several passes go over a log: an opened file is kept.
+    """
 
     path: str
     kind: str
-    parts: Sequence[Opener]
+    files: Sequence[Callable[[], MessageFile]]
     notices: tuple[Notice, ...] = ()
 
 
@@ -50,32 +49,26 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
     """
     from algid.readers.messages.plan import NothingFoundError, plan
 
-    name, parts = log.path, log.parts
-    with parts[0]() as source:
-        try:
-            wanted = plan(source, profile)
-        except NothingFoundError as error:
-            if not source.damage:
-                raise
-            places = list(dict.fromkeys(source.damage))
-            where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
-            text = f"the file is damaged ({where}); copy it again; in what is left: {error.lacking}"
-            raise LogError(f"{source.path}: {text}") from error
-        truth = source.truth()
-        main = wanted.topics[0]
-        rows = main.count(source)
-        beside = moving_joints(
-            wanted.others,
-            lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(
-                source, _LOOKED
-            ),
-        )
-    origin = Origin(name, log.kind, wanted.mapping, truth, wanted.reading)
+    name, file = log.path, log.files[0]()
+    try:
+        wanted = plan(file, profile)
+    except NothingFoundError as error:
+        if not file.damage:
+            raise
+        places = list(dict.fromkeys(file.damage))
+        where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+        text = f"the file is damaged ({where}); copy it again; in what is left: {error.lacking}"
+        raise LogError(f"{file.path}: {text}") from error
+    main = wanted.topics[0]
+    beside = moving_joints(
+        wanted.others,
+        lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(file, _LOOKED),
+    )
+    origin = Origin(name, log.kind, wanted.mapping, file.truth, wanted.reading)
 
     def read(topic: Topic, rows: int) -> Iterator[SampleTable]:
-        for part in parts:
-            with part() as source:
-                yield from topic.tables(source, rows)
+        for opened in log.files:
+            yield from topic.tables(opened(), rows)
 
     def tables(rows: int) -> Iterator[SampleTable]:
         samples, others = read(main, rows), wanted.topics[1:]
@@ -103,6 +96,6 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
         profile,
         wanted.units,
         (*log.notices, *wanted.notices, *beside),
-        rows,
+        main.count(file),
         wanted.said,
     )

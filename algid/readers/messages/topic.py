@@ -18,8 +18,8 @@ from algid.log import IntArray
 from algid.notices import Notice, Remedy
 from algid.readers.messages.batch import Account
 from algid.readers.messages.codec import decoder_for
-from algid.readers.messages.columnar import Decoder, ExcessError, Shape
-from algid.readers.messages.source import Source, channels_of
+from algid.readers.messages.columnar import Decoder, Shape
+from algid.readers.messages.message_file import MessageFile, channels_of
 from algid.readers.names import COMMANDED, CURRENTS, STEMS
 from algid.readers.stated import several
 from algid.readers.table import REFERENCES, VELOCITIES, SampleTable, stack
@@ -166,7 +166,7 @@ class Topic:
     clock: str | None
     _chosen: str | None = field(default=None)
 
-    def tables(self, source: Source, rows: int) -> Iterator[SampleTable]:
+    def tables(self, file: MessageFile, rows: int) -> Iterator[SampleTable]:
         """The topic's samples in tables of about `rows` rows.
 
         Raises
@@ -174,8 +174,8 @@ class Topic:
         LogError
             If half of the messages do not fit their schema, or their stamps are none.
         """
-        path = source.path
-        channels = channels_of(source, self.name, self.type)
+        path = file.path
+        channels = channels_of(file, self.name, self.type)
         if not channels:
             missing = Notice("NO_TOPIC", numbers={"file": path, "topic": self.name}, lossy=True)
             yield SampleTable(np.empty(0, np.int64), {}, (missing,))
@@ -183,21 +183,15 @@ class Topic:
         wanted = dict(self.fields.paths)
         if self.fields.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
-        decoder = decoder_for(path, source.channels[min(channels)], wanted, source.works)
-        source.check(channels)
+        decoder = decoder_for(path, file.channels[min(channels)], wanted)
         account = Account()
         parts: list[SampleTable] = []
         size = 0
-        for batch in source.batches(channels):
+        for batch in file.batches(channels):
             account.add(batch)
             if batch.messages is None or not len(batch.messages):
                 continue
-            try:
-                held, columns = decoder.columns(batch.messages)
-            except ExcessError as error:
-                raise LogError(
-                    f"{path}: topic {self.name!r} has {error}; write it anew with fewer"
-                ) from error
+            held, columns = decoder.columns(batch.messages)
             if decoder.misfits > account.found / 2:
                 raise LogError(
                     f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without "
@@ -211,17 +205,14 @@ class Topic:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
-        promised = self.count(source) if source.counts else None
-        notices = list(source.notices)
-        notices += account.notices(promised)
-        notices += self._left_out(decoder, source, channels)
+        notices = [*file.notices, *account.notices(self.count(file))]
+        notices += self._left_out(decoder, file, channels)
         yield last.noting(*notices)
 
-    def count(self, source: Source) -> int:
-        """Messages that the file counts, 0 where it does not."""
-        counts = source.counts or {}
-        channels = channels_of(source, self.name, self.type)
-        return sum(counts.get(channel, 0) for channel in channels)
+    def count(self, file: MessageFile) -> int:
+        """Messages of the topic that the file counts."""
+        channels = channels_of(file, self.name, self.type)
+        return sum(file.counts.get(channel, 0) for channel in channels)
 
     def _clocked(self, path: str, parts: list[SampleTable]) -> SampleTable:
         """The tables as one, with the stamps of the chosen clock and float64 columns."""
@@ -267,7 +258,9 @@ class Topic:
             nanoseconds = nanoseconds + np.rint((seconds - whole) * 1e9)
         return whole.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
 
-    def _left_out(self, decoder: Decoder, source: Source, channels: frozenset[int]) -> list[Notice]:
+    def _left_out(
+        self, decoder: Decoder, file: MessageFile, channels: frozenset[int]
+    ) -> list[Notice]:
         """Notices of messages that lack a field, do not fit, or are otherwise typed or encoded."""
         said = []
         if decoder.lacking:
@@ -284,9 +277,8 @@ class Topic:
             several(path, values) for path, values in decoder.labels.items() if len(values) > 1
         ]
         types = set()
-        for number in source.used() - channels:
-            channel = source.channels[number]
-            if channel.topic == self.name:
+        for number, channel in file.channels.items():
+            if number not in channels and channel.topic == self.name and file.counts.get(number):
                 types.add(channel.type or "no schema")
         if types:
             numbers = {"topic": self.name, "types": ", ".join(sorted(types)[:4])}

@@ -1,0 +1,254 @@
+"""ROS 1 bags through rosbags; rosbag2's SQLite files by themselves, or in their folder.
+
+rosbags passes over the rows of a `-wal` file beside a database: SQLite itself reads those.
+"""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from algid.errors import LogError
+from algid.files import read_start
+from algid.limits import LIMITS
+from algid.notices import Notice
+from algid.readers.mcap import open_mcap
+from algid.readers.messages.batch import MessageBatch, Messages
+from algid.readers.messages.message_file import MessageChannel, MessageFile
+from algid.readers.messages.reader import MessageLog
+from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+
+_BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
+_PAD = 8
+"""Bytes before the first message, which decoders want to have there."""
+_NAME_AND_NUMBER = re.compile(r"(.*?)(?:_(\d+))?$")
+
+
+def open_bag(path: Path, kind: str) -> MessageLog:
+    """A ROS 1 bag ("bag"), a SQLite file of rosbag2 ("db3"), or a folder ("rosbag2").
+
+    Raises
+    ------
+    LogError
+        If none of a folder's files is there, or its metadata cannot be read.
+    """
+    if kind != "rosbag2":
+        opened = ros1_file if kind == "bag" else database_file
+        return MessageLog(str(path), "bag", [cache(partial(opened, path))])
+    paths, notices = _files_of_folder(path)
+    if paths[0].suffix == ".mcap":
+        return replace(open_mcap(paths), notices=notices)
+    return MessageLog(
+        str(path), "bag", [cache(partial(database_file, one)) for one in paths], notices
+    )
+
+
+def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
+    """The files of a rosbag2 folder in their order, and what is to be said of those missing."""
+    metadata = folder / "metadata.yaml"
+    if metadata.is_file():
+        from ruamel.yaml import YAML  # of rosbags
+
+        try:
+            text = read_start(metadata, LIMITS.bag_metadata_bytes).decode()
+            stated = YAML(typ="safe").load(text)["rosbag2_bagfile_information"]
+            names = [Path(str(name)).name for name in stated["relative_file_paths"]]
+        except Exception as error:  # what the library raises, and what is not there
+            raise LogError(
+                f"{metadata}: expected the metadata of a rosbag2 folder with relative_file_paths "
+                f"({type(error).__name__}: {str(error).partition(chr(10))[0][:80]}); without that "
+                "file the folder's numbered files are read"
+            ) from error
+        if (mode := str(stated.get("compression_mode") or "NONE")).upper() != "NONE":
+            raise LogError(
+                f"{folder}: the bag was compressed by rosbag2 (compression_mode {mode}), "
+                "unreadable; write it anew with ros2 bag convert and storage compression (mcap, "
+                "zstd chunks)"
+            )
+    else:
+        found = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
+        by_stem = {one.name: _NAME_AND_NUMBER.match(one.stem) for one in found}
+        order = {name: (int(one[2] or 0), name) for name, one in by_stem.items() if one}
+        names = sorted(order, key=order.__getitem__)
+        if len({one[1] for one in by_stem.values() if one}) > 1:
+            raise LogError(
+                f"{folder}: {', '.join(names[:3])}: not the numbered parts of one bag, and no "
+                "metadata.yaml lists them; read each for itself"
+            )
+    there = [folder / name for name in names if (folder / name).is_file()]
+    if not there:
+        raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
+    if len({path.suffix for path in there}) > 1:
+        raise LogError(f"{folder}: the bag mixes files of .db3 and .mcap; read one file of it")
+    missing = [name for name in names if folder / name not in there]
+    numbers = {"missing": len(missing), "files": len(names), "names": ", ".join(missing[:3])}
+    notices = (Notice("MISSING_SPLIT", numbers=numbers, lossy=True),) if missing else ()
+    return there, notices
+
+
+@contextmanager
+def _as_log_error(path: Path, mend: str) -> Iterator[None]:
+    """Turn what a library raises about a bag into a `LogError` that names what to do."""
+    try:
+        yield
+    except LogError:
+        raise
+    except Exception as error:  # rosbags raises what its parts do
+        raise LogError(f"{path}: the bag cannot be read ({_reason(error)}); {mend}") from error
+
+
+def _reason(error: Exception) -> str:
+    return (str(error) or type(error).__name__).partition("\n")[0][:200]
+
+
+def ros1_file(path: Path) -> MessageFile:
+    """A ROS 1 bag with an index.
+
+    Raises
+    ------
+    LogError
+        If its index is missing or damaged.
+    """
+    from rosbags.rosbag1 import Reader
+    from rosbags.typesys.msg import denormalize_msgtype
+
+    reader = Reader(path)
+    with _as_log_error(path, f"rosbag reindex {path.name} may mend it, else copy it again"):
+        reader.open()
+    channels, counts = {}, dict[int, int]()
+    for one in reader.connections:
+        definition = one.msgdef.data.encode()
+        kind = denormalize_msgtype(one.msgtype)
+        channels[one.id] = MessageChannel(one.topic, kind, "ros1", "ros1msg", definition)
+    for chunk in reader.chunk_infos:
+        for number, count in chunk.connection_counts.items():
+            counts[number] = counts.get(number, 0) + count
+    # rosbags has the end behind the last message
+    span = (reader.start_time, reader.end_time - 1) if any(counts.values()) else None
+
+    def rows(wanted: frozenset[int]) -> Iterator[tuple[Any, Any]]:
+        chosen = [one for one in reader.connections if one.id in wanted]
+        for _, stamp, data in reader.messages(chosen) if chosen else ():
+            yield stamp, data
+
+    file = MessageFile(str(path), channels, partial(_batches, rows), counts, span)
+    weakref.finalize(file, reader.close)  # its index is read once for all passes
+    return file
+
+
+def database_file(path: Path) -> MessageFile:
+    """A SQLite file of rosbag2.
+
+    Raises
+    ------
+    LogError
+        If it is damaged, or holds no tables as rosbag2 writes them.
+    """
+    with _as_log_error(path, "copy it again, or record it anew"), _connected(path) as base:
+        query = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may run for ever
+        tables = {str(name) for (name,) in base.execute(query)}
+        for needed in sorted({"messages", "topics"} - tables):
+            raise LogError(f"{path}: no table {needed!r}; expected a SQLite file of rosbag2")
+        own: dict[str, tuple[str, bytes]] = {}
+        if "message_definitions" in tables:  # newer rosbag2
+            query = (
+                "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+            )
+            own = {kind: (form, text.encode()) for kind, form, text in base.execute(query) if text}
+        channels = {}
+        query = "SELECT id, name, type, serialization_format FROM topics"
+        for number, name, kind, encoding in base.execute(query):
+            definition = own.get(kind) or usual_definition(kind)
+            channels[number] = MessageChannel(name, kind, encoding, *definition)
+        query = (
+            "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages "
+            "GROUP BY topic_id"
+        )
+        totals = base.execute(query).fetchall()
+    counts = {number: count for number, count, _, _ in totals}
+    strays = sum(count for number, count in counts.items() if number not in channels)
+    stray = Notice("STRAY_MESSAGES", numbers={"count": strays}, lossy=True)
+    stamps = [stamp for row in totals for stamp in row[2:] if type(stamp) is int]
+    span = (min(stamps), max(stamps)) if stamps else None
+
+    def rows(wanted: frozenset[int]) -> Iterator[tuple[Any, Any]]:
+        numbers = ",".join(map(str, sorted(wanted)))
+        with _connected(path) as base:
+            yield from base.execute(
+                f"SELECT timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY rowid"
+            )
+
+    notices = (stray,) if strays else ()
+    return MessageFile(str(path), channels, partial(_batches, rows), counts, span, notices)
+
+
+@contextmanager
+def _connected(path: Path) -> Iterator[sqlite3.Connection]:
+    """A connection that writes nothing, not even beside the file where nothing is unfinished."""
+    beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-journal")]
+    unfinished = any(one.exists() and one.stat().st_size for one in beside)
+    place = f"{path.absolute().as_uri()}?{'mode=ro' if unfinished else 'immutable=1'}"
+    with closing(sqlite3.connect(place, uri=True, check_same_thread=False)) as base:
+        yield base
+
+
+def usual_definition(kind: str) -> tuple[str, bytes]:
+    """Encoding and text of the definition of a type that every ROS 2 knows, else nothing."""
+    if kind == JOINT_STATE:
+        return "ros2msg", JOINT_STATE_DEFINITION.encode()
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    if kind not in store.types:
+        return "", b""
+    return "ros2msg", store.generate_msgdef(kind, ros_version=2)[0].encode()
+
+
+def _batches(
+    rows: Callable[[frozenset[int]], Iterator[tuple[Any, Any]]], channels: frozenset[int]
+) -> Iterator[MessageBatch]:
+    """Messages by their stamps and payloads up to the first break, which yields its reason."""
+    stamps: list[int] = []
+    payloads: list[bytes] = []
+    size = odd = 0
+    wrong, broken = "", ""
+    found = rows(channels)
+    while True:
+        try:
+            row = next(found, None)
+        except Exception as error:  # rosbags raises what its parts do
+            row, broken = None, _reason(error)
+        if stamps and (row is None or size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS):
+            yield MessageBatch(_gathered(stamps, payloads), checked=True)
+            stamps, payloads, size = [], [], 0
+        if row is None:
+            break
+        stamp, data = row
+        if type(stamp) is int and type(data) is bytes:
+            stamps.append(stamp)
+            payloads.append(data)
+            size += len(data)
+        else:
+            odd += 1
+            wrong = wrong or repr(data if type(stamp) is int else stamp)[:40]
+    if odd:
+        text = f"{wrong} for a time or a message in the table 'messages'"
+        yield MessageBatch(None, checked=True, reason=text, rows=odd)
+    if broken:
+        yield MessageBatch(None, checked=True, reason=f"{broken}; of what follows nothing is read")
+
+
+def _gathered(stamps: list[int], payloads: list[bytes]) -> Messages:
+    sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
+    ends = _PAD + np.cumsum(sizes)
+    content = np.frombuffer(b"".join([bytes(_PAD), *payloads]), np.uint8)
+    return Messages(content, ends - sizes, sizes, np.array(stamps, np.int64))
