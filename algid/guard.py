@@ -32,7 +32,7 @@ TRACEBACK = "ALGID_TRACEBACK"
 _ENDING = tuple(
     getattr(signal, f"SIG{name}") for name in ["HUP", "INT", "QUIT", "TERM", "USR1", "USR2"]
 )
-_BREAKING = tuple(
+BREAKING = tuple(
     getattr(signal, f"SIG{name}") for name in ["SEGV", "BUS", "FPE", "ILL", "ABRT", "TRAP"]
 )
 _READING = {
@@ -107,11 +107,11 @@ class Notes:
     def end(self, number: int) -> tuple[int, str]:
         """Exit code and line for a process that the signal of a number has ended."""
         name = signal.Signals(number).name
-        if self.reading and number in (*_READING, *_BREAKING):
+        if self.reading and number in (*_READING, *BREAKING):
             why = _READING.get(signal.Signals(number), f"a library broke on it ({name})")
             remedy = "look at the file, or write it anew in another format"
             return Exit.USAGE, f"while reading {self.reading[-1]}: {why}; {remedy}"
-        if number in _BREAKING:
+        if number in BREAKING:
             return Exit.INTERNAL, f"internal error: a library broke ({name}); report it"
         return 128 + number, STOPPED
 

@@ -200,6 +200,7 @@ OPTIONS: tuple[Option, ...] = (
     Option("memory_limit", _BATCH),
     Option("timeout", _BATCH, range=(1e-3, 1e7)),
     Option("retry_failed", _BATCH),
+    Option("part", _BATCH),
     Option("watch", _BATCH),
     Option("max_nrmse", ("validate",), range=_LARGEST),
     Option("simulate", ("validate",)),

@@ -78,7 +78,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pyarrow",
     ),
     "batches": room(
-        "errors files identification limits options profile readers results "
+        "errors files guard identification limits options profile readers results "
         "runtime settings staging stores text verdict words",
         "distributed polars pyarrow pydantic",
     ),

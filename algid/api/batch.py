@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from algid.api.options import ProfileLike
+    from algid.batches.jobs import Job
     from algid.batches.records import JobRecord
     from algid.batches.run import Batch, Ended
     from algid.batches.run import Progress as Progress
@@ -90,6 +91,7 @@ def batch(
     timeout: float = 3600.0,
     retry_failed: bool = False,
     watch: bool = False,
+    part: str | None = None,
     report: bool = True,
     profile_for: Callable[[str | None], Profile | None] | None = None,
     progress: Callable[[Progress], None] | None = None,
@@ -122,6 +124,8 @@ def batch(
         Run jobs again that have failed.
     watch : bool
         Go on until a signal, and take logs as they arrive.
+    part : str
+        ``2/40``: do the second of 40 shares of the jobs, beside other processes that do the others.
     report : bool
         Write pages and time series beside each ``result.json``.
     profile_for : callable
@@ -192,12 +196,17 @@ def batch(
         jobs = jobs_of(names, place, alone)
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
+    if part is not None:
+        jobs = share_of(jobs, part, watch)
     store = open_store(place)
-    with locked(place):
+    with locked(place, shared=part is not None):
         sweep(store)
         try:
             with _workers(place, scheduler, workers, bytes_each, timeout) as (executor, slots):
-                running = Batch(store, recipe, executor, slots, progress or (lambda _: None))
+                running = Batch(
+                    *(store, recipe, executor, slots, progress or (lambda _: None)),
+                    shared=part is not None,
+                )
                 with stopped_by_signals(running.stop):
                     if watch:
                         ended = watched(running, names, place, alone, retry_failed, complain)
@@ -231,8 +240,11 @@ def _workers(
 
     if scheduler is not None:
         from algid.batches.cluster import cluster
+        from algid.batches.records import FOLDER
+        from algid.stores import is_url
 
-        with cluster(scheduler, out, timeout) as pool_and_size:
+        folder = None if is_url(out) else Path(out, FOLDER)
+        with cluster(scheduler, folder, timeout) as pool_and_size:
             yield pool_and_size
         return
     count = workers or cores()
@@ -240,7 +252,16 @@ def _workers(
     try:
         yield executor, 2 * count
     finally:
-        executor.shutdown(cancel_futures=True)
+        executor.shutdown()
+
+
+def share_of(jobs: list[Job], part: str, watch: bool = False) -> list[Job]:
+    """The jobs of a part like ``2/40``, every 40th from the second; raises `SettingError`."""
+    number, _, count = part.partition("/")
+    if watch or not (number + count).isdecimal() or not 1 <= int(number) <= int(count):
+        expected = f"expected 1/N to N/N, and no {flag('watch')}"
+        raise SettingError(f"{flag('part')}: {expected}, found {part!r:.60}")
+    return jobs[int(number) - 1 :: int(count)]
 
 
 def bytes_of(text: str) -> int:

@@ -45,9 +45,12 @@ class DiskFull:
     reason: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Task:
-    """A job with all that decides its outcome; travels to the worker."""
+    """A job with all that decides its outcome; travels to the worker.
+
+    It is not printed: its URLs may hold credentials, and a cluster logs what it runs.
+    """
 
     job: Job
     basis: str

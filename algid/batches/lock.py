@@ -16,78 +16,54 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from algid.batches.records import FOLDER
 from algid.errors import OutputError
+from algid.files import refuse_links
 from algid.options import flag
 from algid.stores import is_url, public
 
-LOCK = ".lock"
 DYING = 2.0  # s that the processes of a killed batch may take to be gone
 
 
 @contextmanager
-def locked(out: str) -> Iterator[None]:
-    """Hold OUT; the system lets go of it however this process ends.
+def locked(out: str, shared: bool = False) -> Iterator[None]:
+    """Hold OUT, or share it with others that share it; the system lets go of it with the process.
+
+    The file that stands for it stays: two processes that find none would lock two.
 
     Raises
     ------
     OutputError
         If another batch of this machine holds it, or it cannot be made.
     """
-    path = lock_file(out)
+    path = Path(out, FOLDER, "lock")
+    if is_url(out):
+        name = hashlib.sha256(public(out).encode()).hexdigest()[:24]
+        path = Path(tempfile.gettempdir(), f"algid-{os.getuid()}-{name}.lock")
+    else:
+        refuse_links(Path(out), f"{FOLDER}/lock")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle = _held(path)
-    except BlockingIOError as error:
-        raise OutputError(
-            f"{out}: another batch is at work there; wait for it or choose another {flag('out')}"
-        ) from error
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
     except OSError as error:
         raise OutputError(
             f"{out}: cannot write there ({error.strerror}); choose another folder with "
             f"{flag('out')}"
         ) from error
+    kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+    until = time.monotonic() + DYING
     try:
+        while True:
+            try:
+                fcntl.flock(handle, kind | fcntl.LOCK_NB)
+                break
+            except BlockingIOError as error:
+                if time.monotonic() > until:
+                    raise OutputError(
+                        f"{out}: another batch is at work there; wait for it or choose another "
+                        f"{flag('out')}"
+                    ) from error
+                time.sleep(0.02)
         yield
     finally:
-        path.unlink(missing_ok=True)
-        os.close(handle)
-
-
-def lock_file(out: str) -> Path:
-    """The file that stands for OUT: in it, or in the temporary folder where OUT is no folder."""
-    if not is_url(out):
-        return Path(out) / LOCK
-    name = hashlib.sha256(public(out).encode()).hexdigest()[:24]
-    return Path(tempfile.gettempdir()) / f"algid-{os.getuid()}-{name}.lock"
-
-
-def _held(path: Path) -> int:
-    """A handle that holds the file; one that its last holder removed meanwhile is made anew.
-
-    Processes of a batch that was killed hold it until they are gone.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened, or another batch holds it: then a `BlockingIOError`.
-    BlockingIOError
-        As above.
-    """
-    until = time.monotonic() + DYING
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if os.path.samestat(os.fstat(handle), path.stat()):
-                return handle
-        except FileNotFoundError:
-            pass
-        except BlockingIOError:
-            if time.monotonic() > until:
-                os.close(handle)
-                raise
-            time.sleep(0.02)
-        except OSError:
-            os.close(handle)
-            raise
         os.close(handle)

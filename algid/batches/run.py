@@ -31,7 +31,7 @@ from algid.batches.records import (
     write_record,
 )
 from algid.batches.table import write_jobs
-from algid.batches.workers import CallFailedError, WorkerDiedError, WorkersGoneError
+from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.options import flag
 from algid.profile import Profile
@@ -188,6 +188,7 @@ class Batch:
     executor : who runs them
     slots : how many are handed out at once
     progress : called with each job that ends
+    shared : whether other batches do other jobs of the same OUT
     """
 
     def __init__(
@@ -197,7 +198,9 @@ class Batch:
         executor: Executor,
         slots: int,
         progress: Callable[[Progress], None],
+        shared: bool = False,
     ) -> None:
+        self._shared = shared
         self._store, self._recipe, self._executor = store, recipe, executor
         self._slots, self._progress = slots, progress
         self._kills: Counter[str] = Counter()
@@ -235,6 +238,8 @@ class Batch:
         if self._written and self._store.exists(TABLE):
             return
         try:
+            if self._shared:  # the others have come further meanwhile
+                self.records |= read_records(self._store).records
             write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
             self._written = True
         except OutputError as error:
@@ -265,17 +270,15 @@ class Batch:
         try:
             ended: JobRecord | DiskFull = future.result()
         except WorkerDiedError as died:
-            self._kills[task.job.name] += died.kills
+            self._kills[task.job.name] += 1
             if self._kills[task.job.name] < MOST_KILLS:
                 return None
-            return failed_record(task, f"it took its worker with it: {died.how}", End.KILLED)
+            return failed_record(task, f"it took its worker with it: {died}", End.KILLED)
         except CallFailedError as failed:
             return failed_record(task, str(failed))
-        except WorkersGoneError as gone:
-            self._stop_because(f"{gone}; {RUN_AGAIN}")
+        except Exception as error:  # no job's fault: no process can be started, a cluster is lost
+            self._stop_because(f"{text_of(error)}; {RUN_AGAIN}")
             return None
-        except Exception as error:  # of the executor's own: the other jobs go on
-            return failed_record(task, text_of(error))
         if isinstance(ended, DiskFull):
             self._stop_because(f"{ended.reason}; {MAKE_ROOM}")
             return None

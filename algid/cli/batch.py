@@ -58,6 +58,9 @@ def batch(
     watch: Annotated[
         bool, typer.Option("--watch", help="Go on, and take logs as they arrive.")
     ] = False,
+    part: Annotated[
+        str | None, typer.Option(help="Share of the jobs, like 2/40, for arrays of processes.")
+    ] = None,
     report: Annotated[
         bool, typer.Option(help="Write pages and time series beside each result.json.")
     ] = True,
@@ -92,6 +95,7 @@ def batch(
             timeout=timeout,
             retry_failed=retry_failed,
             watch=watch,
+            part=part,
             report=report,
             progress=progress,
             complain=complain,

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
-import signal
+import resource
 import sys
-import tempfile
+import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+
+from algid.guard import reading
+from algid.staging import staged
 
 
 def add(a: int, b: int) -> int:
@@ -22,9 +26,16 @@ def fail() -> None:
     raise ValueError("as asked")
 
 
-def die() -> None:
-    """Take the worker along."""
-    os.kill(os.getpid(), signal.SIGKILL)
+def die(number: int, file: str, half: str) -> None:
+    """Take the worker along while a file is read, if any, and something is half made."""
+    with staged(Path(half), Path.mkdir), reading(file) if file else nullcontext():
+        os.kill(os.getpid(), number)
+        time.sleep(60)
+
+
+def bound() -> int:
+    """Bytes of data that the worker may have."""
+    return resource.getrlimit(resource.RLIMIT_DATA)[0]
 
 
 def fill(size: int) -> int:
@@ -39,8 +50,6 @@ def environment(name: str) -> str | None:
 
 def linger(pid_file: str) -> None:
     """Tell the worker's number, then wait for a minute."""
-    import time
-
     Path(pid_file).write_text(str(os.getpid()))
     time.sleep(60)
 
@@ -51,17 +60,6 @@ def spin() -> NoReturn:
         pass
 
 
-def temporary_file() -> str:
-    """Leave a file in the temporary folder."""
-    return tempfile.mkstemp()[1]
-
-
-def raise_its_own_cause() -> NoReturn:
-    """Raise an exception whose chain is a circle."""
-    error = ValueError("as asked")
-    raise error from error
-
-
 def raise_a_long_chain() -> NoReturn:
     """Raise an exception with thousands of causes."""
     error = ValueError("0")
@@ -70,19 +68,6 @@ def raise_a_long_chain() -> NoReturn:
         following.__cause__ = error
         error = following
     raise error
-
-
-class UnpicklableError(Exception):
-    """An exception that holds what cannot be pickled."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.held = lambda: None
-
-
-def raise_unpicklable() -> NoReturn:
-    """Raise it."""
-    raise UnpicklableError("as asked")
 
 
 class UnprintableError(Exception):
@@ -116,11 +101,6 @@ def leave() -> NoReturn:
     sys.exit(3)
 
 
-def interrupt() -> NoReturn:
-    """Raise what Ctrl-C does."""
-    raise KeyboardInterrupt
-
-
 def give_unpicklable() -> Any:
     """An answer that cannot be pickled."""
     return lambda: None
@@ -133,10 +113,11 @@ def _not_here() -> NoReturn:
 class NotHere:
     """What can be pickled and not be unpickled."""
 
+    def __call__(self) -> None:
+        """Never."""
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _not_here, ()
 
 
-def give_what_cannot_be_unpacked() -> NotHere:
-    """An answer that can be pickled and not be unpickled."""
-    return NotHere()
+take_not_here = NotHere()

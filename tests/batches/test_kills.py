@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -60,8 +60,8 @@ def undisturbed(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Undistu
     return Undisturbed(_digest(out), time.monotonic() - start)
 
 
-# The command, and in each of its workers a reader that never ends on what is named so.
 HANGING = """
+import sys
 import algid.readers as readers
 opened = readers.open_log
 def open_log(path, *more):
@@ -69,22 +69,19 @@ def open_log(path, *more):
         pass
     return opened(path, *more)
 readers.open_log = open_log
-if __name__ == "__main__":
-    from algid.cli import main
-    main()
 """
+"""In every interpreter a reader that never ends on what is named so."""
 
 
-def _start(
-    logs: Path, out: Path, *flags: str, program: Sequence[str] = ("-m", "algid")
-) -> subprocess.Popen[str]:
+def _start(logs: Path, out: Path, *flags: str, site: Path | None = None) -> subprocess.Popen[str]:
+    """The command; what stands in ``site/sitecustomize.py`` runs in it and in its workers."""
     where = flags or ("--workers", "2")
     quick = ("--no-report", "--estimator", "weak", "--model", "plain")
-    command = [sys.executable, *program, "batch", str(logs), "-o", str(out), *quick, *where]
-    root = str(Path(__file__).parents[2])
+    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), *quick, *where]
+    paths = [str(Path(__file__).parents[2]), *([str(site)] if site else [])]
     return subprocess.Popen(
         command,
-        env={**os.environ, "PYTHONPATH": root},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -183,9 +180,8 @@ def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/d0-unloaded.mcap").symlink_to(logs / "d0-unloaded.mcap")
     (tmp_path / "logs/hangs.csv").write_text("t,theta1,theta2,tau1,tau2\n")
-    script = tmp_path / "hanging.py"
-    script.write_text(HANGING)
-    running = _start(tmp_path / "logs", tmp_path / "out", "--workers", "2", program=[str(script)])
+    (tmp_path / "sitecustomize.py").write_text(HANGING)
+    running = _start(tmp_path / "logs", tmp_path / "out", "--workers", "2", site=tmp_path)
     _wait_for_records(tmp_path / "out", 1)
     running.send_signal(sent)
     told, errors = running.communicate(timeout=60)
@@ -199,9 +195,8 @@ def test_a_job_past_its_time_fails_until_its_log_changes(tmp_path: Path) -> None
     log, out = tmp_path / "logs/hangs.csv", tmp_path / "out"
     log.parent.mkdir()
     log.write_text("t,theta1,theta2,tau1,tau2\n")
-    script = tmp_path / "hanging.py"
-    script.write_text(HANGING)
-    running = _start(log.parent, out, "--workers", "1", "--timeout", "0.5", program=[str(script)])
+    (tmp_path / "sitecustomize.py").write_text(HANGING)
+    running = _start(log.parent, out, "--workers", "1", "--timeout", "0.5", site=tmp_path)
     told, errors = running.communicate(timeout=120)
     assert (running.returncode, errors) == (1, "")
     assert told.startswith(

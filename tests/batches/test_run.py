@@ -8,6 +8,7 @@ import os
 import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -238,6 +239,27 @@ def test_two_batches_on_one_folder(tmp_path: Path) -> None:
         pass
     with locked(str(tmp_path)):
         pass
+
+
+def test_parts_share_an_output_and_its_table_is_of_all(
+    logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here(), 1)))
+    out = logs.parent / "out"
+    quick: Any = {"estimator": "weak", "model": "plain", "report": False}
+    with locked(str(out), shared=True):  # as another part holds it
+        done = [algid.batch(logs, out, part=f"{part}/2", **quick) for part in (1, 2)]
+        with pytest.raises(OutputError, match="another batch is at work"):
+            algid.batch(logs, out, **quick)
+    assert [[record.job.name for record in one.records] for one in done] == [
+        ["bad", "r1/b"],
+        ["r1/a"],
+    ]
+    assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["bad", "r1/a", "r1/b"]
+    assert algid.batch(logs, out, **quick).ran == 0
+    for wrong in ("0/2", "3/2", "2", "a/b", "", "-1/2", "1/2/3"):
+        with pytest.raises(algid.errors.SettingError, match="--part: expected 1/N to N/N"):
+            algid.batch(logs, out, part=wrong, **quick)
 
 
 def test_a_growing_log_is_left_alone(tmp_path: Path) -> None:
