@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -257,8 +258,8 @@ def _workers(
 
 def share_of(jobs: list[Job], part: str, watch: bool = False) -> list[Job]:
     """The jobs of a part like ``2/40``, every 40th from the second; raises `SettingError`."""
-    number, _, count = part.partition("/")
-    if watch or not (number + count).isdecimal() or not 1 <= int(number) <= int(count):
+    number, count = part.split("/") if re.fullmatch("[0-9]{1,9}/[0-9]{1,9}", part) else ("0", "0")
+    if watch or not 1 <= int(number) <= int(count):
         expected = f"expected 1/N to N/N, and no {flag('watch')}"
         raise SettingError(f"{flag('part')}: {expected}, found {part!r:.60}")
     return jobs[int(number) - 1 :: int(count)]
