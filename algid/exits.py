@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from enum import IntEnum
 
 
@@ -20,9 +20,9 @@ class Exit(IntEnum):
 
 MEANINGS: Mapping[Exit, str] = {
     Exit.OK: "a result to use, good or with reservations",
-    Exit.LIMIT: "a limit was passed: an error, a misfit, failed jobs of a batch",
+    Exit.LIMIT: "a limit was exceeded: an error, a misfit, failed jobs of a batch",
     Exit.USAGE: "the call or a file is wrong; one line says what to do",
-    Exit.FAILED: "failed, or not all is identifiable: do not use it as it is",
+    Exit.FAILED: "failed, or some parameters not identifiable: do not use",
     Exit.DATA_LOST: "usable, but data were lost",
     Exit.INTERNAL: "a fault of algid",
     Exit.STOPPED: "stopped by a signal (128 + its number); nothing half-written is left",
@@ -30,9 +30,9 @@ MEANINGS: Mapping[Exit, str] = {
 WHAT_TO_DO: Mapping[Exit, str] = {
     Exit.OK: "go on",
     Exit.LIMIT: "alert",
-    Exit.USAGE: "mend it, do not retry",
-    Exit.FAILED: "look at the verdict's command and the report",
-    Exit.DATA_LOST: "go on, and look at the recorder",
+    Exit.USAGE: "correct it, do not retry",
+    Exit.FAILED: "read the verdict and the report",
+    Exit.DATA_LOST: "go on, and check the recorder",
     Exit.INTERNAL: "report it",
     Exit.STOPPED: "retry",
 }
@@ -65,9 +65,8 @@ def epilog(command: str) -> str:
     return "Exit codes: " + "; ".join(f"{int(code)} {MEANINGS[code]}" for code in codes) + "."
 
 
-def table() -> str:
-    """All codes as a table in Markdown, as README and guide have it."""
-    lines = ["| exit code | meaning | what a scheduler should do |", "|---|---|---|"]
+def rows() -> Iterator[tuple[str, str, str]]:
+    """All codes as rows of a table, its head first, as README and guide have it."""
+    yield "exit code", "meaning", "what a scheduler should do"
     for code, meaning in MEANINGS.items():
-        lines.append(f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |")
-    return "\n".join(lines)
+        yield str(int(code)), meaning, WHAT_TO_DO[code]

@@ -53,6 +53,6 @@ def table4(folder: Path) -> Table:
 if __name__ == "__main__":
     Console().print(table4(Path(sys.argv[1])))
     print(
-        "The torque was sought for this table, which the paper does not state: see `algid guide "
-        "paper`."
+        "The paper does not state the torque; this one was fitted to its table: see `algid guide "
+        "estimators`."
     )

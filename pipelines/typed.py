@@ -1,7 +1,7 @@
 """Run the commands of the guide's pages and write their output into the pages.
 
-A fence ``text`` holds the output of the fence ``sh`` before it. One that begins with ``…`` shows
-lines that were chosen by hand, and stays as it is.
+A fence ``text`` or ``text found`` has the output of the fence ``sh`` before it. One with ``…``
+shows lines that were chosen by hand, and stays as it is.
 
 Usage: python -m pipelines.typed [PAGE …]
 """
@@ -17,8 +17,8 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("lab", "campaign")
-FENCE = re.compile(r"^```(sh|text)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PAGES = ("lab", "motion")
+FENCE = re.compile(r"^```(sh|text|text found)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def run(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -64,10 +64,10 @@ def typed(text: str, folder: Path) -> str:
         if kind == "sh":
             printed = output(inside, folder)
             return fence[0]
-        if inside.startswith("…\n"):  # lines that were chosen by hand
+        if "…" in inside:  # lines that were chosen by hand
             return fence[0]
         lines = [line.rstrip() for line in printed.strip("\n").splitlines()]
-        return "```text\n" + "".join(f"{line}\n" for line in lines) + "```"
+        return f"```{kind}\n" + "".join(f"{line}\n" for line in lines) + "```"
 
     return FENCE.sub(block, text)
 

@@ -101,7 +101,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("arm compiled errors files limits model notices physics progress report "
                   "significance text verdict words", "numpy polars scipy"),
     "api": room(
-        "batches check designs errors estimators example exports files fleet identification "
+        "batches check designs errors estimators example exits exports files fleet identification "
         "inspection limits log methods model notices options physics profile progress "
         "readers report results runtime settings stores synth tracks units writers",
         "numpy plotly polars",

@@ -7,6 +7,7 @@ from enum import StrEnum
 from importlib import resources
 
 from algid.api.choices import with_lists
+from algid.exits import rows
 from algid.options import PROFILE, SETTINGS, flag, options_of
 
 
@@ -16,40 +17,35 @@ class GuideTopic(StrEnum):
     START = "start"
     ARM = "arm"
     LAB = "lab"
-    CAMPAIGN = "campaign"
     LOGS = "logs"
     MOTION = "motion"
-    EXPORT = "export"
     REPORT = "report"
     WARNINGS = "warnings"
-    ESTIMATORS = "estimators"
-    PAPER = "paper"
     PAYLOAD = "payload"
+    EXPORT = "export"
     BATCH = "batch"
-    CI = "ci"
     PYTHON = "python"
+    ESTIMATORS = "estimators"
     MEASURED = "measured"
     CONTRIBUTING = "contributing"
 
 
 SUMMARIES = {
-    GuideTopic.START: "a first result from a real log",
-    GuideTopic.ARM: "the drawing, the equation of motion, what each constant is",
-    GuideTopic.LAB: "a real arm, from its logs to what it carries, to be typed along",
-    GuideTopic.CAMPAIGN: "from a design over the recording to the export, to be typed along",
+    GuideTopic.START: "a first result from a real log, in five minutes",
+    GuideTopic.ARM: "drawing, equation of motion, meaning of each constant",
+    GuideTopic.LAB: "a real arm, from its logs to its payload, to type along",
     GuideTopic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
-    GuideTopic.MOTION: "which motion to record",
-    GuideTopic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C; the payload as YAML",
+    GuideTopic.MOTION: "which motion to record: design, recording, comparison with the plan",
     GuideTopic.REPORT: "the report, figure by figure",
     GuideTopic.WARNINGS: "every warning and status: meaning, cause, what to do",
-    GuideTopic.ESTIMATORS: "the estimators, the torque's terms, and what they assume",
-    GuideTopic.PAPER: "the paper's method, its misprints, and how special its torque is",
-    GuideTopic.PAYLOAD: "payloads, lengths, payload in time",
-    GuideTopic.BATCH: "thousands of logs, fleets, clusters",
-    GuideTopic.CI: "an arm and its logs checked by a forge at every change",
+    GuideTopic.PAYLOAD: "payload mass, lengths, payload in time",
+    GuideTopic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C, and draws of it; the payload "
+    "as YAML",
+    GuideTopic.BATCH: "many logs, fleets, exit codes, CI, clusters",
     GuideTopic.PYTHON: "the Python API",
+    GuideTopic.ESTIMATORS: "the estimators, the torque's terms, assumptions, the paper's method",
     GuideTopic.MEASURED: "accuracy, robustness and speed, each figure with its command",
-    GuideTopic.CONTRIBUTING: "the house and its rules",
+    GuideTopic.CONTRIBUTING: "architecture and conventions",
 }
 
 
@@ -121,5 +117,6 @@ TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
     "<!-- units -->": _units,
     "<!-- settings -->": lambda: _options(SETTINGS),
     "<!-- profile -->": lambda: _options(PROFILE),
+    "<!-- exits -->": rows,
 }
 """Rows of a table by the mark in whose place it stands."""
