@@ -124,7 +124,7 @@ def fit(
                 return replace(refuted, iterations=steps)
         beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
         width = None
-        if end != "unsettled" and has_width(shared.model):
+        if has_width(shared.model):
             shared, beta, outcomes, end, width = _settled_width(
                 shared, logs, (beta, outcomes, end), anchored, progress
             )
