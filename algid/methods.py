@@ -36,8 +36,6 @@ class Estimator:
         Where its velocities come from, unless the settings say otherwise.
     lacks : names of settings
         That mean nothing to it: of the model its terms, of gravity that it is zero.
-    endogenous : bool
-        Whether torque that the model lacks biases it where that torque drives the motion.
     beside_paper : bool
         Whether its report shows the paper's convergence too.
     """
@@ -49,7 +47,6 @@ class Estimator:
     fit: Callable[..., Fit] | None
     observer: Literal["zero-phase", "luenberger"] = "zero-phase"
     lacks: tuple[str, ...] = ()
-    endogenous: bool = True
     beside_paper: bool = False
 
 
@@ -116,7 +113,6 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "the same windows, with regressors simulated from the measured torque as instruments",
         "where unmodelled torque drives the motion",
         _instruments,
-        endogenous=False,
     ),
     Estimator(
         "paper",

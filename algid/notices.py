@@ -258,11 +258,6 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "REFINED_FAILED": "the refined estimator did not converge, and the {kept} estimate with robust "
     "intervals stands in its place",
     "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight",
-    "ENDOGENEITY": (
-        "instruments and least squares are {distance:.1f} standard deviations apart: torque that "
-        "the model lacks "
-        "drives the motion, and least squares takes the constants too small"
-    ),
     "INSTRUMENTS_STAND": (
         "torque that the model lacks drives the motion (least squares is {distance:.1f} of its "
         "standard deviations "

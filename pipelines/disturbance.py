@@ -112,17 +112,6 @@ def evaluate(draws: int, arms: int = 3) -> list[dict[str, Any]]:
                     "asked": None,
                 }
             )
-        statistics = [
-            instruments.endogeneity([s], [], weak.WeakSettings(), f) or np.nan
-            for s, f in zip(sources, starts, strict=True)
-        ]
-        rows.append(
-            {
-                "what": f"{name}: statistic of endogeneity, median",
-                "value": float(np.nanmedian(statistics)),
-                "asked": None,
-            }
-        )
     return rows
 
 

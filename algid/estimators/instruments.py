@@ -30,7 +30,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +41,6 @@ from algid.estimators.combine import (
     BlockSums,
     LogInformation,
     Prior,
-    long_run_variance,
     scaled_pinv,
 )
 from algid.estimators.fit import Fit, conclude
@@ -50,7 +48,6 @@ from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.references import Following, followed
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, acceleration, inertia
-from algid.names import evenly_spread
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
@@ -60,8 +57,6 @@ _STEP = 4e-3  # s: of the simulation, in which motions of 10 Hz turn by a quarte
 _ASTRAY = 100.0  # rad: a simulated window that ends so far from the measured one has run away
 _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
-_EXAMINED = 2  # pieces of each log that `endogeneity` looks at
-_MOST_EXAMINED = 64  # logs of a kind, evenly spread, that it looks at
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +208,6 @@ def moments(
     sources: Sequence[Source],
     settings: WeakSettings,
     c: FloatArray,
-    most: int | None = None,
     following: Following | None = None,
 ) -> list[Moments | None]:
     """Sums over each log, the windows simulated with coefficients `c`.
@@ -221,11 +215,11 @@ def moments(
     None of those that these do not move. Where it is known how the arm is `following` a
     reference, the motion that this explains stands in place of a simulated one.
 
-    At most `most` pieces of a log are looked at. The windows of many pieces are simulated side by
-    side: a step costs the same for few as for many.
+    The windows of many pieces are simulated side by side: a step costs the same for few as for
+    many.
     """
     gathered = [_Sums() for _ in sources]
-    for batch in _batches(sources, settings, most):
+    for batch in _batches(sources, settings):
         if following is None:
             instruments = _side_by_side(batch, settings, c)
         else:
@@ -266,14 +260,12 @@ _Piece = tuple[int, Segment, Windows]
 """The number of a log, a piece of it and the windows on that."""
 
 
-def _batches(
-    sources: Sequence[Source], settings: WeakSettings, most: int | None
-) -> Iterator[list[_Piece]]:
+def _batches(sources: Sequence[Source], settings: WeakSettings) -> Iterator[list[_Piece]]:
     """Pieces with whole windows, those together that are alike and have not too many samples."""
     batch: list[_Piece] = []
     samples = 0
     for number, source in enumerate(sources):
-        for piece, windows, _ in islice(weak.overlapping(source(), settings), most):
+        for piece, windows, _ in weak.overlapping(source(), settings):
             if (len(piece) - 2 * windows.margin) // windows.step < OVERLAP:
                 continue
             if batch and (samples + len(piece) > _TOGETHER or not _alike(windows, batch[0][2])):
@@ -486,47 +478,3 @@ def _inert(model: Model, c: FloatArray, theta: FloatArray) -> NDArray[np.bool_]:
     """Whether the mass matrix is positive definite at the angles (2, R, S) of each window (R,)."""
     (m11, m12), (_, m22) = inertia(model, c, theta)
     return np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)
-
-
-def endogeneity(
-    unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings, fit: Fit
-) -> float | None:
-    """Distance of instruments from least squares on the same windows, in the former's std.
-
-    The statistic of Durbin, Wu and Hausman (Hausman 1978), coefficient by coefficient; the largest
-    is returned, of which `algid.significance.chance` makes a p value. None where the windows cannot
-    be simulated. Of a long log the first pieces are looked at.
-    """
-    if fit.delay is not None:
-        settings = replace(settings.delayed(fit.delay), estimate_delay=False)
-    largest = None
-    for kind, sources in ((False, unloaded), (True, loaded)):
-        if not sources:
-            continue
-        c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-        looked_at = evenly_spread(sources, _MOST_EXAMINED)
-        following = followed(looked_at, settings)
-        gathered = moments(looked_at, settings, c, _EXAMINED, following)
-        sums = [one for one in gathered if one is not None and one.rows and not gone_astray(one)]
-        if sums:
-            largest = max(largest or 0.0, _apart(sums, c, kind))
-    return largest
-
-
-def _apart(sums: Sequence[Moments], c: FloatArray, loaded: bool) -> float:
-    q = c.size
-    squares = [_only_least_squares(one, q) for one in sums]
-    least, _ = solve(squares, c, loaded)
-    better, logs = solve(sums, c, loaded)
-    S, _ = _added(logs)
-    inverse = scaled_pinv(S)
-    meat = np.sum([long_run_variance(log.g)[0] for log in logs], axis=0)
-    std = np.sqrt(np.maximum(np.diag(inverse @ meat @ inverse), 0.0))
-    determined = std < np.abs(better) + np.abs(least)  # what neither determines is not apart
-    return float(np.max(np.abs(better - least)[determined] / std[determined], initial=0.0))
-
-
-def _only_least_squares(sums: Moments, q: int) -> Moments:
-    """The same windows with X as its own instruments."""
-    order = np.concatenate([np.arange(q, 2 * q), np.arange(q, 2 * q + 1)])
-    return replace(sums, gram=sums.gram[:, :, order[:, None], order])

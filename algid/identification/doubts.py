@@ -1,10 +1,10 @@
-"""What is asked of a fit afterwards: its residual, its instruments, what makes it doubtful."""
+"""What is asked of a fit afterwards: its residual, what makes it doubtful."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from algid.estimators import instruments, weak
+from algid.estimators import weak
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, constrained
 from algid.estimators.doubt import doubted, doubted_without_motor
 from algid.estimators.fit import Fit
@@ -82,12 +82,3 @@ def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
         total += score(fit.shared.model, c, survey.segments(log), shift)
     predicted = prediction(total)
     return predicted is not None and bool(predicted.unexplained(MOST))
-
-
-def with_endogeneity(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
-    """The fit with the distance of instruments from least squares on its logs, if not yet known."""
-    if fit.endogeneity is not None:
-        return fit
-    unloaded, loaded = passes(survey, settings)
-    ours = weak_settings(settings, chosen)
-    return replace(fit, endogeneity=instruments.endogeneity(unloaded, loaded, ours, fit))

@@ -257,7 +257,7 @@ def _by_likelihood(
     survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
 ) -> tuple[Identified, Settings]:
     """The outcome of the logs, and the settings with the effort that they show."""
-    from algid.identification.doubts import residual_of, with_doubt, with_endogeneity
+    from algid.identification.doubts import residual_of, with_doubt
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
 
@@ -272,13 +272,14 @@ def _by_likelihood(
         fit, predictions, chosen = _fitted(survey, settings, earlier)
         sure = with_doubt(fit, survey, settings, chosen)
     settings = replace(settings, torque_hold=chosen.hold)
-    fit = with_endogeneity(sure, survey, settings, chosen)
     survey.begin("prediction")
-    outcome = outcome_of(fit, predictions, survey, settings, chosen)
+    outcome = outcome_of(sure, predictions, survey, settings, chosen)
     outcome = replace(outcome, notices=outcome.notices + of_driver)
     if folder is not None:
         survey.begin("series")
-        write_fit_series(folder, fit, survey, settings, residual_of(survey, settings, chosen, fit))
+        write_fit_series(
+            folder, sure, survey, settings, residual_of(survey, settings, chosen, sure)
+        )
         if estimator_of(settings.estimator).beside_paper:
             outcome = _with_the_papers(outcome, survey, settings, folder)
     return outcome, settings

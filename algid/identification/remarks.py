@@ -12,10 +12,9 @@ from algid.estimators.fit import Fit
 from algid.estimators.shrunk_fit import unshrunk
 from algid.identification.phases import phase_note
 from algid.identification.source import LogSource
-from algid.methods import estimator_of
 from algid.model import K4
 from algid.notices import Notice, Remedy, has_code
-from algid.significance import CERTAIN, LEVEL, chance, sigmas
+from algid.significance import CERTAIN, sigmas
 from algid.units import TORQUE
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
@@ -64,13 +63,6 @@ def fit_warnings(fit: Fit, unit: float | None = None) -> Iterator[Notice]:
             "NO_GRAVITY",
             remedies=(Remedy({"l1": None}, "a length tells its mass"),) if needed else (),
         )
-    if (
-        fit.endogeneity is not None
-        and chance(fit.endogeneity, len(fit.shared.log_names)) < LEVEL
-        and estimator_of(fit.estimator).endogenous
-    ):
-        instruments = Remedy({"estimator": "instruments"}, "to compare")
-        yield Notice("ENDOGENEITY", numbers={"distance": fit.endogeneity}, remedies=(instruments,))
     phases = phase_note(fit)
     if phases is not None:
         yield phases

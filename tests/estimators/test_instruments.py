@@ -4,7 +4,6 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +16,6 @@ from algid.estimators.modulating_functions import Windows
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, Motion, acceleration, torque
 from algid.signals.segments import Segment
-from algid.significance import LEVEL, chance
 from algid.synth.cases import load_case
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
@@ -38,17 +36,6 @@ def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
     bias = (least.values / truth - 1)[inertias]
     assert np.all(bias < -0.05)  # attenuated
     assert np.all(np.abs(found.values / truth - 1)[inertias] < 0.6 * np.abs(bias))
-    apart = instruments.endogeneity(sources, [], WeakSettings(), least)
-    assert apart is not None
-    assert chance(apart, least.values.size) < LEVEL
-
-
-def test_without_a_disturbance_both_agree(bench: Bench) -> None:
-    sources: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=seed)]) for seed in range(2)]
-    least = weak.fit(sources)
-    apart = instruments.endogeneity(sources, [], WeakSettings(), least)
-    assert apart is not None
-    assert chance(apart, least.values.size) > LEVEL
 
 
 def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: Bench) -> None:
@@ -204,27 +191,8 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     assert told.std[3] < 2e-5 * k4
 
 
-def test_of_a_long_log_the_first_pieces_are_looked_at(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(weak, "PIECE_SAMPLES", 500)
-    log = bench.log(sigma=1e-3)
-    least = weak.fit([lambda: [log]])
-    taken = []
-
-    def source() -> Iterator[Segment]:
-        for place, first in enumerate(range(0, 4000, 500)):
-            taken.append(place)
-            yield replace(log.part(first, first + 500), continues=place > 0)
-
-    apart = instruments.endogeneity([source], [], WeakSettings(), least)
-    assert apart is not None
-    assert 2 <= max(taken) + 1 <= 4  # one more is asked for before a piece is known to be whole
-
-
 def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Evenly spread, for the choice of terms and for endogeneity."""
-    monkeypatch.setattr(instruments, "_MOST_EXAMINED", 2)
+    """Evenly spread, for the choice of terms."""
     monkeypatch.setattr(selection, "MOST_LOGS", 2)
     looked_at: list[int] = []
 
@@ -233,11 +201,6 @@ def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.Monke
         return [bench.log(sigma=1e-3, seed=number)]
 
     sources: list[Source] = [partial(source, number) for number in range(4)]
-    least = weak.fit(sources)
-    looked_at.clear()
-    assert instruments.endogeneity(sources, [], WeakSettings(), least) is not None
-    assert looked_at == [0, 0, 2]  # the first is asked for a reference
-    looked_at.clear()
     assert not selection.select(sources, [], WeakSettings()).model.terms
     assert looked_at == [0, 2]
 

@@ -298,16 +298,6 @@ def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
     assert list(fit_warnings(replace(fit_of(), notes=(note,)))) == [note]
 
 
-def test_endogeneity_is_told_unless_instruments_already_stand_in() -> None:
-    fit = replace(fit_of(), endogeneity=8.25)
-    (one,) = found(fit, "ENDOGENEITY")
-    assert one.numbers["distance"] == 8.25
-    assert one.remedy is not None
-    assert one.remedy.flags == ("--estimator", "instruments")
-    assert not found(replace(fit, estimator="instruments"), "ENDOGENEITY")
-    assert not found(replace(fit, endogeneity=0.3), "ENDOGENEITY")
-
-
 def notes(**changes: Any) -> list[Notice]:
     summary = FitSummary(
         noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
