@@ -84,17 +84,31 @@ class ThinnedLog:
     squares: FloatArray
 
 
+def _windows(dt: float, rate: float) -> tuple[int, Windows]:
+    """How many samples are averaged to leave `rate` Hz, and the windows on what that leaves."""
+    width = max(1, round(1 / (rate * dt)))
+    dt *= width
+    return width, Windows(dt, WINDOW, 0.0, max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW))
+
+
+def holds_window(samples: int, dt: float, rate: float) -> bool:
+    """True if a stretch of so many `samples`, thinned to `rate` Hz, holds a window."""
+    width, windows = _windows(dt, rate)
+    assert windows.bandwidth is not None
+    reach = half_length(windows.dt, windows.bandwidth)
+    return samples // width - 2 * reach >= OVERLAP * windows.step
+
+
 def thinned(
     theta: FloatArray, tau: FloatArray, dt: float, rate: float, longest: float
 ) -> ThinnedLog:
     """Means over as many samples as leave `rate` Hz, of the first `longest` s."""
-    width = max(1, round(1 / (rate * dt)))
+    width, windows = _windows(dt, rate)
+    assert windows.bandwidth is not None
     count = min(theta.shape[1], round(longest / dt)) // width
     theta = theta[:, : count * width].reshape(2, count, width).mean(axis=2)
     tau = tau[:, : count * width].reshape(2, count, width).mean(axis=2)
-    dt *= width
-    bandwidth = max(min(_BANDWIDTH, 0.2 / dt), 6.0 / WINDOW)
-    windows = Windows(dt, WINDOW, 0.0, bandwidth)
+    dt, bandwidth = windows.dt, windows.bandwidth
     omega, kernels = correlate(theta, differentiator(dt, bandwidth)), windows.kernels()
     squares = windows.moments(omega**2, kernels[0])
     return ThinnedLog(theta, omega, tau, dt, half_length(dt, bandwidth), windows, kernels, squares)

@@ -56,7 +56,7 @@ class Survey:
         self.progress = progress
         self._seen: dict[LogSource, Seen] = {}
         self._findings: dict[LogSource, tuple[Notice, ...]] = {}
-        self._recorded: dict[LogSource, Recorded] = {}
+        self._recorded: dict[LogSource, list[Recorded]] = {}
         self._limits: dict[LogSource, tuple[Limit, ...]] = {}
         self._conventions: dict[LogSource, Notice] | None = None
         self._digests: dict[LogSource, Beside[str]] = {}
@@ -178,11 +178,8 @@ class Survey:
             if any(one.code in CONTRADICTIONS for one in notices):
                 self._limits[log] = ()  # of an arm that is not this one
             return notices
-        kept = None
         if log.effort != "external" and log in evenly_spread(alike, MOST_LOGS):
-            kept = recorded(begin, seconds_of_each(len(alike)))
-        if kept is not None:
-            self._recorded[log] = kept
+            self._recorded[log] = recorded(begin, seconds_of_each(len(alike)))
         return notices
 
     def summary(self, log: LogSource) -> LogSummary:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.criteria import CUT
 from algid.estimators.saturation import UNSEEN, Saturation
 from algid.inspection.candidates import torques_beside
 from algid.inspection.figures import differences, robust_deviation, saturated_share, thinned
@@ -125,7 +126,9 @@ def angles(log: Log) -> Iterator[Notice]:
             continue
         wraps = 0
         if largest > 0.8 * _TURN:  # of most logs no step is, and none has to be looked at
-            wraps = int(np.count_nonzero(np.abs(sizes - _TURN) < 0.1 * _TURN))
+            # over a gap that cuts the log, a joint may have turned round
+            joined = np.diff(log.stamp_ns) <= CUT * log.period * 1e9
+            wraps = int(np.count_nonzero((np.abs(sizes - _TURN) < 0.1 * _TURN) & joined))
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and median(thinned(sizes)) < 0.5:
             yield Notice(
@@ -147,11 +150,11 @@ def angles(log: Log) -> Iterator[Notice]:
             yield Notice("STUCK_SENSOR", numbers=numbers)
 
 
-def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
+def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
     """Angles or velocities in degrees, by each other or by how far the angles turn.
 
-    A joint may turn as often as it will: `is_right` says whether physics holds for the log as it
-    was read.
+    A joint may turn as often as it will: `is_to_scale` says whether physics holds for the log as
+    it was read, and no scale of its angles does better.
     """
     ratios = (0.0, 0.0)
     if log.omega is not None:
@@ -164,7 +167,7 @@ def degrees(log: Log, is_right: Callable[[], bool]) -> Iterator[Notice]:
                 yield _in_degrees(log, f"{quantity}{joint}", seen)
     widest = np.abs(log.theta).max(axis=1)
     row = int(np.argmax(widest))
-    if widest[row] > 12 * math.pi and not any(ratios) and not is_right():
+    if widest[row] > 12 * math.pi and not any(ratios) and not is_to_scale():
         seen = {"case": "reach", "largest": float(widest[row])}
         yield _in_degrees(log, f"theta{row + 1}", seen)
 

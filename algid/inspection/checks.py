@@ -16,7 +16,7 @@ from algid.inspection.channels import (
     spikes,
 )
 from algid.inspection.clipping import saturation
-from algid.inspection.conventions import advised, is_right, judged, mend
+from algid.inspection.conventions import advised, is_right, is_to_scale, judged, mend
 from algid.inspection.dynamics import dynamic_figures, gravity_findings
 from algid.inspection.findings import yielding
 from algid.inspection.sampling import rests, sampling
@@ -68,7 +68,7 @@ def examine(
         every += dead_efforts(log)
     every += held_efforts(log)
     every += angles(log)
-    every += degrees(log, lambda: is_right(tried()))
+    every += degrees(log, lambda: is_to_scale(tried()))
     every += spikes(log)
     every += sampling(log)
     every += rests(log, whole)

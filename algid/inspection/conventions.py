@@ -7,7 +7,7 @@ that change the reading.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import degrees, isclose, pi, remainder
@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from algid.estimators.convention_search import (
+    MOST_LOGS,
     Candidate,
     Judgement,
     Recorded,
@@ -87,27 +88,29 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
     log : Log, as it was read
     gravity : False for an arm in a horizontal plane
     """
-    return judged_together([recorded(log)], gravity=gravity)
+    return judge_together(recorded(log), gravity=gravity)
 
 
-def judged_together(logs: Iterable[Recorded | None], *, gravity: bool = True) -> Judgement | None:
-    """The same of logs of one arm, those that are None left out."""
-    return judge_together([log for log in logs if log is not None], gravity=gravity)
-
-
-def recorded(log: Log, seconds: float = math.inf) -> Recorded | None:
-    """The beginning of the longest stretch of a log without a gap; None of an empty one."""
-    longest = max(stretches([log]), key=len, default=None)
-    if longest is None:
-        return None
-    part = longest.part(0, int(min(len(longest), seconds / longest.dt)))
-    passive = log.origin.reading.passive
-    return Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive)
+def recorded(log: Log, seconds: float = math.inf) -> list[Recorded]:
+    """The stretches of a log without a gap, the longest first, `seconds` of them in all."""
+    passive, parts = log.origin.reading.passive, []
+    for stretch in sorted(stretches([log]), key=len, reverse=True)[:MOST_LOGS]:
+        part = stretch.part(0, int(min(len(stretch), seconds / stretch.dt)))
+        seconds -= len(part) * part.dt
+        parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive))
+    return parts
 
 
 def is_right(judgement: Judgement | None) -> bool:
     """Whether physics holds for a log as it was read, and for no other convention."""
     return judgement is not None and judgement.alone and judgement.best.convention == AS_READ
+
+
+def is_to_scale(judgement: Judgement | None) -> bool:
+    """True if the log shows a real arm as it was read, and no scale of its angles a better one."""
+    if judgement is None:
+        return False
+    return judgement.as_read.convincing and judgement.best.convention.scale == AS_READ.scale
 
 
 def mend(log: Read, judgement: Judgement | None) -> Mend | None:
@@ -158,18 +161,20 @@ def _contradiction(judgement: Judgement) -> str:
     return f"it demands {name}, which the log misses by {missed}"
 
 
-def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> list[Mend | None]:
+def mends(
+    logs: Sequence[tuple[Read, list[Recorded]]], *, gravity: bool = True
+) -> list[Mend | None]:
     """What sets each of several logs of one arm right: see `mend`.
 
     They are judged together. Where that leaves it open, each is judged alone, and only for another
     convention: in a single run, friction can look like zeros that are off.
     """
-    judgement = judged_together([recording for _, recording in logs], gravity=gravity)
+    judgement = judge_together([part for _, parts in logs for part in parts], gravity=gravity)
     if judgement is not None and judgement.alone:
         return [mend(log, judgement) for log, _ in logs]
     own: list[Mend | None] = []
-    for log, recording in logs:
-        one = mend(log, judged_together([recording], gravity=gravity))
+    for log, parts in logs:
+        one = mend(log, judge_together(parts, gravity=gravity))
         if one is not None and not one.another:
             one = None
         own.append(one)
@@ -178,23 +183,20 @@ def mends(logs: Sequence[tuple[Read, Recorded]], *, gravity: bool = True) -> lis
 
 def advised(log: Log, suspicion: Suspicion) -> Notice:
     """The notice of a suspicion with its remedies: those under which the log shows a real arm."""
-    recording = recorded(log)
-    if recording is None:
-        return replace(suspicion.notice, remedies=())
-    return replace(suspicion.notice, remedies=tuple(_tried(log, suspicion, recording)))
+    return replace(suspicion.notice, remedies=tuple(_tried(log, suspicion, recorded(log))))
 
 
-def _tried(log: Log, suspicion: Suspicion, recording: Recorded) -> Iterator[Remedy]:
+def _tried(log: Log, suspicion: Suspicion, parts: list[Recorded]) -> Iterator[Remedy]:
     """The remedies that are physical and explain the torque."""
     if suspicion.weightless:
-        weightless = tried_together([recording], AS_READ, gravity=False)
+        weightless = tried_together(parts, AS_READ, gravity=False)
         if weightless is not None and weightless.convincing:
             yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
             yield Remedy({"gravity": 0}, "for a horizontal plane")
-    together = partial(tried_together, [recording])
+    together = partial(tried_together, parts)
     real = [one.convention for one in _tried_of(suspicion, together) if one.convincing]
     if suspicion.free_zero and not real:
-        zeroed = _tried_of(suspicion, partial(zeroed_together, [recording]))
+        zeroed = _tried_of(suspicion, partial(zeroed_together, parts))
         real = [one.convention for one in zeroed if one.convincing]
     if not real:  # friction may hide inertia, and not where gravity pulls
         real = [one.convention for one in _tried_of(suspicion, together) if one.plausible]

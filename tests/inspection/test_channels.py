@@ -143,6 +143,15 @@ def test_wraps_are_counted(turns: int) -> None:
     assert [*channels.angles(logged(np.stack([np.sin(T), angle])))] == []
 
 
+def test_a_turn_over_a_gap_is_no_wrap() -> None:
+    """A joint may turn round while nothing is recorded; a gap that is filled in hides a wrap."""
+    theta = np.stack([np.sin(T), 0.1 * T])
+    theta[1, 700:] += 2 * math.pi
+    for periods, told in ((6.0, []), (4.0, ["WRAPPED_ANGLE"])):
+        stamps = T + 1e-3 * (periods - 1) * (np.arange(ROWS) >= 700)
+        assert [one.code for one in channels.angles(logged(theta, stamps=stamps))] == told
+
+
 @pytest.mark.parametrize(
     ("jump", "wraps"), [(0.89, False), (0.92, True), (1.08, True), (1.11, False)]
 )

@@ -16,7 +16,7 @@ import pytest
 from algid.arm import Arm, inverse_dynamics
 from algid.cli.settings import profile_from
 from algid.estimators.conventions import AS_READ, Convention
-from algid.inspection.conventions import Mend, advised, judged, mend
+from algid.inspection.conventions import Mend, advised, is_right, judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures, gravity_findings
 from algid.log import Log, Origin, Reading
@@ -95,6 +95,20 @@ def test_a_rough_fit_goes_by_the_stamps(uneven: str) -> None:
     assert found.turn == pytest.approx(0, abs=1)
     assert found.weight1 == pytest.approx(K[3], rel=0.01)
     assert found.explained > 0.999
+
+
+def test_conventions_are_judged_over_all_stretches() -> None:
+    """None of ten stretches of 1 s shows a convention by itself."""
+    log = swung()
+    kept = (log.t % 2.0) > 1.0
+    log = replace(log, stamp_ns=log.stamp_ns[kept], theta=log.theta[:, kept], tau=log.tau[:, kept])
+    assert is_right(judged(log))
+    flipped = replace(log, tau=-log.tau)
+    found = mend(flipped, judged(flipped))
+    assert found is not None
+    assert found.settings == {"tau1": {"sign": -1}, "tau2": {"sign": -1}}
+    alone = log.part(0, int(np.argmax(np.diff(log.stamp_ns))) + 1)
+    assert judged(alone) is None
 
 
 @pytest.mark.parametrize(
