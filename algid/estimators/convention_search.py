@@ -27,6 +27,7 @@ from algid.estimators.convention_sums import (
     ZEROED,
     ConventionSums,
     ThinnedLog,
+    holds_window,
     moving,
     solved,
     summed,
@@ -58,6 +59,9 @@ _EXACT = (180 / pi, 1 / (2 * pi)) + tuple(range(2, 401))
 """Scales of their own right: degrees, turns, whole gears."""
 _NEAR = 0.01  # of a scale: how near one of those it is tried for them
 
+_NEXT_TO_AXIS, _LONG = 0.02, 1.5
+_OF_SIDE = ("k1 > 0", "k2 > 0", "k1 k2 > 0")
+"""Demands that hold where link 2's centre of mass is off its axis: see `Candidate.balanced`."""
 _INERTIAL = ("M22 > 0", "k5 > 0", "det M > 0", "k1 k2 > 0")
 
 MOST_LOGS = 32
@@ -116,11 +120,32 @@ class Candidate:
         """The convention, zeros included."""
         return replace(self.family, zero=self.zero)
 
+    @property
+    def other_side(self) -> Convention:
+        """The convention with θ2 half a turn off, which turns the signs of k1 and k2."""
+        return replace(self.family, zero=(self.zero[0], (self.zero[1] + pi) % (2 * pi)))
+
     @cached_property
     def demands(self) -> dict[str, float]:
         """What physics demands, and how many standard deviations the log is on the right side."""
         k = dict(zip(self.names, self.k.tolist(), strict=True))
-        return _demands(k, self.covariance, self.speed)
+        demands = _demands(k, self.covariance, self.speed)
+        if self.balanced:
+            demands = {name: far for name, far in demands.items() if name not in _OF_SIDE}
+        return demands
+
+    @property
+    def balanced(self) -> bool:
+        """True if link 2's centre of mass is next to its axis: k1 and k2 have either sign then.
+
+        lc2² ≥ k1 k2 / (k3 k4) k3 / m2, since m2 ≤ k4 / (g l1) with l1 = g k1 / k2 (Table 1), or
+        without gravity m2 ≤ k5 / l1². Of a link much lighter than the first that bound says
+        little: it has to be a long pendulum too, k3 / k1 in lengths l1.
+        """
+        k = dict(zip(self.names, self.k.tolist(), strict=True))
+        along = abs(k[K1] * k.get(K2, k[K1]))
+        own = k[K3] * k.get(K4, k[K5])
+        return along < _NEXT_TO_AXIS * own and _LONG * abs(k[K1]) < k[K3]
 
     @property
     def broken(self) -> dict[str, float]:
@@ -170,12 +195,13 @@ class Recorded:
 
     @property
     def usable(self) -> bool:
-        """Whether it is fast enough (ten samples a window), and its angles may be angles.
+        """True if it holds windows, of ten samples each, and its angles may be angles.
 
         One that spans more than any scale makes a joint's is none, as a spike of 1e6 rad is none.
         """
-        wide = np.ptp(self.theta, axis=1).max() > _SCALES[1] * _WIDEST
-        return self.theta.shape[1] * self.dt >= 2 * WINDOW and 10 * self.dt <= WINDOW and not wide
+        if np.ptp(self.theta, axis=1).max() > _SCALES[1] * _WIDEST or 10 * self.dt > WINDOW:
+            return False
+        return all(holds_window(self.theta.shape[1], self.dt, rate) for rate, _ in (_FINE, _COARSE))
 
 
 def judge(
@@ -271,6 +297,8 @@ def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
             continue
         if best is None:
             best = candidate
+            continue
+        if best.balanced and candidate.convention == best.other_side:
             continue
         alone = best.convincing and candidate.score - best.score > apart
         return Judgement(as_read, best, alone)

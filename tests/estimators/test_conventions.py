@@ -24,6 +24,7 @@ from algid.estimators.convention_sums import ZEROED
 from algid.estimators.conventions import AS_READ, Convention
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
+from pipelines.accuracy_scenes import random_arm
 from tests.estimators.conftest import DT, Bench
 
 Pair = tuple[FloatArray, FloatArray]
@@ -191,6 +192,34 @@ def test_logs_of_an_arm_are_judged_together(bench: Bench) -> None:
         assert found is not None
         assert found.alone
         assert found.best.convention == mistake
+
+
+@pytest.mark.parametrize("off", [-0.01, 0.01])
+def test_a_balanced_second_link_has_either_sign(off: float) -> None:
+    """Its centre of mass is within 1 % of l2 of its axis: half a turn of θ2 changes next to nothing
+    but the signs of k1 and k2.
+    """
+    arm = random_arm(21)[0]
+    arm = replace(arm, lc2=off * arm.l2)
+    motion = simulate(arm.constants(), wide_multi_sine(arm, 3), np.arange(4001) * DT)
+    for mistake in (AS_READ, Convention(torque_signs=(-1, -1)), Convention(signs=(1, -1))):
+        theta, tau = measured(motion)
+        found = judged(mistake.angles(theta), mistake.torques(tau))
+        assert found.best.balanced
+        assert found.alone
+        assert found.best.convention == mistake
+
+
+def test_a_light_second_link_is_not_balanced() -> None:
+    """With 2 % of the first one's mass it still tells where θ2 is zero."""
+    arm = random_arm(21)[0]
+    share = 0.02 * arm.m1 / arm.m2
+    light = replace(arm, m2=share * arm.m2, I2=share * arm.I2, b2=share * arm.b2)
+    motion = simulate(light.constants(), wide_multi_sine(light, 3), np.arange(4001) * DT)
+    theta, tau = measured(motion, coulomb=0.0)
+    found = judged(theta + np.array([[0.0], [np.pi]]), tau)
+    assert not found.as_read.balanced
+    assert "k2 > 0" in found.as_read.broken
 
 
 @pytest.mark.parametrize("passive", [1, 2])
