@@ -14,8 +14,8 @@ from algid.errors import LogError
 from algid.files import sha256_of
 from algid.log import Log, Origin
 from algid.notices import Notice
+from algid.readers.clock import check_step
 from algid.readers.memory import Columns, is_columns, refuse_others
-from algid.readers.timebase import check_step
 from algid.results import LogSummary, Result
 from algid.runtime import ahead
 

@@ -14,7 +14,7 @@ from algid.criteria import GAP
 from algid.log import Log
 from algid.notices import Notice, of_codes
 from algid.quantiles import distinct, median
-from algid.readers.runs import PAUSE
+from algid.readers.clock import PAUSE
 from algid.signals.spacing import near_stamps, spaced
 
 ENOUGH = 1 << 18

@@ -28,6 +28,7 @@ def open_parquet(path: Path) -> TableFile:
     with as_log_error(path, "Parquet"):
         about = pq.read_metadata(path)
         schema = about.schema.to_arrow_schema()
+        names = set(schema.names)  # damaged ones are no text
         text = (about.metadata or {}).get(KEY.encode())
     companion = Companion(None, {})
     notices: tuple[Notice, ...] = ()
@@ -38,7 +39,7 @@ def open_parquet(path: Path) -> TableFile:
             raise LogError(
                 f"{path}: the truth in the file's metadata cannot be read ({error})"
             ) from error
-    if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= set(schema.names):
+    if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= names:
         notices = (Notice("NO_CHECKSUM", numbers={"case": "values"}),)
 
     def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
@@ -69,7 +70,7 @@ def open_feather(path: Path) -> TableFile:
     def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
         left = most
         with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
-            places = [schema.names.index(name) for name in columns]
+            places = [names.index(name) for name in columns]
             options = pa.ipc.IpcReadOptions(included_fields=places)
             reader = pa.ipc.open_file(source, options=options)
             for number in range(reader.num_record_batches):
@@ -84,6 +85,7 @@ def open_feather(path: Path) -> TableFile:
 
     with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
         schema = pa.ipc.open_file(source).schema
+        names = list(schema.names)  # damaged ones are no text
         # one column tells the rows; the others need not be unpacked for it
         options = pa.ipc.IpcReadOptions(included_fields=[0])
         reader = pa.ipc.open_file(source, options=options)

@@ -17,11 +17,10 @@ from algid.faults import during
 from algid.limits import LIMITS
 from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
+from algid.readers.clock import in_order
 from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
-from algid.readers.runs import one_after_another
 from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, stack
-from algid.readers.timebase import in_order
 from algid.words import counted
 
 if TYPE_CHECKING:
@@ -122,8 +121,8 @@ class TableReader:
         """Checked and sorted tables that are not empty, with what is to be said of each."""
         notices, total = self.notices, 0
         held: _Noted | None = None
-        path, only = self.origin.path, self.origin.reading.segment
-        ordered = in_order(path, one_after_another(path, self.tables(rows), only))
+        path, segment = self.origin.path, self.origin.reading.segment
+        ordered = in_order(path, self.tables(rows), segment, runs=True)
         for table in cut(self._finite(self._within(ordered)), rows):
             if total < 2 <= len(table):
                 notices += other_rate(self.stated_rate, table.stamp_ns)

@@ -231,9 +231,9 @@ def _is_nested(kind: pa.DataType) -> bool:
 
 def units_of(schema: pa.Schema, cells: Mapping[str, Cell]) -> dict[str, str]:
     """By cell the unit that the schema's metadata state of it, of its column, or of the file."""
-    units = units_in(decoded(schema.metadata), list(cells))
+    units, names = units_in(decoded(schema.metadata), list(cells)), list(schema.names)
     for name, cell in cells.items():
-        for key, value in decoded(schema.field(cell.column).metadata).items():
+        for key, value in decoded(schema.field(names.index(cell.column)).metadata).items():
             if key.lower() in ("unit", "units"):
                 unit = value.strip()
                 if unit.lower() not in _NO_UNIT:

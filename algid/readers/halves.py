@@ -16,9 +16,9 @@ from algid.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice, Remedy
 from algid.readers.assemble import TableReader
+from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.formats import entries_at
 from algid.readers.table import BLOCK_ROWS, SampleTable
-from algid.readers.timebase import Series, aligned, in_order, whole_topic
 
 if TYPE_CHECKING:
     from algid.profile import Profile

@@ -11,10 +11,10 @@ import pytest
 from algid.errors import LogError
 from algid.notices import Notice
 from algid.readers import read_log
+from algid.readers.clock import in_order
 from algid.readers.flat import time_unit, to_nanoseconds
 from algid.readers.names import take_apart
 from algid.readers.table import SampleTable
-from algid.readers.timebase import in_order
 from tests.readers.headers import opened
 
 FIELD = {

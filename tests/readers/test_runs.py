@@ -18,9 +18,8 @@ from algid.log import IntArray
 from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.runs import one_after_another
+from algid.readers.clock import in_order
 from algid.readers.table import SampleTable, stack
-from algid.readers.timebase import in_order
 
 MS = 1_000_000
 
@@ -31,7 +30,7 @@ def table(stamps: IntArray, values: FloatArray, *said: Notice) -> SampleTable:
 
 def read(parts: list[SampleTable], only: int | None = None) -> SampleTable:
     """What comes of the tables, in time order."""
-    return stack(list(in_order("log", one_after_another("log", iter(parts), only))))
+    return stack(list(in_order("log", iter(parts), only, runs=True)))
 
 
 @settings(max_examples=60, deadline=None)
@@ -139,3 +138,18 @@ def test_the_pause_between_runs_is_no_gap(lost: int, tmp_path: Path) -> None:
     assert found.clock.longest_gap == pytest.approx((lost + 1) / 500 if lost else 0.0)
     assert "RESTARTS" in [one.code for one in found.notices]
     assert ("GAPS" in [one.code for one in found.findings]) == bool(lost)
+
+
+def test_a_clock_that_stands_still_starts_no_run() -> None:
+    stamps = np.concatenate([np.arange(1000), np.full(30, 999), np.arange(1000, 2000)]) * MS
+    found = read([table(stamps, np.arange(stamps.size) * 1.0)])
+    (said,) = found.notices
+    assert (said.code, said.lossy) == ("DUPLICATE_STAMPS", True)
+
+
+def test_a_clock_set_back_by_more_than_a_short_log_so_far_starts_a_run() -> None:
+    first, second = np.arange(500, 800) * MS, np.arange(0, 2000) * MS
+    stamps = np.concatenate([first, second])
+    found = read([table(stamps, np.arange(stamps.size) * 1.0)])
+    assert len(found) == stamps.size
+    assert [one.code for one in found.notices] == ["RESTARTS"]

@@ -10,11 +10,11 @@ from algid.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice
 from algid.readers.assemble import TableReader, reader_of
+from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.joints import moving_joints
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Fields, Topic
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable
-from algid.readers.timebase import Series, aligned, in_order, whole_topic
 
 if TYPE_CHECKING:
     from algid.profile import Profile
