@@ -14,9 +14,11 @@ LONGEST_TEXT = 2000  # characters
 LONGEST_CHAIN = 100
 
 
-# What stands before the @ of an object's URL; a slash in it should have been written %2F, and may
+# What stands before the @ of a URL; a slash in it should have been written %2F, and may
 # not have been.
-_USER = re.compile(r"\b(s3|gs|az|abfss?)(:/{1,2})([^\s/?#]*@|[^\s/?#@]*:[^\s?#]*@)", re.IGNORECASE)
+_USER = re.compile(
+    r"\b([a-z][a-z0-9+.-]*)(:/{1,2})([^\s/?#]*@|[^\s/?#@]*:[^\s?#]*@)", re.IGNORECASE
+)
 _SECRET = re.compile(
     r"([?&][a-z_]*(?:secret|sig|key|password|token)[a-z_]*=)[^&\s]*", re.IGNORECASE
 )

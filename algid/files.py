@@ -297,8 +297,18 @@ def refuse_misleading(name: str | None) -> None:
         raise SettingError(f"{flag('name')}: expected a name without slashes, {problem}")
 
 
+def refuse_url(place: Path | str) -> None:
+    """Raise `OutputError` where a folder's path is a URL, which would make folders of its parts."""
+    if re.match(r"[A-Za-z][\w+.-]+:/", str(place)):
+        raise OutputError(
+            f"{place}: expected a folder of this machine, found a URL; algid batch alone writes to "
+            "s3://, gs:// and az://, spelled so"
+        )
+
+
 def refuse_existing(folder: Path, force: bool) -> None:
-    """Raises `OutputError` where `folder` exists and is not to be replaced."""
+    """Raises `OutputError` where `folder` is a URL, or exists and is not to be replaced."""
+    refuse_url(folder)
     if os.path.lexists(folder) and not force:
         raise OutputError(EXISTS.format(folder))
 

@@ -21,11 +21,13 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from algid.errors import AlgidError, LogError, OutputError, without_credentials
-from algid.files import read_whole, refuse_links, remove_whole, whole_file
+from algid.files import read_whole, refuse_links, refuse_url, remove_whole, whole_file
 
 if TYPE_CHECKING:
     from pyarrow.fs import FileInfo, FileSystem
 
+MOST_LISTED = 1_000_000
+"""Entries below a prefix or a folder: more are no robot's logs."""
 SCHEMES = ("s3://", "gs://", "az://")
 _SAFE = "/%!$&'()*+,;=:@~"
 """What stands in the path of a URL as it is, beside letters, digits and ``-._``."""
@@ -142,6 +144,11 @@ class Store:
                 raise OutputError(
                     f"{self.place}: there is no bucket {bucket}; check its name, or make it"
                 )
+        if len(entries) > MOST_LISTED:
+            raise OutputError(
+                f"{self.place}: expected at most {MOST_LISTED:,} objects, found {len(entries):,}; "
+                "name a prefix of fewer"
+            )
         names = []
         for info in entries:
             if info.type == FileType.File and not info.base_name.startswith("."):
@@ -172,13 +179,14 @@ def open_store(place: str) -> Store:
     Raises
     ------
     OutputError
-        If the URL cannot be understood or reached.
+        If the URL cannot be understood or reached, or is of another kind.
     """
     from pyarrow.fs import LocalFileSystem
 
     if is_url(place):
         filesystem, path = connect(place)
         return Store(filesystem, path, shown(place))
+    refuse_url(place)
     folder = Path(place).absolute()
     root = folder.as_posix().rstrip("/")
     return Store(LocalFileSystem(), root, root, folder)

@@ -108,6 +108,16 @@ def test_objects_below_a_url_and_one_that_is_not_there(served: Served) -> None:
         filesystem.open_input_file(path)
 
 
+def test_a_listing_is_bounded(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("a", "b", "c"):
+        open_store(served.url("logs")).write(f"{name}.csv", b"1")
+    monkeypatch.setattr("algid.stores.MOST_LISTED", 3)
+    assert len(list_urls(served.url("logs"))) == 3
+    monkeypatch.setattr("algid.stores.MOST_LISTED", 2)
+    with pytest.raises(OutputError, match="expected at most 2 objects, found 3; name a prefix"):
+        list_urls(served.url("logs"))
+
+
 def test_a_changed_object_is_done_again(served: Served, tmp_path: Path) -> None:
     store, out = open_store(served.url("logs")), str(tmp_path / "out")
     store.write("bad.csv", b"junk")

@@ -169,6 +169,7 @@ def batch(
     names, place = [str(one) for one in sources], str(out)
     if not place.strip():
         raise SettingError("-o: expected a folder or a URL, found none; name where results go")
+    store = open_store(place)
     check("batch", workers=workers, timeout=timeout)
     bytes_each = None
     if memory_limit is not None:
@@ -199,7 +200,6 @@ def batch(
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
     if part is not None:
         jobs = share_of(jobs, part, watch)
-    store = open_store(place)
     with locked(place, shared=part is not None):
         sweep(store)
         try:

@@ -15,7 +15,7 @@ from typer.core import TyperCommand
 from algid import __version__
 from algid.api.choices import with_lists
 from algid.cli.output import say
-from algid.errors import SettingError
+from algid.errors import SettingError, without_credentials
 from algid.exits import epilog
 
 COMMANDS: dict[str, Callable[[], Callable[..., Any]]] = {
@@ -75,6 +75,14 @@ class FiniteCommand(TyperCommand):
             text = with_lists(getattr(option, "help", None) or "")
             option.help = text  # type: ignore[attr-defined]
         super().format_help(ctx, formatter)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the arguments; typer prints those that it refuses."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter.__base__ as error:  # type: ignore[misc]
+            error.message = without_credentials(error.message)
+            raise
 
     def invoke(self, ctx: Any) -> Any:
         """Run it.

@@ -10,11 +10,17 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from algid.text import printable
+from algid import text as letters
+from algid.errors import without_credentials
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
+
+
+def printable(text: str) -> str:
+    """Text as a terminal may have it: what would drive it is escaped, credentials are left out."""
+    return letters.printable(without_credentials(text))
 
 
 def say(text: str, *, end: str = "\n") -> None:
