@@ -214,6 +214,7 @@ OPTIONS: tuple[Option, ...] = (
     Option("m1", _EXPORT, range=_MASS),
     Option("m2", _EXPORT, range=_MASS),
     Option("rotor1", _EXPORT, range=(0, 1e6)),
+    Option("flange", _EXPORT),
     Option("draws", _EXPORT, range=(1, 100_000)),
     Option("limits", _DESIGN),
     Option("range", _DESIGN),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from algid.api.given import called, opened
+from algid.api.given import called, opened, parts_of
 from algid.api.ranges import check
 from algid.errors import SettingError
 from algid.files import refuse_existing, whole_file, whole_folder
@@ -18,7 +19,7 @@ from algid.results import Result
 if TYPE_CHECKING:
     from algid.notices import Notice
 
-FORMATS = ("urdf", "mjcf", "sdf", "python", "c", "yaml", "csv", "parquet")
+FORMATS = ("urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet")
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,14 @@ class Exported:
     """An arm as a model: its text, warnings of what does not fit, and its file, if written.
 
     Of draws `text` is the manifest, `path` a folder, and `files` what that holds, by name.
+    Of a payload `call` sets it on a controller of Universal Robots.
     """
 
     text: str
     warnings: tuple[Notice, ...]
     path: Path | None = None
     files: Mapping[str, bytes] = field(default_factory=dict)
+    call: str = ""
 
     def __repr__(self) -> str:
         codes = ", ".join(one.code for one in self.warnings) or "none"
@@ -41,7 +44,7 @@ class Exported:
 
 def export(
     result: Result | str | Path,
-    to: Literal["urdf", "mjcf", "sdf", "python", "c", "yaml", "csv", "parquet"],
+    to: Literal["urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet"],
     *,
     l1: float | None = None,
     l2: float | None = None,
@@ -50,6 +53,7 @@ def export(
     rotor1: float | None = None,
     draws: int | None = None,
     seed: int = 0,
+    flange: Sequence[float] | str | None = None,
     out: str | Path | None = None,
     force: bool = False,
 ) -> Exported:
@@ -58,7 +62,7 @@ def export(
     Parameters
     ----------
     result : Result or path of one
-    to : 'urdf', 'mjcf', 'sdf' (robot descriptions), 'python', 'c' (dynamics), 'yaml' (payload), or
+    to : 'urdf', 'mjcf', 'sdf' (robot descriptions), 'python', 'c' (dynamics), 'payload' (YAML), or
         'csv' or 'parquet' (table of draws)
     l1, l2 : float, m
         Link lengths; what the result knows best by default.
@@ -71,6 +75,8 @@ def export(
         that they are.
     seed : int
         Of the draws; the first ones are the same however many there are.
+    flange : three float, m, m and degrees
+        Of a payload: origin of the flange's frame in that of link 2, and where its x axis points.
     out : Path
         File to write, or folder of draws; None writes nothing.
     force : bool
@@ -99,7 +105,7 @@ def export(
     >>> algid.export(arm, "urdf", l2=0.1667).text.count("<link ")
     4
     """
-    from algid.exports.formats import exported
+    from algid.exports.formats import controller_call, exported
     from algid.exports.links import Knowns
 
     if to not in FORMATS:
@@ -108,6 +114,7 @@ def export(
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
     check("export", l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1, draws=draws, seed=seed)
     knowns = Knowns(l1, l2, m1, m2, rotor1)
+    place = None if flange is None else _flange(flange, to)
     path = None if out is None else Path(out)
     if path is not None:
         refuse_existing(path, force)
@@ -120,11 +127,29 @@ def export(
                 for name, content in files.items():
                     (folder / name).write_bytes(content)
         return Exported(files["manifest.json"].decode(), warnings, path, files)
-    text, warnings = exported(opened(result), called(result), to, knowns)
+    read, file, call = opened(result), called(result), ""
+    text, warnings = exported(read, file, to, knowns)
+    if to == "payload":
+        call = controller_call(read, file, knowns, place)
     if path is not None:
         with whole_file(path, force=force) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    return Exported(text, warnings, path)
+    return Exported(text, warnings, path, call=call)
+
+
+def _flange(given: Sequence[float] | str, to: str) -> tuple[float, float, float]:
+    """A flange's place and direction out of three numbers, or of X,Y,ANGLE."""
+    if to != "payload":
+        raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
+    try:
+        x, y, angle = (float(part) for part in parts_of(given))
+    except (TypeError, ValueError):
+        x = y = angle = math.nan
+    if not (abs(x) <= 1e3 and abs(y) <= 1e3 and abs(angle) <= 360):
+        raise SettingError(
+            f"{flag('flange')}: expected metres and degrees like 0.12,0,-90, found {given!r:.60}"
+        )
+    return x, y, angle
 
 
 def file_of(result: Path, to: str, draws: int | None = None) -> Path:
@@ -142,6 +167,6 @@ def file_of(result: Path, to: str, draws: int | None = None) -> Path:
         return Path(f"{stem}-draws")
     if to == "python":
         stem = re.sub(r"\W", "_", stem)
-    if to == "yaml":
+    if to == "payload":
         return Path(f"{stem}-payload.yaml")
     return Path(f"{stem}{WRITTEN[to].suffix}")

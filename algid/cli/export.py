@@ -10,7 +10,7 @@ import typer
 
 from algid.api.ranges import ends
 from algid.cli.common import Force, Quiet, out
-from algid.cli.output import complain, remark
+from algid.cli.output import complain, remark, say
 
 
 class To(StrEnum):
@@ -21,7 +21,7 @@ class To(StrEnum):
     SDF = "sdf"
     PYTHON = "python"
     C = "c"
-    YAML = "yaml"
+    PAYLOAD = "payload"
     CSV = "csv"
     PARQUET = "parquet"
 
@@ -33,7 +33,7 @@ def export(
     to: Annotated[
         To,
         typer.Option(
-            help="Robot description (urdf, mjcf, sdf), dynamics (python, c), payload (yaml), or "
+            help="Robot description (urdf, mjcf, sdf), dynamics (python, c), payload (YAML), or "
             "table of draws (csv, parquet)."
         ),
     ],
@@ -71,6 +71,12 @@ def export(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the draws.", **ends("export", "seed"))] = 0,
+    flange: Annotated[
+        str | None,
+        typer.Option(
+            help="The flange in link 2's frame for a payload's call: X,Y,ANGLE in m, m and degrees."
+        ),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -96,6 +102,7 @@ def export(
         rotor1=rotor1,
         draws=draws,
         seed=seed,
+        flange=flange,
         out=file,
         force=force,
     )
@@ -103,4 +110,5 @@ def export(
         return
     for warning in made.warnings:
         complain(warning.text)
+    say(made.call, end="")
     remark(f"wrote {file}")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
@@ -45,7 +47,7 @@ FORMATS = {
     "python": Format("arm.py", partial(program, before=""), False, frozenset({"l1"})),
     "c": Format("arm.c", partial(program, before=" * "), False, frozenset({"l1"})),
 }
-PAYLOAD = "yaml"
+PAYLOAD = "payload"
 
 
 def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, tuple[Notice, ...]]:
@@ -57,7 +59,7 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     file : str
         What the result's file is called.
     to : str
-        A name in `FORMATS`, or "yaml" for the payload.
+        A name in `FORMATS`, or "payload".
     knowns : Knowns
 
     Raises
@@ -158,3 +160,46 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
         "J_std": number(J_std),
         "covariance": covariance.tolist(),
     }
+
+
+def controller_call(
+    result: Result, file: str, knowns: Knowns, flange: tuple[float, float, float] | None
+) -> str:
+    """The calls that set a result's payload on a controller of Universal Robots, in kg and m.
+
+    What a planar log does not tell is a named blank: z, and x and y without `flange`.
+
+    Parameters
+    ----------
+    result, file, knowns : as of `exported`
+    flange : (x, y, angle)
+        The flange's frame in that of link 2: origin, m, and in degrees from the link's line where
+        its x axis points. Its x and y axes lie in the arm's plane.
+
+    Raises
+    ------
+    ResultError
+        If the result has no payload, or one that no load explains.
+    """
+    payload = _payload(result, file, knowns)
+    x, y = "FLANGE_X", "FLANGE_Y"
+    blanks = f"FLANGE_X, FLANGE_Y: give {flag('flange')}; FLANGE_Z: measure,"
+    if flange is not None:
+        apart = complex(payload["x"] - flange[0], payload["y"] - flange[1])
+        centre = apart * cmath.exp(-1j * math.radians(flange[2]))
+        x, y, blanks = (
+            f"{round(centre.real, 5) + 0.0:.5f}",
+            f"{round(centre.imag, 5) + 0.0:.5f}",
+            "FLANGE_Z: measure,",
+        )
+    mass = f"{payload['mass']:.5f}"
+    return (
+        "# kg, and m in the flange's frame; the mass is what the loaded log has more than the\n"
+        "# unloaded one: a gripper that both had is to be added.\n"
+        f"# {blanks} a log of a planar arm does not tell what lies across its plane.\n"
+        "# URScript, PolyScope 5.10 or later:\n"
+        f"set_target_payload({mass}, [{x}, {y}, FLANGE_Z])\n"
+        "# ROS 2, ur_robot_driver:\n"
+        "ros2 service call /io_and_status_controller/set_payload ur_msgs/srv/SetPayload "
+        f'"{{mass: {mass}, center_of_gravity: {{x: {x}, y: {y}, z: FLANGE_Z}}}}"\n'
+    )

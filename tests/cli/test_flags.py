@@ -315,6 +315,11 @@ OWN = [
     ("identify", ("--name", ""), NAME),
     *(("identify", ("--name", text), PLAIN.format(text)) for text in ("../../evil", "..")),
     (
+        "export",
+        ("--flange", "0.1,0"),
+        "--flange: urdf holds no flange; leave it out",
+    ),
+    (
         "identify",
         ("--export", "mcap", "--no-report"),
         "--export: the log is made from the time series; leave --no-report out",

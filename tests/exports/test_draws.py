@@ -172,7 +172,7 @@ def test_the_command_writes_a_folder_that_a_seed_repeats(
         assert table[name][:3].to_list() == [row[name] for row in manifest["draws"]]
     for arguments, said in (
         (("csv",), "--to csv: a table of draws; say how many by --draws"),
-        (("yaml", "--draws", "2"), "--draws: yaml has no draws; leave it out"),
+        (("payload", "--draws", "2"), "--draws: payload has no draws; leave it out"),
         (("csv", "--draws", "2", "--m1", "1"), "--m1: csv holds no such number; leave it out"),
         (("mjcf", "--draws", "3", "-o", "more"), "more: exists already"),
     ):

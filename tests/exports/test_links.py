@@ -207,8 +207,8 @@ def test_the_file_says_what_is_identified_given_and_chosen() -> None:
         ("urdf", Knowns(l1=-0.1), "--l1: expected a positive number, found -0.1"),
         ("urdf", Knowns(m1=math.nan), "--m1: expected a positive number, found nan"),
         ("python", Knowns(m1=1.0), "--m1: python holds no such number; leave it out"),
-        ("yaml", Knowns(l1=1.0), "--l1: yaml holds no such number; leave it out"),
-        ("yaml", Knowns(), "arm: the result has no payload; identify with --loaded LOG"),
+        ("payload", Knowns(l1=1.0), "--l1: payload holds no such number; leave it out"),
+        ("payload", Knowns(), "arm: the result has no payload; identify with --loaded LOG"),
     ],
 )
 def test_what_contradicts_physics_is_refused(to: str, known: Knowns, message: str) -> None:
@@ -245,21 +245,21 @@ def test_results_that_no_arm_explains_are_refused() -> None:
         exported(
             result_of(values_of(ODD), payload={"m_p": -0.2, "l1": 0.4, "l2": 0.3}),
             "arm",
-            "yaml",
+            "payload",
             Knowns(),
         )
 
 
 def test_the_payload_comes_with_its_error_bars() -> None:
     result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=0.01)
-    text, warnings = exported(result, "arm", "yaml", Knowns())
+    text, warnings = exported(result, "arm", "payload", Knowns())
     assert warnings == ()
     assert "  mass: 0.5  # kg\n  mass_std: 0.005\n" in text
     assert (
         "  centre_of_gravity: [0.3, 0.0, 0.0]  # m\n  centre_of_gravity_std: [0.003, 0.0, 0.0]\n"
         in text
     )
-    text, (warning,) = exported(result, "arm", "yaml", Knowns(l2=0.4))
+    text, (warning,) = exported(result, "arm", "payload", Knowns(l2=0.4))
     assert "[0.4, 0.0, 0.0]" in text
     assert "centre_of_gravity_std: [0.0," in text
     assert warning.text == "l2 is given as 0.4 m, but identified as 0.3 ± 0.0059 m (33 σ apart)"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+import algid
 from algid.arm import Arm, regressor
 from algid.errors import AlgidError
 from algid.exports.formats import FORMATS, exported
@@ -199,7 +200,7 @@ def test_a_delay_is_said_to_be_lacking() -> None:
 
 def test_the_payload_is_yaml_that_a_planner_reads() -> None:
     result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=0.01)
-    content = YAML(typ="safe").load(exported(result, 'a"b', "yaml", Knowns())[0])["payload"]
+    content = YAML(typ="safe").load(exported(result, 'a"b', "payload", Knowns())[0])["payload"]
     assert content == {
         "mass": 0.5,
         "mass_std": pytest.approx(0.005),
@@ -215,32 +216,34 @@ def test_the_payload_is_yaml_that_a_planner_reads() -> None:
             [0.0, 0.0, 0.0, 0.0],
         ],
     }
-    given = YAML(typ="safe").load(exported(result, "a", "yaml", Knowns(l2=0.3))[0])["payload"]
+    given = YAML(typ="safe").load(exported(result, "a", "payload", Knowns(l2=0.3))[0])["payload"]
     assert given["covariance"][1] == [0.0] * 4
     bare = result.payload["m_p"].model_copy(update={"std": None})
     text = exported(
         result.model_copy(update={"payload": {**result.payload, "m_p": bare}}),
         "a",
-        "yaml",
+        "payload",
         Knowns(),
     )[0]
     assert YAML(typ="safe").load(text)["payload"]["mass_std"] is None
     told = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4}, l2=0.25)
-    content = YAML(typ="safe").load(exported(told, "a", "yaml", Knowns())[0])["payload"]
+    content = YAML(typ="safe").load(exported(told, "a", "payload", Knowns())[0])["payload"]
     assert (content["centre_of_gravity"][0], content["centre_of_gravity_std"][0]) == (0.25, 0.0)
 
 
 def test_a_payload_without_a_length_or_a_sound_mass_is_refused() -> None:
     lost = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4})
     with pytest.raises(AlgidError) as refused:
-        exported(lost, "arm", "yaml", Knowns())
+        exported(lost, "arm", "payload", Knowns())
     assert str(refused.value) == "arm: the result does not tell where the payload hangs; give --l2"
-    assert "[0.3, 0.0, 0.0]  # m" in exported(lost, "arm", "yaml", Knowns(l2=0.3))[0]
+    assert "[0.3, 0.0, 0.0]  # m" in exported(lost, "arm", "payload", Knowns(l2=0.3))[0]
     vague = lost.payload["m_p"].model_copy(update={"status": Status.NOT_IDENTIFIABLE})
     with pytest.raises(
         AlgidError, match="arm: the result has no payload; identify with --loaded LOG"
     ):
-        exported(lost.model_copy(update={"payload": {"m_p": vague}}), "arm", "yaml", Knowns(l2=0.3))
+        exported(
+            lost.model_copy(update={"payload": {"m_p": vague}}), "arm", "payload", Knowns(l2=0.3)
+        )
 
 
 def test_lengths_that_the_result_was_told_are_taken_and_flags_beat_them() -> None:
@@ -295,3 +298,28 @@ def test_no_rotor_may_be_said_and_no_arm_has_two_negative_inertias() -> None:
         AlgidError, match=r"not positive definite \(k1 0\.0308, k3 -1, k5 -1 kg m²\)"
     ):
         text_of("c", values_of(ODD) | {"k3": -1.0, "k5": -1.0})
+
+
+def test_the_payloads_call_is_in_the_flanges_frame() -> None:
+    """A flange 0.1 m along link 2, its x axis to the right of it: x is what lies right of the
+    line, y what lies beyond along it.
+    """
+    payload = {"m_p": 0.5, "l1": 0.4, "l2": 0.3, "y_p": 0.02}
+    result = result_of(values_of(ODD), payload=payload)
+    made = algid.export(result, "payload", flange="0.1,0,-90")
+    assert "\nset_target_payload(0.50000, [-0.02000, 0.20000, FLANGE_Z])\n" in made.call
+    request = YAML(typ="safe").load(made.call.splitlines()[-1].split('"')[1])
+    assert request == {
+        "mass": 0.5, "center_of_gravity": {"x": -0.02, "y": 0.2, "z": "FLANGE_Z"},
+    }  # fmt: skip
+    assert made.text == exported(result, "result", "payload", Knowns())[0].replace(
+        '"result"', '"run--1.csv"'
+    )
+    blank = algid.export(result, "payload").call
+    assert "set_target_payload(0.50000, [FLANGE_X, FLANGE_Y, FLANGE_Z])" in blank
+    assert "FLANGE_X, FLANGE_Y: give --flange" in blank
+    with pytest.raises(AlgidError, match="--flange: urdf holds no flange; leave it out"):
+        algid.export(result, "urdf", flange=(0, 0, 0))
+    for wrong in ("1,2", (0, 0, 720), "0,nan,0"):
+        with pytest.raises(AlgidError, match="--flange: expected metres and degrees like 0"):
+            algid.export(result, "payload", flange=wrong)

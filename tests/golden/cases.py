@@ -250,7 +250,7 @@ def cases() -> Iterator[Case]:
         yield Case(f"five logs {estimator}", _several(5, estimator=estimator))
     yield Case("cross-validated", _several(3, cross_validate=True, estimator="weak"))
     yield Case("known arm", _known_arm)
-    for form in ("urdf", "mjcf", "sdf", "python", "c", "yaml"):
+    for form in ("urdf", "mjcf", "sdf", "python", "c", "payload"):
         yield Case(f"export {form}", _exported(form))
     yield Case("C.1, one run", _real("dfki/C1_sysid", slice(2, 3)), real=True)
     yield Case("C.1, three runs", _real("dfki/C1_sysid", slice(0, 3)), real=True)
