@@ -1,5 +1,5 @@
-"""The pages of the site: the guide as the command prints it, and the API's reference out of its
-docstrings.
+"""The pages of the site: the README in front, the guide as the command prints it, and the API's
+reference out of its docstrings.
 
 Usage: python -m pipelines.docs FOLDER
 """
@@ -14,18 +14,21 @@ from pathlib import Path
 import algid
 from algid.api.guide import SUMMARIES, text_of
 
+ROOT = Path(__file__).parents[1]
+PICTURES = Path("data/pictures")  # as the README names them
+
 
 def pages(folder: Path) -> None:
-    """Write a Markdown file a topic, a list of them, and the reference."""
+    """Write a Markdown file a topic, the README with its pictures, and the reference."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for topic in SUMMARIES:
         (folder / f"{topic}.md").write_text(_linked(text_of(topic)), encoding="utf-8")
-    rows = "\n".join(f"- [{topic}]({topic}.md): {words}" for topic, words in SUMMARIES.items())
-    first = f"# algid\n\n{(algid.__doc__ or '').splitlines()[0].partition(': ')[2]}\n\n{rows}\n"
+    first = (ROOT / "README.md").read_text(encoding="utf-8").replace("(algid/guide/", "(")
     (folder / "index.md").write_text(
-        f"{first}- [reference](reference.md): every public name\n", encoding="utf-8"
+        f"{first}\n[Reference](reference.md): every public name.\n", encoding="utf-8"
     )
+    shutil.copytree(ROOT / PICTURES, folder / PICTURES)
     names = [f"::: {home}.{name}\n" for name, home in algid._HOMES.items()]
     (folder / "reference.md").write_text("# Reference\n\n" + "\n".join(names), encoding="utf-8")
 

@@ -169,6 +169,14 @@ def test_the_readme_installs_from_a_clean_clone(tmp_path: Path) -> None:
     ]
 
 
+def test_the_guide_and_the_readme_are_short() -> None:
+    """A reader's time: topics and words of the guide, lines of the README."""
+    guide = {name: path.read_text("utf-8") for name, path in PAGES.items() if name != "README"}
+    assert len(guide) <= 14
+    assert sum(len(text.split()) for text in guide.values()) <= 16_000
+    assert len(PAGES["README"].read_text("utf-8").splitlines()) <= 90
+
+
 def test_the_site_has_a_page_for_each_topic_and_every_public_name(tmp_path: Path) -> None:
     pages(tmp_path / "pages")
     guide = {path.stem for path in (Path(algid.__file__).parent / "guide").glob("*.md")}
