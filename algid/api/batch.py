@@ -46,6 +46,7 @@ class Batched:
     interrupted : whether it was stopped by a signal
     stopped : why it could not go on, where it could not
     unreadable : why records that are there cannot be read, by their places
+    links : to folders, that were passed over
     """
 
     records: list[JobRecord]
@@ -55,6 +56,7 @@ class Batched:
     interrupted: bool = False
     stopped: str | None = None
     unreadable: dict[str, str] = field(default_factory=dict)
+    links: list[str] = field(default_factory=list)
 
     @property
     def failed(self) -> list[JobRecord]:
@@ -193,9 +195,9 @@ def batch(
 
     recipe = Recipe(place, asked, cache(profile_for or meant), known, report)  # each file once
     recipe.profile(None)
-    jobs = []
+    jobs, links = [], list[str]()
     if not watch:
-        jobs = jobs_of(names, place, alone)
+        jobs = jobs_of(names, place, alone, links)
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
     if part is not None:
@@ -223,6 +225,7 @@ def batch(
         running.stop.is_set() and not watch,
         ended.stopped,
         running.unreadable,
+        links,
     )
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -31,7 +31,9 @@ MOST_NAMED = 8
 _ROLE = re.compile(r"(?P<base>.+)[-_](?P<role>unloaded|loaded)")
 
 
-def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
+def jobs_of(
+    sources: Sequence[str], out: str, alone: str = "logs", links: list[str] | None = None
+) -> list[Job]:
     """The jobs that sources hold, sorted by name.
 
     Parameters
@@ -40,6 +42,7 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
     out : where results go; logs are not looked for within it
     alone : 'logs' or 'loaded'
         What a log is whose name does not tell.
+    links : takes links to folders, which are not entered
 
     Raises
     ------
@@ -47,13 +50,15 @@ def jobs_of(sources: Sequence[str], out: str, alone: str = "logs") -> list[Job]:
         If a source is not there or cannot be looked at, or a manifest is wrong.
     """
     jobs: dict[str, Job] = {}
+    links = [] if links is None else links
     for source in sources:
         try:
             if not is_url(source) and is_manifest(Path(source)):
                 all_jobs = read_manifest(Path(source))
             else:
-                all_jobs = _paired(_logs(source, out), alone)
-        except (OSError, ValueError) as error:  # ValueError: a NUL in a path
+                all_jobs = _paired(_logs(source, out, links), alone)
+        # a NUL in a path; folders within folders beyond what Python walks
+        except (OSError, ValueError, RecursionError) as error:
             raise SettingError(
                 f"{source}: cannot look there ({error}); check its name and rights"
             ) from error
@@ -69,7 +74,7 @@ Found = tuple[str, str, str | None]
 """A log's path or URL, its name below its source without suffix, and why it is unreadable."""
 
 
-def _logs(source: str, out: str) -> list[Found]:
+def _logs(source: str, out: str, links: list[str]) -> list[Found]:
     """The logs of a source."""
     logs: list[Found] = []
     if is_url(source):
@@ -80,14 +85,14 @@ def _logs(source: str, out: str) -> list[Found]:
         return logs
     path = Path(source)
     if path.is_dir() and not _is_bag(path):
-        for one in _walk(path, out):
+        for one in _walk(path, out, links):
             if one.trouble or one.bag or _is_log(one.name):
                 logs.append(_below(path, one))
         return logs
     if path.exists():
         matches = [_File(source, _is_bag(path))]
     else:
-        matches = list(_matches(source, out))
+        matches = list(_matches(source, out, links))
     if not matches:
         raise SettingError(f"{source}: there is no such file, folder or match; check the name")
     for one in matches:
@@ -136,83 +141,48 @@ def _below(folder: Path, one: _File) -> Found:
     return one.path, name, one.trouble
 
 
-def _walk(folder: Path, out: str) -> Iterator[_File]:
+def _walk(folder: Path, out: str, links: list[str]) -> Iterator[_File]:
     """Files below a folder; hidden ones, results and what lies in `out` are passed over.
 
-    Each folder is looked through once, whatever links lead there, and those above `folder` are
-    not; a name that goes through no link comes first.
+    Links to folders are not entered, but added to `links`.
 
     Raises
     ------
     OSError
         If nobody may look into `folder` itself.
     """
-    results = _mark(out) if Path(out).is_dir() else None
-    # a link there leads to all that there is
-    seen = {_mark(str(one)) for one in folder.resolve().parents}
-    if results is not None and results != _mark(str(folder)):
-        seen.add(results)
-    pending, links = [str(folder)], deque[str]()
-    while pending or links:
-        place = pending.pop() if pending else links.popleft()
-        try:
-            mark = _mark(place)
-            if mark in seen:
-                continue
-            seen.add(mark)
-            files, folders, linked = _entries(place)
-        except OSError as error:
-            if place == str(folder):
-                raise
-            yield _File(
-                place,
-                trouble=f"{kept_path(place)}: cannot look there ({error.strerror}); check its "
-                "rights",
-            )
-            continue
-        if BAG in files and place != str(folder):
+    unreadable: list[OSError] = []
+    for place, folders, names in os.walk(folder, onerror=unreadable.append):
+        if BAG in names and place != str(folder):
+            folders.clear()
             yield _File(place, bag=True)
             continue
-        for name in files:
-            if mark != results or name != TABLE:
-                yield _File(f"{place}/{name}")
-        pending += [f"{place}/{name}" for name in folders if not name.endswith(".algid")]
-        links += [f"{place}/{name}" for name in linked if not name.endswith(".algid")]
-
-
-def _mark(folder: str) -> tuple[int, int]:
-    status = Path(folder).stat()
-    return status.st_dev, status.st_ino
-
-
-def _entries(folder: str) -> tuple[list[str], list[str], list[str]]:
-    """Names of what lies in a folder and is not hidden: files, folders, and links to folders."""
-    files, folders, links = list[str](), list[str](), list[str]()
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.name.startswith("."):
+        inner = list[str]()
+        for name in folders:
+            path = f"{place}/{name}"
+            if name.startswith(".") or name.endswith(".algid") or _is_same(path, out):
                 continue
-            if not _is_folder(entry):
-                files.append(entry.name)
-            elif entry.is_symlink():
-                links.append(entry.name)
-            else:
-                folders.append(entry.name)
-    return sorted(files), sorted(folders), sorted(links)
+            (links if os.path.islink(path) else inner).append(path)  # noqa: PTH114
+        folders[:] = [path.rpartition("/")[2] for path in inner]
+        for name in sorted(names):
+            if not name.startswith(".") and (name != TABLE or not _is_same(place, out)):
+                yield _File(f"{place}/{name}")
+    for error in unreadable:
+        place = str(error.filename)
+        if place == str(folder):
+            raise error
+        trouble = f"{kept_path(place)}: cannot look there ({error.strerror}); check its rights"
+        yield _File(place, trouble=trouble)
 
 
-def _is_folder(entry: os.DirEntry[str]) -> bool:
-    try:
-        return entry.is_dir()
-    except OSError:  # a link to itself
-        return False
+def _is_same(folder: str, other: str) -> bool:
+    with suppress(OSError):  # there may be no other
+        return Path(folder).samefile(other)
+    return False
 
 
-def _matches(pattern: str, out: str) -> Iterator[_File]:
-    """Files and bags that a pattern names.
-
-    ``**`` goes through folders as `_walk` does, and follows links once.
-    """
+def _matches(pattern: str, out: str, links: list[str]) -> Iterator[_File]:
+    """Files and bags that a pattern names; ``**`` goes through folders as `_walk` does."""
     parts = Path(pattern).parts
     first = parts.index("**") if "**" in parts else len(parts)
     # a pattern may be absolute
@@ -222,7 +192,7 @@ def _matches(pattern: str, out: str) -> Iterator[_File]:
         if first == len(parts):
             yield _File(match, _is_bag(folder))
         elif folder.is_dir():
-            for one in _walk(folder, out):
+            for one in _walk(folder, out, links):
                 below = Path(one.path).relative_to(folder).parts
                 if not one.trouble and _fits(below, parts[first:]):
                     yield one
@@ -230,26 +200,11 @@ def _matches(pattern: str, out: str) -> Iterator[_File]:
 
 def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
     """Whether a path's parts fit a pattern's, of which ``**`` stands for any number of folders."""
-    places = {0}  # of the pattern, after the parts so far
-    for part in parts:
-        reached = set()
-        for place in _onward(places, pattern) - {len(pattern)}:
-            if pattern[place] == "**":
-                reached.add(place)
-            elif fnmatchcase(part, pattern[place]):
-                reached.add(place + 1)
-        places = reached
-    return len(pattern) in _onward(places, pattern)
-
-
-def _onward(places: set[int], pattern: Sequence[str]) -> set[int]:
-    """Those places, and what follows each ``**`` there."""
-    reached = set(places)
-    for place in sorted(places):
-        while place < len(pattern) and pattern[place] == "**":
-            place += 1
-            reached.add(place)
-    return reached
+    if not pattern:
+        return not parts
+    if pattern[0] == "**":
+        return any(_fits(parts[n:], pattern[1:]) for n in range(len(parts) + 1))
+    return bool(parts) and fnmatchcase(parts[0], pattern[0]) and _fits(parts[1:], pattern[1:])
 
 
 def _is_bag(path: Path) -> bool:

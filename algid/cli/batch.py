@@ -102,6 +102,9 @@ def batch(
         )
     for name, why in ended.unreadable.items():
         complain(f"{ended.out}/{name}: no record of a job ({why}); it counts as none: remove it")
+    if ended.links:
+        named = ", ".join(ended.links[:8])
+        complain(f"links to folders are not entered ({named}); name what they lead to as sources")
     _conclude(ended, quiet)
 
 
