@@ -26,8 +26,6 @@ _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}
 _ZIGZAG = {17, 18}
 _UINT64 = 4
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
-_IMPLICIT = 2
-"""Of google.protobuf.FeatureSet.FieldPresence."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ def parse(root: str, data: bytes) -> Types:
         known = {}
         for file in FileDescriptorSet.FromString(data).file:
             for name, message in _messages(file.package, file.message_type):
-                known[name] = message, _implicit(file)
+                known[name] = message, file.syntax
         types: Types = {}
         waiting = [root]
         while waiting:
@@ -78,33 +76,28 @@ def parse(root: str, data: bytes) -> Types:
                 continue
             if name not in known:
                 raise DefinitionError(f"{root}: the type {name[:80]!r} is not defined")
-            message, implicit = known[name]
-            types[name] = {one.number: _field(one, implicit) for one in message.field}
+            message, syntax = known[name]
+            if syntax == "editions":
+                raise DefinitionError(
+                    f"{root}: {name} is written in an edition of Protobuf; expected proto2 or "
+                    "proto3: record with a schema of either"
+                )
+            types[name] = {one.number: _field(one, syntax) for one in message.field}
             waiting += [one.message for one in types[name].values() if one.type == _MESSAGE]
     except (DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DefinitionError(f"{root}: no set of descriptors ({error})") from error
     return types
 
 
-def _implicit(file: Any) -> bool:
-    """Whether a file's messages omit numbers that are zero, unless the field says otherwise."""
-    if file.syntax == "editions":
-        return int(file.options.features.field_presence) == _IMPLICIT
-    return str(file.syntax) == "proto3"
-
-
-def _field(one: Any, implicit: bool) -> ProtobufField:
-    # an optional field of proto3 has one of its own
+def _field(one: Any, syntax: str) -> ProtobufField:
+    # an optional field of proto3 has a oneof of its own; the others are left out where they are 0
     oneof = one.oneof_index if one.HasField("oneof_index") else None
-    presence = int(one.options.features.field_presence)
-    implicit = presence == _IMPLICIT if presence else implicit
-    message = one.type_name.lstrip(".")
     return ProtobufField(
         one.name,
         one.type,
-        message,
+        one.type_name.lstrip("."),
         one.label == _REPEATED,
-        implicit=implicit and oneof is None,
+        implicit=syntax == "proto3" and oneof is None,
         oneof=oneof,
     )
 
