@@ -40,9 +40,9 @@ def open_log(path: str | Path | Columns, profile: Profile | None = None) -> Tabl
     with during("opening", path if isinstance(path, str | Path) else NAME):
         if known.torque_file is None:
             return _open_one(path, known)
-        from algid.readers.halves import open_halves
+        from algid.readers.two_files import open_with_torque_file
 
-        return open_halves(path, known, _open_one)
+        return open_with_torque_file(path, known, _open_one)
 
 
 def _open_one(path: str | Path | Columns, profile: Profile) -> TableReader:

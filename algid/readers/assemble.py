@@ -18,7 +18,7 @@ from algid.limits import LIMITS
 from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order
-from algid.readers.convert import ROWS, Conversion, Gatherer, channel_readings, laws_of
+from algid.readers.convert import ROWS, Conversion, GrowingBuffer, channel_readings, laws_of
 from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, stack
 from algid.words import counted
@@ -83,30 +83,30 @@ class TableReader:
     def _gathered(self, most: int) -> Iterator[Log]:
         """Logs of at most `most` samples, each converted from small tables into its arrays."""
         unwrapper = Unwrapper(self.origin.reading.unwrap)
-        gatherer: Gatherer | None = None
+        buffer: GrowingBuffer | None = None
         notices, samples = self._of_passive(self._samples(min(ROWS, most)))
         for table, said in samples:
-            if gatherer is not None and len(gatherer) + len(table) > most:
-                yield self._log(gatherer, notices)
-                gatherer, notices = None, ()
-            if gatherer is None:
-                gatherer = Gatherer(
+            if buffer is not None and len(buffer) + len(table) > most:
+                yield self._log(buffer, notices)
+                buffer, notices = None, ()
+            if buffer is None:
+                buffer = GrowingBuffer(
                     min(most, self.rows or len(table)),
                     velocity=table.has_velocities,
                     reference=table.has_references,
                 )
-            room = gatherer.more(len(table))
+            room = buffer.more(len(table))
             room.stamp_ns[:] = table.stamp_ns
             self.conversion.apply(table, room)
             unwrapper.run(room.theta)
             if room.reference is not None:
                 unwrapper.follow(room.reference, room.theta)
             notices += said
-        if gatherer is not None:
-            yield self._log(gatherer, notices)
+        if buffer is not None:
+            yield self._log(buffer, notices)
 
-    def _log(self, gatherer: Gatherer, notices: tuple[Notice, ...]) -> Log:
-        room = gatherer.filled()
+    def _log(self, buffer: GrowingBuffer, notices: tuple[Notice, ...]) -> Log:
+        room = buffer.filled()
         return Log(
             room.stamp_ns,
             room.theta,
@@ -255,7 +255,7 @@ def _rms(values: FloatArray) -> float:
         return float(np.sqrt(np.mean(np.square(values))))
 
 
-def reader_of(
+def make_reader(
     origin: Origin,
     tables: Callable[[int], Iterator[SampleTable]],
     profile: Profile | None,

@@ -326,7 +326,7 @@ class Series:
         return median(np.diff(self.table.stamp_ns)) if len(self.table) > 1 else 0.0
 
     def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
-        """Which of the stamps (N,) are those of samples, or between two samples that are close."""
+        """True where a stamp (N,) equals a sample's, or lies between two samples without a gap."""
         own = self.table.stamp_ns
         if own.size < 2:
             return np.zeros(stamps.size, np.bool_)

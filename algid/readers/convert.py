@@ -31,7 +31,7 @@ ROWS = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
+class SampleBuffer:
     """Samples to be filled in: stamps (N,) in ns.
 
     Angles, torques and, where recorded, velocities and references (2, N).
@@ -44,7 +44,7 @@ class Room:
     reference: FloatArray | None = None
 
     @classmethod
-    def empty(cls, rows: int, *, velocity: bool, reference: bool = False) -> Room:
+    def empty(cls, rows: int, *, velocity: bool, reference: bool = False) -> SampleBuffer:
         """Room for `rows` samples in one piece of memory, which the system maps in large pages."""
         signals = np.empty((5 + 2 * velocity + 2 * reference, rows))
         stamps = signals[-1].view(np.int64)
@@ -54,11 +54,11 @@ class Room:
     def __len__(self) -> int:
         return int(self.stamp_ns.size)
 
-    def part(self, first: int, last: int) -> Room:
+    def part(self, first: int, last: int) -> SampleBuffer:
         """Samples `first` to `last` - 1 as views."""
         omega = None if self.omega is None else self.omega[:, first:last]
         reference = None if self.reference is None else self.reference[:, first:last]
-        return Room(
+        return SampleBuffer(
             self.stamp_ns[first:last],
             self.theta[:, first:last],
             self.tau[:, first:last],
@@ -67,7 +67,7 @@ class Room:
         )
 
 
-class Gatherer:
+class GrowingBuffer:
     """Room that grows by samples. Reserved memory costs nothing until it is written.
 
     Parameters
@@ -80,18 +80,18 @@ class Gatherer:
 
     def __init__(self, rows: int, *, velocity: bool, reference: bool = False) -> None:
         reserved = min(rows, LIMITS.reserved_rows)
-        self._room = Room.empty(reserved, velocity=velocity, reference=reference)
+        self._room = SampleBuffer.empty(reserved, velocity=velocity, reference=reference)
         self._used = 0
 
     def __len__(self) -> int:
         return self._used
 
-    def more(self, rows: int) -> Room:
+    def more(self, rows: int) -> SampleBuffer:
         """Room for the next `rows` samples."""
         first, self._used = self._used, self._used + rows
         if self._used > len(self._room):
             old = self._room.part(0, first)
-            self._room = Room.empty(
+            self._room = SampleBuffer.empty(
                 max(self._used, 2 * len(self._room)),
                 velocity=old.omega is not None,
                 reference=old.reference is not None,
@@ -103,20 +103,20 @@ class Gatherer:
                     here[:] = there
         return self._room.part(first, self._used)
 
-    def filled(self) -> Room:
+    def filled(self) -> SampleBuffer:
         """All samples so far."""
         return self._room.part(0, self._used)
 
 
 @dataclass(frozen=True)
-class Law:
+class PdLaw:
     """A PD law τ = kp (q_des − θ) − kd θ̇: gains in N m/rad and N m s/rad."""
 
     kp: float
     kd: float
 
 
-def laws_of(path: str, profile: Profile) -> tuple[Law | None, Law | None]:
+def laws_of(path: str, profile: Profile) -> tuple[PdLaw | None, PdLaw | None]:
     """The PD law of each joint, where the profile has one.
 
     Raises
@@ -127,7 +127,7 @@ def laws_of(path: str, profile: Profile) -> tuple[Law | None, Law | None]:
     return _law(path, 1, profile), _law(path, 2, profile)
 
 
-def _law(path: str, joint: int, profile: Profile) -> Law | None:
+def _law(path: str, joint: int, profile: Profile) -> PdLaw | None:
     name, channel = f"tau{joint}", (profile.tau1, profile.tau2)[joint - 1]
     given = [key for key in ("q_des", "kp", "kd") if getattr(channel, key) is not None]
     if not given:
@@ -139,7 +139,7 @@ def _law(path: str, joint: int, profile: Profile) -> Law | None:
             f"{', '.join(given)} alone: "
             f"{Remedy(needed)}"
         )
-    return Law(float(channel.kp or 0.0), float(channel.kd or 0.0))
+    return PdLaw(float(channel.kp or 0.0), float(channel.kd or 0.0))
 
 
 @dataclass(frozen=True)
@@ -157,9 +157,9 @@ class Conversion:
     absolute: bool = False
     base: bool = False
     passive: int | None = None
-    laws: tuple[Law | None, Law | None] = (None, None)
+    laws: tuple[PdLaw | None, PdLaw | None] = (None, None)
 
-    def apply(self, table: SampleTable, room: Room) -> None:
+    def apply(self, table: SampleTable, room: SampleBuffer) -> None:
         """Fill in a table's angles, torques and, where recorded, velocities and references.
 
         In rad, N m, rad/s.

@@ -19,7 +19,7 @@ from algid.limits import LIMITS
 from algid.log import Companion, IntArray, Origin, add, word_sum
 from algid.notices import Notice, Remedy
 from algid.quantiles import median
-from algid.readers.assemble import TableReader, reader_of
+from algid.readers.assemble import TableReader, make_reader
 from algid.readers.attributes import decoded, honoured
 from algid.readers.columns import Columns, assign
 from algid.readers.joints import moving_joints
@@ -285,7 +285,7 @@ def open_table(table: TableFile, profile: Profile) -> TableReader:
     unit = profile.theta1.unit or columns.units.get("theta1", "rad")
     # of counts nobody knows how far they are
     beside = moving_joints(columns.others, look, ANGLE[unit]) if unit in ANGLE else ()
-    return reader_of(
+    return make_reader(
         origin,
         lambda _: samples(table, cells, columns, table.companion.sums),
         profile,

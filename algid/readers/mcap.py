@@ -28,7 +28,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
-from algid.readers.messages.batch import MessageBatch, Messages, beside, gather
+from algid.readers.messages.batch import MessageBatch, Messages, gaps_between, gather
 from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.messages.reader import MessageLog
 from algid.runtime import ahead
@@ -357,7 +357,7 @@ class _Records:
         )
         sizes = self.heads["length"][ours].astype(np.int64) - (_HEAD_BYTES - 9)
         log_ns = self.heads["log_ns"][ours].astype(np.int64)
-        return Messages(self.content, self.offsets[ours] + _HEAD_BYTES, sizes, log_ns).apart()
+        return Messages(self.content, self.offsets[ours] + _HEAD_BYTES, sizes, log_ns).compacted()
 
 
 def _records(stream: IO[bytes], part: _Part) -> _Records:
@@ -453,7 +453,7 @@ def _by_index(
     lengths = heads["length"]
     if np.any(heads["code"] != Opcode.MESSAGE) or lengths.max() > octets.size:
         return None
-    borders = beside(offsets, offsets + 9 + lengths.astype(np.int64), octets.size)
+    borders = gaps_between(offsets, offsets + 9 + lengths.astype(np.int64), octets.size)
     if borders is None or lengths.min() < _HEAD_BYTES - 9:
         return None
     others: list[tuple[int, bytes]] = []

@@ -16,7 +16,7 @@ from algid.errors import LogError
 from algid.log import Log, Origin, join
 from algid.notices import Notice
 from algid.profile import Profile
-from algid.readers.assemble import TableReader, reader_of
+from algid.readers.assemble import TableReader, make_reader
 from algid.readers.table import CHANNELS, SampleTable, cut
 
 MS = 1_000_000
@@ -40,7 +40,7 @@ def reader(
 ) -> TableReader:
     profile = Profile.model_validate(settings or {})
     origin = Origin("log.csv", "csv", MAPPING)
-    return reader_of(
+    return make_reader(
         origin, lambda _rows: tables(*sizes, **channels), profile, {}, (Notice("FIRST", "first"),)
     )
 

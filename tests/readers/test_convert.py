@@ -17,7 +17,7 @@ from algid.log import ChannelReading, Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.readers.assemble import Unwrapper
-from algid.readers.convert import Conversion, Gatherer, Room
+from algid.readers.convert import Conversion, GrowingBuffer, SampleBuffer
 from algid.readers.table import CHANNELS, SampleTable
 from algid.units import CURRENT, TORQUE, VELOCITY
 from tests.readers.headers import opened
@@ -170,7 +170,7 @@ def test_zero_and_reference_of_the_angles() -> None:
 
 def test_factor_and_offset_of_a_channel() -> None:
     samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
-    room = Room.empty(50, velocity=False)
+    room = SampleBuffer.empty(50, velocity=False)
     channels = {
         name: ChannelReading(name, "", factor=place - 1.5, offset=1.0 - place)
         for place, name in enumerate(CHANNELS)
@@ -182,7 +182,7 @@ def test_factor_and_offset_of_a_channel() -> None:
 
 def test_a_file_is_not_believed_how_many_samples_it_holds() -> None:
     """Of 2^45, which take a petabyte, none is reserved beyond what may be at once."""
-    gatherer = Gatherer(1 << 45, velocity=False)
+    gatherer = GrowingBuffer(1 << 45, velocity=False)
     gatherer.more(3).tau[:] = 7
     assert gatherer.filled().tau.tolist() == [[7] * 3] * 2
 
@@ -198,7 +198,7 @@ def test_a_gatherer_keeps_what_was_put_in(
     sizes: list[int], expected: int, velocity: bool, reference: bool
 ) -> None:
     """Whatever number of samples was expected, also none."""
-    gatherer = Gatherer(expected, velocity=velocity, reference=reference)
+    gatherer = GrowingBuffer(expected, velocity=velocity, reference=reference)
     total = sum(sizes)
     signals = np.random.default_rng(total).normal(size=(4, 2, total))
     done = 0

@@ -25,21 +25,21 @@ class Messages:
     def __len__(self) -> int:
         return int(self.starts.size)
 
-    def apart(self) -> Messages:
-        """The same messages in bytes of their own where they are of one size, else these.
+    def compacted(self) -> Messages:
+        """Copy messages of equal size into an aligned array, so that their chunk can be freed.
 
-        One row of whole words each, so that what they stood in is free to go.
+        A row of whole words (8 bytes) each; messages of several sizes stay as they are.
         """
         if not len(self) or np.any(self.sizes != self.sizes[0]):
             return self
         size = int(self.sizes[0])
-        lead = lead_of(size)
+        lead = padding(size)
         rows = gather(self.content, self.starts - lead, f"V{lead + size}").view(np.uint8)
         starts = lead + (lead + size) * np.arange(len(self), dtype=np.int64)
         return Messages(rows, starts, self.sizes, self.log_ns)
 
 
-def lead_of(size: int) -> int:
+def padding(size: int) -> int:
     """Bytes to take before a payload of `size` bytes: whole words (8 bytes), one at least."""
     return -size % 8 if size else 8
 
@@ -53,7 +53,7 @@ def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np
     return window[places]
 
 
-def beside(starts: IntArray, ends: IntArray, size: int) -> list[tuple[int, int]] | None:
+def gaps_between(starts: IntArray, ends: IntArray, size: int) -> list[tuple[int, int]] | None:
     """Bytes [first, last) before, between and behind records [starts, ends) (N,) within `size`.
 
     None where records lie in one another or beyond the end, or too many apart.
@@ -85,7 +85,7 @@ class MessageBatch:
 
 
 @dataclass
-class Account:
+class Losses:
     """What was lost on the way, for the notices at the end."""
 
     spans: int = 0

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from algid.blocks import concatenated, rows_of
 from algid.limits import LIMITS
 from algid.log import IntArray
-from algid.readers.messages.batch import Messages, gather, lead_of
+from algid.readers.messages.batch import Messages, gather, padding
 from algid.words import counted
 
 _NAMED = re.compile(r"[^\[\]]*\[([^\]]*)\]")
@@ -196,7 +196,7 @@ class Layout:
 
 def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
     """The layout of a message; its fields are None where it lacks one of those `wanted`."""
-    lead = lead_of(len(payload))
+    lead = padding(len(payload))
     mask = np.zeros(lead + len(payload), np.uint8)
     for start, end in shape.fixed:
         mask[lead + start : lead + end] = 0xFF
@@ -382,9 +382,9 @@ def _by_size(sizes: IntArray) -> Iterator[NDArray[np.intp]]:
 
 
 def _words(octets: NDArray[np.uint8], starts: IntArray, size: int) -> NDArray[np.uint64]:
-    """Messages of one size as rows (N, words), each behind its lead: see `Messages.apart`."""
-    firsts = starts - lead_of(size)  # every row lies within the records, behind a head
-    width = size + lead_of(size)
+    """Messages of one size as rows (N, words), each behind its lead: see `Messages.compacted`."""
+    firsts = starts - padding(size)  # every row lies within the records, behind a head
+    width = size + padding(size)
     if np.any(np.diff(firsts) != width):
         rows = gather(octets, firsts, f"V{width}")
     else:

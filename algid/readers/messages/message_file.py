@@ -65,10 +65,10 @@ class MessageFile:
 
 def channels_of(file: MessageFile, topic: str, type_name: str) -> frozenset[int]:
     """Numbers of the channels with a topic and type whose definition is that of the first one."""
-    return kinds(file).get((topic, type_name), frozenset())
+    return channels_by_type(file).get((topic, type_name), frozenset())
 
 
-def kinds(file: MessageFile) -> dict[tuple[str, str], frozenset[int]]:
+def channels_by_type(file: MessageFile) -> dict[tuple[str, str], frozenset[int]]:
     """Channel numbers by topic and type: those defined and encoded as the first of them."""
     groups: dict[tuple[str, str], tuple[MessageChannel, list[int]]] = {}
     for number, channel in sorted(file.channels.items()):

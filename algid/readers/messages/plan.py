@@ -14,7 +14,7 @@ from algid.notices import Notice, Remedy
 from algid.readers.joints import along_the_arm, order_notice
 from algid.readers.messages.codec import walk_for
 from algid.readers.messages.columnar import MisfitError, Shape
-from algid.readers.messages.message_file import MessageFile, channels_of, kinds, listed
+from algid.readers.messages.message_file import MessageFile, channels_by_type, channels_of, listed
 from algid.readers.messages.topic import (
     DYNAMIC_JOINT_STATE,
     JOINT_REFERENCES,
@@ -93,7 +93,7 @@ def plan(file: MessageFile, profile: Profile | None) -> Plan:
                 named[channel] = (topic, path)
     usual = None
     if not set(needed) <= named.keys():
-        usual = _usual_topic(file, profile)
+        usual = _find_joint_topic(file, profile)
     sources: dict[str, tuple[str, str]] = {}
     units: dict[str, str] = {}
     reading = Reading(joints_told="profile")
@@ -165,7 +165,7 @@ def _stated(file: MessageFile, topic: Topic) -> tuple[dict[str, str], list[str]]
     return {name: unit_of(unit) or unit for name, unit in units.items()}, lines
 
 
-def _reading(usual: _Usual, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
+def _reading(usual: _JointTopic, profile: Profile | None) -> tuple[Reading, tuple[Notice, ...]]:
     """Which joints of the topic are read, by the user or along the arm, and what to say of it."""
     if profile is not None and profile.joints is not None:
         return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
@@ -194,7 +194,7 @@ def _channels(profile: Profile | None) -> tuple[tuple[str, ...], tuple[str, ...]
 def _reference(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[str, str]]:
     """By reference channel topic and path of what joints follow, if one topic alone tells it."""
     by_topic = {}
-    for topic, kind in kinds(file):
+    for topic, kind in channels_by_type(file):
         if kind not in TRAJECTORY_STATE and (topic != JOINT_REFERENCES or kind not in JOINT_STATE):
             continue
         try:
@@ -210,7 +210,7 @@ def _reference(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[st
     return by_topic.popitem()[1]
 
 
-def _choice_notice(usual: _Usual) -> tuple[Notice, ...]:
+def _choice_notice(usual: _JointTopic) -> tuple[Notice, ...]:
     """What to say where other topics hold two joints too."""
     if not usual.beside:
         return ()
@@ -228,7 +228,7 @@ def _topic(
         if home == name:
             paths[channel] = path
     best: tuple[str, list[str], list[str], tuple[str, str] | None] | None = None
-    for topic, kind in kinds(file):
+    for topic, kind in channels_by_type(file):
         if topic != name:
             continue
         missing, known, stamp, messages = list(paths), list[str](), None, 0
@@ -260,7 +260,7 @@ def _topic(
 
 
 @dataclass(frozen=True)
-class _Usual:
+class _JointTopic:
     """A topic with joint states: its two joints, whether they are named, and its fields."""
 
     topic: str
@@ -273,9 +273,9 @@ class _Usual:
     """Other topics that hold two joints too."""
 
 
-def _usual_topic(file: MessageFile, profile: Profile | None) -> _Usual | None:
+def _find_joint_topic(file: MessageFile, profile: Profile | None) -> _JointTopic | None:
     """The one topic with joint states; None where there is none and a profile names the fields."""
-    fitting: dict[str, _Usual] = {}
+    fitting: dict[str, _JointTopic] = {}
     many: dict[str, dict[str, None]] = {}
     lacking: list[str] = []
     refused: list[LogError] = []
@@ -284,7 +284,7 @@ def _usual_topic(file: MessageFile, profile: Profile | None) -> _Usual | None:
         try:
             for shape in _shapes(file, name, kind):
                 joints, names = joint_names(shape, needed), names_in(shape)
-                if usual := _fitting(name, shape, joints, profile):
+                if usual := _joint_topic_in(name, shape, joints, profile):
                     fitting.setdefault(name, usual)
                     break
                 if repeated := repeated_name(shape):
@@ -340,10 +340,12 @@ def _words(channels: Sequence[str]) -> list[str]:
     return [word for quantity, word in words.items() if f"{quantity}1" in channels]
 
 
-def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | None) -> _Usual | None:
-    """Two of a message's `joints` and their fields.
+def _joint_topic_in(
+    topic: str, shape: Shape, joints: list[str], profile: Profile | None
+) -> _JointTopic | None:
+    """The two joints to read and their fields.
 
-    None where it has not both, or of more nobody chose two.
+    None if one is missing, or if there are more than two and none was selected.
     """
     wanted = None if profile is None else profile.joints
     chosen = None
@@ -355,7 +357,7 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     if chosen:
         there = (joints[0], joints[1]) if len(joints) == 2 else chosen
         named = bool(names_in(shape))
-        return _Usual(
+        return _JointTopic(
             topic, there, named, joint_fields(shape, chosen), others=other_positions(shape, chosen)
         )
     if joints or repeated_name(shape):
@@ -379,7 +381,9 @@ def _fitting(topic: str, shape: Shape, joints: list[str], profile: Profile | Non
     for name, path in path_of.items():
         if take_apart(path).stem in CURRENTS:
             units[name] = "A"
-    return _Usual(topic, choice.joints or ("1", "2"), choice.joints is not None, path_of, units)
+    return _JointTopic(
+        topic, choice.joints or ("1", "2"), choice.joints is not None, path_of, units
+    )
 
 
 def _candidates(file: MessageFile, profile: Profile | None) -> list[tuple[str, str]]:
@@ -392,7 +396,7 @@ def _candidates(file: MessageFile, profile: Profile | None) -> list[tuple[str, s
     LogError
         Where several topics may hold them and no profile names one.
     """
-    places = kinds(file)
+    places = channels_by_type(file)
     if profile and profile.topic:
         return [place for place in places if place[0] == profile.topic]
     some = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from algid.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice
-from algid.readers.assemble import TableReader, reader_of
+from algid.readers.assemble import TableReader, make_reader
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.joints import moving_joints
 from algid.readers.messages.message_file import MessageFile
@@ -90,7 +90,7 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
             (needed if set(paths) - set(REFERENCES) else followed).append(series)
         return aligned(in_order(name, samples), needed, followed, left_out)
 
-    return reader_of(
+    return make_reader(
         origin,
         tables,
         profile,

@@ -16,7 +16,7 @@ from algid.errors import LogError
 from algid.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
-from algid.readers.messages.batch import Account
+from algid.readers.messages.batch import Losses
 from algid.readers.messages.codec import decoder_for
 from algid.readers.messages.columnar import Decoder, Shape
 from algid.readers.messages.message_file import MessageFile, channels_of
@@ -184,15 +184,15 @@ class Topic:
         if self.fields.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.fields.stamp, strict=True))
         decoder = decoder_for(path, file.channels[min(channels)], wanted)
-        account = Account()
+        losses = Losses()
         parts: list[SampleTable] = []
         size = 0
         for batch in file.batches(channels):
-            account.add(batch)
+            losses.add(batch)
             if batch.messages is None or not len(batch.messages):
                 continue
             held, columns = decoder.columns(batch.messages)
-            if decoder.misfits > account.found / 2:
+            if decoder.misfits > losses.found / 2:
                 raise LogError(
                     f"{path}: topic {self.name!r}: {decoder.misfit}; it cannot be read without "
                     "guessing"
@@ -205,7 +205,7 @@ class Topic:
                 yield self._clocked(path, parts)
                 parts, size = [], 0
         last = self._clocked(path, parts) if parts else SampleTable(np.empty(0, np.int64), {})
-        notices = [*file.notices, *account.notices(self.count(file))]
+        notices = [*file.notices, *losses.notices(self.count(file))]
         notices += self._left_out(decoder, file, channels)
         yield last.noting(*notices)
 

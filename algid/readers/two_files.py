@@ -27,7 +27,7 @@ Opener = Callable[[Any, "Profile"], TableReader]
 """Opens one file, or columns in memory, as a profile says."""
 
 
-def open_halves(log: Any, profile: Profile, open_one: Opener) -> TableReader:
+def open_with_torque_file(log: Any, profile: Profile, open_one: Opener) -> TableReader:
     """Open a log whose torques stand in the profile's `torque_file`.
 
     Parameters
