@@ -182,60 +182,58 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "{joint}{band}",
     "WORSE_THAN_MEAN": "the model predicts the torque of joint {joint} worse than its mean does",
     "BROKEN_BOUND": "the estimates break {bound} by {distance}",
-    "NOT_WHITE": "the residual of {names} is not white, though the intervals take it to be",
+    "NOT_WHITE": (
+        "the residual of {names} is autocorrelated, and the intervals assume white noise"
+    ),
     "UNKNOWN_CAUSE": (
         "angles, signs, units or the order of the joints are not what algid took them for, or the "
         "logs are of another "
         "arm"
     ),
     "REFUTED": (
-        "the torque's error is far larger and slower than its sensor's noise (unmodelled "
-        "dynamics): the likelihood of "
-        "white noise does not hold, and the {kept} estimate with robust intervals stands in its "
-        "place"
+        "residual torque is larger and more autocorrelated than sensor noise (unmodelled "
+        "dynamics): the maximum-likelihood fit is rejected, and the {kept} estimate with robust "
+        "intervals is reported"
     ),
     "MISFIT": (
-        "what the likelihood leaves of the torque depends on the motion (unmodelled dynamics): its "
-        "error bars do not hold, and the {kept} estimate with robust intervals stands in its place"
+        "the residual torque of the maximum-likelihood fit depends on the motion (unmodelled "
+        "dynamics): the fit is rejected, and the {kept} estimate with robust intervals is "
+        "reported"
     ),
-    "SHRUNK_TERMS": "every term of the torque is shrunk to what the logs tell of it: none is "
-    "chosen",
+    "SHRUNK_TERMS": (
+        "all optional torque terms are kept with a shrinkage prior (no term selection)"
+    ),
     "INTEGRATION": (
-        "the log has no noise: what its own integration and sampling leave, {samples:.2g} of a "
-        "sample, limits the intervals (up to {factor:.2g} times wider)"
+        "the log has no noise: its own integration and sampling errors, {samples:.2g} of a "
+        "sample, limit the intervals (up to {factor:.2g} times wider)"
     ),
     "HELD_TORQUE": (
-        "the torque is held from each sample to the next: it acts {late:.3g} ms after its stamp in "
-        "the mean"
+        "the torque is zero-order held: it acts {late:.3g} ms after its stamp in the mean"
     ),
     "HOLD_UNTOLD": (
-        "the logs do not tell whether the torque is held from each sample to the next, which makes "
-        "it {half:.3g} ms late in the mean: the intervals hold both"
+        "the logs leave open whether the torque is zero-order held ({half:.3g} ms mean delay): "
+        "intervals cover both cases"
     ),
     "FASTER_CONTROLLER": (
-        "the logs do not tell how late the torque of a controller that is faster than they are "
-        "acts: the intervals hold none to one millisecond"
+        "the controller may run faster than the log: intervals allow for a torque delay of 0 to 1 "
+        "ms"
     ),
     "UNLIKE_GAINS": (
-        "the gains of the torques differ: torque 2 is {ratio:.3f} ± {half:.2g} times (95 %) what "
-        "torque 1 has it; no "
-        "log tells which is right, and where torque 2 is, k1 … k7 and every mass are larger by "
-        "that factor"
+        "the two torque channels disagree in scale: τ2/τ1 = {ratio:.3f} ± {half:.2g} (95 %); "
+        "check both torque constants: if τ2 is right, all inertias and masses are larger by that "
+        "factor"
     ),
     "JOINT_STILL": "{joints} never moved: give a log in which both joints do",
     "HEAVY_ARM": (
-        "the arm would be {mass:.3g} kg heavy on a link of {length:.2g} m, more than a block of "
-        "steel of that length: are "
-        "its torques in N m?"
+        "implausible mass ({mass:.3g} kg on a link of {length:.2g} m): check the torque unit"
     ),
     "MOTORLESS_INSTRUMENTS": (
-        "friction and cables pull nearly as hard as the load of the joint without a motor, which "
-        "draws least squares to constants near nothing: instruments stand in its place"
+        "friction of the passive joint biases least squares towards zero: the "
+        "instrumental-variable estimate is reported"
     ),
     "MOTORLESS_UNTOLD": (
-        "joint {joint} has no motor, and what else moves it (friction, cables) pulls as hard as "
-        "its load: k1 … k5 are "
-        "not determined; move it faster"
+        "joint {joint} has no motor, and friction or cables pull on it as hard as its load: k1 … "
+        "k5 are not determined; move it faster"
     ),
     "JOINTS_CONTRADICT": (
         "{name} is {first:.2g} {unit} from joint 1's equation alone and {second:.2g} from "
@@ -243,38 +241,32 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "check both constants, and give a log that drives both joints"
     ),
     "HARDLY_DRIVEN": (
-        "joint {joint} has less than {percent:.3g} % of the other's torque in every log: bearings "
-        "and cables pull as hard as its motor; give a log that drives both"
+        "joint {joint} is hardly driven (under {percent:.3g} % of the other joint's torque in "
+        "every log): friction dominates; give a log that drives both"
     ),
     "BOUNDS_DOUBTED": (
-        "the estimates break {bounds}, though an arm that obeys physics explains the torques as "
-        "well: a joint is hardly "
-        "driven, and the friction that moves it makes the constants; give logs that drive both "
-        "joints"
+        "the estimates break {bounds}, but an arm within the bounds explains the torques as well: "
+        "a joint is hardly driven, and friction dominates; give logs that drive both joints"
     ),
     "CONSTRAINED": "{flag[constrain]} enforces {bounds}, which the logs contradict",
     "NOT_FEASIBLE": "{flag[constrain]} cannot obey {bounds}: no estimates within the bounds were "
     "found",
     "REFINED_FAILED": "the refined estimator did not converge, and the {kept} estimate with robust "
-    "intervals stands in its place",
+    "intervals is reported",
     "NO_GRAVITY": "without gravity k2 and k4 have no effect, and the payload has no weight",
     "INSTRUMENTS_STAND": (
-        "torque that the model lacks drives the motion (least squares is {distance:.1f} of its "
-        "standard deviations "
-        "off), and the logged torque does not answer it: instruments stand in place of least "
-        "squares"
+        "unmodelled torque drives the motion (least squares is {distance:.1f} σ off), and the "
+        "logged torque does not respond to it: the instrumental-variable estimate is reported"
     ),
     "REFERENCE_STANDS": (
-        "torque that the model lacks drives the motion (least squares is {distance:.1f} of its "
-        "standard deviations off): the motion that the logged reference explains is the "
-        "instrument, in place of least squares"
+        "unmodelled torque drives the motion (least squares is {distance:.1f} σ off): the "
+        "instrumental-variable estimate by the logged reference is reported"
     ),
     "FEEDBACK": (
-        "the logged torque answers torque that the model lacks (feedback, p = {p_value:.1g}): "
-        "neither least squares "
-        "nor the logged torque as an instrument is right, and constants may be off by more than "
-        "their intervals; "
-        "log the reference (q_des1, q_des2), or record with the torque commanded in open loop"
+        "the logged torque responds to unmodelled torque (feedback, p = {p_value:.1g}), which "
+        "biases least squares and instruments alike: constants may be off by more than their "
+        "intervals; log the reference (q_des1, q_des2), or record with the torque commanded in "
+        "open loop"
     ),
     "NO_PAYLOAD": "the payload is not significantly different from zero: at most {most:.3g} kg at "
     "95 %",
@@ -285,28 +277,27 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "compensated in part, or a "
         "zero, a sign or a term of the torque is wrong"
     ),
-    "EXCHANGED_LOGS": "the payload's mass is negative by far: the loaded and the unloaded logs "
-    "are exchanged",
-    "LOGS_APART": "the loaded and the unloaded logs are {distance:.1f} standard deviations from "
-    "belonging to one arm",
+    "EXCHANGED_LOGS": (
+        "the payload's mass is clearly negative: the loaded and the unloaded logs are exchanged"
+    ),
+    "LOGS_APART": (
+        "the loaded and the unloaded logs are {distance:.1f} σ from belonging to one arm"
+    ),
     "NO_CROSS_VALIDATION": "no cross-validation: a log is too short to be fitted, or to be judged",
     "ONE_RUN": (
-        "what differs from run to run is not in the intervals: give four logs of different "
-        "motions, or more"
+        "run-to-run variation is not in the intervals: give four or more logs of different motions"
     ),
     "REPEATABILITY": (
         "the loaded runs by themselves weigh {masses} kg: repeatability {std:.2g} kg (95 %: "
         "{low:.2g} to {high:.2g})"
     ),
     "TORQUE_GAIN": (
-        "by the payload that is known the torques have to be multiplied by {gain:.5g} (95 %: "
-        "{low:.5g} to {high:.5g}), "
-        "and with them k1 … k7, friction and masses"
+        "by the known payload the torques have to be multiplied by {gain:.5g} (95 %: {low:.5g} to "
+        "{high:.5g}), and with them k1 … k7, friction and masses"
     ),
     "NO_TORQUE_GAIN": (
-        "the payload that is known does not tell the gain of the torques: its mass is not "
-        "significantly different from "
-        "zero"
+        "the known payload does not determine the gain of the torques: its identified mass is not "
+        "significant"
     ),
     # of logs
     "SAME_LOG": "{name} is the same log, byte for byte, and counts once",
@@ -329,24 +320,25 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         "gravity-compensated, without k2 and k4"
     ),
     "PAYLOAD_WEIGHTLESS": (
-        "torques do not carry the payload's weight either: its inertia alone is left, which tells "
-        "its mass where a "
-        "length is known"
+        "torques do not carry the payload's weight either: only its inertia is left, which "
+        "determines its mass where a length is known"
     ),
     "EXTERNAL_EFFORT": (
-        "without payload the torques have nothing of an arm in them, with it those of a payload: "
-        "they are external ones"
+        "logged torques contain the payload only, not the arm: the driver logs external torque"
     ),
-    "NO_FRICTION": "torques hold no friction: they are friction-compensated, or the joints have "
-    "none",
-    "WRONG_CONVENTION": "{wrong}, by all that physics says ({contradiction})",
+    "NO_FRICTION": (
+        "torques contain no friction: they are friction-compensated, or the joints have none"
+    ),
+    "WRONG_CONVENTION": ("{wrong} by the equations of motion (as read, {contradiction})"),
     "ZERO_OFFSET": "{wrong}, or a centre of mass lies as far off its link's line",
     "PHASES": (
         "θ1's zero against gravity is off by {first}, joint 1's load lies {load} off link 1's "
-        "line, and {second} is "
-        "θ2's zero or link 2's centre of mass, which no torque tells apart (95 %)"
+        "line, and {second} is θ2's zero or link 2's centre of mass, which torque does not "
+        "distinguish (95 %)"
     ),
-    "PHASE": "{second} is θ2's zero or link 2's centre of mass, which no torque tells apart (95 %)",
+    "PHASE": (
+        "{second} is θ2's zero or link 2's centre of mass, which torque does not distinguish (95 %)"
+    ),
     "RESTS": (
         "the arm rests {rests}; where friction holds it there, the torque is not that of the "
         "weight: leave the rest out"
@@ -362,7 +354,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "COMMANDED_TORQUE": "torques are commanded ones ({columns}): no measured torque in the log",
     "FOREIGN_UNIT": (
         "the column {column!r} for {name} states the unit {unit!r}, and is taken for {given} as "
-        "told"
+        "configured"
     ),
     "STATED_UNUSED": {
         "line": "the file says {said}, which was not used",
@@ -375,7 +367,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     },
     "CURRENT_AS_TORQUE": (
         "{column!r} for {name} is a current by its name, and is taken for a torque in {given} as "
-        "told"
+        "configured"
     ),
     "PASSIVE_TORQUE": (
         "{column!r} holds a torque of {percent:.2g} % of the other joint's at joint {joint}, which "
@@ -389,8 +381,8 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "JOINT_ORDER": "joint 1 is {first!r} and joint 2 {second!r}, {why}",
     "OTHER_JOINTS": (
         "{count:# other joint moves|other joints move} meanwhile: {joints} (in the first "
-        "{samples:# sample|samples}); what that does to the torques is in no two-link model: hold "
-        "them still"
+        "{samples:# sample|samples}); their reaction torques are not modelled: keep them fixed "
+        "while recording"
     ),
     "TOPIC_CHOICE": "the joints are taken from {topic!r}; there are two also on {others}",
     "NO_TOPIC": "{file}: topic {topic!r} is not in this file",
@@ -449,7 +441,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "NO_INDEX": "the file has no usable index; read by scanning",
     "DAMAGED_SUMMARY": "the file's summary cannot be used ({why}); read by scanning",
     "NOT_FINITE": "{count:# sample holds|samples hold} a number that is not finite; left out",
-    "CUT": "{count:# sample|samples} before {start:g} s or behind {end} left out, as told",
+    "CUT": ("{count:# sample|samples} before {start:g} s or behind {end} left out, as configured"),
     "UNSORTED_STAMPS": "{count:# sample|samples} came late, now in order",
     "DUPLICATE_STAMPS": (
         "{count:# sample repeats|samples repeat} a stamp; the first of each was kept{others}"
@@ -481,12 +473,12 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "EFFORT_CONSTANT": "{channel} is {value:.6g} N m in every sample",
     "DEGREES": {
         "signal": (
-            "{what} of joint {joint} are in degrees by the other signal"
-            "{unit:~; they are taken for # as told}"
+            "{what} of joint {joint} are in degrees by the other signal{unit:~; they are taken "
+            "for # as configured}"
         ),
         "reach": (
-            "angles reach {largest:.4g}: few arms turn that far in rad"
-            "{unit:~; they are taken for # as told}"
+            "angles reach {largest:.4g}: few arms turn that far in rad{unit:~; they are taken for "
+            "# as configured}"
         ),
     },
     "HELD_EFFORT": (
@@ -503,12 +495,12 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     },
     "CLIPPED_TORQUE": {
         "sensor": (
-            "{channel} is cut off at {level:.4g} N m, where the motion tells of more: the sensor "
+            "{channel} is cut off at {level:.4g} N m, where the motion implies more: the sensor "
             "reaches the end of its range; {count:# sample|samples} ({percent:.2g} %) left out"
         ),
         "drive": (
-            "{channel} exceeds {level:.4g} N m, where the motion tells of no more: the drive "
-            "gives less than is logged; {count:# sample|samples} ({percent:.2g} %) left out"
+            "{channel} exceeds {level:.4g} N m, where the motion implies no more: the drive gives "
+            "less than is logged; {count:# sample|samples} ({percent:.2g} %) left out"
         ),
     },
     "DEAD_EFFORT": (
@@ -524,8 +516,8 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     ),
     "SLOW_SAMPLING": {
         "period": (
-            "{samples:.2g} samples in a period of the motion at {rate:.4g} Hz: too slow to tell "
-            "its acceleration; record faster, or move more slowly"
+            "{samples:.2g} samples in a period of the motion at {rate:.4g} Hz: too slow to "
+            "determine its acceleration; record faster, or move more slowly"
         ),
         "turn": (
             "a joint turns {turn:.2g} rad between samples, more than derivatives follow: the "
@@ -549,15 +541,11 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     # of tracks
     "STRETCHES_WEAK": "stretch{numbers:|es} {numbers} {numbers:moves|move} too little to be "
     "weighed",
-    "STRETCHES_NEGATIVE": (
-        "stretch{numbers:|es} {numbers} {numbers:weighs|weigh} less than nothing, which no "
-        "payload does"
-    ),
+    "STRETCHES_NEGATIVE": ("stretch{numbers:|es} {numbers}: negative payload mass"),
     "TORQUE_UNEXPLAINED": "arm and payload explain only {percent:.0f} % of the torque",
     "TORQUE_ERRORS": (
-        "the torque holds errors {times} times its sensors' noise that the arm's model does not "
-        "explain: intervals are "
-        "wider by as much, and small changes go unseen"
+        "the torque has errors of {times} times its sensors' noise that the arm's model does not "
+        "explain: intervals are wider by as much, and small changes go unseen"
     ),
     "ARM_DOUBTFUL": "the arm's own result is {grade}: {headline}",
     "LENGTH_CONTRADICTED": {
@@ -592,7 +580,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         ),
         "undated": (
             "No drift was looked for in {count:# log|logs} without a date: stamps count from "
-            "1970, or a manifest tells the time."
+            "1970, or a manifest gives the time."
         ),
         "steady": (
             "Drift was not tested for {count:# robot|robots}: fewer than {least} dated logs "
@@ -600,11 +588,11 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
         ),
         "alone": ("Outliers were not tested for {count:# robot|robots}: fewer than {least} logs."),
     },
-    "NOT_REACHED": "no motion within the limits tells {names}",
+    "NOT_REACHED": ("no motion within the limits determines {names}"),
     "BROKEN_OFF": "the search was broken off: this is the best motion until then",
 }
 """Text by code; of a code with several cases, by the number "case"."""
-_ANYWHERE = "{accepted:~; used nevertheless, as accept says}{looked_at:~ (in its first # s)}"
+_ANYWHERE = "{accepted:~ (accepted by --accept)}{looked_at:~ (in its first # s)}"
 """What may stand behind the text of every code."""
 
 

@@ -103,7 +103,7 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
     assert lines == repr(found).splitlines()
     assert len(lines) == 3 + len(made.estimates)
     assert lines[1] == made.verdict.sentence
-    assert lines[2].split() == ["parameter", "estimate", "std", "unit", "status"]
+    assert lines[2].split() == ["parameter", "estimate", "±", "95", "%", "unit", "status"]
     k1 = made.parameters["k1"]
     assert lines[3].split()[:2] == ["k1", f"{k1.estimate:.6g}"]
     assert lines[3].endswith("OK")

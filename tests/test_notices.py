@@ -137,7 +137,7 @@ def test_a_notice_is_plain_data() -> None:
         (
             "DEGREES",
             {"case": "reach", "largest": 90.0, "unit": "rad"},
-            "angles reach 90: few arms turn that far in rad; they are taken for rad as told",
+            "angles reach 90: few arms turn that far in rad; they are taken for rad as configured",
         ),
         (
             "OPEN_DIRECTION",
@@ -148,7 +148,7 @@ def test_a_notice_is_plain_data() -> None:
             "GAPS",
             {"count": 1, "seconds": 2.0, "accepted": True, "looked_at": 30},
             (
-                "1 gap, the longest 2 s; no window spans one; used nevertheless, as accept says "
+                "1 gap, the longest 2 s; no window spans one (accepted by --accept) "
                 "(in its first 30 s)"
             ),
         ),

@@ -629,12 +629,8 @@ def _demands(k: dict[str, float], covariance: FloatArray, speed: FloatArray) -> 
             k5 * m22 + k[K3] * k[J2] - k1**2,
             {K1: -2 * k1, K3: k5 + k[J2], K5: m22, J2: k5 + k[K3]},
         ),
-        "that the friction of joint 1 brakes": distance(
-            k[K6] * speed[0] + k[F1], {K6: float(speed[0]), F1: 1}
-        ),
-        "that the friction of joint 2 brakes": distance(
-            k[K7] * speed[1] + k[F2], {K7: float(speed[1]), F2: 1}
-        ),
+        "friction of joint 1 > 0": distance(k[K6] * speed[0] + k[F1], {K6: float(speed[0]), F1: 1}),
+        "friction of joint 2 > 0": distance(k[K7] * speed[1] + k[F2], {K7: float(speed[1]), F2: 1}),
     }
     if K2 not in k:
         return distances | {"k1 > 0": distance(k1, {K1: 1})}

@@ -29,7 +29,6 @@ from algid.inspection.dynamics import Suspicion
 from algid.log import ZEROS, Log, Origin, Reading
 from algid.notices import Notice, Remedy, flat
 from algid.signals.segments import stretches
-from algid.words import counted
 
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _SMALL = np.pi / 4
@@ -155,10 +154,9 @@ def _contradiction(judgement: Judgement) -> str:
     if not broken:
         left = 100 * float(judgement.as_read.left.max())
         then = 100 * float(judgement.best.left.max())
-        return f"{left:.3g} % of a torque stays unexplained, {then:.2g} % then"
+        return f"{left:.3g} % of a torque stays unexplained, {then:.2g} % otherwise"
     name = min(broken, key=lambda name: broken[name])
-    missed = counted(round(-broken[name]), "standard deviation")
-    return f"it demands {name}, which the log misses by {missed}"
+    return f"{name} is broken by {round(-broken[name]):,} σ"
 
 
 def mends(

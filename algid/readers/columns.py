@@ -310,7 +310,7 @@ def _of_other_units(
         given = profile.time_unit if name == "t" else profile.channel(name).unit
         other = unit_of(beside.get(name, unit))
         if given not in (None, unit) and not (given in TORQUE and unit in CURRENT):
-            numbers = {"unit": unit, "taken": given, "why": "as told"}
+            numbers = {"unit": unit, "taken": given, "why": "as configured"}
         elif given is None and other not in (None, unit):
             numbers = {"unit": other, "taken": unit, "why": "as its name says"}
         else:

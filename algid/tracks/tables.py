@@ -184,10 +184,10 @@ def _failure(result: TrackResult) -> str | None:
     statuses = result.statuses
     negative = statuses.count(StretchStatus.NEGATIVE_MASS)
     if 2 * negative >= len(statuses):
-        share = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')} weigh"
+        share = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')} have"
         if len(statuses) == 1:
-            share = "the payload weighs"
-        return f"{share} less than nothing: the arm's constants do not fit this log"
+            share = "the payload has"
+        return f"{share} a negative mass: the arm's constants do not fit this log"
     if set(statuses) == {StretchStatus.WEAK_EXCITATION}:
         return "the arm moves too little to weigh anything"
     return None

@@ -302,8 +302,8 @@ def test_demands_are_in_standard_deviations(gravity: bool) -> None:
             "k5 > 0": k["k5"],
             # of M at the angle where k1 cos θ2 couples nothing else, and what the rotor adds to it
             "det M > 0": float(np.linalg.det(mass)) + k["k3"] * k["j2"],
-            "that the friction of joint 1 brakes": k["k6"] * speed[0] + k["f1"],
-            "that the friction of joint 2 brakes": k["k7"] * speed[1] + k["f2"],
+            "friction of joint 1 > 0": k["k6"] * speed[0] + k["f1"],
+            "friction of joint 2 > 0": k["k7"] * speed[1] + k["f2"],
         }
         return found | {f"{name} > 0": k[name] for name in (("k2", "k4") if gravity else ("k1",))}
 

@@ -293,7 +293,7 @@ def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path)
     assert [one.text for one in history.untested] == [
         (
             "No drift was looked for in 1 log without a date: stamps count from 1970, or a "
-            "manifest tells the time."
+            "manifest gives the time."
         )
     ]
 

@@ -180,9 +180,7 @@ def test_logs_of_two_arms_are_told() -> None:
     _, second = algid.synthesise("case2", duration=6.0, excitation="wide", sensors=sensors)
     result = identify(first, second, Settings(model="plain"))
     assert any("another arm" in warning for warning in result.warnings)
-    assert any(
-        "standard deviations from belonging to one arm" in warning for warning in result.warnings
-    )
+    assert any("σ from belonging to one arm" in warning for warning in result.warnings)
 
 
 def test_weak_excitation_is_a_status_not_a_number() -> None:

@@ -70,7 +70,7 @@ def test_a_unit_that_leaves_no_arm_is_asked_for_and_not_advised(
     log = replace(log, origin=replace(log.origin, reading=Reading(channels=channels)))
     (asked,) = heavy(identify(log, report=False))
     assert not asked.remedies
-    assert asked.clause.endswith("are its torques in N m?")
+    assert asked.clause.endswith(": check the torque unit")
 
 
 def test_a_unit_that_an_earlier_result_contradicts_is_not_advised() -> None:

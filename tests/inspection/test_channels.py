@@ -253,7 +253,8 @@ def test_a_unit_that_the_user_said_is_believed() -> None:
     assert not found.refuse
     assert (
         found.text
-        == "angles of joint 1 are in degrees by the other signal; they are taken for rad as told"
+        == "angles of joint 1 are in degrees by the other signal; they are taken for rad as "
+        "configured"
     )
 
 

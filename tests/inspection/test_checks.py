@@ -361,7 +361,7 @@ def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
     )
     accepted = yielding(refusal, ("RESTS", "EFFORT_ZERO"))
     assert not accepted.refuse
-    assert accepted.text == "tau2 is zero in every sample; used nevertheless, as accept says"
+    assert accepted.text == "tau2 is zero in every sample (accepted by --accept)"
 
 
 def test_joints_that_turn_many_times_are_read_where_physics_holds_for_radians() -> None:

@@ -86,14 +86,18 @@ def test_a_log_is_cut_where_the_user_says(sizes: tuple[int, ...]) -> None:
         (
             {"start": 0.003, "end": 0.006},
             range(3, 7),
-            "6 samples before 0.003 s or behind 0.006 s left out, as told",
+            "6 samples before 0.003 s or behind 0.006 s left out, as configured",
         ),
         (
             {"start": 0.0035},
             range(4, 10),
-            "4 samples before 0.0035 s or behind the end left out, as told",
+            "4 samples before 0.0035 s or behind the end left out, as configured",
         ),
-        ({"end": 0.0088}, range(9), "1 sample before 0 s or behind 0.0088 s left out, as told"),
+        (
+            {"end": 0.0088},
+            range(9),
+            "1 sample before 0 s or behind 0.0088 s left out, as configured",
+        ),
     ):
         log = reader(*sizes, settings=settings).whole()
         assert (log.stamp_ns // MS).tolist() == list(kept)

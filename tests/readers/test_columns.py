@@ -176,8 +176,8 @@ def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
     assert units(current_2="mA") == ["A", "mA"]
     assert units(current_2="Nm") == ["A", "A"]
     told = assigned(header, {"tau1": {"unit": "N m"}, "tau2": CONSTANTS["tau2"]})
-    text = "'current_1' for tau1 is a current by its name, and is taken for a torque in N m as told"
-    assert said(told) == [("CURRENT_AS_TORQUE", text)]
+    text = "'current_1' for tau1 is a current by its name, and is taken for a torque in N m as"
+    assert said(told) == [("CURRENT_AS_TORQUE", f"{text} configured")]
 
 
 def test_the_file_and_the_user_differ_about_a_unit() -> None:
@@ -188,7 +188,10 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
     ) == [
         (
             "OTHER_UNIT",
-            "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad, as told",
+            (
+                "the file states the unit deg for theta1 ('q1_deg'), which is taken for rad, as "
+                "configured"
+            ),
         )
     ]
     assert said(assigned("t q1_deg q2 tau1 tau2", None, q1_deg="rad", q2="deg")) == [
@@ -203,7 +206,7 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
     assert said(assigned("time_ms q1 q2 tau1 tau2", {"time_unit": "s"})) == [
         (
             "OTHER_UNIT",
-            "the file states the unit ms for t ('time_ms'), which is taken for s, as told",
+            "the file states the unit ms for t ('time_ms'), which is taken for s, as configured",
         )
     ]
 
@@ -218,7 +221,8 @@ def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))
     assert (
         foreign[1]
-        == "the column 'q1_inch' for theta1 states the unit 'inch', and is taken for rev as told"
+        == "the column 'q1_inch' for theta1 states the unit 'inch', and is taken for rev as "
+        "configured"
     )
     assert said(assigned("t q1_inch q2 q_b tau1 tau2", {"theta1": {"source": "q_b"}})) == []
     assert said(assigned(PLAIN, None, t="%")) == []

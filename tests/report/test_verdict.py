@@ -86,7 +86,7 @@ def test_warnings_are_reasons_and_notes_are_none(result: Result) -> None:
         ({"broken_bounds": [Bound(bound="k6 ≥ 0", value=-1.0, distance_sigma=4.0)]}, "k6 ≥ 0"),
         (
             {"whiteness": {"tau1": WhitenessTest(white=False, p_value=0.0, lag1_correlation=0.9)}},
-            "the residual of tau1 is not white",
+            "the residual of tau1 is autocorrelated",
         ),
         (
             {

@@ -129,10 +129,10 @@ def test_masses_that_cannot_be_are_not_passed_on(result: TrackResult) -> None:
     ]
     judged = verdict(found)
     assert judged.grade == "failed"
-    assert "2 of 3 stretches weigh less than nothing" in judged.sentence
+    assert "2 of 3 stretches have a negative mass" in judged.sentence
     assert [reason.text for reason in judged.reasons[:2]] == [
         "stretch 2 moves too little to be weighed",
-        "stretches 1 and 3 weigh less than nothing, which no payload does",
+        "stretches 1 and 3: negative payload mass",
     ]
 
 
@@ -332,7 +332,7 @@ def test_what_a_track_cannot_explain_is_told_by_how_much(result: TrackResult) ->
         "arm and payload explain only 80 % of the torque",
     )
     wider = judged(colour=9.0)
-    assert wider.reasons[0].text.startswith("the torque holds errors 3.0 times its sensors' noise")
+    assert wider.reasons[0].text.startswith("the torque has errors of 3.0 times its sensors' noise")
     lost = verdict(replace(result, data_lost=True))
     assert [reason.code for reason in lost.reasons] == ["DATA_LOST"]
     assert lost.sentence.endswith(", but samples of the log are lost.")
@@ -362,7 +362,7 @@ def test_one_stretch_and_many_are_told_in_words(result: TrackResult) -> None:
         replace(result, track=replace(alone, stretches=[replace(first, m_p=-0.2, std=0.001)]))
     )
     assert light.sentence.startswith(
-        "Failed: the payload weighs less than nothing: the arm's constants do not fit"
+        "Failed: the payload has a negative mass: the arm's constants do not fit"
     )
 
 
