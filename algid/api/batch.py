@@ -47,6 +47,7 @@ class Batched:
     stopped : why it could not go on, where it could not
     unreadable : why records that are there cannot be read, by their places
     links : to folders, that were passed over
+    anew : how many jobs that had ended were run again, by why
     """
 
     records: list[JobRecord]
@@ -57,6 +58,7 @@ class Batched:
     stopped: str | None = None
     unreadable: dict[str, str] = field(default_factory=dict)
     links: list[str] = field(default_factory=list)
+    anew: dict[str, int] = field(default_factory=dict)
 
     @property
     def failed(self) -> list[JobRecord]:
@@ -226,6 +228,7 @@ def batch(
         ended.stopped,
         running.unreadable,
         links,
+        dict(running.anew),
     )
 
 

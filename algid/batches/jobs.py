@@ -6,12 +6,18 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import Annotated
+
+from pydantic import Field
 
 from algid.errors import SettingError
 from algid.limits import LIMITS
 from algid.stores import public
 
-Label = str | float | int | bool
+Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+"""What a column of the table can hold."""
+Label = str | Finite | Int64 | bool
 TABLE = "jobs.parquet"
 """The table of all jobs, in OUT."""
 COLUMNS = frozenset(

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import json
-import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
-from algid.batches.jobs import COLUMNS, TABLE, Job, kept_path, name_fault, utc_of
+from algid.batches.jobs import (
+    COLUMNS,
+    TABLE,
+    Finite,
+    Int64,
+    Job,
+    kept_path,
+    name_fault,
+    utc_of,
+)
 from algid.errors import LogError, OutputError
 from algid.files import refuse_links, sha256_of, writing
 from algid.limits import LIMITS
@@ -47,7 +55,7 @@ class Input:
     """
 
     path: str
-    size: int
+    size: Int64
     mtime_ns: int
     ctime_ns: int = 0
     sha256: str | None = None
@@ -72,11 +80,11 @@ class JobRecord:
     inputs: tuple[Input, ...]
     settings: Mapping[str, Any]
     version: str
-    seconds: float = 0.0
-    start_ns: int | None = None
-    log_seconds: float | None = None
+    seconds: Finite = 0.0
+    start_ns: Int64 | None = None
+    log_seconds: Finite | None = None
     estimator: str | None = None
-    estimates: Mapping[str, tuple[float | None, float | None, str]] = field(default_factory=dict)
+    estimates: Mapping[str, tuple[Finite | None, Finite | None, str]] = field(default_factory=dict)
     verdict: Literal["good", "reservations", "failed"] | None = None
     headline: str | None = None
     reasons: tuple[str, ...] = ()
@@ -256,8 +264,6 @@ def _fault(record: JobRecord, place: str) -> str | None:
         return f"job.name: expected the job whose record lies here, found {job.name!r:.60}"
     if tuple(one.path for one in record.inputs) != job.logs + job.loaded:
         return "inputs: expected the job's own logs"
-    if not all(map(_fits_column, _numbers(record))):
-        return "expected finite numbers, whole ones of 64 bits"
     if not all(map(_is_estimates, record.estimates)):
         return "estimates: expected the names of parameters"
     if job.time is not None:
@@ -266,29 +272,6 @@ def _fault(record: JobRecord, place: str) -> str | None:
         except ValueError:
             return f"job.time: expected ISO 8601 from 1970 to 2261, found {job.time!r:.60}"
     return None
-
-
-def _numbers(record: JobRecord) -> Iterator[float]:
-    """The numbers of a record, and its labels that are some."""
-    for number in (record.start_ns, record.seconds, record.log_seconds):
-        if number is not None:
-            yield number
-    for one in record.inputs:
-        yield one.size
-    for estimate, std, _ in record.estimates.values():
-        for number in (estimate, std):
-            if number is not None:
-                yield number
-    for label in record.job.labels.values():
-        if isinstance(label, int | float):
-            yield label
-
-
-def _fits_column(number: float) -> bool:
-    """Whether a column of a table can hold a number."""
-    if isinstance(number, int):
-        return -(2**63) <= number < 2**63
-    return math.isfinite(number)
 
 
 def _is_estimates(name: str) -> bool:

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from algid import __version__
 from algid.batches.job import DiskFull, Task, basis_of, failed_record, is_full, kept, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
@@ -88,13 +89,15 @@ class BatchPlan:
     """Tasks to run, records of jobs that cannot even start, and records that stand as they are.
 
     Of `unseen` jobs an earlier end is known, and it cannot be looked at whether their logs and
-    results are as they were: they fail this time, and what is known of them stays.
+    results are as they were: they fail this time, and what is known of them stays. `anew` counts
+    jobs that have ended before, by why they are run again.
     """
 
     tasks: list[Task] = field(default_factory=list)
     refused: list[JobRecord] = field(default_factory=list)
     standing: list[JobRecord] = field(default_factory=list)
     unseen: list[JobRecord] = field(default_factory=list)
+    anew: Counter[str] = field(default_factory=Counter)
 
 
 def plan(
@@ -104,10 +107,7 @@ def plan(
     store: Store,
     retry_failed: bool = False,
 ) -> BatchPlan:
-    """Sort jobs by what is known of them.
-
-    a job whose logs and settings are as they were is not run again.
-    """
+    """Split jobs into those to run and those whose stored result is up to date."""
     made = BatchPlan()
     for job in jobs:
         try:
@@ -117,38 +117,40 @@ def plan(
             continue
         record = records.get(job.name)
         try:
-            again = record is None or (retry_failed and record.status in FAILURES)
-            standing = None if again else _standing(record, task, store)
-            if standing is None:
-                made.tasks.append(task)
-            else:
-                made.standing.append(standing)
+            standing = None if record is None else _standing(record, task, store, retry_failed)
         except AlgidError as error:
             made.unseen.append(failed_record(task, str(error)))
+            continue
+        if isinstance(standing, JobRecord):
+            made.standing.append(standing)
+            continue
+        made.tasks.append(task)
+        if standing is not None:
+            made.anew[standing] += 1
     return made
 
 
-def _standing(record: JobRecord | None, task: Task, store: Store) -> JobRecord | None:
-    """The record with its job and logs as they are now, if its outcome is still valid.
+def _standing(record: JobRecord, task: Task, store: Store, retry_failed: bool) -> JobRecord | str:
+    """The record with its job and logs as they are now, or why its job is run anew.
 
     Times of change that moved while the content did not are stored, so that it is hashed once
     for them.
     """
     job = kept(task.job)
-    if record is None or record.basis != task.basis:
-        return None
-    if (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
-        return None
+    if retry_failed and record.status in FAILURES:
+        return "failed before"
+    if record.basis != task.basis:
+        other = record.version != __version__
+        return f"of algid {record.version}" if other else "of other settings"
     if _has_result(record) and not store.exists(f"{task.job.name}.algid/result.json"):
-        return None
+        return "without their result"
     paths = (*task.job.logs, *task.job.loaded)
-    inputs = []
-    for before, path in zip(record.inputs, paths, strict=True):
-        now = unchanged(before, path)
-        if now is None:
-            return None
-        inputs.append(now)
-    return replace(record, job=job, inputs=tuple(inputs)) if inputs else None
+    same = (record.job.logs, record.job.loaded) == (job.logs, job.loaded)
+    inputs = [unchanged(*pair) for pair in zip(record.inputs, paths, strict=True)] if same else []
+    found = tuple(one for one in inputs if one is not None)
+    if not found or len(found) < len(inputs):
+        return "of other logs"
+    return replace(record, job=job, inputs=found)
 
 
 def _has_result(record: JobRecord) -> bool:
@@ -210,6 +212,8 @@ class Batch:
         self.stop = threading.Event()
         """If set, `run` returns at once; running jobs are left to whoever ends the executor."""
         prepare(store)
+        self.anew = Counter[str]()
+        """Jobs that had ended and were run again, by why."""
         known = read_records(store)
         self.records = known.records
         self.unreadable = known.unreadable
@@ -222,6 +226,7 @@ class Batch:
         over new ones. Jobs of earlier runs that are not among `jobs` keep their rows.
         """
         made = plan(jobs, self.records, self._recipe, self._store, retry_failed)
+        self.anew += made.anew
         unseen = {record.job.name: record for record in made.unseen}
         for record in (*made.standing, *made.refused):
             if record != self.records.get(record.job.name):

@@ -138,6 +138,9 @@ def _conclude(ended: Batched, quiet: bool) -> None:
     if not quiet:
         for record in ended.failed:
             say(f"{visible(record.job.name)}: {record.status.value}: {visible(record.reason)}")
+        if ended.anew:
+            why = ", ".join(f"{count} {visible(reason)}" for reason, count in ended.anew.items())
+            say(f"run anew: {why}")
         summary = ", ".join(f"{count} {name}" for name, count in ended.counts.items())
         say(
             f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; "

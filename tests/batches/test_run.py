@@ -148,6 +148,24 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
 
 
+def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here(), 1)))
+    quick: Any = {"estimator": "weak", "model": "plain", "report": False}
+    out = logs.parent / "out"
+    assert algid.batch(logs, out, **quick).anew == {}
+    for path in (out / ".jobs").rglob("*.json"):  # as an older algid has left them
+        record = json.loads(path.read_text()) | {"version": "0.1", "basis": "another"}
+        path.write_text(json.dumps(record))
+    assert algid.batch(logs, out, **quick).anew == {"of algid 0.1": 3}
+    shutil.rmtree(out / "r1/a.algid")
+    assert algid.batch(logs, out, **quick).anew == {"without their result": 1}
+    (logs / "bad.csv").write_text("other,words\n1,2\n")
+    assert algid.batch(logs, out, **quick).anew == {"of other logs": 1}
+    assert algid.batch(logs, out, retry_failed=True, **quick).anew == {"failed before": 1}
+    done = algid.batch(logs, out, window=0.3, **quick)
+    assert (done.anew, done.ran) == ({"of other settings": 3}, 3)
+
+
 @pytest.mark.parametrize("set_back", [False, True])
 def test_a_changed_log_of_equal_size_runs_again(logs: Path, *, set_back: bool) -> None:
     """Whatever its time of change is set to: the file system keeps one of its own."""
