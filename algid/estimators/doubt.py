@@ -18,7 +18,7 @@ from algid.estimators.diagnostics import joints_apart
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import MOTORLESS
 from algid.estimators.weak import Normal, Source, WeakSettings
-from algid.model import RIGID, UNITS
+from algid.model import K1, K2, K3, RIGID, UNITS
 from algid.notices import Notice
 
 
@@ -45,6 +45,9 @@ def doubted(
 
 UNLIKE, UNLIKE_IN_MANY = 0.5, 0.25
 """Share of the larger of two values: more than what a model lacks makes in one run, and in many."""
+UNEXPLAINED = 0.1
+"""Share of a torque's power: constants that leave more of it do not explain that joint."""
+OF_LINK_2 = (K1, K2, K3)
 LEAST_ACTING = 0.02
 """Share of the other joint's torque: less at a joint without a motor is bearing or cable."""
 
@@ -102,7 +105,7 @@ def _doubt(
     if few and still:
         return Notice("JOINT_STILL", numbers={"joints": still})
     settings = _delayed(fit, settings)
-    for sources in (unloaded, loaded):
+    for kind, sources in ((False, unloaded), (True, loaded)):
         normals = weak.normals_of(sources, settings)
         if not normals:
             continue
@@ -116,9 +119,29 @@ def _doubt(
             }
             return Notice("JOINTS_CONTRADICT", numbers=numbers)
         hardly = _hardly_driven(normals)
-        if few and hardly is not None:
+        if few and hardly and not _confirmed(fit, hardly, kind, sources, settings):
             return Notice("HARDLY_DRIVEN", numbers={"joint": hardly, "percent": 100 * MOTORLESS})
     return None
+
+
+def _confirmed(
+    fit: Fit, joint: int, kind: bool, sources: Sequence[Source], settings: WeakSettings
+) -> bool:
+    """True if both joints confirm the constants of one that is hardly driven, 1 or 2.
+
+    A light second link needs little torque. Its constants stand where they explain that torque,
+    and their part of the other joint's torque is larger than what the fit leaves there. What
+    bearings and cables make of a joint that no motor moves is confirmed by nothing.
+    """
+    model = fit.shared.model
+    c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
+    normals = weak.normals_of(sources, replace(settings, model=model), c)
+    gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
+    of_link = np.append(np.where(np.isin(model.names, OF_LINK_2), c, 0.0), 0.0)
+    residual = np.append(-c, 1.0)
+    left, part = (gram @ residual) @ residual, (gram @ of_link) @ of_link
+    own, other = joint - 1, 2 - joint
+    return bool(left[own] < UNEXPLAINED * gram[own, -1, -1] and left[other] < part[other])
 
 
 def _hardly_driven(normals: Sequence[Normal]) -> int | None:

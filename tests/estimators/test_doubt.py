@@ -118,6 +118,19 @@ def test_a_joint_that_is_driven_in_no_log_is_told_where_the_other_does_not_contr
     assert all("joint 2 has less than 10 % of the other's torque" in note.text for note in notes)
 
 
+def test_a_light_second_link_is_driven(bench: Bench) -> None:
+    """Its motor needs 1 % of the other's torque, which the same constants explain."""
+    arm = replace(bench.arm, m2=0.002, I2=2e-5, b2=1e-3)
+    motion = simulate(arm.constants(), wide_multi_sine(arm, 3), np.arange(4001) * DT)
+    rng = np.random.default_rng(0)
+    size = np.sqrt(np.mean(motion.tau**2, axis=1, keepdims=True))
+    assert size[1] < 0.02 * size[0]
+    tau = motion.tau + 0.01 * size * rng.standard_normal(motion.tau.shape)
+    log = Segment(0.0, DT, motion.theta + 1e-4 * rng.standard_normal(tau.shape), tau)
+    fit = replace(weak.fit([lambda: [log]]), notes=(REFUTED,))
+    assert doubted(fit, [lambda: [log]], [], WeakSettings()) is fit
+
+
 def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
     """The joints of the loaded log agree about the loaded arm: that the arm alone differs is no
     contradiction.
