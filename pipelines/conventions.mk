@@ -6,5 +6,6 @@ conventions: setup ## every wrong convention of a log, on five arms, with and wi
 
 .PHONY: false-alarms
 LOGS ?= 300
-false-alarms: setup ## sound logs of 300 simulated arms: how many bring a warning, and which
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.false_alarms --logs $(LOGS)
+FIRST ?= 0
+false-alarms: setup ## sound logs of 300 simulated arms: how many are withheld or accused, and by what
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.false_alarms --logs $(LOGS) --first $(FIRST)
