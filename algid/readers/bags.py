@@ -168,17 +168,15 @@ def database_file(path: Path) -> MessageFile:
         query = "SELECT id, name, type, serialization_format FROM topics"
         for number, name, kind, encoding in base.execute(query):
             definition = own.get(kind) or usual_definition(kind)
-            channels[number] = MessageChannel(name, kind, encoding, *definition)
-        query = (
-            "SELECT topic_id, COUNT(*), MIN(timestamp), MAX(timestamp) FROM messages "
-            "GROUP BY topic_id"
-        )
-        totals = base.execute(query).fetchall()
-    counts = {number: count for number, count, _, _ in totals}
-    strays = sum(count for number, count in counts.items() if number not in channels)
+            channels[int(number)] = MessageChannel(name, kind, encoding, *definition)
+        # in one pass: GROUP BY would sort the rows
+        each = "".join(f", TOTAL(topic_id IS {number})" for number in channels)
+        query = f"SELECT COUNT(*), MIN(timestamp), MAX(timestamp){each} FROM messages"
+        total, first, last, *sums = base.execute(query).fetchone()
+    counts = dict(zip(channels, map(int, sums), strict=True))
+    strays = total - sum(counts.values())
     stray = Notice("STRAY_MESSAGES", numbers={"count": strays}, lossy=True)
-    stamps = [stamp for row in totals for stamp in row[2:] if type(stamp) is int]
-    span = (min(stamps), max(stamps)) if stamps else None
+    span = (first, last) if type(first) is type(last) is int else None
 
     def rows(wanted: frozenset[int]) -> Iterator[tuple[Any, Any]]:
         numbers = ",".join(map(str, sorted(wanted)))
@@ -221,25 +219,22 @@ def _batches(
     payloads: list[bytes] = []
     size = odd = 0
     wrong, broken = "", ""
-    found = rows(channels)
-    while True:
-        try:
-            row = next(found, None)
-        except Exception as error:  # rosbags raises what its parts do
-            row, broken = None, _reason(error)
-        if stamps and (row is None or size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS):
-            yield MessageBatch(_gathered(stamps, payloads), checked=True)
-            stamps, payloads, size = [], [], 0
-        if row is None:
-            break
-        stamp, data = row
-        if type(stamp) is int and type(data) is bytes:
+    try:
+        for stamp, data in rows(channels):
+            if type(stamp) is not int or type(data) is not bytes:
+                odd += 1
+                wrong = wrong or repr(data if type(stamp) is int else stamp)[:40]
+                continue
             stamps.append(stamp)
             payloads.append(data)
             size += len(data)
-        else:
-            odd += 1
-            wrong = wrong or repr(data if type(stamp) is int else stamp)[:40]
+            if size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS:
+                yield MessageBatch(_gathered(stamps, payloads), checked=True)
+                stamps, payloads, size = [], [], 0
+    except Exception as error:  # rosbags raises what its parts do
+        broken = _reason(error)
+    if stamps:
+        yield MessageBatch(_gathered(stamps, payloads), checked=True)
     if odd:
         text = f"{wrong} for a time or a message in the table 'messages'"
         yield MessageBatch(None, checked=True, reason=text, rows=odd)
