@@ -32,8 +32,8 @@ import polars as pl
 
 from algid.batches.discover import jobs_of
 from algid.batches.job import failed_record
-from algid.batches.records import End, stat_of
-from algid.batches.run import Batch, Recipe, sweep
+from algid.batches.records import JobStatus, stat_of
+from algid.batches.run import Batch, BatchConfig, sweep
 from algid.errors import AlgidError
 from algid.files import refuse_links, whole_folder
 from algid.settings import Settings
@@ -55,11 +55,11 @@ class AtOnce(Executor):
         """Run a task."""
         self.ran += 1
         (task,) = args
-        status = End.OK if len(task.job.name) % 2 else End.FAILED
+        status = JobStatus.OK if len(task.job.name) % 2 else JobStatus.FAILED
         future: Future[Any] = Future()
         try:
             refuse_links(Path(task.out), task.job.name)  # as `run_task` does
-            if status is End.OK:
+            if status is JobStatus.OK:
                 with whole_folder(Path(task.out, f"{task.job.name}.algid"), force=True) as folder:
                     (folder / "result.json").touch()
             inputs = tuple(
@@ -153,7 +153,7 @@ def _run(jobs: list[Any], out: Path, executor: AtOnce) -> tuple[set[str], str | 
     """The jobs of the table that a batch leaves, and why it was stopped."""
     store = open_store(str(out))
     sweep(store)
-    recipe = Recipe(str(out), Settings(), lambda _file: None)
+    recipe = BatchConfig(str(out), Settings(), lambda _file: None)
     ended = Batch(store, recipe, executor, 1, lambda _progress: None).run(jobs)
     if ended.stopped is not None:
         return set(), ended.stopped

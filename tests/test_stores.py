@@ -10,8 +10,8 @@ import pytest
 
 import algid
 from algid.batches.discover import jobs_of
-from algid.batches.records import End
-from algid.batches.run import Batch, Recipe
+from algid.batches.records import JobStatus
+from algid.batches.run import Batch, BatchConfig
 from algid.errors import LogError, OutputError
 from algid.settings import Settings
 from algid.stores import list_urls, object_stat, open_store, reading
@@ -35,12 +35,12 @@ def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> Non
     store.write("r1/a.mcap", (tmp_path / "a.mcap").read_bytes())
     store.write("bad.csv", b"junk")
     out = served.url("out")
-    recipe = Recipe(out, Settings(estimator="weak"), lambda _file: None, report=False)
+    recipe = BatchConfig(out, Settings(estimator="weak"), lambda _file: None, report=False)
     jobs = jobs_of([served.url("logs")], out)
     ended = Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs)
     assert [(record.job.name, record.status) for record in ended.records] == [
-        ("bad", End.FAILED),
-        ("r1/a", End.OK),
+        ("bad", JobStatus.FAILED),
+        ("r1/a", JobStatus.OK),
     ]
     assert Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran == 0
     (tmp_path / "result.json").write_bytes(open_store(out).read("r1/a.algid/result.json") or b"")
@@ -122,7 +122,7 @@ def test_a_changed_object_is_done_again(served: Served, tmp_path: Path) -> None:
     store, out = open_store(served.url("logs")), str(tmp_path / "out")
     store.write("bad.csv", b"junk")
     jobs = jobs_of([served.url("logs")], out)
-    recipe = Recipe(out, Settings(estimator="weak"), lambda _file: None, report=False)
+    recipe = BatchConfig(out, Settings(estimator="weak"), lambda _file: None, report=False)
 
     def ran() -> int:
         return Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from algid.api.options import ProfileLike
     from algid.batches.jobs import Job
     from algid.batches.records import JobRecord
-    from algid.batches.run import Batch, Ended
+    from algid.batches.run import Batch, BatchOutcome
     from algid.batches.run import Progress as Progress
     from algid.profile import Profile
     from algid.results import Result
@@ -70,17 +70,17 @@ class Batched:
     @property
     def incomplete(self) -> bool:
         """Whether a job's result leaves a parameter open."""
-        from algid.batches.records import End
+        from algid.batches.records import JobStatus
 
-        return any(record.status is End.INCOMPLETE for record in self.records)
+        return any(record.status is JobStatus.INCOMPLETE for record in self.records)
 
     @property
     def counts(self) -> dict[str, int]:
         """Jobs by status, those there are."""
-        from algid.batches.records import End
+        from algid.batches.records import JobStatus
 
         counts = Counter(record.status for record in self.records)
-        return {end.value: counts[end] for end in End if end in counts}
+        return {end.value: counts[end] for end in JobStatus if end in counts}
 
 
 def batch(
@@ -165,7 +165,7 @@ def batch(
     """
     from algid.batches.discover import jobs_of
     from algid.batches.lock import locked
-    from algid.batches.run import Batch, Recipe, stopped_by_signals, sweep
+    from algid.batches.run import Batch, BatchConfig, stopped_by_signals, sweep
     from algid.stores import absolute, open_store, shown
 
     if isinstance(sources, str | Path):
@@ -195,7 +195,7 @@ def batch(
             return said
         return _over(file, options)
 
-    recipe = Recipe(place, asked, cache(profile_for or meant), known, report)  # each file once
+    recipe = BatchConfig(place, asked, cache(profile_for or meant), known, report)  # each file once
     recipe.profile(None)
     jobs, links = [], list[str]()
     if not watch:
@@ -298,15 +298,15 @@ def watched(
     alone: str,
     retry_failed: bool,
     complain: Complaint | None = None,
-) -> Ended:
+) -> BatchOutcome:
     """Look for logs until stopped.
 
     Nothing but settled ones are taken, and a trouble is reported once.
     """
     from algid.batches.discover import jobs_of
-    from algid.batches.run import LOOK_EVERY, Settling
+    from algid.batches.run import LOOK_EVERY, StableFiles
 
-    settling = Settling()
+    settling = StableFiles()
     complaint = ""
     ended = running.run([])
     while not running.stop.is_set():

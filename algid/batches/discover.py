@@ -18,7 +18,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from urllib.parse import unquote
 
-from algid.batches.jobs import TABLE, Job, kept_path, name_fault, safe_name
+from algid.batches.jobs import TABLE, Job, name_fault, redacted_path, safe_name
 from algid.batches.manifest import is_manifest, read_manifest
 from algid.errors import SettingError
 from algid.readers.formats import SUFFIXES
@@ -171,7 +171,7 @@ def _walk(folder: Path, out: str, links: list[str]) -> Iterator[_File]:
         place = str(error.filename)
         if place == str(folder):
             raise error
-        trouble = f"{kept_path(place)}: cannot look there ({error.strerror}); check its rights"
+        trouble = f"{redacted_path(place)}: cannot look there ({error.strerror}); check its rights"
         yield _File(place, trouble=trouble)
 
 
@@ -240,7 +240,7 @@ def _job(name: str, path: str, *, loaded: bool, trouble: str | None) -> Job:
     if not trouble:
         fault = name_fault(name)
         if fault is not None:
-            trouble = f"{kept_path(path)}: a log's name becomes a folder's: {fault}; rename it"
+            trouble = f"{redacted_path(path)}: a log's name becomes a folder's: {fault}; rename it"
     if trouble:
         return Job(safe_name(name), logs=(path,), trouble=trouble)
     robot = name.rpartition("/")[0] or None
@@ -260,7 +260,7 @@ def _of_one_name(first: Job, second: Job) -> Job:
     """What stands for two jobs of one name: it cannot be run."""
     logs = tuple(dict.fromkeys(first.logs + second.logs))
     loaded = tuple(dict.fromkeys(first.loaded + second.loaded))
-    paths = ", ".join(map(kept_path, (logs + loaded)[:MOST_NAMED]))
+    paths = ", ".join(map(redacted_path, (logs + loaded)[:MOST_NAMED]))
     trouble = (
         f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a "
         "manifest"

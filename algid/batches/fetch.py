@@ -62,7 +62,7 @@ def _one_version(filesystem: FileSystem, path: str, url: str) -> Iterator[Native
 
 
 @contextmanager
-def naming(copies: dict[Path, str]) -> Iterator[None]:
+def errors_name_url(copies: dict[Path, str]) -> Iterator[None]:
     """Errors about copies name the objects that they are of."""
     try:
         yield

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
-from algid.batches.fetch import naming, staged
-from algid.batches.jobs import Job, kept_path
-from algid.batches.records import End, Input, JobRecord, estimates_of, hash_of, stat_of
+from algid.batches.fetch import errors_name_url, staged
+from algid.batches.jobs import Job, redacted_path
+from algid.batches.records import Input, JobRecord, JobStatus, estimates_of, hash_of, stat_of
 from algid.errors import AlgidError, chain_of, text_of
 from algid.files import refuse_links, temporary_folder
 from algid.identification.identify import identify
@@ -98,10 +98,10 @@ def run_task(task: Task) -> JobRecord | DiskFull:
     )
 
 
-def _end(result: Result) -> tuple[End, str]:
+def _end(result: Result) -> tuple[JobStatus, str]:
     """How a job that gave a result ended, and why, where all is not well."""
     if result.verdict.failed:
-        return End.FAILED, _first_reason(result.verdict)
+        return JobStatus.FAILED, _first_reason(result.verdict)
     lacking = []
     if result.data_lost:
         lacking.append("samples were lost")
@@ -109,8 +109,8 @@ def _end(result: Result) -> tuple[End, str]:
         if not one.usable:
             lacking.append(f"{name} {one.status.value}")
     if lacking:
-        return End.INCOMPLETE, "; ".join(lacking)
-    return End.OK, ""
+        return JobStatus.INCOMPLETE, "; ".join(lacking)
+    return JobStatus.OK, ""
 
 
 def _first_reason(judged: Verdict) -> str:
@@ -128,28 +128,30 @@ def is_full(error: BaseException) -> bool:
     return not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain)
 
 
-def failed_record(task: Task, reason: str, status: End = End.FAILED, **known: Any) -> JobRecord:
+def failed_record(
+    task: Task, reason: str, status: JobStatus = JobStatus.FAILED, **known: Any
+) -> JobRecord:
     """The record of a task without result; `known` are other fields of it."""
     known.setdefault("inputs", inputs_of(task.job))
     return _record(task, status=status, reason=reason, **known)
 
 
-def kept(job: Job) -> Job:
+def redacted(job: Job) -> Job:
     """A job as records hold it: its URLs without credentials."""
     profile = job.profile
     if profile is not None:
-        profile = kept_path(profile)
+        profile = redacted_path(profile)
     return replace(
         job,
-        logs=tuple(map(kept_path, job.logs)),
-        loaded=tuple(map(kept_path, job.loaded)),
+        logs=tuple(map(redacted_path, job.logs)),
+        loaded=tuple(map(redacted_path, job.loaded)),
         profile=profile,
     )
 
 
 def _record(task: Task, **known: Any) -> JobRecord:
     return JobRecord(
-        job=kept(task.job),
+        job=redacted(task.job),
         basis=task.basis,
         settings=task.settings.as_json(),
         version=__version__,
@@ -170,7 +172,7 @@ def _looked_at(path: str) -> Input:
     try:
         return stat_of(path)
     except AlgidError:
-        return Input(kept_path(path), 0, 0)
+        return Input(redacted_path(path), 0, 0)
 
 
 def _identified(task: Task) -> Result:
@@ -181,9 +183,11 @@ def _identified(task: Task) -> Result:
         refuse_links(Path(task.out), task.job.name)
     with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
         place = (stage if away else Path(task.out)) / task.job.name
-        logs = _here(task.job.logs, stage / "logs")
-        loaded = _here(task.job.loaded, stage / "loaded")
-        with naming({log.path: log.url for log in logs + loaded if isinstance(log, Staged)}):
+        logs = _fetched(task.job.logs, stage / "logs")
+        loaded = _fetched(task.job.loaded, stage / "loaded")
+        with errors_name_url(
+            {log.path: log.url for log in logs + loaded if isinstance(log, Staged)}
+        ):
             result = identify(
                 logs,
                 loaded,
@@ -205,7 +209,7 @@ def _identified(task: Task) -> Result:
         return result
 
 
-def _here(paths: Sequence[str], folder: Path) -> list[str | Staged]:
+def _fetched(paths: Sequence[str], folder: Path) -> list[str | Staged]:
     """Logs as they can be read on this machine."""
     here: list[str | Staged] = []
     for number, path in enumerate(paths):

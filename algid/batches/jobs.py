@@ -118,7 +118,7 @@ def safe_name(name: str) -> str:
     return f"%{readable}~{hashlib.sha256(content).hexdigest()[:8]}"
 
 
-def kept_path(path: str) -> str:
+def redacted_path(path: str) -> str:
     """A path or URL to print and keep: without credentials, in letters that any file can hold."""
     return public(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
 

@@ -16,8 +16,8 @@ from algid.batches.jobs import (
     Finite,
     Int64,
     Job,
-    kept_path,
     name_fault,
+    redacted_path,
     utc_of,
 )
 from algid.errors import LogError, OutputError
@@ -30,7 +30,7 @@ from algid.stores import Store, is_url, object_stat
 FOLDER = ".jobs"
 
 
-class End(StrEnum):
+class JobStatus(StrEnum):
     """How a job ended."""
 
     OK = "ok"
@@ -41,7 +41,7 @@ class End(StrEnum):
     KILLED = "killed"  # it took its worker with it, three times
 
 
-FAILURES = (End.FAILED, End.KILLED)
+FAILURES = (JobStatus.FAILED, JobStatus.KILLED)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class JobRecord:
     """
 
     job: Job
-    status: End
+    status: JobStatus
     reason: str
     basis: str
     inputs: tuple[Input, ...]
@@ -102,14 +102,14 @@ def stat_of(path: str) -> Input:
         If it may be there and cannot be looked at.
     """
     if is_url(path):
-        return Input(kept_path(path), *object_stat(path))
+        return Input(redacted_path(path), *object_stat(path))
     files = [Path(path)]
     try:
         if files[0].is_dir():
             files = [file for file in files[0].iterdir() if file.is_file()]
         stats = [file.stat() for file in files]
     except (FileNotFoundError, NotADirectoryError):
-        return Input(kept_path(path), 0, 0)
+        return Input(redacted_path(path), 0, 0)
     except OSError as error:
         raise LogError(
             f"{path}: it cannot be looked at ({error.strerror}); check name and rights"
@@ -117,7 +117,7 @@ def stat_of(path: str) -> Input:
     size = sum(one.st_size for one in stats)
     mtime = max((one.st_mtime_ns for one in stats), default=0)
     ctime = max((one.st_ctime_ns for one in stats), default=0)
-    return Input(kept_path(path), size, mtime, ctime)
+    return Input(redacted_path(path), size, mtime, ctime)
 
 
 def hash_of(path: str) -> str | None:
@@ -177,7 +177,7 @@ def record_name(job: str) -> str:
     return f"{'/'.join(parts)}.json"
 
 
-def prepare(store: Store) -> None:
+def make_folders(store: Store) -> None:
     """Make room for records, before any job has run.
 
     Raises
@@ -207,16 +207,16 @@ def write_record(store: Store, record: JobRecord) -> None:
 
 
 @dataclass(frozen=True)
-class Known:
+class StoredRecords:
     """Records of earlier jobs, and why some of them cannot be read, by their places."""
 
     records: dict[str, JobRecord]
     unreadable: dict[str, str]
 
 
-def read_records(store: Store) -> Known:
+def read_records(store: Store) -> StoredRecords:
     """All records by job; one that cannot be read counts as none, so that its job runs again."""
-    known = Known({}, {})
+    known = StoredRecords({}, {})
     columns: set[str] = set()
     for name in store.names(FOLDER):
         if not name.endswith(".json"):

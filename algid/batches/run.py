@@ -16,14 +16,14 @@ from types import FrameType
 from typing import Any
 
 from algid import __version__
-from algid.batches.job import DiskFull, Task, basis_of, failed_record, is_full, kept, run_task
+from algid.batches.job import DiskFull, Task, basis_of, failed_record, is_full, redacted, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
     FAILURES,
-    End,
     Input,
     JobRecord,
-    prepare,
+    JobStatus,
+    make_folders,
     read_records,
     record_name,
     same_logs,
@@ -49,7 +49,7 @@ _STOP_EVERY = 0.1  # s, for a stop
 
 
 @dataclass(frozen=True)
-class Recipe:
+class BatchConfig:
     """What all jobs of a batch share; `profile` gives the profile of a job's file, or of none."""
 
     out: str
@@ -88,22 +88,22 @@ class Recipe:
 class BatchPlan:
     """Tasks to run, records of jobs that cannot even start, and records that stand as they are.
 
-    Of `unseen` jobs an earlier end is known, and it cannot be looked at whether their logs and
+    Of `unreachable` jobs an earlier end is known, and it cannot be looked at whether their logs and
     results are as they were: they fail this time, and what is known of them stays. `anew` counts
     jobs that have ended before, by why they are run again.
     """
 
     tasks: list[Task] = field(default_factory=list)
     refused: list[JobRecord] = field(default_factory=list)
-    standing: list[JobRecord] = field(default_factory=list)
-    unseen: list[JobRecord] = field(default_factory=list)
+    up_to_date: list[JobRecord] = field(default_factory=list)
+    unreachable: list[JobRecord] = field(default_factory=list)
     anew: Counter[str] = field(default_factory=Counter)
 
 
 def plan(
     jobs: Iterable[Job],
     records: Mapping[str, JobRecord],
-    recipe: Recipe,
+    recipe: BatchConfig,
     store: Store,
     retry_failed: bool = False,
 ) -> BatchPlan:
@@ -117,26 +117,26 @@ def plan(
             continue
         record = records.get(job.name)
         try:
-            standing = None if record is None else _standing(record, task, store, retry_failed)
+            up_to_date = None if record is None else _up_to_date(record, task, store, retry_failed)
         except AlgidError as error:
-            made.unseen.append(failed_record(task, str(error)))
+            made.unreachable.append(failed_record(task, str(error)))
             continue
-        if isinstance(standing, JobRecord):
-            made.standing.append(standing)
+        if isinstance(up_to_date, JobRecord):
+            made.up_to_date.append(up_to_date)
             continue
         made.tasks.append(task)
-        if standing is not None:
-            made.anew[standing] += 1
+        if up_to_date is not None:
+            made.anew[up_to_date] += 1
     return made
 
 
-def _standing(record: JobRecord, task: Task, store: Store, retry_failed: bool) -> JobRecord | str:
+def _up_to_date(record: JobRecord, task: Task, store: Store, retry_failed: bool) -> JobRecord | str:
     """The record with its job and logs as they are now, or why its job is run anew.
 
     Times of change that moved while the content did not are stored, so that it is hashed once
     for them.
     """
-    job = kept(task.job)
+    job = redacted(task.job)
     if retry_failed and record.status in FAILURES:
         return "failed before"
     if record.basis != task.basis:
@@ -168,7 +168,7 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Ended:
+class BatchOutcome:
     """Outcome of a batch: its jobs' records, the number run now, and the number left when stopped.
 
     `stopped` says why it could not go on, where it could not.
@@ -196,7 +196,7 @@ class Batch:
     def __init__(
         self,
         store: Store,
-        recipe: Recipe,
+        recipe: BatchConfig,
         executor: Executor,
         slots: int,
         progress: Callable[[Progress], None],
@@ -211,7 +211,7 @@ class Batch:
         self._written = False
         self.stop = threading.Event()
         """If set, `run` returns at once; running jobs are left to whoever ends the executor."""
-        prepare(store)
+        make_folders(store)
         self.anew = Counter[str]()
         """Jobs that had ended and were run again, by why."""
         known = read_records(store)
@@ -219,7 +219,7 @@ class Batch:
         self.unreadable = known.unreadable
         """Why records that are there cannot be read, by their places."""
 
-    def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> Ended:
+    def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> BatchOutcome:
         """Bring `jobs` to an end, and write ``jobs.parquet``.
 
         Labels, robot and time decide nothing about a job's outcome: a record that stands takes
@@ -227,14 +227,14 @@ class Batch:
         """
         made = plan(jobs, self.records, self._recipe, self._store, retry_failed)
         self.anew += made.anew
-        unseen = {record.job.name: record for record in made.unseen}
-        for record in (*made.standing, *made.refused):
+        unreachable = {record.job.name: record for record in made.unreachable}
+        for record in (*made.up_to_date, *made.refused):
             if record != self.records.get(record.job.name):
                 self._keep(record)
         left = self._work(deque(made.tasks))
         self._write_table()
-        now = {**self.records, **unseen}
-        return Ended(
+        now = {**self.records, **unreachable}
+        return BatchOutcome(
             [now[job.name] for job in jobs if job.name in now], self._ran, left, self._stopped
         )
 
@@ -278,7 +278,7 @@ class Batch:
             self._kills[task.job.name] += 1
             if self._kills[task.job.name] < MOST_KILLS:
                 return None
-            return failed_record(task, f"it took its worker with it: {died}", End.KILLED)
+            return failed_record(task, f"it took its worker with it: {died}", JobStatus.KILLED)
         except CallFailedError as failed:
             return failed_record(task, str(failed))
         except Exception as error:  # no job's fault: no process can be started, a cluster is lost
@@ -326,7 +326,7 @@ class Batch:
         self.stop.set()
 
 
-class Settling:
+class StableFiles:
     """Find jobs whose logs are unchanged since the last look: others are still being written."""
 
     def __init__(self) -> None:

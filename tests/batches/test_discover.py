@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from algid.batches.discover import jobs_of
-from algid.batches.job import kept
+from algid.batches.job import redacted
 from algid.batches.jobs import Job, checked_name, name_fault
 from algid.batches.manifest import is_manifest, label_of
 from algid.batches.run import sweep
@@ -107,7 +107,7 @@ def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(
         in odd.trouble
     )
     assert odd.logs == (f"{tmp_path}/{name}.csv",)
-    assert all(path.encode() for path in kept(odd).logs)
+    assert all(path.encode() for path in redacted(odd).logs)
     assert jobs_of([str(tmp_path)], "out") == jobs_of([str(tmp_path)], "out")
 
 

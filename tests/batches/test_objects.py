@@ -19,8 +19,8 @@ import algid
 from algid.api.batch import watched
 from algid.batches.discover import jobs_of
 from algid.batches.fetch import staged
-from algid.batches.records import End
-from algid.batches.run import Batch, Ended, Recipe
+from algid.batches.records import JobStatus
+from algid.batches.run import Batch, BatchConfig, BatchOutcome
 from algid.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.settings import Settings
 from algid.stores import connect, list_urls, open_store, put_folder
@@ -75,18 +75,20 @@ def log() -> bytes:
     return pl.DataFrame(columns).write_csv().encode()
 
 
-RECIPE = Recipe("", Settings(estimator="weak", model="plain"), lambda _file: None, report=False)
+CONFIG = BatchConfig(
+    "", Settings(estimator="weak", model="plain"), lambda _file: None, report=False
+)
 
 
-def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> Ended:
+def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> BatchOutcome:
     out = served.url("out", user) if place is None else place
     jobs = jobs_of([served.url("logs", user)], out)
     return Batch(
-        open_store(out), replace(RECIPE, out=out, **recipe), Here(), 1, lambda _progress: None
+        open_store(out), replace(CONFIG, out=out, **recipe), Here(), 1, lambda _progress: None
     ).run(jobs)
 
 
-def _ends(ended: Ended) -> dict[str, End]:
+def _ends(ended: BatchOutcome) -> dict[str, JobStatus]:
     return {record.job.name: record.status for record in ended.records}
 
 
@@ -106,7 +108,7 @@ def test_a_batch_over_odd_keys_has_a_result_for_each(served: Served, log: bytes)
     keys = ("run%41", "runA", "a b", "[ü]", "q?#")
     for key in keys:
         open_store(served.url("logs")).write(f"{key}.csv", log)
-    assert _ends(_run(served)) == dict.fromkeys(sorted(keys), End.OK)
+    assert _ends(_run(served)) == dict.fromkeys(sorted(keys), JobStatus.OK)
     assert _run(served).ran == 0
     for key in keys:
         assert open_store(served.url("out")).exists(f"{key}.algid/result.json")
@@ -152,7 +154,10 @@ def test_credentials_in_a_url_open_everything_below_it_and_are_kept_nowhere(
     store.write("r1/a.csv", log)
     store.write("bad.csv", b"junk")
     served.asked.clear()
-    assert _ends(_run(served, user=USER, report=True)) == {"bad": End.FAILED, "r1/a": End.OK}
+    assert _ends(_run(served, user=USER, report=True)) == {
+        "bad": JobStatus.FAILED,
+        "r1/a": JobStatus.OK,
+    }
     assert {f"Credential={KEY}/" in authorization for _, _, authorization in served.asked} == {True}
     out = open_store(served.url("out"))
     names = [*out.names(""), ".jobs/bad.json", ".jobs/r1/a.json"]
@@ -206,12 +211,12 @@ def test_an_object_that_may_not_be_read_fails_alone(
         open_store(served.url("logs")).write(f"{name}.csv", log)
     served.denied = lambda asked, path: path.endswith("/b.csv") and asked in ("GET", method)
     ended = _run(served)
-    assert _ends(ended) == {"a": End.OK, "b": End.FAILED, "c": End.OK}
+    assert _ends(ended) == {"a": JobStatus.OK, "b": JobStatus.FAILED, "c": JobStatus.OK}
     assert "it cannot be read" in ended.records[1].reason
     assert "ACCESS_DENIED" in ended.records[1].reason
     served.denied = lambda _method, _path: False
     assert (_run(served).ran, _ends(_run(served))["b"]) == (
-        (1, End.OK) if method == "HEAD" else (0, End.FAILED)
+        (1, JobStatus.OK) if method == "HEAD" else (0, JobStatus.FAILED)
     )
 
 
@@ -223,10 +228,10 @@ def test_a_log_that_cannot_be_looked_at_for_a_while_loses_no_result(
     _run(served)
     served.denied = lambda method, path: method == "HEAD" and path.endswith("/a.csv")
     ended = _run(served)
-    assert (_ends(ended), ended.ran) == ({"a": End.FAILED, "b": End.OK}, 0)
+    assert (_ends(ended), ended.ran) == ({"a": JobStatus.FAILED, "b": JobStatus.OK}, 0)
     served.denied = lambda _method, _path: False
     ended = _run(served)
-    assert (_ends(ended), ended.ran) == ({"a": End.OK, "b": End.OK}, 0)
+    assert (_ends(ended), ended.ran) == ({"a": JobStatus.OK, "b": JobStatus.OK}, 0)
 
 
 def test_a_record_that_may_not_be_read_counts_as_none(served: Served, log: bytes) -> None:
@@ -235,7 +240,7 @@ def test_a_record_that_may_not_be_read_counts_as_none(served: Served, log: bytes
     _run(served)
     served.denied = lambda method, path: method == "GET" and path.endswith(".jobs/a.json")
     ended = _run(served)
-    assert (_ends(ended), ended.ran) == ({"a": End.OK, "b": End.OK}, 1)
+    assert (_ends(ended), ended.ran) == ({"a": JobStatus.OK, "b": JobStatus.OK}, 1)
 
 
 def test_a_result_that_may_not_be_written_says_so(served: Served, log: bytes) -> None:
@@ -243,7 +248,7 @@ def test_a_result_that_may_not_be_written_says_so(served: Served, log: bytes) ->
         open_store(served.url("logs")).write(f"{name}.csv", log)
     served.denied = lambda method, path: method in ("PUT", "POST") and "a.algid" in path
     ended = _run(served)
-    assert _ends(ended) == {"a": End.FAILED, "b": End.OK}
+    assert _ends(ended) == {"a": JobStatus.FAILED, "b": JobStatus.OK}
     assert "cannot write there" in ended.records[0].reason
     assert "ACCESS_DENIED" in ended.records[0].reason
     served.denied = lambda method, path: method in ("PUT", "POST") and ".jobs" in path
@@ -266,7 +271,7 @@ def test_what_a_batch_wrote_below_its_source_is_no_log(
         assert [job.name for job in jobs] == ["logs/jobs", "logs/r 1/a"]
         Batch(
             open_store(out),
-            replace(RECIPE, out=out, report=True),
+            replace(CONFIG, out=out, report=True),
             Here(),
             1,
             lambda _progress: None,
@@ -281,7 +286,7 @@ def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
     monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
     open_store(served.url("logs")).write("bad.csv", b"junk")
     out, looks = str(tmp_path / "out"), 0
-    batch = Batch(open_store(out), replace(RECIPE, out=out), Here(), 1, lambda _progress: None)
+    batch = Batch(open_store(out), replace(CONFIG, out=out), Here(), 1, lambda _progress: None)
 
     def denied(_method: str, path: str) -> bool:
         """Listings 1 and 2 are refused; the batch is stopped once the log is done."""
@@ -294,7 +299,7 @@ def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
     served.denied = denied
     heard: list[str] = []
     ended = watched(batch, [served.url("logs")], out, "logs", False, heard.append)
-    assert _ends(ended) == {"bad": End.FAILED}
+    assert _ends(ended) == {"bad": JobStatus.FAILED}
     assert sum("its objects cannot be listed" in line for line in heard) == 1
 
 
@@ -335,7 +340,7 @@ def test_a_log_that_fails_once_changed_keeps_no_result(
         logs.write(f"{name}.csv", log)
     _run(served, place)
     logs.write("a.csv", b"junk")
-    assert _ends(_run(served, place)) == {"a": End.FAILED, "b": End.OK}
+    assert _ends(_run(served, place)) == {"a": JobStatus.FAILED, "b": JobStatus.OK}
     assert [name for name in open_store(place).names("") if ".algid/" in name] == [
         "b.algid/result.json"
     ]
@@ -350,7 +355,7 @@ def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(
 ) -> None:
     open_store(served.url("logs")).write("a.csv", log)
     _run(served)
-    assert _ends(_run(served, profile=_settings_fail)) == {"a": End.FAILED}
+    assert _ends(_run(served, profile=_settings_fail)) == {"a": JobStatus.FAILED}
     assert open_store(served.url("out")).exists("a.algid/result.json")
 
 
@@ -392,6 +397,6 @@ def test_a_replaced_object_fails_its_job_and_is_done_by_the_next_run(
         open_store(served.url("logs")).write(f"{name}.csv", log)
     served.after = _replacing(served, "a.csv", log + log.splitlines()[-1] + b"\n", 1)
     ended = _run(served)
-    assert _ends(ended) == {"a": End.FAILED, "b": End.OK}
+    assert _ends(ended) == {"a": JobStatus.FAILED, "b": JobStatus.OK}
     assert "replaced while it was read" in ended.records[0].reason
     assert _run(served).ran == 1

@@ -18,17 +18,17 @@ from algid.batches.discover import jobs_of
 from algid.batches.jobs import Job
 from algid.batches.manifest import read_manifest
 from algid.batches.records import (
-    End,
     Input,
     JobRecord,
+    JobStatus,
     hash_of,
-    prepare,
+    make_folders,
     read_records,
     record_name,
     stat_of,
     write_record,
 )
-from algid.batches.run import Batch, Ended, Recipe, sweep
+from algid.batches.run import Batch, BatchConfig, BatchOutcome, sweep
 from algid.batches.table import jobs_frame, write_jobs
 from algid.errors import OutputError
 from algid.settings import Settings
@@ -46,24 +46,26 @@ class Failing(Executor):
         (task,) = args
         self.ran.append(task.job.name)
         inputs = tuple(replace(stat_of(path), sha256=hash_of(path)) for path in task.job.logs)
-        future.set_result(JobRecord(task.job, End.FAILED, "as asked", task.basis, inputs, {}, ""))
+        future.set_result(
+            JobRecord(task.job, JobStatus.FAILED, "as asked", task.basis, inputs, {}, "")
+        )
         return future
 
 
-RECIPE = Recipe("", Settings(), lambda _file: None)
+CONFIG = BatchConfig("", Settings(), lambda _file: None)
 
 
 def _batch(out: Path, executor: Executor | None = None) -> Batch:
     return Batch(
         open_store(str(out)),
-        replace(RECIPE, out=str(out)),
+        replace(CONFIG, out=str(out)),
         executor or Failing(),
         1,
         lambda _: None,
     )
 
 
-def _run(logs: Path, out: Path, executor: Executor | None = None) -> Ended:
+def _run(logs: Path, out: Path, executor: Executor | None = None) -> BatchOutcome:
     return _batch(out, executor).run(jobs_of([str(logs)], str(out)))
 
 
@@ -85,7 +87,7 @@ def _sound() -> dict[str, Any]:
     )
     estimates = {"k1": (1.0, 0.1, "OK"), "k5+k3+z1": (None, None, "WEAK_EXCITATION")}
     record = JobRecord(
-        job, End.OK, "", "b", (Input("x.csv", 1, 2),), {"a": [1]}, "0.1", estimates=estimates
+        job, JobStatus.OK, "", "b", (Input("x.csv", 1, 2),), {"a": [1]}, "0.1", estimates=estimates
     )
     return asdict(record)
 
@@ -217,7 +219,7 @@ def test_no_job_takes_another_ones_place(tmp_path: Path) -> None:
 
 def _record(name: str, **more: Any) -> JobRecord:
     return JobRecord(
-        Job(name, ("x.csv",), **more), End.OK, "", "b", (Input("x.csv", 1, 2),), {}, "0.1"
+        Job(name, ("x.csv",), **more), JobStatus.OK, "", "b", (Input("x.csv", 1, 2),), {}, "0.1"
     )
 
 
@@ -261,7 +263,7 @@ def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
     else:
         (out / place).mkdir()
     if (place, kind) in ((".jobs", "folder"), ("jobs.parquet", "file")):
-        prepare(open_store(str(out)))
+        make_folders(open_store(str(out)))
         return
     executor = Failing()
     with pytest.raises(

@@ -20,8 +20,8 @@ import pytest
 import algid
 from algid.batches.discover import jobs_of
 from algid.batches.lock import locked
-from algid.batches.records import End
-from algid.batches.run import Batch, Ended, Recipe, Settling, sweep
+from algid.batches.records import JobStatus
+from algid.batches.run import Batch, BatchConfig, BatchOutcome, StableFiles, sweep
 from algid.batches.workers import WorkerDiedError
 from algid.errors import OutputError
 from algid.identification.identify import identify
@@ -71,12 +71,12 @@ def logs(made: Path, tmp_path: Path) -> Path:
 
 
 WEAK = Settings(estimator="weak", model="plain")
-RECIPE = Recipe("", WEAK, lambda _file: None, report=False)
+CONFIG = BatchConfig("", WEAK, lambda _file: None, report=False)
 
 
 def _run(
-    logs: Path, executor: Executor | None = None, recipe: Recipe = RECIPE, **more: bool
-) -> Ended:
+    logs: Path, executor: Executor | None = None, recipe: BatchConfig = CONFIG, **more: bool
+) -> BatchOutcome:
     out = logs.parent / "out"
     store = open_store(str(out))
     batch = Batch(
@@ -96,7 +96,11 @@ def _digest(out: Path) -> dict[str, str]:
 
 def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None:
     ended = _run(logs)
-    assert [record.status for record in ended.records] == [End.FAILED, End.OK, End.OK]
+    assert [record.status for record in ended.records] == [
+        JobStatus.FAILED,
+        JobStatus.OK,
+        JobStatus.OK,
+    ]
     table = pl.read_parquet(logs.parent / "out/jobs.parquet")
     assert table["job"].to_list() == ["bad", "r1/a", "r1/b"]
     assert table["robot"].to_list() == [None, "r1", "r1"]
@@ -119,7 +123,7 @@ def test_the_table_names_the_estimator_whose_numbers_are_reported(
         return identify(*args, **more).model_copy(update={"estimator": "weak"})
 
     monkeypatch.setattr("algid.batches.job.identify", handed_back)
-    _run(logs, recipe=replace(RECIPE, settings=Settings(estimator="refined", model="plain")))
+    _run(logs, recipe=replace(CONFIG, settings=Settings(estimator="refined", model="plain")))
     table = pl.read_parquet(logs.parent / "out/jobs.parquet")
     assert table["estimator"].to_list() == [None, "weak", "weak"]
     assert '"estimator": "refined"' in table["settings"][1]
@@ -145,7 +149,7 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     shutil.rmtree(logs.parent / "out/r1/b.algid")
     _run(logs, executor)
     assert executor.ran == ["r1/b"]
-    _run(logs, executor, replace(RECIPE, settings=replace(WEAK, window=0.3)))
+    _run(logs, executor, replace(CONFIG, settings=replace(WEAK, window=0.3)))
     assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
 
 
@@ -199,7 +203,11 @@ def test_a_job_that_kills_three_workers_is_set_aside(logs: Path) -> None:
     executor = Here(die)
     ended = _run(logs, executor)
     assert executor.ran.count("r1/a") == 3
-    assert [record.status for record in ended.records] == [End.FAILED, End.KILLED, End.OK]
+    assert [record.status for record in ended.records] == [
+        JobStatus.FAILED,
+        JobStatus.KILLED,
+        JobStatus.OK,
+    ]
 
 
 def test_an_interrupted_batch_ends_as_an_undisturbed_one(logs: Path) -> None:
@@ -243,7 +251,7 @@ def test_a_stopped_batch_hands_out_no_more_jobs(logs: Path) -> None:
     out = logs.parent / "out"
     store = open_store(str(out))
     batch = Batch(
-        store, replace(RECIPE, out=str(out)), Here(), 1, lambda _progress: batch.stop.set()
+        store, replace(CONFIG, out=str(out)), Here(), 1, lambda _progress: batch.stop.set()
     )
     ended = batch.run(jobs_of([str(logs)], str(out)))
     assert (ended.ran, ended.left) == (1, 2)
@@ -283,7 +291,7 @@ def test_parts_share_an_output_and_its_table_is_of_all(
 
 def test_a_growing_log_is_left_alone(tmp_path: Path) -> None:
     log = tmp_path / "a.csv"
-    settling = Settling()
+    settling = StableFiles()
     found = []
     for text in ("1", "12", "12"):
         log.write_text(text) if not log.exists() or log.read_text() != text else None
@@ -301,7 +309,7 @@ def test_a_result_that_must_not_be_used_is_a_failure_with_its_first_reason_and_i
         patch.setattr(Result, "verdict", property(lambda _result: failed))
         ended = _run(logs)
     good, bad = ended.records[1], ended.records[0]
-    assert (good.status, good.verdict) == (End.FAILED, "failed")
+    assert (good.status, good.verdict) == (JobStatus.FAILED, "failed")
     assert good.reason == "Failed: no sense; do not use these numbers. X: the torque is none"
     assert bad.verdict is None
     table = pl.read_parquet(logs.parent / "out/jobs.parquet")

@@ -18,8 +18,8 @@ from algid.api.batch import Batched, watched
 from algid.api.compare import labels_of as labels
 from algid.api.design import campaign_of, noise_of
 from algid.batches.jobs import Job
-from algid.batches.records import End, JobRecord
-from algid.batches.run import Ended, Progress
+from algid.batches.records import JobRecord, JobStatus
+from algid.batches.run import BatchOutcome, Progress
 from algid.cli import batch as command
 from algid.designs.prior import KnownBefore, prior_of
 from algid.designs.request import request
@@ -29,27 +29,30 @@ from algid.synth.cases import load_case
 from tests.cli.commands import call
 
 
-def record(name: str, status: End, reason: str = "") -> JobRecord:
+def record(name: str, status: JobStatus, reason: str = "") -> JobRecord:
     return JobRecord(Job(name, ("a.csv",)), status, reason, "", (), {}, "")
 
 
-GOOD, PART = record("a", End.OK), record("b", End.INCOMPLETE)
-BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED, "three times")
+GOOD, PART = record("a", JobStatus.OK), record("b", JobStatus.INCOMPLETE)
+BAD, DEAD = (
+    record("c", JobStatus.FAILED, "no\x1b[31m torque"),
+    record("d", JobStatus.KILLED, "three times"),
+)
 
 
 @pytest.mark.parametrize(
     ("ended", "stopped", "code", "lines"),
     [
-        (Ended([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
-        (Ended([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
+        (BatchOutcome([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
+        (BatchOutcome([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
         (
-            Ended([GOOD, PART], 1, 0),
+            BatchOutcome([GOOD, PART], 1, 0),
             False,
             3,
             ["1 ok, 1 incomplete; 1 run now, 0 left; out/jobs.parquet"],
         ),
         (
-            Ended([GOOD, PART, BAD, DEAD], 4, 0),
+            BatchOutcome([GOOD, PART, BAD, DEAD], 4, 0),
             False,
             1,
             [
@@ -58,21 +61,21 @@ BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED
                 "1 ok, 1 incomplete, 1 failed, 1 killed; 4 run now, 0 left; out/jobs.parquet",
             ],
         ),
-        (Ended([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
+        (BatchOutcome([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
         (
-            Ended([GOOD, PART], 2, 3),
+            BatchOutcome([GOOD, PART], 2, 3),
             True,
             130,
             ["1 ok, 1 incomplete; 2 run now, 3 left; out/jobs.parquet"],
         ),
         (
-            Ended([GOOD], 1, 3, "out: the disk is full"),
+            BatchOutcome([GOOD], 1, 3, "out: the disk is full"),
             True,
             1,
             ["1 ok; 1 run now, 3 left; out/jobs.parquet"],
         ),
         (
-            Ended([GOOD], 1, 0, "out: the disk is full"),
+            BatchOutcome([GOOD], 1, 0, "out: the disk is full"),
             False,
             1,
             ["1 ok; 1 run now, 0 left; out/jobs.parquet"],
@@ -80,7 +83,11 @@ BAD, DEAD = record("c", End.FAILED, "no\x1b[31m torque"), record("d", End.KILLED
     ],
 )
 def test_a_batch_says_what_became_of_its_jobs(
-    ended: Ended, stopped: bool, code: int, lines: list[str], capsys: pytest.CaptureFixture[str]
+    ended: BatchOutcome,
+    stopped: bool,
+    code: int,
+    lines: list[str],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     batched = Batched(
         ended.records, ended.ran, ended.left, "out", interrupted=stopped, stopped=ended.stopped
@@ -100,7 +107,7 @@ def test_a_batch_says_what_became_of_its_jobs(
 def test_progress_is_one_line_that_is_gone_at_the_end(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    last = Progress(3, 7, record("x" * 60, End.OK))
+    last = Progress(3, 7, record("x" * 60, JobStatus.OK))
     with command._progress(False) as silent:
         silent(last)
     assert capsys.readouterr().err == ""
@@ -124,9 +131,9 @@ class Watched:
     def look(self, _seconds: float) -> None:
         self.looks -= 1
 
-    def run(self, jobs: list[Any], retry_failed: bool = False) -> Ended:
+    def run(self, jobs: list[Any], retry_failed: bool = False) -> BatchOutcome:
         self.heard.append((jobs, retry_failed))
-        return Ended([GOOD] * len(self.heard), len(jobs), 0)
+        return BatchOutcome([GOOD] * len(self.heard), len(jobs), 0)
 
 
 def test_a_watch_complains_once_and_retries_what_failed_once(
@@ -149,7 +156,7 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
 
     monkeypatch.setattr("algid.batches.discover.jobs_of", jobs_of)
     monkeypatch.setattr(
-        "algid.batches.run.Settling", lambda: SimpleNamespace(settled=lambda jobs: jobs)
+        "algid.batches.run.StableFiles", lambda: SimpleNamespace(settled=lambda jobs: jobs)
     )
     running: Any = Watched(6)
     heard: list[str] = []

@@ -16,8 +16,8 @@ from scipy.stats import norm, t
 from typer.testing import CliRunner
 
 from algid.batches.discover import jobs_of
-from algid.batches.records import End, JobRecord, stat_of
-from algid.batches.run import Batch, Recipe
+from algid.batches.records import JobRecord, JobStatus, stat_of
+from algid.batches.run import Batch, BatchConfig
 from algid.errors import ResultError
 from algid.fleet.figures import overview
 from algid.fleet.history import history_of
@@ -31,14 +31,14 @@ from tests.terminals import shown
 
 START = 1_700_000_000 * 10**9
 DAY = 86_400 * 10**9
-Known = tuple[str, int, dict[str, tuple[float, float, str]]]
+StoredRecords = tuple[str, int, dict[str, tuple[float, float, str]]]
 """Robot, first stamp in ns and estimates of a job."""
 
 
 class Finished(Executor):
     """Ends every job at once, with what is known of it."""
 
-    def __init__(self, known: Mapping[str, Known]) -> None:
+    def __init__(self, known: Mapping[str, StoredRecords]) -> None:
         self.known = known
 
     def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
@@ -48,14 +48,15 @@ class Finished(Executor):
         inputs = tuple(map(stat_of, task.job.logs))
         future.set_result(
             JobRecord(
-                task.job, End.OK, "", task.basis, inputs, {}, "", 1.0, start_ns, 10.0, "refined",
+                task.job, JobStatus.OK, "", task.basis, inputs, {}, "", 1.0, start_ns, 10.0,
+                "refined",
                 estimates,
             )
         )  # fmt: skip
         return future
 
 
-def _written(folder: Path, known: Mapping[str, Known]) -> Path:
+def _written(folder: Path, known: Mapping[str, StoredRecords]) -> Path:
     """A batch of such jobs, whose payload is labelled 0.5 kg."""
     folder.mkdir(exist_ok=True)
     (folder / "a.csv").write_text("no log")
@@ -64,15 +65,15 @@ def _written(folder: Path, known: Mapping[str, Known]) -> Path:
         lines.append(f"{name},a.csv,{robot},0.5")
     (folder / "manifest.csv").write_text("\n".join(lines))
     jobs = jobs_of([str(folder / "manifest.csv")], str(folder))
-    recipe = Recipe(str(folder), Settings(), lambda _file: None)
+    recipe = BatchConfig(str(folder), Settings(), lambda _file: None)
     ended = Batch(open_store(str(folder)), recipe, Finished(known), 1, lambda _: None).run(jobs)
-    assert [record.status for record in ended.records] == [End.OK] * len(known)
+    assert [record.status for record in ended.records] == [JobStatus.OK] * len(known)
     return folder
 
 
 def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = START) -> Path:
     """A batch whose first robot's k6 doubles within its logs, one a day."""
-    known: dict[str, Known] = {}
+    known: dict[str, StoredRecords] = {}
     for robot in range(robots):
         for day in range(logs):
             estimates = {
@@ -149,7 +150,7 @@ def test_the_tables_have_their_columns_and_their_notes(tmp_path: Path) -> None:
 
 
 def test_a_trend_is_told_in_percent_of_a_mean_that_is_not_zero(tmp_path: Path) -> None:
-    known: dict[str, Known] = {}
+    known: dict[str, StoredRecords] = {}
     for number in range(20):
         # k4 grows through zero and is the clearest; its mean is none to be a percentage of
         estimates = {
@@ -196,7 +197,7 @@ def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
 
 
 def test_an_outlier_has_a_ring(tmp_path: Path) -> None:
-    known: dict[str, Known] = {}
+    known: dict[str, StoredRecords] = {}
     for number in range(20):
         k1 = 1.0 + 0.001 * ((7 * number) % 5 - 2) + 0.5 * (number == 12)
         known[f"r/{number}"] = "r", START + number * DAY, {"k1": (k1, 0.01, "OK")}
@@ -236,7 +237,7 @@ def test_the_page_is_three_tables_and_a_figure_and_leads_to_reports(tmp_path: Pa
 
 
 def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> None:
-    known: dict[str, Known] = {}
+    known: dict[str, StoredRecords] = {}
     for robot in range(2):
         for number in range(20):
             k1 = 1.0 + 0.001 * ((7 * number) % 5 - 2)
