@@ -20,6 +20,8 @@ STILL = 0.01
 """Radians: a joint that moves less in a whole log has not moved."""
 BESIDE_STILL = 0.02
 """Radians: the same of a joint that is not read, of which the first samples alone are looked at."""
+SWINGING = 0.5
+"""Radians: where a joint that is not read moves by more, its reaction is in every estimate."""
 
 SETTLED = 0.02
 """Standard deviations: estimates that change by less have settled."""

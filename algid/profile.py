@@ -47,6 +47,9 @@ Check = Literal[
     "WRONG_CONVENTION",
     "NOT_FINITE",
     "CLIPPED_TORQUE",
+    "OTHER_JOINTS",
+    "WRONG_ZERO",
+    "BROKEN_BOUND",
 ]
 """Checks of a log that refuse it, its result or some samples, unless they are accepted."""
 

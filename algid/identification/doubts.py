@@ -63,6 +63,8 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
     for broken in broken_bounds(fit):
         if broken.distance is not None and broken.distance > FAR_BEYOND:
             far.append(broken.bound)
+    if any("BROKEN_BOUND" in log.origin.reading.accepted for log in survey.logs):
+        return fit
     if far:
         lawful = constrained(fit)
         if not lawful.converged or _explains_little(lawful, survey, settings):

@@ -214,9 +214,9 @@ def _identified(
         if settles(settings.estimator):
             outcome = _by_the_paper(survey, settings, earlier, folder)
         elif series:
-            outcome, settings = _by_likelihood(survey, settings, earlier, folder)
+            outcome, settings = _by_likelihood(survey, settings, earlier, stated, folder)
         else:
-            outcome, settings = _by_likelihood(survey, settings, earlier, None)
+            outcome, settings = _by_likelihood(survey, settings, earlier, stated)
         result = result_of(outcome, settings, survey)
     notices = result.notices
     if earlier is not None:
@@ -254,12 +254,20 @@ def _by_the_paper(
 
 
 def _by_likelihood(
-    survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
+    survey: Survey,
+    settings: Settings,
+    earlier: Earlier | None,
+    stated: dict[str, Any],
+    folder: Path | None = None,
 ) -> tuple[Identified, Settings]:
-    """The outcome of the logs, and the settings with the effort that they show."""
+    """The outcome of the logs, and the settings with the effort that they show.
+
+    A zero of θ1 that is `stated` is not doubted.
+    """
     from algid.identification.doubts import residual_of, with_doubt
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
+    from algid.identification.phases import turn_note
 
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
@@ -275,6 +283,11 @@ def _by_likelihood(
     survey.begin("prediction")
     outcome = outcome_of(sure, predictions, survey, settings, chosen)
     outcome = replace(outcome, notices=outcome.notices + of_driver)
+    turned = None
+    if earlier is None and not _zero_is_stated(survey.logs[0], stated):
+        turned = turn_note(sure, survey.logs[0])
+    if turned is not None:
+        outcome = replace(outcome, notices=[turned, *outcome.notices])
     if folder is not None:
         survey.begin("series")
         write_fit_series(
@@ -283,6 +296,18 @@ def _by_likelihood(
         if estimator_of(settings.estimator).beside_paper:
             outcome = _with_the_papers(outcome, survey, settings, folder)
     return outcome, settings
+
+
+def _zero_is_stated(log: LogSource, stated: dict[str, Any]) -> bool:
+    """Whether the caller, or the log itself, says what θ1 is measured from."""
+    reading = log.origin.reading
+    of_channel = stated.get("theta1") or {}
+    return (
+        not {"zero", "offsets"}.isdisjoint(stated)
+        or "offset" in of_channel
+        or reading.zero != "horizontal"
+        or reading.offsets[0] != 0
+    )
 
 
 def _fitted(

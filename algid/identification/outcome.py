@@ -92,7 +92,8 @@ def outcome_of(
         fit=summary,
         notices=notices + list(fit_notes(summary)),
     )
-    if is_implausible(summary):
+    accepted = {code for log in survey.logs for code in log.origin.reading.accepted}
+    if is_implausible(summary, bounds="BROKEN_BOUND" not in accepted):
         return outcome.distrusted()
     return outcome
 
@@ -117,16 +118,17 @@ def _loaded_rows(
     return with_significance(combined)
 
 
-def is_implausible(summary: results.FitSummary) -> bool:
+def is_implausible(summary: results.FitSummary, *, bounds: bool = True) -> bool:
     """Whether physics or the torque contradict a fit.
 
     Its estimates come from one solution: where one of them breaks a bound by more than chance
     explains, or a joint's torque is predicted worse than its mean would, none can be trusted. A
     torque that hardly varies leaves R² nothing to explain, nor does a joint that is hardly driven;
-    there the residual has to be a tenth of what acts on the joint at least.
+    there the residual has to be a tenth of what acts on the joint at least. Without `bounds`, by
+    the torque alone.
     """
     for bound in summary.broken_bounds:
-        if bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND:
+        if bounds and bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND:
             return True
     judged = summary.cross_validation or summary.residual
     return judged is not None and bool(judged.unexplained(least=0.0))

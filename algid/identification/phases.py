@@ -20,8 +20,9 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.diagnostics import bent
 from algid.estimators.fit import Fit
+from algid.identification.source import LogSource
 from algid.model import K1, K2, K4, SINE_OF, SINES, phasor
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
 
 
 def phase_note(fit: Fit) -> Notice | None:
@@ -46,6 +47,45 @@ def phase_note(fit: Fit) -> Notice | None:
     return Notice("PHASE", numbers=numbers, note=True)
 
 
+LEAST_TURN = np.radians(20.0)
+"""rad: gravity that is turned by more, beyond its interval, is no base that is not quite level."""
+LEAST_SURE = 5.0  # standard deviations of k1 and of k2 that an angle between them needs
+
+
+def turn_note(fit: Fit, log: LogSource) -> Notice | None:
+    """That gravity is turned against θ1 as `log` was read, with the zero that turns it back.
+
+    Where its named zeros lie within the interval of ε1, the nearest is named. None where gravity is
+    turned by less than `LEAST_TURN`, and where it may be upside down, which signs make too.
+    """
+    from algid.inspection.conventions import zeroed
+
+    names = set(fit.names) - set(fit.absent)
+    if not {K1, K2, SINE_OF[K1], SINE_OF[K2]} <= names or fit.shared.model.gravity == 0:
+        return None
+    if min(_certainty(fit, K1), _certainty(fit, K2)) < LEAST_SURE:
+        return None
+    (second, of_second), (whole, of_whole) = _argument(fit, K1), _argument(fit, K2)
+    turn = float(np.remainder(whole - second + np.pi, 2 * np.pi) - np.pi)
+    half = _half(fit, of_whole - of_second)
+    if not abs(turn) - half > LEAST_TURN or abs(turn) + half >= np.pi:
+        return None
+    anyway = Remedy({"accept": "WRONG_ZERO"}, "where the arm is mounted so")
+    numbers = {"turn": float(np.degrees(turn))}
+    return Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log, turn, half), anyway))
+
+
+def _certainty(fit: Fit, name: str) -> float:
+    """Size of the moment `name` in its standard deviations."""
+    places = [fit.names.index(name), fit.names.index(SINE_OF[name])]
+    K = fit.values[places]
+    size = float(np.linalg.norm(K))
+    variance = float(K @ fit.covariance[np.ix_(places, places)] @ K)
+    if not np.all(np.isfinite(fit.std[places])) or variance <= 0:
+        return 0.0
+    return size**2 / float(np.sqrt(variance))
+
+
 def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
     """Argument of the moment `name` and its slope (Q,)."""
     K = phasor(fit.shared.model, fit.values[: len(fit.shared.model.names)], name)
@@ -58,6 +98,9 @@ def _argument(fit: Fit, name: str) -> tuple[float, FloatArray]:
 
 def _in_degrees(fit: Fit, angle: float, slope: FloatArray) -> str:
     turned = float(np.degrees(np.remainder(angle + np.pi, 2 * np.pi) - np.pi))
-    variance = max(float(slope @ fit.covariance @ slope), 0.0)
-    half = float(np.degrees(fit.quantile * np.sqrt(variance)))
-    return f"{turned:.3g}° ± {half:.2g}°"
+    return f"{turned:.3g}° ± {np.degrees(_half(fit, slope)):.2g}°"
+
+
+def _half(fit: Fit, slope: FloatArray) -> float:
+    """Half the 95 % interval of what has this slope (Q,)."""
+    return fit.quantile * float(np.sqrt(max(float(slope @ fit.covariance @ slope), 0.0)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import PurePath
 
 from algid import __version__
@@ -16,11 +17,18 @@ from algid.results.verdict import LEAST_R2
 from algid.settings import Settings
 from algid.table4 import paper_errors, table4, true_parameters, true_rows
 
-CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES")
+CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES", "OTHER_JOINTS")
 """Checks by which estimates are wrong, unless the user accepts them.
 
 A time base that is too short by the samples it lacks falsifies accelerations by twice their share.
 """
+
+
+def _contradicts(notice: Notice) -> bool:
+    """Whether no estimate can be right of a log of which this is noticed."""
+    if notice.code == "OTHER_JOINTS":
+        return bool(notice.numbers.get("swing", False))
+    return notice.code in CONTRADICTED
 
 
 def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
@@ -28,6 +36,8 @@ def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]
     codes = []
     if has_code(outcome.notices, "PHASES", "PHASE"):
         codes.append("ZERO_OFFSET")
+    if has_code(outcome.notices, "WRONG_ZERO"):
+        codes.append("WRONG_ZERO")
     if settings.effort is not None:
         codes.append("GRAVITY_COMPENSATED")
     return tuple(codes)
@@ -67,14 +77,18 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
     down = _pulled_down(outcome, len(survey.logs))
     of_logs: list[Notice] = []
     lost = contradicted = False
+    accepted = {code for log in survey.logs for code in log.origin.reading.accepted}
     for log, is_down in zip(survey.logs, down, strict=True):
         for notice in survey.notices(log):
             if notice.code in replaced or (is_down and notice.code in _OF_GRAVITY):
                 continue
             of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
             lost |= notice.lossy
-            if notice.code in CONTRADICTED and notice.code not in log.origin.reading.accepted:
-                contradicted = True
+            contradicted |= _contradicts(notice) and notice.code not in accepted
+    if has_code(of_logs, "WRONG_CONVENTION"):  # of which gravity that is turned is a part
+        kept = [one for one in outcome.notices if one.code != "WRONG_ZERO"]
+        outcome = replace(outcome, notices=kept)
+    contradicted |= has_code(outcome.notices, "WRONG_ZERO") and "WRONG_ZERO" not in accepted
     if contradicted:
         outcome = outcome.distrusted()
     summaries = [survey.summary(log) for log in survey.logs]

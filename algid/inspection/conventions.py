@@ -279,6 +279,20 @@ def _settings(convention: Convention, log: Read) -> dict[str, Any]:
     return {name: value for name, value in mending.items() if value != {}}
 
 
+def zeroed(log: Read, turn: float, half: float) -> Remedy:
+    """What reads θ1 further on by `turn` ± `half` rad, by a named zero that lies within that."""
+    reading = log.origin.reading
+    own = ZEROS[reading.zero] + reading.offsets[0]
+    if "theta1" in reading.channels:
+        own = ZEROS[reading.zero] + reading.channels["theta1"].offset
+    left = min((remainder(own + turn - zero, 2 * pi) for zero in ZEROS.values()), key=abs)
+    if abs(left) <= half:
+        turn -= left
+    else:
+        turn = round(turn, 3)
+    return Remedy(flat(_settings(replace(AS_READ, zero=(turn, 0.0)), log)))
+
+
 def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
     """Where the channels come from that have to change places."""
     joints = log.origin.reading.joints

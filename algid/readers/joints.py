@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from algid.criteria import BESIDE_STILL
+from algid.criteria import BESIDE_STILL, SWINGING
 from algid.errors import LogError
 from algid.log import Reading
 from algid.notices import Notice, Remedy
@@ -181,5 +181,9 @@ def moving_joints(
     listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
     if len(moved) > _NAMED:
         listed += f" and {len(moved) - _NAMED} more"
-    numbers = {"count": len(moved), "joints": listed, "samples": len(table)}
-    return (Notice("OTHER_JOINTS", numbers=numbers),)
+    swing = max(moved.values()) > SWINGING
+    numbers = {"count": len(moved), "joints": listed, "samples": len(table), "swing": swing}
+    remedies: tuple[Remedy, ...] = ()
+    if swing:
+        remedies = (Remedy({"accept": "OTHER_JOINTS"}, "to use it nevertheless"),)
+    return (Notice("OTHER_JOINTS", numbers=numbers, remedies=remedies),)

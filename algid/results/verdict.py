@@ -155,12 +155,17 @@ def _worst_bound(fit: FitSummary | None) -> Bound | None:
     return max(fit.broken_bounds, key=lambda bound: bound.distance_sigma or 0.0, default=None)
 
 
-def _contradiction(fit: FitSummary | None) -> str:
+def _contradiction(result: Result) -> str:
     """Why the statuses are IMPLAUSIBLE."""
+    fit = result.fit
     worst = _worst_bound(fit)
     poor = next(_worse_than_constant(fit), None)
     if poor is not None and (worst is None or not worst.distance_sigma):
         return poor.text
+    if worst is None and has_code(result.notices, "OTHER_JOINTS"):
+        return "other joints of the arm move"
+    if worst is None and has_code(result.notices, "WRONG_ZERO"):
+        return "gravity is turned against θ1"
     if worst is None:
         return "physics forbids these estimates"
     broken = f"the estimates break {visible(worst.bound)}"
@@ -181,10 +186,11 @@ def _failure(result: Result) -> str | None:
     if "NOT_CONVERGED" in statuses:
         return "the estimator did not converge"
     if "IMPLAUSIBLE" in statuses:
-        return _contradiction(result.fit)
+        return _contradiction(result)
     if has_code(result.notices, "LENGTH_CONTRADICTED"):
         return "a link length contradicts the arm's result"
-    usable, count = sum(one.usable for one in estimates), len(estimates)
+    own = _asked_for(result).values()
+    usable, count = sum(one.usable for one in own), len(own)
     if not usable or not any(map(_tells, estimates)):
         words = {STATUS_WORDS.get(status, "absent") for status in statuses}
         return f"no parameter could be identified ({joined(sorted(words))})"
