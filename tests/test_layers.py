@@ -64,7 +64,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
-                       "readers signals units words", "numpy"),
+                       "readers signals units", "numpy"),
     "report": room(
         "arm arrow blocks criteria errors files inspection methods model notices options progress "
         "quantiles results ros2 significance text verdict words",
