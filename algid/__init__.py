@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from algid.api.inspect import inspect
     from algid.api.read import read_log
     from algid.api.result import Result, read_result
-    from algid.api.synthesise import synthesise
+    from algid.api.synth import synthesise
     from algid.api.track import track
     from algid.api.validate import validate
     from algid.arm import Arm
@@ -77,7 +77,7 @@ _HOMES = {
     "read_log": "algid.api.read",
     "read_result": "algid.api.result",
     "simulate": "algid.synth.simulator",
-    "synthesise": "algid.api.synthesise",
+    "synthesise": "algid.api.synth",
     "track": "algid.api.track",
     "validate": "algid.api.validate",
     "write_log": "algid.writers",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -14,6 +14,9 @@ from algid.files import read_toml
 from algid.options import flag
 from algid.results import Result
 from algid.results.model import Table4Row
+
+LARGEST = 1e9
+"""Percent."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +49,20 @@ class _Tolerances(BaseModel):
     max_error_percent: dict[str, Annotated[float, Field(ge=0)]] = Field(min_length=1)
 
 
-def judge(
-    result: Result,
-    against: Literal["paper", "truth"],
-    max_error: float | None,
-    tolerance_file: Path | None,
-) -> list[Judged]:
+def judge(result: Result, largest: float | str | Path) -> list[Judged]:
     """Rows of Table 4 beside their limits.
+
+    Parameters
+    ----------
+    result : Result
+    largest : float, 'paper' or path
+        One limit for all in percent; the paper's; or a TOML file with a table
+        ``[max_error_percent]``.
 
     Raises
     ------
     SettingError
-        If the limit is missing, doubled, or names a parameter that is no row of Table 4.
+        If the limit is none, or names a parameter that is no row of Table 4.
     ResultError
         If the result holds no truth to compare with, or no case of the paper.
     """
@@ -67,7 +72,7 @@ def judge(
             f"{result.log.path}: the log holds no true parameters; only synthetic logs can be "
             "checked"
         )
-    limits = _limits(result.log.path, known, against == "paper", max_error, tolerance_file)
+    limits = _limits(result.log.path, known, largest)
     judged = []
     for row in result.table4:
         if row.parameter in limits:
@@ -75,44 +80,36 @@ def judge(
     return judged
 
 
-def failed(rows: Sequence[Judged]) -> bool:
-    """Whether any row is over its limit."""
-    return not all(row.passed for row in rows)
-
-
 def _limits(
-    log: str,
-    known: Sequence[Table4Row],
-    of_paper: bool,
-    max_error: float | None,
-    tolerance_file: Path | None,
+    log: str, known: Sequence[Table4Row], largest: float | str | Path
 ) -> Mapping[str, float]:
     """The largest error in percent of the rows whose truth is known, by parameter."""
-    if tolerance_file is not None:
-        if max_error is not None:
-            raise SettingError(
-                f"{flag('max_error')} and {flag('tolerance_file')}: give one of them"
-            )
-        limits = read_toml(tolerance_file, _Tolerances).max_error_percent
-        names = [row.parameter for row in known]
-        for name in limits:
-            if name not in names:
-                raise SettingError(
-                    f"{tolerance_file}: max_error_percent.{name}: expected one of "
-                    f"{', '.join(names)}"
-                )
-        return limits
-    if of_paper:
+    names = [row.parameter for row in known]
+    if largest == "paper":
         limits = {}
         for row in known:
             if row.paper_error_percent is not None:
                 limits[row.parameter] = row.paper_error_percent
         if not limits:
-            raise ResultError(f"{log}: not a case of the paper; check {flag('against')} truth")
+            raise ResultError(
+                f"{log}: not a case of the paper; give {flag('max_error')} in percent"
+            )
         return limits
-    if max_error is None:
+    if str(largest).endswith(".toml"):
+        limits = read_toml(Path(largest), _Tolerances).max_error_percent  # type: ignore[arg-type]
+        for name in limits:
+            if name not in names:
+                raise SettingError(
+                    f"{largest}: max_error_percent.{name}: expected one of {', '.join(names)}"
+                )
+        return limits
+    try:
+        percent = float(largest)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        percent = -1.0
+    if not 0 <= percent <= LARGEST:
         raise SettingError(
-            f"{flag('against')} truth: give the largest error with {flag('max_error')} or "
-            f"{flag('tolerance_file')}"
+            f"{flag('max_error')}: expected a number from 0 to {LARGEST:g}, paper, or a TOML file, "
+            f"found {largest!r:.60}"
         )
-    return dict.fromkeys((row.parameter for row in known), max_error)
+    return dict.fromkeys(names, percent)

@@ -7,6 +7,7 @@ friction, and its sensors noise and steps. What it truly is stands in `ARM`, `FR
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import numpy as np
 from algid.arm import Arm, with_payload
 from algid.files import refuse_existing, whole_file
 from algid.log import Log, Truth
+from algid.options import flag
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.sensors import Sensors, record, sample_times
 from algid.synth.simulator import HANGING, simulate
@@ -34,26 +36,23 @@ STRENGTH = 0.3
 RATE, DURATION = 500.0, 10.0
 LOGS = {"run1": 0.0, "run2": 0.0, "run3": 0.0, "run4": 0.0, "loaded": PAYLOAD}
 PROFILE = "arm.toml"
-PROFILE_TEXT = """\
-# What the logs of this arm do not say. `algid profile new run1.csv` writes all that can be set.
+PROFILE_TEXT = f"""\
+# What the logs of this arm do not say; `inspect LOG {flag("write_profile")} FILE` writes all.
 zero = "hanging"  # θ1 is zero hanging straight down, not along the horizontal
 """
 
 
-def write_example(folder: str | Path, force: bool = False) -> list[Path]:
-    """Write the logs ``run1.csv`` to ``run4.csv`` and ``loaded.csv``, and a profile ``arm.toml``.
+def example_logs() -> list[Log]:
+    """The runs ``run1`` to ``run4``, and ``loaded``."""
+    logs = []
+    for number, (name, payload) in enumerate(LOGS.items()):
+        log = run(number, payload)
+        logs.append(replace(log, origin=replace(log.origin, path=name)))
+    return logs
 
-    Parameters
-    ----------
-    folder : str or Path
-        It is made where it is missing.
-    force : bool
-        Replace files that are there.
 
-    Returns
-    -------
-    list of Path
-        The files, logs first.
+def write_example(folder: str | Path, logs: Sequence[Log], force: bool = False) -> None:
+    """Write the logs as CSV, and a profile ``arm.toml``, all or none.
 
     Raises
     ------
@@ -61,14 +60,13 @@ def write_example(folder: str | Path, force: bool = False) -> list[Path]:
         If a file is there already and `force` is not set, or cannot be written.
     """
     folder = Path(folder)
-    paths = [folder / f"{name}.csv" for name in LOGS] + [folder / PROFILE]
+    paths = [folder / f"{log.origin.path}.csv" for log in logs] + [folder / PROFILE]
     for path in paths:
         refuse_existing(path, force)
-    for number, (path, payload) in enumerate(zip(paths, LOGS.values(), strict=False)):
-        write_log(path, run(number, payload), force=force)
+    for path, log in zip(paths, logs, strict=False):
+        write_log(path, log, force=force)
     with whole_file(paths[-1], force=force) as temporary:
         temporary.write_text(PROFILE_TEXT, encoding="utf-8")
-    return paths
 
 
 def run(number: int, payload: float) -> Log:

@@ -44,7 +44,6 @@ OF_COMMAND: Mapping[str, tuple[Exit, ...]] = {
     "validate": (Exit.OK, Exit.LIMIT, Exit.USAGE),
     "batch": (Exit.OK, Exit.LIMIT, Exit.USAGE, Exit.FAILED, Exit.DATA_LOST, Exit.STOPPED),
     "track": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
-    "check": (Exit.OK, Exit.LIMIT, Exit.USAGE),
     "convert": _ALWAYS + (Exit.DATA_LOST,),
 }
 """The codes that a command ends with by itself; any other command ends with `OK` or `USAGE`."""

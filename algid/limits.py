@@ -143,3 +143,13 @@ class Physical:
 
 
 PHYSICAL = Physical()
+
+PLANNED: dict[str, Range] = {
+    "tip_height": (-1e6, 1e3),
+    "duration": (0.5, 120),
+    "rate": (20, 1e5),
+}
+"""What a design takes, in m, s and Hz."""
+KNOWN_LENGTH: Range = (1e-3, 1e3)
+KNOWN_MASS: Range = (1e-6, 1e6)
+"""A link's length in m and a mass in kg as a user knows them."""

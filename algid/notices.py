@@ -16,21 +16,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from algid.options import FLAGS, OPTIONS, flag
+from algid.options import BY_SET, FLAGS, VALUES, flag
 from algid.text import joined
 from algid.words import counted
-
-_OF_CHANNELS: Mapping[str, str | tuple[str, ...]] = {
-    "source": "NAME",
-    "q_des": "NAME",
-    "time": "NAME",
-    "gear_ratio": "N",
-    "counts": "N",
-    "offset": "RAD",
-    "torque_constant": "K",
-}
-"""What stands for a value that only the user knows, by the last part of a setting's name, where
-`algid.options` has no such option."""
 
 
 def _own(name: str, value: object) -> bool:
@@ -38,7 +26,7 @@ def _own(name: str, value: object) -> bool:
 
     A profile's `velocity` is true or false and has none: the option says where velocities are from.
     """
-    return name in FLAGS and not isinstance(value, bool)
+    return "." not in name and name not in BY_SET and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, repr=False)
@@ -114,11 +102,7 @@ def _shown(name: str, value: Any) -> Any:
     """A value, or what stands for one that only the user knows."""
     if value is not None:
         return value
-    last = name.rpartition(".")[2]
-    for one in OPTIONS:
-        if one.name == last and one.open:
-            return one.open
-    return _OF_CHANNELS.get(last, "VALUE")
+    return VALUES.get(name.rpartition(".")[2], "VALUE")
 
 
 def _toml(name: str, value: Any) -> str:
@@ -592,7 +576,7 @@ MESSAGES: Mapping[str, str | Mapping[str, str]] = {
     "BROKEN_OFF": "the search was broken off: this is the best motion until then",
 }
 """Text by code; of a code with several cases, by the number "case"."""
-_ANYWHERE = "{accepted:~ (accepted by --accept)}{looked_at:~ (in its first # s)}"
+_ANYWHERE = "{accepted:~ (accepted by {flag[accept]})}{looked_at:~ (in its first # s)}"
 """What may stand behind the text of every code."""
 
 

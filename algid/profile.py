@@ -6,15 +6,17 @@ refused.
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
 from algid.errors import SettingError
 from algid.files import misfit, read_toml
-from algid.options import PROFILE, range_of
+from algid.limits import PHYSICAL
+from algid.options import EVERYDAY
 from algid.units import names_of, unit_of
 
 
@@ -59,11 +61,22 @@ ALL_CHANNELS = (
 )  # fmt: skip
 
 
+CHANNELS_OF: Mapping[str, tuple[str, ...]] = {
+    "angle_unit": ("theta1", "theta2", "omega1", "omega2"),
+    "torque_unit": ("tau1", "tau2"),
+}
+"""Keywords that set the unit of several channels."""
+NO_BOUNDS = (None, None)
 OF_ONE_LOG = ("torque_file", "segment")
 """Settings that no other log shares."""
 
 
-_RATE = range_of(PROFILE, "rate")
+def field(
+    default: Any, text: str, panel: str = "", bounds: tuple[float | None, float | None] = NO_BOUNDS
+) -> Any:
+    """A field with its help, its panel and its least and largest value."""
+    low, high = bounds
+    return Field(default, ge=low, le=high, description=text, json_schema_extra={"panel": panel})
 
 
 def _parts(text: object) -> object:
@@ -85,6 +98,9 @@ def _number(text: object) -> object:
     if isinstance(text, str) and text.isdecimal():
         return int(text)
     return text
+
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 class _Strict(BaseModel):
@@ -148,57 +164,24 @@ class Torque(Channel):
         return self.q_des or self.source
 
 
+def documented(model: type[Model]) -> type[Model]:
+    """The model, whose docstring tells of each field what its description says."""
+    told = ["Parameters", "----------"]
+    for name, one in model.model_fields.items():
+        told += [name, f"    {one.description}"]
+    head, raises, rest = inspect.cleandoc(model.__doc__ or "").partition("Raises\n")
+    model.__doc__ = "\n".join((head + told[0], *told[1:], "", raises + rest))
+    return model
+
+
+@documented
 class Profile(_Strict):
-    """What a log's names, units and signs mean.
+    """What a log's names, units and signs mean: each field's description says what it is.
 
-    Angles become θ1 from the horizontal, θ2 from link 1.
-
-    Parameters
-    ----------
-    topic : str
-        Where the joint states stand in a log of messages.
-    joints : pair of str
-        The two joints, where the log has more or does not tell which is the first.
-    clock : 'header' or 'log'
-        Stamps of the messages' own header, or those of the recorder.
-    time, time_unit : str
-        The column of the time, and its unit: 's', 'ms', 'us' or 'ns'.
-    rate : float, Hz
-        Samples a second of a table without a time: its rows are counted.
-    columns : tuple of str
-        The names of the columns of a text table without a header, in their order.
-    zero : 'horizontal', 'hanging' or 'upright'
-        Where θ1 is zero.
-    second_angle : 'relative' or 'absolute'
-        Whether θ2 counts from link 1, or from where θ1 does.
-    drive : 'joint' or 'base'
-        Where the second motor stands: in its joint, or at the base, where a belt or a
-        parallelogram takes its torque to θ1 + θ2. Torques then become those of the joints: τ1 + τ2
-        and τ2.
-    passive : 1 or 2
-        A joint without a motor, as an acrobot's first or a pendubot's second: its torque is zero,
-        whatever the log says.
-    gravity : float, m/s^2
-    effort : str
-        'raw', 'gravity-compensated', 'friction-compensated', 'external', 'command' or 'current':
-        what the driver logs as torque.
-    velocity : bool
-        Whether recorded velocities are read.
-    signs, offsets : pairs of 1 or -1, and of float in rad
-        Of the joints.
-    start, end : float, s since the log's first sample
-        Where it is cut.
-    torque_file : str
-        The file that holds the torques, beside the log or in the working folder, where the log
-        itself has none: they are interpolated to the log's stamps.
-    segment : int
-        The run that is read alone, from 1, of a log whose clock starts again.
-    accept : codes of checks
-        Which may warn but not refuse.
-    theta1, theta2, tau1, tau2, omega1, omega2, q_des1, q_des2 : dict
-        Of one channel its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind
-        has. The reference that a controller follows, q_des, is recorded as its angle is, where
-        nothing else is said.
+    Angles become θ1 from the horizontal, θ2 from link 1. Of each channel, ``theta1`` to ``q_des2``,
+    a dict holds its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind has.
+    The reference that a controller follows, q_des, is recorded as its angle is, where nothing else
+    is said.
 
     Raises
     ------
@@ -206,35 +189,63 @@ class Profile(_Strict):
         If a setting or its value is not known.
     """
 
-    topic: str | None = None
-    joints: tuple[str, str] | None = None
-    clock: Literal["header", "log"] | None = None
-    time: str | None = None
-    time_unit: TimeUnit | None = None
-    rate: float | None = Field(default=None, ge=_RATE[0], le=_RATE[1])
-    columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = None
-    zero: Literal["horizontal", "hanging", "upright"] = "horizontal"
-    second_angle: Literal["relative", "absolute"] = "relative"
-    drive: Literal["joint", "base"] = "joint"
-    passive: Annotated[Literal[1, 2] | None, BeforeValidator(_number)] = None
-    gravity: float = Field(default=9.81, ge=0)
-    effort: Effort | None = None
-    velocity: bool = True
-    signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)
-    offsets: tuple[float, float] = (0.0, 0.0)
-    start: float | None = Field(default=None, ge=0)
-    end: float | None = Field(default=None, gt=0)
-    torque_file: Annotated[str | None, BeforeValidator(_plain)] = Field(default=None, min_length=1)
-    segment: Annotated[int | None, BeforeValidator(_number)] = Field(default=None, ge=1)
-    accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = ()
-    theta1: Angle = Angle()
-    theta2: Angle = Angle()
-    tau1: Torque = Torque()
-    tau2: Torque = Torque()
-    omega1: Velocity = Velocity()
-    omega2: Velocity = Velocity()
-    q_des1: Angle = Angle()
-    q_des2: Angle = Angle()
+    topic: str | None = field(None, "Topic with the joint states.")
+    joints: tuple[str, str] | None = field(None, "The two joints, as NAME,NAME.", EVERYDAY)
+    clock: Literal["header", "log"] | None = field(
+        None, "Stamps of the messages' own header, or of the log (the recorder)."
+    )
+    time: str | None = field(None, "The column of the time.")
+    time_unit: TimeUnit | None = field(None, "Its unit: s, ms, us or ns.")
+    rate: float | None = field(
+        None, "Samples a second, Hz, of a table without time.", bounds=PHYSICAL.rate
+    )
+    columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = field(
+        None, "Names of the columns of a CSV without a header, as t,theta1,…."
+    )
+    zero: Literal["horizontal", "hanging", "upright"] = field(
+        "horizontal", "Where θ1 is zero: horizontal, hanging or upright.", EVERYDAY
+    )
+    second_angle: Literal["relative", "absolute"] = field(
+        "relative", "θ2 is relative (to link 1) or absolute."
+    )
+    drive: Literal["joint", "base"] = field(
+        "joint",
+        "Where the second motor stands: in its joint, or at the base, where a belt or a "
+        "parallelogram takes its torque to θ1 + θ2; torques become τ1 + τ2 and τ2.",
+    )
+    passive: Annotated[Literal[1, 2] | None, BeforeValidator(_number)] = field(
+        None, "The joint without a motor, 1 or 2: its torque is zero, whatever the log says."
+    )
+    gravity: float = field(9.81, "m/s².", bounds=(0, None))
+    effort: Effort | None = field(None, "What the driver logs as torque.")
+    velocity: bool = field(True, "Whether recorded velocities are read.")
+    signs: tuple[Literal[1, -1], Literal[1, -1]] = field((1, 1), "Of the joints.")
+    offsets: tuple[float, float] = field((0.0, 0.0), "Of the joints, rad.")
+    start: float | None = field(
+        None, "Leave out what is before, s from the first sample.", bounds=(0, None)
+    )
+    end: Annotated[float | None, Field(gt=0)] = field(
+        None, "Leave out what is after, s from the first sample."
+    )
+    torque_file: Annotated[str | None, Field(min_length=1), BeforeValidator(_plain)] = field(
+        None, "File with the torques, joined on the stamps."
+    )
+    segment: Annotated[int | None, BeforeValidator(_number)] = field(
+        None,
+        "One run alone, 1 for the first, where the log's clock starts again.",
+        bounds=(1, None),
+    )
+    accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = field(
+        (), "Checks that warn but do not refuse: CODE,CODE."
+    )
+    theta1: Angle = field(Angle(), "θ1: its source, unit, sign, ….")
+    theta2: Angle = field(Angle(), "θ2: its source, unit, sign, ….")
+    tau1: Torque = field(Torque(), "τ1: its source, unit, sign, ….")
+    tau2: Torque = field(Torque(), "τ2: its source, unit, sign, ….")
+    omega1: Velocity = field(Velocity(), "ω1: its source, unit, sign, ….")
+    omega2: Velocity = field(Velocity(), "ω2: its source, unit, sign, ….")
+    q_des1: Angle = field(Angle(), "The reference of θ1: its source, unit, sign, ….")
+    q_des2: Angle = field(Angle(), "The reference of θ2: its source, unit, sign, ….")
 
     _flags: frozenset[str] = PrivateAttr(frozenset())
     _channels: tuple[str, ...] = PrivateAttr(ALL_CHANNELS)
@@ -276,6 +287,10 @@ class Profile(_Strict):
         """The profile of the canonical channel `name`."""
         channel: Angle | Velocity | Torque = getattr(self, name)
         return channel
+
+
+KEYWORDS = (*Profile.model_fields, *CHANNELS_OF)
+"""What verbs take that read logs."""
 
 
 class ProfileSettingError(SettingError):

@@ -1,38 +1,38 @@
 """Everything that decides an identification, as one value that travels into its result.
 
-What each setting is called, its range and its help stand in `algid.options`, its type and its
-default here.
+Each field holds its type, default, bounds, help and panel: the command line, Python's keywords and
+the guide read them off it.
 """
 
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
-from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from algid.errors import SettingError
-from algid.limits import PHYSICAL, Range
+from algid.files import misfit
+from algid.limits import PHYSICAL
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
-from algid.options import BY_TAKER, PROFILE, SETTINGS, flag, names_taken
-from algid.physics.effort import Effort, without_terms
-from algid.signals.shift import TorqueShift
+from algid.options import EVERYDAY, flag
+from algid.profile import Effort, documented, field
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
+    from algid.signals.shift import TorqueShift
+
     EstimatorName = str
 else:
     EstimatorName = Literal[NAMES]
 
 
+OF_BOTH = ("gravity", "effort")
+"""Settings that a profile has too: there they are of its log's driver and arm."""
 EXTERNAL_GRAVITY = (
     f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
     f"{flag('gravity')} out, or say {flag('effort')} gravity-compensated"
 )
-
-
-OF_BOTH = names_taken(SETTINGS, PROFILE)
-"""Settings that a profile has too: there they are of its log's driver and arm."""
 
 
 def refuse_contradictions(given: Mapping[str, Any]) -> None:
@@ -47,16 +47,24 @@ def refuse_contradictions(given: Mapping[str, Any]) -> None:
         raise SettingError(EXTERNAL_GRAVITY)
 
 
-def _poles(text: str) -> tuple[complex, ...]:
-    """Six poles out of text; complex ones like -80+20j."""
+def _poles(given: object) -> object:
+    """Six poles out of text or a list; complex ones like -80+20j."""
+    if given is None or (
+        isinstance(given, tuple) and all(isinstance(one, complex) for one in given)
+    ):
+        return given
     from algid.signals.observers import observer_gain
 
     like = "give six like -80,-390,-391,-392,-393,-394"
+    if isinstance(given, list | tuple):
+        given = ",".join(map(str, given[:7]))
+    if not isinstance(given, str):
+        raise SettingError(f"{flag('poles')}: expected six numbers, found {reprlib.repr(given)}")
     try:
-        poles = tuple(complex(part.strip()) for part in text.split(","))
+        poles = tuple(complex(part.strip()) for part in given.split(","))
     except ValueError:
         raise SettingError(
-            f"{flag('poles')} {text}: expected numbers between commas; {like}"
+            f"{flag('poles')} {given:.200}: expected numbers between commas; {like}"
         ) from None
     low, high = PHYSICAL.pole
     try:
@@ -64,119 +72,70 @@ def _poles(text: str) -> tuple[complex, ...]:
             raise ValueError(f"each must be from {low:g} to {high:g} rad/s in size")
         observer_gain(poles)
     except ValueError as error:
-        raise SettingError(f"{flag('poles')} {text:.200}: {error}; {like}") from None
-    return tuple(_as_real(pole) for pole in poles)
+        raise SettingError(f"{flag('poles')} {given:.200}: {error}; {like}") from None
+    return poles
 
 
-def _as_real(pole: complex) -> complex:
-    """A pole as a float if it is real, so that it is written as one."""
-    if pole.imag == 0:
-        return pole.real
-    return pole
-
-
-@cache
-def _kinds() -> dict[str, Any]:
-    """The types of the fields, by name."""
-    return get_type_hints(Settings)
-
-
-def _expected(bounds: Range | None, kind: Any, value: object) -> str | None:
-    """What a setting has to be, where its value is not that."""
-    if bounds is not None:
-        low, high = bounds
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and low <= value <= high:  # type: ignore[operator]
-            return None
-        return f"a number from {low:g} to {high:g}"
-    for part in (kind,) + get_args(kind):
-        if get_origin(part) is Literal:
-            words = get_args(part)
-            if value in words:
-                return None
-            return f"one of {', '.join(words)}"
-    if kind is bool and not isinstance(value, bool):
-        return "true or false"
-    if kind is str and not isinstance(value, str):
-        return "text"
-    return None
-
-
-PARSERS: Mapping[str, Callable[[str], Any]] = {"poles": _poles}
-"""Of the settings that a command line gives as text which no annotation reads."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How to identify.
-
-    Parameters
-    ----------
-    estimator : name in `algid.methods.ESTIMATORS`
-        'refined' (maximum likelihood, the default), 'weak' (least squares on windows),
-        'instruments' (for arms whose unmodelled torque drives the motion) or 'paper'.
-    velocity : 'observer' or 'measured'
-        Where joint velocities come from. The refined estimator needs none.
-    observer : 'luenberger' (eq. 6), 'zero-phase', or None
-        None takes the paper's observer for the paper's method and the zero-phase differentiator
-        otherwise.
-    poles : six complex, rad/s, three a joint, or None
-        Of the paper's observer; None takes the paper's.
-    window : float, s, or None
-        After how long the paper's integrals restart (2 s), or the length of the weak form's
-        windows (0.4 s).
-    bandwidth : float, Hz, of the zero-phase differentiator
-    gravity : float, m/s^2, 0 for an arm that moves in a horizontal plane
-    effort : str or None
-        What the logged torque is: 'raw', 'gravity-compensated', 'friction-compensated',
-        'external', 'command' or 'current'. None is raw, unless the logs show that gravity is
-        compensated; with `gravity` 0 a payload's weight is compensated too.
-    model : 'auto', 'plain', or terms of the torque between commas
-        Names in `algid.model.TERMS`, and delay; 'auto' lets the logs choose.
-    torque_hold : 'auto', 'foh' or 'zoh'
-        Whether the torque moves evenly from sample to sample or is held from each to the next;
-        'auto' lets the logs choose.
-    delay : float, s, between torque and angle, where it is known; the term `delay` estimates it
-    l1, l2 : float, m, link lengths where known
-    payload_mass : float, kg, the payload's where it is known
-        Then the gain of the torques follows: what the log's torques have to be multiplied by.
-    constrain : bool, solve within the physical bounds
-    cross_validate : bool, leave each log out in turn
+@documented
+class Settings(BaseModel):
+    """How to identify: each field's description says what it is.
 
     Raises
     ------
     SettingError
-        If a number has no meaning, or the paper's method lacks what is set.
+        If a value is none that its field takes, or the paper's method lacks what is set.
     """
 
-    estimator: EstimatorName = NAMES[0]
-    velocity: Literal["observer", "measured"] = "observer"
-    observer: Literal["luenberger", "zero-phase"] | None = None
-    poles: tuple[complex, ...] | None = None
-    window: float | None = None
-    bandwidth: float = 60.0
-    gravity: float = 9.81
-    effort: Effort | None = None
-    model: str = "auto"
-    torque_hold: Literal["auto", "foh", "zoh"] = "auto"
-    delay: float = 0.0
-    l1: float | None = None
-    l2: float | None = None
-    payload_mass: float | None = None
-    constrain: bool = False
-    cross_validate: bool = False
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
-    def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if value is None and one.default is None:
-                continue
-            expected = _expected(BY_TAKER[SETTINGS, one.name].range, _kinds()[one.name], value)
-            if expected:
-                raise SettingError(
-                    f"{flag(one.name)}: expected {expected}, found {reprlib.repr(value)}"
-                )
-        if self.effort == "external" and self.gravity != type(self).gravity:
+    estimator: EstimatorName = field(NAMES[0], f"{', '.join(NAMES[:-1])} or {NAMES[-1]}.")
+    velocity: Literal["observer", "measured"] = field(
+        "observer", "Joint velocities: observer, or measured (the log's)."
+    )
+    observer: Literal["luenberger", "zero-phase"] | None = field(
+        None, "luenberger (eq. 6 of the paper) or zero-phase; by default the estimator's."
+    )
+    poles: Annotated[tuple[complex, ...] | None, BeforeValidator(_poles)] = field(
+        None, "Six poles of the paper's observer, rad/s, three a joint."
+    )
+    window: float | None = field(
+        None,
+        "s: the paper's integrals restart after it (2 s); the weak form's windows (0.4 s).",
+        bounds=PHYSICAL.window,
+    )
+    bandwidth: float = field(
+        60.0, "Of the zero-phase differentiator, Hz.", bounds=PHYSICAL.bandwidth
+    )
+    gravity: float = field(
+        9.81, "m/s²; 0 for an arm in a horizontal plane [9.81].", bounds=PHYSICAL.gravity
+    )
+    effort: Effort | None = field(None, "Logged torque: raw, current, external, command, ….")
+    model: str = field("auto", "Torque terms: auto, plain, or coulomb,rotor,….")
+    torque_hold: Literal["auto", "foh", "zoh"] = field(
+        "auto", "Torque between samples: auto, foh (linear), zoh."
+    )
+    delay: float = field(
+        0.0, "From torque to angle, s; the term delay estimates it.", bounds=PHYSICAL.delay
+    )
+    l1: float | None = field(None, "Length of link 1, m, where known.", bounds=PHYSICAL.length)
+    l2: float | None = field(None, "Length of link 2, m, where known.", bounds=PHYSICAL.length)
+    payload_mass: float | None = field(
+        None, "Known payload, kg: gives the torques' gain.", bounds=PHYSICAL.mass
+    )
+    constrain: bool = field(False, "Solve within the physical bounds.")
+    cross_validate: bool = field(False, "Predict each log from the others.", panel=EVERYDAY)
+
+    if not TYPE_CHECKING:
+
+        def __init__(self, **given: Any) -> None:
+            try:
+                super().__init__(**given)
+            except ValidationError as error:
+                raise _refusal(error) from None
+
+    def model_post_init(self, _context: Any, /) -> None:
+        """Refuse what no single field shows."""
+        if self.effort == "external" and self.gravity != DEFAULTS["gravity"]:
             raise SettingError(EXTERNAL_GRAVITY)
         if self.model not in ("auto", "plain"):
             self._check_terms()
@@ -194,15 +153,11 @@ class Settings:
             As for a new one.
         """
         content = _without_short_forms(content)
-        known = {f.name: content[f.name] for f in fields(cls) if f.name in content}
-        poles = known.get("poles")
-        if poles is not None:
-            if not isinstance(poles, list | tuple):
-                raise SettingError(
-                    f"{flag('poles')}: expected six numbers, found {reprlib.repr(poles)}"
-                )
-            known["poles"] = _poles(",".join(map(str, poles[:7])))
-        return cls(**known)
+        return cls(**{name: content[name] for name in cls.model_fields if name in content})
+
+    def but(self, **changes: Any) -> Settings:
+        """The same with other values."""
+        return Settings(**dict(self) | changes)
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -233,6 +188,8 @@ class Settings:
 
     def torque_shift(self, delay: float | None = None) -> TorqueShift:
         """After how long a logged torque acts: its hold, and the `delay` in s, or the one set."""
+        from algid.signals.shift import TorqueShift
+
         if delay is None:
             delay = self.delay
         return TorqueShift(self.torque_hold == "zoh", delay)
@@ -243,14 +200,12 @@ class Settings:
 
         poles: list[float | str] = []
         for pole in self.poles or PAPER_POLES:
-            if pole.imag == 0:
-                poles.append(float(pole.real))
-            else:
-                poles.append(str(complex(pole)))
-        return asdict(self) | {"poles": poles}
+            poles.append(float(pole.real) if pole.imag == 0 else str(complex(pole)))
+        return dict(self) | {"poles": poles}
 
     def _check_terms(self) -> None:
         from algid.model import CHOICES, EVERY_TERM
+        from algid.physics.effort import without_terms
 
         for term in self.terms:
             if term not in CHOICES:
@@ -276,7 +231,6 @@ class Settings:
             )
 
     def _refuse_what_it_lacks(self, estimator: Estimator) -> None:
-        default = {f.name: f.default for f in fields(self)}
         for name in estimator.lacks:
             value = getattr(self, name)
             others = [one.name for one in ESTIMATORS if name not in one.lacks]
@@ -285,11 +239,29 @@ class Settings:
                 what = f"{flag('model')} {value}: {estimator.title} has no such terms"
             elif name == "gravity" and value == 0:
                 what = f"{flag('gravity')} 0: without gravity {estimator.title} has no payload"
-            elif name not in ("model", "gravity") and value != default[name]:
+            elif name not in ("model", "gravity") and value != DEFAULTS[name]:
                 what = f"{flag(name)}: {estimator.title} has no such term"
             else:
                 continue
             raise SettingError(f"{what}; {use}")
+
+
+DEFAULTS: Mapping[str, Any] = {name: field.default for name, field in Settings.model_fields.items()}
+"""Of each setting."""
+
+
+def _refusal(error: ValidationError) -> SettingError:
+    """The first misfit in one line: a number's is told with both of its bounds."""
+    place, why = misfit(error)
+    name = place.partition(".")[0]
+    ends: dict[str, float] = {}
+    if name in Settings.model_fields:
+        for bound in Settings.model_fields[name].metadata:
+            ends |= {end: getattr(bound, end) for end in ("ge", "le") if hasattr(bound, end)}
+    if len(ends) == 2:
+        found = reprlib.repr(error.errors()[0]["input"])
+        why = f"expected a number from {ends['ge']:g} to {ends['le']:g}, found {found}"
+    return SettingError(f"{flag(name)}: {why}")
 
 
 _SHORT_FORMS = {

@@ -30,7 +30,6 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from typer.main import get_command
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.cli.app import called
@@ -51,7 +50,7 @@ ALIKE = 1.1  # times the error of the log unspoiled: by rounding and the search 
 COULOMB, STRIBECK, LOAD = 0.05, 0.03, 0.03  # of the torque's RMS; of the torque at the moment
 WIDTH, STRIBECK_SPEED = 0.05, 0.3  # rad/s
 HELD = np.array([400.0, 40.0])  # N m/rad and N m s/rad that hold a joint, by its inertia
-ADVISED = re.compile(r"--passive \d|--set \w+\.unit=\"?deg\"?|--angle-unit deg")
+ADVISED = re.compile(r"--set passive=\d|--set \w+\.unit=\"?deg\"?|--angle-unit deg")
 
 Pair = tuple[FloatArray, FloatArray]
 Spoil = Callable[[FloatArray, FloatArray], Pair]
@@ -174,7 +173,7 @@ def run(words: list[str], folder: Path) -> Outcome:
         contextlib.redirect_stderr(printed),
     ):
         try:
-            get_command(called(words[1:2]))(words[1:])
+            called(words[1])(words[1:])
         except AlgidError as error:
             print(error)
             code = Exit.USAGE
@@ -226,7 +225,7 @@ def row(job: tuple[str, str, str]) -> Line:
         words = ["algid", "identify", *(str(folder / f"log{n}.csv") for n in range(_count(kind)))]
         words += ["--no-report", "-o", str(folder), "--accept", "DEGREES"]
         if kind in ("acrobot", "pendubot"):
-            words += ["--passive", "1" if kind == "acrobot" else "2"]
+            words += ["--set", "passive=1" if kind == "acrobot" else "2"]
         if kind == "real friction":
             written(folder, kind, arm, title, SPOILS["nothing"])
             limit = max(WITHIN, ALIKE * furthest(run(words, folder).result, k, names))

@@ -31,8 +31,8 @@ pipeline-$(1)-$(2): setup
 	  $(ALGID) identify $(PIPELINES)/$(1)-$(2)/$(1)-unloaded.$(2) \
 	    --loaded $(PIPELINES)/$(1)-$(2)/$(1)-loaded.$(2) --estimator $$$$estimator \
 	    -o $(PIPELINES)/$(1)-$(2)/$$$$estimator --quiet --no-report && \
-	  $(ALGID) check $(PIPELINES)/$(1)-$(2)/$$$$estimator/$(1)-unloaded.algid \
-	    --tolerance-file pipelines/tolerances/$(1)-$$$$estimator.toml || exit 1; \
+	  $(ALGID) validate $(PIPELINES)/$(1)-$(2)/$$$$estimator/$(1)-unloaded.algid \
+	    --max-error pipelines/tolerances/$(1)-$$$$estimator.toml || exit 1; \
 	done
 endef
 $(foreach case,$(CASES),$(foreach format,$(FORMATS),$(eval $(call PIPELINE,$(case),$(format)))))

@@ -26,11 +26,10 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-import algid.cli.app
 from algid.faults import EXIT_INTERNAL
 from algid.text import printable
 from pipelines.hostile.calls import Call, draw_call
-from pipelines.hostile.places import called, called_once, furnish
+from pipelines.hostile.places import called, furnish
 
 CALLS = 5_000
 SECONDS = 20.0
@@ -61,7 +60,6 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="algid-fuzz-") as folder:
         sound = Path(folder, "sound")
         sound.mkdir()
-        algid.cli.app.called = called_once()  # type: ignore[assignment]
         furnish(sound)
         for first in range(seed, seed + calls, _BATCH):
             count = min(_BATCH, seed + calls - first)
@@ -109,7 +107,6 @@ def batch(sound: Path, first: int, count: int) -> None:
         place = outer / "a" / "b" / "place"
         shutil.copytree(sound, place)
         os.chdir(place)
-        algid.cli.app.called = called_once()  # type: ignore[assignment]
         resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
         signal.signal(signal.SIGPROF, _stop)
         os.environ["ALGID_TRACEBACK"] = "1"  # a finding is told with its place

@@ -3,9 +3,9 @@ passive`.
 
 An acrobot's first joint, or a pendubot's second, bears Coulomb friction of its bearing, and cables
 pull at both joints by 2 % of the driven joint's torque, slowly and unlogged. Every draw is
-identified with no flag but `--passive`. A row gives how many converged, how many failed, how many
-have k1, k2 and k3 all as nothing, and how many intervals hold the truth of those that are told, by
-constant. Writes
+identified with no flag but `--set passive`. A row gives how many converged, how many failed, how
+many have k1, k2 and k3 all as nothing, and how many intervals hold the truth of those that are
+told, by constant. Writes
 `passive.md` into the output folder.
 """
 

@@ -112,6 +112,9 @@ def imported(module: str, text: str, sources: Mapping[str, str]) -> Iterator[str
                 yield exact if exact in sources or base == "algid" else base
         elif isinstance(node, ast.Call) and _imports(node.func):
             first = node.args[0] if node.args else None
+            if isinstance(first, ast.JoinedStr) and isinstance(first.values[0], ast.Constant):
+                first = first.values[0]  # of one room, whatever its module
+                first = ast.Constant(str(first.value).rpartition(".")[0] or "?")
             yield (
                 first.value
                 if isinstance(first, ast.Constant) and isinstance(first.value, str)

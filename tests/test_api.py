@@ -475,7 +475,7 @@ def test_a_log_is_read_with_settings_as_keywords(columns: dict[str, Any]) -> Non
     assert np.allclose(turned.theta[0], plain.theta[0] - np.pi / 2)
     assert turned.origin.reading == algid.read_log(columns, {"zero": "hanging"}).origin.reading
     with pytest.raises(SettingError, match="zer"):
-        algid.read_log(columns, zer="hanging")
+        algid.read_log(columns, zer="hanging")  # type: ignore[call-arg]
 
 
 def test_settings_are_keywords_as_they_are_flags(columns: dict[str, Any]) -> None:
@@ -522,20 +522,20 @@ def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(
     [
         ({"estimater": "weak"}, "^estimater: no setting has this name; did you mean estimator\\?$"),
         ({"xyzzy": 1}, "^xyzzy: no setting has this name; known are estimator, .*, zero, "),
-        ({"estimator": "weakest"}, "^--estimator: expected one of refined, .*, found 'weakest'$"),
+        ({"estimator": "weakest"}, "^--estimator: expected 'refined', .*, found 'weakest'$"),
         (
             {"model": "coulomb,nothing"},
             "^--model: expected auto, plain or some of .*; found 'nothing'$",
         ),
         ({"gravity": -1}, "^--gravity: expected a number from "),
-        ({"bandwidth": None}, "^--bandwidth: expected a number from "),
-        ({"poles": [1, 2]}, "^--poles 1,2: "),
-        ({"poles": 7}, "^--poles: expected text or numbers, found 7$"),
+        ({"bandwidth": None}, "^--set bandwidth: expected a number from "),
+        ({"poles": [1, 2]}, "^--set poles 1,2: "),
+        ({"poles": 7}, "^--set poles: expected six numbers, found 7$"),
         (
             {"zero": "down"},
-            "^setting zero: expected 'horizontal', 'hanging' or 'upright', found 'down'$",
+            r"^--zero \(profile: zero\): expected 'horizontal', .*, found 'down'$",
         ),
-        ({"tau1": {"unit": "m"}}, "^setting tau1.unit: expected "),
+        ({"tau1": {"unit": "m"}}, r"^--set \(profile: tau1.unit\): expected "),
         (
             {"profile": {"zeros": "hanging"}},
             "^setting zeros: extra inputs are not permitted, found 'hanging'$",

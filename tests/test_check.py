@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
 
 import pytest
 
-from algid.check import failed, judge
+from algid.check import judge
 from algid.errors import ResultError, SettingError
 from algid.results import LogSummary, Result, Table4Row
 
@@ -40,11 +39,9 @@ def _result(*rows: Table4Row) -> Result:
 
 
 def _judged(
-    against: Literal["paper", "truth"] = "paper",
-    max_error: float | None = None,
-    file: Path | None = None,
+    largest: float | str | Path = "paper",
 ) -> list[tuple[str, float | None, float, bool]]:
-    rows = judge(_result(*ROWS), against, max_error, file)
+    rows = judge(_result(*ROWS), largest)
     return [(row.parameter, row.error, row.limit, row.passed) for row in rows]
 
 
@@ -57,25 +54,25 @@ def test_each_row_is_held_against_the_papers_own_error() -> None:
 
 
 def test_one_limit_holds_for_every_row_with_a_truth() -> None:
-    assert [row[::3] for row in _judged("truth", 2.0)] == [
+    assert [row[::3] for row in _judged(2.0)] == [
         ("k1", True),
         ("k2", False),
         ("k3", False),
         ("m_p", True),
     ]
-    assert [row[2] for row in _judged("truth", 2.0)] == [2.0] * 4
+    assert [row[2] for row in _judged(2.0)] == [2.0] * 4
 
 
 def test_a_file_names_the_rows_that_are_checked(tmp_path: Path) -> None:
     file = tmp_path / "limits.toml"
     file.write_text("[max_error_percent]\nm_p = 0\nk2 = 49.9\n")
-    for against in ("paper", "truth"):
-        assert _judged(against, file=file) == [("k2", 50.0, 49.9, False), ("m_p", 0.0, 0.0, True)]
+    for name in (file, str(file)):
+        assert _judged(name) == [("k2", 50.0, 49.9, False), ("m_p", 0.0, 0.0, True)]
     file.write_text("[max_error_percent]\nl1 = 1\n")  # there, but without a truth
     with pytest.raises(
         SettingError, match=r"limits.toml: max_error_percent.l1: expected one of k1, k2, k3, m_p$"
     ):
-        _judged(file=file)
+        _judged(file)
     for text, said in (
         ("", "max_error_percent"),
         ("[max_error_percent]\nk1 = -1\n", "k1"),
@@ -83,30 +80,26 @@ def test_a_file_names_the_rows_that_are_checked(tmp_path: Path) -> None:
     ):
         file.write_text(text)
         with pytest.raises(SettingError, match=said):
-            _judged(file=file)
+            _judged(file)
 
 
-def test_limits_that_are_missing_or_doubled_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match=r"^--max-error and --tolerance-file: give one of them$"):
-        _judged(max_error=1.0, file=tmp_path / "limits.toml")
-    with pytest.raises(
-        SettingError, match=r"^--against truth: give the largest error with --max-error or --tol"
-    ):
-        _judged("truth")
+def test_limits_that_are_none_are_refused() -> None:
+    for largest in ("none", -1.0, float("nan"), "1e10"):
+        with pytest.raises(
+            SettingError, match=r"^--max-error: expected a number from 0 to 1e\+09, paper, or"
+        ):
+            _judged(largest)
     with pytest.raises(
         ResultError, match=r"^log\.mcap: the log holds no true parameters; only synthetic logs"
     ):
-        judge(_result(ROWS[4]), "truth", 1.0, None)
-    with pytest.raises(
-        ResultError, match=r"^log\.mcap: not a case of the paper; check --against truth$"
-    ):
-        judge(_result(ROWS[3]), "paper", None, None)
+        judge(_result(ROWS[4]), 1.0)
+    with pytest.raises(ResultError, match=r"^log\.mcap: not a case of the paper; give --max-error"):
+        judge(_result(ROWS[3]), "paper")
 
 
 def test_one_row_over_its_limit_fails_the_check_and_every_row_is_a_line() -> None:
-    rows = judge(_result(*ROWS), "paper", None, None)
-    assert failed(rows)
-    assert not failed(rows[:1])
+    rows = judge(_result(*ROWS), "paper")
+    assert [row.passed for row in rows] == [True, False, False]
     assert [row.text for row in rows] == [
         "ok    k1                     2 %  limit 2 %",
         "OVER  k2                    50 %  limit 1.235 %",

@@ -8,7 +8,7 @@ import pytest
 
 import algid
 from algid.errors import OutputError
-from algid.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE, write_example
+from algid.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
 from algid.inspection.report import inspect_log
 from algid.profile import load_profile
 from tests.processes import Outcome
@@ -17,7 +17,7 @@ from tests.processes import Outcome
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("example")
-    done = Outcome("example", "-o", folder)
+    done = Outcome("synth", "example", "-o", folder)
     assert (done.code, done.err) == (0, "")
     assert done.out.split() == [str(folder / f"{name}.csv") for name in LOGS] + [
         str(folder / PROFILE)
@@ -28,9 +28,9 @@ def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_nothing_is_overwritten_unless_forced(example: Path, tmp_path: Path) -> None:
     (tmp_path / "run4.csv").write_text("mine")
     with pytest.raises(OutputError, match=r"run4\.csv: exists already"):
-        write_example(tmp_path)
+        algid.synthesise("example", out=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["run4.csv"]
-    write_example(tmp_path, force=True)
+    algid.synthesise("example", out=tmp_path, force=True)
     for path in sorted(example.iterdir()):
         assert (tmp_path / path.name).read_bytes() == path.read_bytes()
 

@@ -21,7 +21,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "staging": room("guard"),
     "limits": room(),
     "units": room(),
-    "options": room("limits units"),
+    "options": room("limits"),
     "faults": room("errors guard options"),
     "progress": room(),
     "significance": room(),
@@ -49,15 +49,18 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "files": room("errors limits options staging", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "runtime": room(packages="threadpoolctl"),
-    "profile": room("errors files options units", "pydantic"),
-    "settings": room("errors limits methods model options physics signals"),
+    "profile": room("errors files limits options units", "pydantic"),
+    "settings": room(
+        "errors files limits methods model options physics profile signals", "pydantic"
+    ),
+    "moved": room("errors options"),
     "results": room(
-        "errors files limits log model names notices options settings significance text verdict "
-        "words", "numpy polars pydantic"),
+        "errors files limits log model names notices options profile settings significance text "
+        "verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow zstandard"),
-    "example": room("arm files log synth writers", "numpy"),
+    "example": room("arm files log options synth writers", "numpy"),
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "
         "quantiles ros2 runtime units words",
@@ -72,9 +75,9 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
-        "arm arrow errors estimators files inspection log methods model names notices options "
-        "physics profile progress readers report results runtime settings signals significance "
-        "table4 text units",
+        "arm arrow check errors estimators files inspection log methods model names notices "
+        "options physics profile progress readers report results runtime settings signals "
+        "significance table4 text units",
         "numpy polars pyarrow",
     ),
     "batches": room(
@@ -88,7 +91,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "mcap numpy polars pyarrow pydantic",
     ),
     "designs": room(
-        "arm criteria errors estimators files identification log model names "
+        "arm criteria errors estimators files identification limits log model names "
         "notices options progress report results signals significance synth text verdict words "
         "writers",
         "numpy polars pydantic scipy",
@@ -102,13 +105,12 @@ TABLE: dict[str, Room] = {  # lower rooms first
                   "significance text verdict words", "numpy polars scipy"),
     "api": room(
         "batches check designs errors estimators example exits exports files fleet identification "
-        "inspection limits log methods model notices options physics profile progress "
-        "readers report results runtime settings stores synth tracks units writers",
+        "inspection limits log methods model moved notices options physics profile progress "
+        "readers report results runtime settings stores synth text tracks units words writers",
         "numpy plotly polars",
     ),
     "cli": room(
-        "api errors exits faults files guard limits options profile report runtime settings text "
-        "words",
+        "api errors exits faults guard moved options profile report runtime settings text units",
         "rich typer",
     ),
 }  # fmt: skip

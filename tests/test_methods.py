@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields
 
 import pytest
-from typer.testing import CliRunner
 
 from algid.api.guide import text_of
 from algid.errors import SettingError
 from algid.methods import ESTIMATORS, NAMES, estimator_of, settles
-from algid.physics.terms import OPTIONAL
+from algid.options import flag
 from algid.settings import Settings
-from tests.cli.commands import app
 
 
 def test_an_entry_names_settings_that_there_are() -> None:
     assert len(set(NAMES)) == len(NAMES)
-    assert {name for one in ESTIMATORS for name in one.lacks} <= {
-        one.name for one in fields(Settings)
-    }
+    assert {name for one in ESTIMATORS for name in one.lacks} <= set(Settings.model_fields)
     assert [one.name for one in ESTIMATORS if settles(one.name)] == ["paper"]
     with pytest.raises(ValueError, match=r"estimator must be one of refined, weak, .* got 'ols'"):
         estimator_of("ols")
@@ -43,17 +38,10 @@ def test_the_guide_tells_each_estimator(one: object) -> None:
 def test_what_an_estimator_lacks_is_refused_with_one_that_takes_it(
     name: str, value: object
 ) -> None:
-    given = f"--{name}" + (
+    given = flag(name) + (
         f" {value:g}" if name == "gravity" else f" {value}" if name == "model" else ""
     )
     with pytest.raises(
         SettingError, match=f"^{given}: .*the paper's method.*; use --estimator refined or weak$"
     ):
         Settings(estimator="paper", **{name: value})  # type: ignore[arg-type]
-
-
-def test_help_names_every_term() -> None:
-    shown = " ".join(
-        CliRunner().invoke(app, ["identify", "--help"]).stdout.replace("│", " ").split()
-    )
-    assert f"some of {', '.join(term.name for term in OPTIONAL)}, like" in shown

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.cli.settings import profile_from
 from algid.notices import (
     MESSAGES,
     Notice,
@@ -23,6 +22,7 @@ from algid.notices import (
 )
 from algid.profile import Profile, with_settings
 from algid.results.verdict import CAUSES
+from tests.cli.commands import profile_from
 
 REMEDIES = (
     Remedy({"zero": "hanging"}),

@@ -5,31 +5,11 @@ the same.
 from __future__ import annotations
 
 import json
-from dataclasses import fields
 
 import pytest
-from typer.main import get_command
 
-from algid.cli.settings import Choice
 from algid.errors import SettingError
-from algid.options import BY_TAKER, SETTINGS, flag, options_of
 from algid.settings import Settings
-from tests.cli.commands import app
-
-
-def test_every_setting_is_an_entry_of_the_options() -> None:
-    assert [one.name for one in options_of(SETTINGS)] == [field.name for field in fields(Settings)]
-
-
-def test_every_setting_is_an_option_with_its_default_and_help() -> None:
-    for command in ("identify", "batch"):
-        called = get_command(app).commands[command]  # type: ignore[attr-defined]
-        options = {option.name: option for option in called.params}
-        for field in fields(Settings):
-            assert options[field.name].opts == [flag(field.name)]
-            assert options[field.name].help == BY_TAKER[SETTINGS, field.name].help
-        defaults = {field.name: options[field.name].default for field in fields(Settings)}
-        assert Choice(defaults, {}).settings() == Settings()
 
 
 @pytest.mark.parametrize(
@@ -50,11 +30,10 @@ def test_a_result_gives_its_settings_back(settings: Settings) -> None:
         assert found == settings
 
 
-def test_text_of_an_option_that_means_nothing_names_the_option() -> None:
-    defaults = {field.name: field.default for field in fields(Settings)}
-    for name, text in (("poles", "1,2,3"), ("poles", "a,b")):
-        with pytest.raises(SettingError, match=f"^{flag(name)}"):
-            Choice(defaults | {name: text}, {}).settings()
+@pytest.mark.parametrize("text", ["1,2,3", "a,b"])
+def test_text_of_a_setting_that_means_nothing_names_it(text: str) -> None:
+    with pytest.raises(SettingError, match=r"^--set poles"):
+        Settings(poles=text)  # type: ignore[arg-type]
 
 
 def test_short_forms_of_older_results_name_terms_of_the_model() -> None:

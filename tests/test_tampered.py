@@ -91,11 +91,11 @@ def changed(content: dict[str, Any], *path: str | int, value: Any) -> dict[str, 
         (
             ("settings", "estimator"),
             "magic",
-            "--estimator: expected one of refined, weak, instruments, paper",
+            "--estimator: expected 'refined', 'weak', 'instruments' or 'paper'",
         ),
-        (("settings", "constrain"), 3, "--constrain: expected true or false, found 3"),
-        (("settings", "model"), [1], "--model: expected text, found [1]"),
-        (("settings", "poles"), 7, "--poles: expected six numbers, found 7"),
+        (("settings", "constrain"), 3, "--set constrain: expected a valid boolean, found 3"),
+        (("settings", "model"), [1], "--model: expected a valid string, found [1]"),
+        (("settings", "poles"), 7, "--set poles: expected six numbers, found 7"),
     ],
 )
 def test_a_result_that_no_identification_gives_is_refused_on_reading(

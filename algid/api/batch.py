@@ -5,31 +5,35 @@ from __future__ import annotations
 import re
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from algid.api.answer import Answer
 from algid.api.given import opened
-from algid.api.options import profile_of, with_options
-from algid.api.ranges import check
+from algid.api.options import OUT, AnyResult, Options, ProfileLike, profile_of, with_options
+from algid.api.signature import check
 from algid.errors import AlgidError, SettingError
-from algid.options import flag
-from algid.settings import Settings
+from algid.exits import Exit
+from algid.options import Option, flag
+from algid.text import visible
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from algid.api.options import ProfileLike
     from algid.batches.jobs import Job
     from algid.batches.records import JobRecord
     from algid.batches.run import Batch, BatchOutcome
-    from algid.batches.run import Progress as Progress
+    from algid.batches.run import Progress as JobProgress
     from algid.profile import Profile
-    from algid.results import Result
+    from algid.progress import Progress
+    from algid.settings import Settings
 
+UNIT = "jobs"
+"""What progress counts."""
 Complaint = Callable[[str], None]
 """Hears, in one line, what goes wrong while a batch goes on."""
 
@@ -84,28 +88,30 @@ class Batched:
 
 
 def batch(
-    sources: str | Path | Sequence[str | Path],
-    out: str | Path,
+    sources: Annotated[str | Path | Sequence[str | Path], Option(kind=list[str])],
+    out: Annotated[str | Path, Option(kind=str, flags=OUT)],
     settings: Settings | None = None,
     *,
-    parameters: Result | str | Path | None = None,
+    parameters: AnyResult | None = None,
     profile: ProfileLike | None = None,
-    workers: int | None = None,
+    workers: Annotated[int, Option(range=(1, 4096))] | None = None,
     scheduler: str | None = None,
     memory_limit: str | None = None,
-    timeout: float = 3600.0,
+    timeout: Annotated[float, Option(range=(1e-3, 1e7))] = 3600.0,
     retry_failed: bool = False,
     watch: bool = False,
     part: str | None = None,
     report: bool = True,
-    profile_for: Callable[[str | None], Profile | None] | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Progress | None = None,
     complain: Complaint | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Batched:
-    """Identify many logs: a result folder a job and ``jobs.parquet``.
+    """Identify many logs: a result folder a job and OUT/jobs.parquet.
 
-    What is done is not done again.
+    What is done already is not done again.
+
+    X-unloaded.* and X-loaded.* are one job X. Ctrl-C ends it at once, and what was running is done
+    by the next run.
 
     Parameters
     ----------
@@ -115,28 +121,27 @@ def batch(
         Folder, or s3://, gs://, az:// URL, for all results.
     settings : Settings
     parameters : Result or path of one
-        An arm identified before; then logs are of the loaded arm.
+        Result of the arm identified before. Then logs are of the loaded arm.
     profile : Profile, path of one, or dict of what would stand in its file
+        algid.toml: what the logs' names and units mean.
     workers : int
         Worker processes; one a core by default.
     scheduler : str
-        ``tcp://HOST:PORT`` of a Dask scheduler to run on.
+        tcp://HOST:PORT of a Dask scheduler to run on.
     memory_limit : str
-        Memory of each worker, like ``2GB``; a job that needs more fails alone.
+        Memory of each worker, like 2GB. A job that needs more fails alone.
     timeout : float, s
-        A job that takes longer fails alone.
+        Seconds that a job may take; 3600. One that takes longer fails alone.
     retry_failed : bool
         Run jobs again that have failed.
     watch : bool
         Go on until a signal, and take logs as they arrive.
     part : str
-        ``2/40``: do the second of 40 shares of the jobs, beside other processes that do the others.
+        Share of the jobs, like 2/40, for arrays of processes.
     report : bool
-        Write pages and time series beside each ``result.json``.
-    profile_for : callable
-        The profile of a manifest's entry by its file, where that is not the file's own.
+        Write no pages and time series.
     progress : callable
-        Called with each job that ends.
+        Called with the job that ended, and how many of how many have.
     complain : callable
         Called with a line about what goes wrong while a watch goes on.
     **options : of `Settings` and of `Profile`, by their names
@@ -155,6 +160,8 @@ def batch(
 
     Examples
     --------
+    $ algid batch logs/ -o results --workers 2
+
     >>> import tempfile
     >>> import algid
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -163,6 +170,7 @@ def batch(
     >>> done.counts
     {'ok': 1}
     """
+    check(batch, locals())
     from algid.batches.discover import jobs_of
     from algid.batches.lock import locked
     from algid.batches.run import Batch, BatchConfig, stopped_by_signals, sweep
@@ -174,7 +182,6 @@ def batch(
     if not place.strip():
         raise SettingError("-o: expected a folder or a URL, found none; name where results go")
     store = open_store(place)
-    check("batch", workers=workers, timeout=timeout)
     bytes_each = None
     if memory_limit is not None:
         bytes_each = bytes_of(memory_limit)
@@ -195,7 +202,11 @@ def batch(
             return said
         return _over(file, options)
 
-    recipe = BatchConfig(place, asked, cache(profile_for or meant), known, report)  # each file once
+    def ended_job(job: JobProgress) -> None:
+        if progress is not None:
+            progress(f"{job.last.job.name[:50]}: {job.last.status.value}", job.done, job.total)
+
+    recipe = BatchConfig(place, asked, cache(meant), known, report)  # each file once
     recipe.profile(None)
     jobs, links = [], list[str]()
     if not watch:
@@ -209,8 +220,7 @@ def batch(
         try:
             with _workers(place, scheduler, workers, bytes_each, timeout) as (executor, slots):
                 running = Batch(
-                    *(store, recipe, executor, slots, progress or (lambda _: None)),
-                    shared=part is not None,
+                    *(store, recipe, executor, slots, ended_job), shared=part is not None
                 )
                 with stopped_by_signals(running.stop):
                     if watch:
@@ -232,7 +242,42 @@ def batch(
     )
 
 
-def _over(file: str, options: dict[str, Any]) -> Profile | None:
+def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
+    """What failed, and how many ended how; the exit code tells the worst."""
+    complaints = [
+        f"{ended.out}/{name}: no record of a job ({why}); it counts as none: remove it"
+        for name, why in ended.unreadable.items()
+    ]
+    if ended.links:
+        named = ", ".join(ended.links[:8])
+        complaints.append(
+            f"links to folders are not entered ({named}); name what they lead to as sources"
+        )
+    lines = [
+        f"{visible(one.job.name)}: {one.status.value}: {visible(one.reason)}"
+        for one in ended.failed
+    ]
+    if ended.anew:
+        why = ", ".join(f"{count} {visible(reason)}" for reason, count in ended.anew.items())
+        lines.append(f"run anew: {why}")
+    summary = ", ".join(f"{count} {name}" for name, count in ended.counts.items())
+    lines.append(
+        f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; "
+        f"{ended.out}/jobs.parquet"
+    )
+    ended_as = Exit.OK
+    if ended.incomplete:
+        ended_as = Exit.FAILED
+    if ended.failed or ended.left or ended.stopped is not None:
+        ended_as = Exit.LIMIT
+    if ended.stopped is not None:
+        complaints.append(ended.stopped)
+    elif ended.interrupted:
+        ended_as = Exit.STOPPED
+    return Answer(lambda: lines, complaints=complaints, exit=ended_as)
+
+
+def _over(file: str, options: Mapping[str, Any]) -> Profile | None:
     """The profile of a manifest's entry with the options over it."""
     return with_options(None, profile_of(file), options)[1]
 

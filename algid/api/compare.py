@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
+from algid.api.answer import Answer
 from algid.api.given import opened
+from algid.api.options import Force, Place
 from algid.errors import SettingError
 from algid.files import refuse_existing
+from algid.options import Option
 from algid.results import Result
 
 if TYPE_CHECKING:
@@ -16,23 +19,25 @@ if TYPE_CHECKING:
 
 
 def compare(
-    *results: Result | str | Path | Sequence[Result | str | Path],
+    *results: Annotated[
+        Result | str | Path | Sequence[Result | str | Path], Option(kind=list[Path])
+    ],
     labels: Sequence[str] | None = None,
-    out: str | Path | None = None,
-    force: bool = False,
+    out: Place | None = None,
+    force: Force = False,
 ) -> Comparison:
     """Lay results side by side: differences in σ from the first one, and which settings differ.
 
     Parameters
     ----------
-    *results : Result or path of one, two or more
-        One after another, or in a list.
+    *results : Result or path of one, one after another, or in a list
+        Two results or more.
     labels : str, one each
         What to call them; by default what tells their folders, or their logs, apart.
     out : Path
-        The page, ``NAME.html``, or the folder to write ``compare.html`` into; None writes nothing.
+        Page NAME.html, or the folder to write compare.html into. None writes nothing.
     force : bool
-        Replace a page that is there.
+        Replace what is there.
 
     Returns
     -------
@@ -50,6 +55,8 @@ def compare(
 
     Examples
     --------
+    $ algid compare monday.algid friday.algid -o friday
+
     >>> import algid
     >>> logs = algid.synthesise("case1", duration=3.0, excitation="wide", torque_noise=1e-2)
     >>> ways = [algid.identify(*logs, estimator=name) for name in ("refined", "weak")]
@@ -91,6 +98,12 @@ def page_of(out: Path) -> Path:
     if out.suffix == ".html":
         return out
     return out / NAME
+
+
+def answer(found: Comparison, given: Mapping[str, Any]) -> Answer:
+    """The tables."""
+    remarks = [f"wrote {page_of(Path(given['out']))}"] if "out" in given else []
+    return Answer(found.tables, found.as_json, remarks)
 
 
 def labels_of(paths: Sequence[Path]) -> list[str]:

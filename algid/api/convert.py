@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from algid.api.choices import written
-from algid.api.options import meaning
+from algid.api.answer import Answer
+from algid.api.options import OUT, Force, LogOptions, ProfileLike, meaning
 from algid.errors import OutputError
+from algid.exits import exit_of
 from algid.files import refuse_existing
+from algid.options import Option
 
 if TYPE_CHECKING:
-    from algid.api.options import ProfileLike
     from algid.log import Log
     from algid.notices import Notice
     from algid.progress import Progress
@@ -20,12 +21,12 @@ if TYPE_CHECKING:
 
 def convert(
     source: str | Path,
-    out: str | Path,
+    out: Annotated[str | Path, Option(kind=Path, flags=OUT)],
     *,
     profile: ProfileLike | None = None,
-    force: bool = False,
+    force: Force = False,
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[LogOptions],
 ) -> list[Notice]:
     """Write a log in another format, in SI units, with canonical names.
 
@@ -38,8 +39,9 @@ def convert(
     out : path
         The log to write: .mcap, .parquet or .csv.
     profile : Profile, path of one, or dict of what would stand in its file
+        algid.toml: what names and units mean.
     force : bool
-        Replace a file that is there.
+        Replace what is there.
     progress : callable
         Called as samples are written.
     **options : settings of `Profile` by their names
@@ -60,6 +62,8 @@ def convert(
 
     Examples
     --------
+    $ algid convert rosbag2_2026/ -o arm.parquet --joints shoulder,elbow --zero hanging
+
     >>> import tempfile
     >>> import algid
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -72,7 +76,7 @@ def convert(
 
     target = Path(out)
     if target.suffix.lstrip(".").lower() not in FORMATS:
-        raise OutputError(f"{target}: expected a name that ends in {', '.join(written())}")
+        raise OutputError(f"{target}: expected a name that ends in .{', .'.join(FORMATS)}")
     refuse_existing(target, force)
     reader = open_log(source, meaning(profile, options))
     notices: list[Notice] = []
@@ -89,3 +93,10 @@ def convert(
 
     write_log(target, noted(), truth=reader.origin.truth, force=force)
     return notices
+
+
+def answer(notices: list[Notice], given: Mapping[str, Any]) -> Answer:
+    """What was noticed, and the file; 4 where samples are missing."""
+    remarks = [f"{one.code}: {one.clause}" for one in notices] + [f"wrote {given['out']}"]
+    ended = exit_of(failed=False, lost=any(one.lossy for one in notices))
+    return Answer(remarks=remarks, exit=ended)

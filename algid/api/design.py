@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-
+from algid.api.answer import Answer
 from algid.api.given import called, folder_or_none, parts_of
-from algid.api.options import two_names
-from algid.api.ranges import check
+from algid.api.options import AnyLog, Folder, Force, Length, two_names
+from algid.api.signature import check
+from algid.api.words import cases
 from algid.errors import SettingError
+from algid.exits import exit_of
 from algid.files import refuse_existing
-from algid.options import flag
+from algid.limits import KNOWN_MASS, PHYSICAL, PLANNED, Range
+from algid.options import Option, flag
 from algid.results import Result
 
 if TYPE_CHECKING:
@@ -31,8 +33,13 @@ if TYPE_CHECKING:
 
 RATE, DURATION = 1000.0, 10.0
 
-Pair = float | tuple[float, float] | str
-Span = Pair | tuple[tuple[float, float], tuple[float, float]]
+NOISE: Range = (1e-12, PHYSICAL.noise[1])
+SEED: Range = (0, 2**63)
+UNIT = "steps"
+"""What progress counts."""
+
+Pair = Annotated[float | tuple[float, float] | str, Option(kind=str)]
+Span = float | tuple[float, float] | str | tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -77,72 +84,87 @@ class Planned:
 
 
 def design(
-    prior: Result | str | Path,
+    prior: Annotated[Result | str | Path, Option(kind=str, complete=cases)],
     *,
     limits: str | Path | None = None,
-    range: Span | None = None,  # noqa: A002  # as the flag
+    range: Annotated[Span, Option(kind=str)] | None = None,  # noqa: A002  # as the flag
     speed: Pair | None = None,
     acceleration: Pair | None = None,
     torque: Pair | None = None,
-    tip_height: float | None = None,
-    duration: float | None = None,
-    rate: float | None = None,
-    runs: tuple[int, int] | str | None = None,
-    wanted: Sequence[str] | str | None = None,
-    position_noise: float | None = None,
-    torque_noise: float | None = None,
-    noise_from: LogLike | None = None,
-    prior_error: float | None = None,
-    payload: float | None = None,
-    l1: float | None = None,
-    l2: float | None = None,
-    margin: float = 0.05,
-    joints: tuple[str, str] | str = ("joint1", "joint2"),
-    seed: int = 0,
-    out: str | Path | None = None,
-    force: bool = False,
+    tip_height: Annotated[float, Option(range=PLANNED["tip_height"])] | None = None,
+    duration: Annotated[float, Option(range=PLANNED["duration"])] | None = None,
+    rate: Annotated[float, Option(range=PLANNED["rate"])] | None = None,
+    runs: Annotated[tuple[int, int] | str, Option(kind=str)] | None = None,
+    wanted: Annotated[Sequence[str] | str, Option(kind=str, flags=("--for",))] | None = None,
+    position_noise: Annotated[float, Option(range=NOISE)] | None = None,
+    torque_noise: Annotated[float, Option(range=NOISE)] | None = None,
+    noise_from: AnyLog | None = None,
+    prior_error: Annotated[float, Option(range=(0, 100))] | None = None,
+    payload: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
+    l1: Length | None = None,
+    l2: Length | None = None,
+    margin: Annotated[float, Option(range=(0, 0.5))] = 0.05,
+    joints: Annotated[tuple[str, str] | str, Option(kind=str)] = "joint1,joint2",
+    seed: Annotated[int, Option(range=SEED)] = 0,
+    out: Folder | None = None,
+    force: Force = False,
     command: str = "",
     progress: Progress | None = None,
 ) -> Planned:
-    """Plan the motion that tells most about an arm within its limits.
+    """Plan the motion that tells most about an arm within its limits; write PRIOR.design.
+
+    Ctrl-C ends the search early and keeps the best motion so far. Exit code 3 tells that a
+    parameter stays open.
 
     Parameters
     ----------
     prior : Result, str or Path
-        Result of the arm or its folder, name of a case that ships with algid, or a TOML file of the
-        arm.
+        Result of the arm, case1, case2, or a TOML file of the arm.
     limits : path
-        TOML file with limits in these keywords' words, which beat it.
+        TOML file with range, speed, …; flags beat it.
     range : float, rad
-        1.2 to both sides of hanging, (1.2, 1.0) by joint, or pairs of lowest and highest.
-    speed, acceleration, torque : float or pair, rad/s, rad/s² and N m
-        The largest, of both joints or by joint.
+        rad: 1.2 about hanging, 1.2,1.0, or LOW:HIGH,LOW:HIGH. In Python also
+        pairs of lowest and highest.
+    speed : float or pair, rad/s
+        Largest speed, rad/s: 3, or 3,4 by joint.
+    acceleration : float or pair, rad/s²
+        Largest acceleration, rad/s²; none by default.
+    torque : float or pair, N m
+        Largest torque, N m: 5, or 5,2 by joint.
     tip_height : float, m
-        The lowest of the tip over joint 1.
-    duration, rate : float, s and Hz
-        Of a run and its log; 10 s at 1000 Hz.
+        Lowest height of the tip over joint 1, m.
+    duration : float, s
+        Length of a run, s; 10 by default.
+    rate : float, Hz
+        Samples a second of its log, Hz; 1000 by default.
     runs : pair of int
-        Runs without and with the payload.
+        Runs without and with the payload, like 2,1.
     wanted : names of parameters
-        That matter, like ("k1", "m_p"); all by default.
-    position_noise, torque_noise : float, rad and N m
-        Standard deviations.
+        Parameters that matter, like k1,m_p; all by default.
+    position_noise : float, rad
+        Noise of the angles, rad (standard deviation).
+    torque_noise : float, N m
+        Noise of the torques, N m (standard deviation).
     noise_from : a log as `algid.identify` takes it
-        Whose noise is taken.
+        A log of the arm whose noise is taken.
     prior_error : float
         Share by which masses and friction may be wrong where no error bar tells; 0.2.
-    payload : float, kg, of the loaded runs
-    l1, l2 : float, m, where known
+    payload : float, kg
+        Payload of the loaded runs, kg.
+    l1 : float, m
+        Length of link 1, m, where known.
+    l2 : float, m
+        Length of link 2, m, where known.
     margin : float
         Share of every limit left unused.
     joints : two names
-        Of the robot's joints.
+        Names of the robot's joints.
     seed : int
-        Of the search.
+        Seed of the search.
     out : Path
-        Folder to write the folder ``PRIOR.design`` into; None writes nothing.
+        Folder for the folder PRIOR.design. None writes nothing.
     force : bool
-        Replace a design that is there.
+        Replace what is there.
     command : str
         The command line behind the call, for the files.
     progress : callable
@@ -164,6 +186,9 @@ def design(
 
     Examples
     --------
+    $ algid design case1 --range 1.2 --speed 3 --torque 1.5 --position-noise 1e-3
+    --torque-noise 1e-2
+
     >>> import algid
     >>> noise = {"position_noise": 1e-3, "torque_noise": 1e-2}
     >>> plan = algid.design("case1", range=1.2, speed=3, torque=1.5, duration=2.0, **noise)
@@ -176,20 +201,7 @@ def design(
     from algid.designs.write import Provenance, write_design
     from algid.runtime import one_blas_thread
 
-    check(
-        "design",
-        tip_height=tip_height,
-        duration=duration,
-        rate=rate,
-        position_noise=position_noise,
-        torque_noise=torque_noise,
-        prior_error=prior_error,
-        payload=payload,
-        l1=l1,
-        l2=l2,
-        margin=margin,
-        seed=seed,
-    )
+    check(design, locals())
     of_flags = {
         "range": range,
         "speed": speed,
@@ -233,6 +245,16 @@ def design(
         if temporary is not None:
             write_design(planned, temporary, origin)
     return Planned(planned, origin)
+
+
+def answer(planned: Planned, given: Mapping[str, Any]) -> Answer:
+    """The plan; 3 where a parameter stays open."""
+    return Answer(
+        lambda: [planned.document()],
+        planned.as_json,
+        [f"wrote {folder_of(given['prior'], given['out'])}"],
+        exit=exit_of(failed=bool(planned.open_parameters), lost=False),
+    )
 
 
 def folder_of(prior: str, out: Path) -> Path:
@@ -280,6 +302,8 @@ def noise_of(
     SettingError
         Where none is known.
     """
+    import numpy as np
+
     from algid.estimators.noise import first_guess
     from algid.estimators.whitening import NoiseLevels
 

@@ -7,19 +7,19 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from algid.api.answer import Answer
 from algid.api.given import called, opened, parts_of
-from algid.api.ranges import check
+from algid.api.options import AnyResult, Folder, Force, Length
+from algid.api.signature import check
 from algid.errors import SettingError
 from algid.files import refuse_existing, whole_file, whole_folder
-from algid.options import flag
-from algid.results import Result
+from algid.limits import KNOWN_MASS
+from algid.options import Option, flag
 
 if TYPE_CHECKING:
     from algid.notices import Notice
-
-FORMATS = ("urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet")
 
 
 @dataclass(frozen=True)
@@ -43,50 +43,58 @@ class Exported:
 
 
 def export(
-    result: Result | str | Path,
-    to: Literal["urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet"],
+    result: AnyResult,
+    to: Annotated[
+        Literal["urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet"],
+        Option(flags=("--to",)),
+    ],
     *,
-    l1: float | None = None,
-    l2: float | None = None,
-    m1: float | None = None,
-    m2: float | None = None,
-    rotor1: float | None = None,
-    draws: int | None = None,
-    seed: int = 0,
-    flange: Sequence[float] | str | None = None,
-    out: str | Path | None = None,
-    force: bool = False,
+    l1: Length | None = None,
+    l2: Length | None = None,
+    m1: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
+    m2: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
+    rotor1: Annotated[float, Option(range=(0, 1e6))] | None = None,
+    draws: Annotated[int, Option(range=(1, 100_000))] | None = None,
+    seed: Annotated[int, Option(range=(0, 2**63))] = 0,
+    flange: Annotated[Sequence[float] | str, Option(kind=str)] | None = None,
+    out: Folder | None = None,
+    force: Force = False,
 ) -> Exported:
-    """The arm of a result as a model.
+    """Write the arm of a result as a model.
+
+    What is not known is chosen nearest to uniform links, and the file says so.
 
     Parameters
     ----------
     result : Result or path of one
-    to : 'urdf', 'mjcf', 'sdf' (robot descriptions), 'python', 'c' (dynamics), 'payload' (YAML), or
-        'csv' or 'parquet' (table of draws)
-    l1, l2 : float, m
-        Link lengths; what the result knows best by default.
+        A result folder, or its result.json.
+    to : str
+        urdf, mjcf, sdf; python, c; payload; draws as csv, parquet.
+    l1 : float, m
+        Length of link 1, m; by default the result's.
+    l2 : float, m
+        Length of link 2, m; by default the result's.
     m1, m2 : float, kg
-        Masses of the links.
+        Mass of the link, kg.
     rotor1 : float, kg m²
-        Joint 1's rotor at the joint, a part of k5.
+        Joint 1's rotor at the joint, kg m², a part of k5.
     draws : int
-        How many arms to draw from the joint distribution of the estimates, in place of the one
-        that they are.
+        Arms to draw from the estimates' joint distribution, into a folder. They come in place of
+        the one arm that the estimates are.
     seed : int
-        Of the draws; the first ones are the same however many there are.
+        Seed of the draws. The first ones are the same however many there are.
     flange : three float, m, m and degrees
-        Of a payload: origin of the flange's frame in that of link 2, and where its x axis points.
+        Flange in link 2's frame, of a payload: X,Y,ANGLE in m, m, °. Its origin, and where its x
+        axis points.
     out : Path
-        File to write, or folder of draws; None writes nothing.
+        File or folder; there the result's name is taken. None writes nothing.
     force : bool
         Replace what is there.
 
     Returns
     -------
     Exported
-        The text and what does not fit. What is not known is chosen nearest to uniform links, and
-        the text says so.
+        The text and what does not fit.
 
     Raises
     ------
@@ -99,6 +107,8 @@ def export(
 
     Examples
     --------
+    $ algid export case1-unloaded.algid --to mjcf --l2 0.5
+
     >>> import algid
     >>> log, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
     >>> arm = algid.identify(log, estimator="weak", model="plain")
@@ -108,15 +118,15 @@ def export(
     from algid.exports.formats import controller_call, exported
     from algid.exports.links import Knowns
 
-    if to not in FORMATS:
-        raise SettingError(f"{flag('to')}: expected one of {', '.join(FORMATS)}, found {to!r:.60}")
+    check(export, locals())
     if to in ("csv", "parquet") and draws is None:
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
-    check("export", l1=l1, l2=l2, m1=m1, m2=m2, rotor1=rotor1, draws=draws, seed=seed)
     knowns = Knowns(l1, l2, m1, m2, rotor1)
     place = None if flange is None else _flange(flange, to)
     path = None if out is None else Path(out)
     if path is not None:
+        if path == Path() or (path.is_dir() and draws is None):
+            path /= file_of(Path(called(result)), to, draws)
         refuse_existing(path, force)
     if draws is not None:
         from algid.exports.draws import drawn_files
@@ -157,7 +167,7 @@ def file_of(result: Path, to: str, draws: int | None = None) -> Path:
 
     Of draws it is a folder.
     """
-    from algid.exports.formats import FORMATS as WRITTEN
+    from algid.exports.formats import FORMATS
 
     folder = result
     if result.name == "result.json":
@@ -169,4 +179,13 @@ def file_of(result: Path, to: str, draws: int | None = None) -> Path:
         stem = re.sub(r"\W", "_", stem)
     if to == "payload":
         return Path(f"{stem}-payload.yaml")
-    return Path(f"{stem}{WRITTEN[to].suffix}")
+    return Path(f"{stem}{FORMATS[to].suffix}")
+
+
+def answer(made: Exported, _given: Mapping[str, Any]) -> Answer:
+    """What does not fit, and the file."""
+    return Answer(
+        lambda: made.call.splitlines(),
+        remarks=[f"wrote {made.path}"],
+        complaints=[one.text for one in made.warnings],
+    )

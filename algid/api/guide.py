@@ -3,50 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from enum import StrEnum
 from importlib import resources
+from typing import Annotated, Any
 
-from algid.api.choices import with_lists
+from algid.api.answer import Answer, Manual
+from algid.errors import SettingError
 from algid.exits import rows
-from algid.options import PROFILE, SETTINGS, flag, options_of
+from algid.options import BY_SET, Option, flag
+
+FIRST = ("start", "lab", "arm", "logs", "motion", "report", "warnings")
+"""Pages at the head of the list; the others follow by name."""
 
 
-class GuideTopic(StrEnum):
-    """The pages of the guide."""
-
-    START = "start"
-    ARM = "arm"
-    LAB = "lab"
-    LOGS = "logs"
-    MOTION = "motion"
-    REPORT = "report"
-    WARNINGS = "warnings"
-    PAYLOAD = "payload"
-    EXPORT = "export"
-    BATCH = "batch"
-    PYTHON = "python"
-    ESTIMATORS = "estimators"
-    MEASURED = "measured"
-    CONTRIBUTING = "contributing"
+def topics() -> dict[str, str]:
+    """The pages of the guide by name, with their titles."""
+    folder = resources.files("algid") / "guide"
+    names = sorted(one.name.removesuffix(".md") for one in folder.iterdir())
+    found = {}
+    for name in sorted(names, key=lambda name: (*FIRST, name).index(name)):
+        with (folder / f"{name}.md").open(encoding="utf-8") as lines:
+            found[name] = next(lines).removeprefix("# ").rstrip()
+    return found
 
 
-SUMMARIES = {
-    GuideTopic.START: "a first result from a real log, in five minutes",
-    GuideTopic.ARM: "drawing, equation of motion, meaning of each constant",
-    GuideTopic.LAB: "a real arm, from its logs to its payload, to type along",
-    GuideTopic.LOGS: "formats, names, units, signs: a recipe for each awkward log",
-    GuideTopic.MOTION: "which motion to record: design, recording, comparison with the plan",
-    GuideTopic.REPORT: "the report, figure by figure",
-    GuideTopic.WARNINGS: "every warning and status: meaning, cause, what to do",
-    GuideTopic.PAYLOAD: "payload mass, lengths, payload in time",
-    GuideTopic.EXPORT: "the arm as URDF, SDF, MJCF, Python, C, and draws of it; the payload "
-    "as YAML",
-    GuideTopic.BATCH: "many logs, fleets, exit codes, CI, clusters",
-    GuideTopic.PYTHON: "the Python API",
-    GuideTopic.ESTIMATORS: "the estimators, the torque's terms, assumptions, the paper's method",
-    GuideTopic.MEASURED: "accuracy, robustness and speed, each figure with its command",
-    GuideTopic.CONTRIBUTING: "architecture and conventions",
-}
+def _begun(incomplete: str) -> list[str]:
+    return [name for name in topics() if name.startswith(incomplete)]
+
+
+def guide(topic: Annotated[str, Option(complete=_begun)] | None = None) -> str:
+    """Read the guide in the terminal.
+
+    Parameters
+    ----------
+    topic : str
+        One of the topics; the list of them without.
+
+    Returns
+    -------
+    str
+        Its Markdown.
+
+    Raises
+    ------
+    SettingError
+        If there is no such topic.
+
+    Examples
+    --------
+    $ algid guide start
+    """
+    if topic is None:
+        table = "".join(f"| `algid guide {name}` | {words} |\n" for name, words in topics().items())
+        return f"# The guide\n\n| | |\n|---|---|\n{table}"
+    if topic not in topics():
+        raise SettingError(f"guide: expected one of {', '.join(topics())}, found {topic!r:.60}")
+    return text_of(topic)
+
+
+def answer(text: str, _given: Mapping[str, Any]) -> Answer:
+    """The page."""
+    return Answer(lambda: [Manual(text)])
 
 
 def text_of(topic: str) -> str:
@@ -104,10 +120,36 @@ def _units() -> Iterator[Sequence[str]]:
         yield f"`{unit.name}`", ", ".join(unit.quantities), unit.spellings.replace(" ", ", ")
 
 
-def _options(taker: str) -> Iterator[Sequence[str]]:
+def _settings() -> Iterator[Sequence[str]]:
+    from algid.settings import Settings
+
+    yield from _fields(Settings)
+
+
+def _profile() -> Iterator[Sequence[str]]:
+    from algid.profile import Profile
+
+    yield from _fields(Profile)
+
+
+def _fields(model: Any) -> Iterator[Sequence[str]]:
+    """Fields: as they are typed, and what they are."""
+    from algid.profile import ALL_CHANNELS
+
     yield "option", "what it says"
-    for one in options_of(taker):
-        yield f"`{flag(one.name)}`", with_lists(one.help).replace("|", "\\|")
+    for name, field in model.model_fields.items():
+        typed = f"{flag(name)}=…" if name in BY_SET else flag(name)
+        if name in ALL_CHANNELS or field.default is True:  # a profile's velocity
+            typed = f"{flag('set')} {name}{'.unit' if name in ALL_CHANNELS else ''}=…"
+        yield f"`{typed}`", field.description.replace("|", "\\|")
+
+
+def _moved() -> Iterator[Sequence[str]]:
+    from algid.moved import MOVED
+
+    yield "in 0.2", "now"
+    for old, new in MOVED.items():
+        yield f"`{old}`", new
 
 
 TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
@@ -115,8 +157,9 @@ TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
     "<!-- estimators -->": _estimators,
     "<!-- formats -->": _formats,
     "<!-- units -->": _units,
-    "<!-- settings -->": lambda: _options(SETTINGS),
-    "<!-- profile -->": lambda: _options(PROFILE),
+    "<!-- settings -->": _settings,
+    "<!-- profile -->": _profile,
+    "<!-- moved -->": _moved,
     "<!-- exits -->": rows,
 }
 """Rows of a table by the mark in whose place it stands."""

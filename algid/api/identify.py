@@ -2,63 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from algid.api.answer import Answer
 from algid.api.given import meant
-from algid.api.options import with_options
-from algid.api.result import Result
-from algid.options import flag
-from algid.settings import Settings
+from algid.api.options import (
+    AnyResult,
+    Export,
+    Folder,
+    Force,
+    Logs,
+    Options,
+    ProfileLike,
+    with_options,
+)
+from algid.errors import SettingError
+from algid.exits import exit_of
+from algid.options import ADVANCED, Option, flag
+from algid.text import visible
+from algid.words import counted
 
 if TYPE_CHECKING:
-    from algid.api.options import ProfileLike
-    from algid.identification.source import LogLike
+    from algid.api.result import Result
     from algid.progress import Progress
-    from algid.report.document import Document
     from algid.results import Result as PlainResult
+    from algid.settings import Settings
 
 
 def identify(
-    unloaded: LogLike | Iterable[LogLike] | None,
-    loaded: LogLike | Iterable[LogLike] | None = None,
+    unloaded: Logs | None,
+    loaded: Annotated[Logs | None, Option(kind=list[Path])] = None,
     settings: Settings | None = None,
     *,
-    parameters: PlainResult | str | Path | None = None,
+    parameters: AnyResult | None = None,
     profile: ProfileLike | None = None,
-    out: str | Path | None = None,
-    name: str | None = None,
-    force: bool = False,
+    out: Folder | None = None,
+    name: Annotated[str, Option(panel=ADVANCED)] | None = None,
+    force: Force = False,
     report: bool = True,
-    export: bool = False,
+    export: Export = False,
     command: str | None = None,
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Result:
-    """Identify the constants k1 … k7 of an arm and, from loaded logs, its tip payload.
+    """Identify an arm's constants k1 … k7 and, with loaded logs, its payload; write LOG.algid.
 
     Parameters
     ----------
-    unloaded, loaded : path, `Log`, pandas or polars frame, or dict of arrays; or several
-        Logs of the arm without and with the payload. The columns of frames and dicts are found by
-        their names and by `profile`, as those of a file.
+    unloaded : path, `Log`, pandas or polars frame, or dict of arrays; or several
+        Logs of the arm without payload; with --parameters, of the loaded one. The columns of
+        frames and dicts are found by their names and by `profile`, as those of a file. In Python
+        these logs are without payload, and `loaded` with it, also beside `parameters`.
+    loaded : as unloaded
+        A log of the arm with its payload; may be repeated.
     settings : Settings
     parameters : Result or path of one
-        An arm identified before; then no unloaded log is needed.
+        Result of the arm identified before. Then no unloaded log is needed.
     profile : Profile, path of one, or dict of what would stand in its file
-        What the logs' names, units and signs mean; where it is silent, what was said of the
+        algid.toml: what the logs' names and units mean. Where it is silent, what was said of the
         earlier result's logs.
     out : Path
-        Folder to write into; None writes nothing.
+        Folder for the result folder LOG.algid. None writes nothing.
     name : str
-        Of the result folder, ``NAME.algid``; the stem of the first log by default.
+        Of the result folder, NAME.algid.
     force : bool
-        Replace a result that is there.
+        Replace what is there.
     report : bool
-        Write time series and pages beside ``result.json``.
+        Write no pages and time series.
     export : bool
-        Write ``estimates.mcap`` beside them.
+        Also write estimates.mcap, for Foxglove.
     command : str
         The command line behind the call, for the result.
     progress : callable
@@ -84,19 +98,20 @@ def identify(
 
     Examples
     --------
+    $ algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
+
     >>> import algid
     >>> logs = algid.synthesise("case1", duration=3.0, excitation="wide")
     >>> result = algid.identify(*logs, estimator="weak")
     >>> round(result.payload["m_p"].estimate, 3)
     0.352
     """
+    from algid.api.result import Result
     from algid.identification.identify import identify as run
 
     asked, meaning = with_options(settings, profile, options)
     unloaded, loaded = meant(unloaded, meaning), meant(loaded, meaning)
     if export and not report:
-        from algid.errors import SettingError
-
         raise SettingError(
             f"{flag('export')}: the log is made from the time series; leave "
             f"{flag('report', off=True)} out"
@@ -111,29 +126,45 @@ def identify(
         name=name,
         force=force,
         report=report,
-        export=export,
+        export=bool(export),
         command=command,
         progress=progress,
     )
     return Result.of(result)
 
 
-def folder_of(result: PlainResult, out: Path, name: str | None) -> Path:
-    """Where a result goes."""
+def typed(given: dict[str, Any]) -> dict[str, Any]:
+    """What a command gives: beside the parameters of an arm its logs are of the loaded one."""
+    if "parameters" in given:
+        loaded = [*given["unloaded"], *given.get("loaded", ())]
+        return given | {"unloaded": [], "loaded": loaded}
+    return given
+
+
+def answer(result: PlainResult, given: Mapping[str, Any]) -> Answer:
+    """The estimates; 3 where the result must not be used as it is, 4 where data were lost."""
     from algid.files import result_folder
-
-    return result_folder(result.log.path, out, name)
-
-
-def document(result: PlainResult) -> Document:
-    """The report of a result."""
+    from algid.report.brief import brief
     from algid.report.page import result_document
-
-    return result_document(result)
-
-
-def as_json(result: PlainResult) -> str:
-    """The text of ``result.json``."""
     from algid.results import result_json
 
-    return result_json(result)
+    wrote = f"wrote {result_folder(result.log.path, given['out'], given.get('name'))}"
+    return Answer(
+        lambda: [result_document(result)],
+        lambda: result_json(result),
+        [*(f"note: {visible(note)}" for note in result.notes), wrote],
+        exit=exit_of(failed=result.verdict.failed or not result.complete, lost=result.data_lost),
+        brief=lambda: brief(result),
+        details=lambda: _reading(result),
+    )
+
+
+def _reading(result: PlainResult) -> Iterator[str]:
+    """What was read, and how."""
+    for log in result.logs:
+        size = f"{counted(log.rows, 'sample')}, {log.duration:.6g} s at {log.rate:.6g} Hz"
+        yield visible(f"{log.role} {log.path}: {size}, {log.format}")
+        for signal, source in log.mapping.items():
+            yield visible(f"  {signal} from {source}")
+    for name, value in result.settings.items():
+        yield visible(f"{name} = {value}")

@@ -3,26 +3,49 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+import shlex
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from algid.api.answer import Answer
 from algid.api.given import meant
-from algid.api.options import meaning
+from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meaning
+from algid.errors import SettingError
+from algid.exits import Exit, exit_of
+from algid.files import refuse_existing, whole_file
+from algid.options import Option, flag
+from algid.text import lines_of
 
 if TYPE_CHECKING:
-    from algid.api.options import ProfileLike
-    from algid.identification.source import LogLike
     from algid.inspection.report import Inspection
     from algid.report.document import Table
 
+PROFILE = "algid.toml"
 
-def inspect(log: LogLike, *, profile: ProfileLike | None = None, **options: Any) -> Inspection:
-    """What a log holds, which channels would be used, and what is wrong with it.
+
+def inspect(
+    log: AnyLog,
+    *,
+    profile: ProfileLike | None = None,
+    write_profile: Annotated[str | Path, Option(kind=Path)] | None = None,
+    force: Force = False,
+    **options: Unpack[LogOptions],
+) -> Inspection:
+    """Show what a log holds, which channels would be used, and what is wrong with it.
 
     Parameters
     ----------
     log : path, `Log`, pandas or polars frame, or dict of arrays
+        A file of any format, or a rosbag2 folder.
     profile : Profile, path of one, or dict of what would stand in its file
+        algid.toml: what names and units mean.
+    write_profile : path
+        Write a profile to edit, of all that can be set. A folder's is called algid.toml. It is
+        filled in with what the log's file tells.
+    force : bool
+        Replace what is there.
     **options : settings of `Profile` by their names
         As ``zero="hanging"``.
 
@@ -38,9 +61,13 @@ def inspect(log: LogLike, *, profile: ProfileLike | None = None, **options: Any)
         If there is no such log, or its format is unknown.
     SettingError
         If a setting is not known or wrong.
+    OutputError
+        If the profile is there already and `force` is not set, or cannot be written.
 
     Examples
     --------
+    $ algid inspect arm.mcap --joints shoulder,elbow --zero hanging
+
     >>> import algid
     >>> log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
     >>> found = algid.inspect(log)
@@ -50,16 +77,43 @@ def inspect(log: LogLike, *, profile: ProfileLike | None = None, **options: Any)
     from algid.inspection.report import inspect_log
 
     own = meaning(profile, options)
+    if write_profile is not None:
+        from algid.inspection.draft import draft_profile
+
+        if not isinstance(log, str | Path):
+            raise SettingError(f"{flag('write_profile')}: expected the path of a log, found arrays")
+        file = profile_file(write_profile)
+        refuse_existing(file, force)
+        text = draft_profile(Path(log))
+        with whole_file(file, force=force) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     return inspect_log(meant(log, own), own)
 
 
-def content(found: Inspection) -> Iterator[Table | str]:
-    """Tables, and lines between them."""
+def profile_file(place: str | Path) -> Path:
+    """The profile that is written: `place`, or algid.toml in that folder."""
+    path = Path(place)
+    return path / PROFILE if path.is_dir() else path
+
+
+def answer(found: Inspection, given: Mapping[str, Any]) -> Answer:
+    """The tables; of a log that would be refused 2, of a wrong convention 3, of lost data 4."""
     from algid.report.inspected import inspection_content
 
-    return inspection_content(found)
+    def shown() -> Iterator[Table | str]:
+        width = shutil.get_terminal_size().columns
+        for part in inspection_content(found):
+            if isinstance(part, str):
+                yield from lines_of(part, width, rest="    ")
+            else:
+                yield part
 
-
-def as_json(found: Inspection) -> str:
-    """What was found, as the text of a JSON file."""
-    return json.dumps(found.as_dict(), indent=2) + "\n"
+    ended = exit_of(failed=found.contradicted, lost=found.lossy)
+    if found.refused:
+        ended = Exit.USAGE
+    remarks = []
+    if "write_profile" in given:  # a log that needs a profile is what one is written for
+        file = profile_file(given["write_profile"])
+        again = shlex.join(["algid", "inspect", str(given["log"]), flag("profile"), str(file)])
+        ended, remarks = Exit.OK, [f"wrote {file}; edit it, then try: {again}"]
+    return Answer(shown, lambda: json.dumps(found.as_dict(), indent=2) + "\n", remarks, exit=ended)

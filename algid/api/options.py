@@ -2,24 +2,106 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, replace
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
 from algid.errors import SettingError
-from algid.options import PROFILE, flag, options_of
-from algid.settings import OF_BOTH, PARSERS, Settings, refuse_contradictions
+from algid.files import parsed_toml
+from algid.limits import KNOWN_LENGTH, LIMITS
+from algid.options import ADVANCED, Option, flag
+from algid.profile import (
+    CHANNELS_OF,
+    KEYWORDS,
+    Effort,
+    Profile,
+    ProfileSettingError,
+    load_profile,
+    over,
+    with_settings,
+)
+from algid.settings import OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
-    from algid.profile import Profile
+    from algid.identification.source import LogLike
+    from algid.results import Result
 
-    ProfileLike = Profile | str | Path | Mapping[str, Any]
-    """A profile, the path of its file, or what would stand in that."""
+ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=Path)]
+"""A profile, the path of its file, or what would stand in that."""
+AnyLog = Annotated["LogLike", Option(kind=Path)]
+"""A path, a `Log`, a pandas or polars frame, or a dict of arrays."""
+Logs = Annotated["LogLike | Iterable[LogLike]", Option(kind=list[Path])]
+AnyResult = Annotated["Result | str | Path", Option(kind=Path)]
+"""A result, or the path of one."""
+OUT = ("-o", "--out")
+Folder = Annotated[str | Path, Option(kind=Path, flags=OUT, default=Path())]
+"""Where a command writes: the working folder by default."""
+Place = Annotated[str | Path, Option(kind=Path, flags=OUT)]
+Length = Annotated[float, Option(range=KNOWN_LENGTH)]
+Force = Annotated[bool, Option(panel=ADVANCED)]
+Export = Annotated[bool | Literal["mcap"], Option(kind=Literal["mcap"], panel=ADVANCED)]
+"""Whether what is shown over time is also written as MCAP."""
 
-CHANNELS_OF = {one.name: one.channels for one in options_of(PROFILE) if one.channels}
-"""Options that set the unit of several channels."""
+
+class _OfLogs(TypedDict, total=False):
+    """What a log means: the fields of `Profile`."""
+
+    topic: str | None
+    joints: tuple[str, str] | list[str] | str | None
+    clock: Literal["header", "log"] | None
+    time: str | None
+    time_unit: Literal["s", "ms", "us", "ns"] | None
+    rate: float | None
+    columns: Iterable[str] | str | None
+    angle_unit: str
+    torque_unit: str
+    zero: Literal["horizontal", "hanging", "upright"]
+    second_angle: Literal["relative", "absolute"]
+    drive: Literal["joint", "base"]
+    passive: Literal[1, 2] | None
+    gravity: float
+    effort: Effort | None
+    signs: tuple[int, int] | list[int]
+    offsets: tuple[float, float] | list[float]
+    start: float | None
+    end: float | None
+    torque_file: str | Path | None
+    segment: int | None
+    accept: Iterable[str] | str
+    theta1: Mapping[str, Any]
+    theta2: Mapping[str, Any]
+    tau1: Mapping[str, Any]
+    tau2: Mapping[str, Any]
+    omega1: Mapping[str, Any]
+    omega2: Mapping[str, Any]
+    q_des1: Mapping[str, Any]
+    q_des2: Mapping[str, Any]
+
+
+class LogOptions(_OfLogs, total=False):
+    """Keywords of a verb that reads logs."""
+
+    velocity: bool
+
+
+class Options(_OfLogs, total=False):
+    """Keywords of a verb that identifies: the fields of `Settings` beside those of `Profile`."""
+
+    estimator: Literal["refined", "weak", "instruments", "paper"]
+    velocity: Literal["observer", "measured"]
+    observer: Literal["luenberger", "zero-phase"] | None
+    poles: Iterable[complex] | str | None
+    window: float | None
+    bandwidth: float
+    model: str
+    torque_hold: Literal["auto", "foh", "zoh"]
+    delay: float
+    l1: float | None
+    l2: float | None
+    payload_mass: float | None
+    constrain: bool
+    cross_validate: bool
 
 
 def with_options(
@@ -42,24 +124,22 @@ def with_options(
     given, known = settings or Settings(), profile_of(profile)
     if not options:
         return given, known
-    from algid.profile import with_settings
-
-    own = [field.name for field in fields(Settings)]
-    _refuse_unknown(options, own + _of_profile())
+    own = Settings.model_fields
+    refuse_unknown(options, (*own, *KEYWORDS))
+    refuse_contradictions(options)
     of_settings, of_profile = {}, {}
     for name, value in options.items():
-        if name not in own:
-            of_profile[name] = value
-        elif name in PARSERS and value is not None:
-            of_settings[name] = PARSERS[name](_text(name, value))
-        else:
+        # a profile's velocity is true or false
+        if name in own and not (name == "velocity" and isinstance(value, bool)):
             of_settings[name] = value
-    refuse_contradictions(options)
+        else:
+            of_profile[name] = value
     known = _over(known, of_profile)
     of_both = {name: of_settings[name] for name in OF_BOTH if name in of_settings}
-    if known is not None and of_both:
-        known = with_settings(known, of_both)
-    return replace(given, **of_settings), known
+    # a driver's effort says how its torques are read, gravity alone says nothing of a log
+    if of_both and (known is not None or "effort" in of_both):
+        known = with_settings(known or Profile(), of_both)
+    return given.but(**of_settings), known
 
 
 def meaning(profile: ProfileLike | None, options: Mapping[str, Any]) -> Profile | None:
@@ -70,7 +150,7 @@ def meaning(profile: ProfileLike | None, options: Mapping[str, Any]) -> Profile 
     SettingError
         If an option is not known, or a value is wrong.
     """
-    _refuse_unknown(options, _of_profile())
+    refuse_unknown(options, KEYWORDS)
     return _over(profile_of(profile), options)
 
 
@@ -82,8 +162,6 @@ def profile_of(given: ProfileLike | None) -> Profile | None:
     SettingError
         If its file cannot be read, or a setting of it is wrong.
     """
-    from algid.profile import Profile, load_profile, over
-
     if given is None or isinstance(given, Profile):
         return given
     if isinstance(given, str | Path):
@@ -107,39 +185,54 @@ def two_names(name: str, given: object) -> tuple[str, str]:
     raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {given!r:.60}")
 
 
-def _of_profile() -> list[str]:
-    from algid.profile import Profile
+def refuse_unknown(options: Mapping[str, Any], known: Iterable[str]) -> None:
+    """Raise `SettingError` at a name that is none of the known ones."""
+    names = list(dict.fromkeys(known))
+    for name in options:
+        if name not in names:
+            mend = f"known are {', '.join(names)}"
+            for near in get_close_matches(name, names, n=1):
+                mend = f"did you mean {near}?"
+            raise SettingError(f"{name}: no setting has this name; {mend}")
 
-    return list(Profile.model_fields) + list(CHANNELS_OF)
+
+def setting_of(line: str) -> dict[str, Any]:
+    """A setting out of ``NAME=VALUE``, as a line of TOML; a bare word is text.
+
+    Raises
+    ------
+    SettingError
+        If it is none.
+    """
+    key, _, value = line.partition("=")
+    like = "expected KEY=VALUE like tau1.sign=-1"
+    if "=" not in line or not key.strip():
+        raise SettingError(f"{flag('set')} {line}: {like}")
+    try:
+        return parsed_toml(f"{key} = {value}")
+    except (ValueError, RecursionError) as error:  # a bare word
+        if key.count(".") > LIMITS.toml_key_parts:
+            raise SettingError(f"{flag('set')} {key[:40]}…: {error}; {like}") from error
+        setting: Any = value.strip()
+        for part in reversed(key.split(".")):
+            setting = {part.strip(): setting}
+        return dict(setting)
 
 
 def _over(profile: Profile | None, options: Mapping[str, Any]) -> Profile | None:
     """The profile with options over it, one after another."""
-    from algid.profile import Profile, with_settings
-
     for name, value in options.items():
         settings = {name: value}
         if name in CHANNELS_OF:
             settings = {channel: {"unit": value} for channel in CHANNELS_OF[name]}
         elif name == "joints" and value is not None:
             settings = {name: two_names(name, value)}
-        profile = with_settings(profile or Profile(), settings)
+        try:
+            profile = with_settings(profile or Profile(), settings)
+        except ProfileSettingError as error:
+            typed = flag(name).partition(" ")[0]
+            if isinstance(value, Mapping) or name == "velocity":
+                typed = flag("set")
+            where = f"{typed} (profile: {error.place})"
+            raise ProfileSettingError(f"{where}: {error.why}", error.place, error.why) from error
     return profile
-
-
-def _refuse_unknown(options: Mapping[str, Any], known: list[str]) -> None:
-    for name in options:
-        if name not in known:
-            mend = f"known are {', '.join(dict.fromkeys(known))}"
-            for near in get_close_matches(name, known, n=1):
-                mend = f"did you mean {near}?"
-            raise SettingError(f"{name}: no setting has this name; {mend}")
-
-
-def _text(name: str, value: object) -> str:
-    """What the command line would be given."""
-    if isinstance(value, str):
-        return value
-    if not isinstance(value, list | tuple):
-        raise SettingError(f"{flag(name)}: expected text or numbers, found {value!r:.60}")
-    return ",".join(map(str, value))

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
-from algid.api.options import meaning
+from algid.api.options import LogOptions, ProfileLike, meaning
 
 if TYPE_CHECKING:
-    from algid.api.options import ProfileLike
     from algid.log import Log
     from algid.readers.memory import Columns
 
 
-def read_log(path: str | Path | Columns, profile: ProfileLike | None = None, **options: Any) -> Log:
+def read_log(
+    path: str | Path | Columns, profile: ProfileLike | None = None, **options: Unpack[LogOptions]
+) -> Log:
     """Read a whole log into memory.
 
     Parameters

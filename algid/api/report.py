@@ -1,77 +1,121 @@
-"""The pages of a result's or a track's folder, made anew."""
+"""The pages of a result, of a track or of a batch, made anew."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+from algid.api.answer import Answer
+from algid.api.options import Export, Place
+from algid.errors import SettingError
+from algid.options import Option, flag
 
 if TYPE_CHECKING:
     from algid.progress import Progress
-    from algid.report.document import Document
-
-
-@dataclass(frozen=True)
-class Reported:
-    """The files that were written, and what prints the result or track."""
-
-    written: list[Path]
-    document: Callable[[], Document]
-    as_json: Callable[[], str]
 
 
 def report(
-    folder: Path,
-    *,
-    export: bool = False,
+    *results: Annotated[str | Path, Option(kind=list[Path])],
+    out: Place | None = None,
+    export: Export = False,
     shared_library: bool = False,
     progress: Progress | None = None,
-) -> Reported:
-    """Write ``report.html`` and ``report.md`` into the folder of a result or a track.
+) -> list[Answer]:
+    """Write report.html and report.md into each RESULT, or fleet.html into a batch, and print it.
+
+    A batch's history tells which robots' parameters drift and which logs stand out, beside its
+    fleet.parquet and findings.parquet. Robots and times come from the manifest, or from the logs'
+    folders and stamps.
+
+    Parameters
+    ----------
+    *results : path
+        Folders of algid identify, algid track or algid batch.
+    out : path
+        Folder for a batch's history; the batch's own by default.
+    export : bool
+        Also write estimates.mcap, for Foxglove and PlotJuggler.
+    shared_library : bool
+        Put the plotting library once beside the folders.
+    progress : callable
+        Called as samples are read.
+
+    Returns
+    -------
+    list of Answer
+        Of each what is printed.
 
     Raises
     ------
     ResultError
-        If the folder holds neither.
+        If a folder holds none of them.
     OutputError
         If the pages cannot be written.
+    SettingError
+        If `out` is given beside what is no batch.
+
+    Examples
+    --------
+    $ algid report case1-unloaded.algid --export mcap
     """
     from algid.tracks.read import is_track
 
-    if is_track(folder):
-        return _of_track(folder, export)
-    return _of_result(folder, export, shared_library, progress)
+    made = []
+    for folder in map(Path, results):
+        if (folder / "jobs.parquet").is_file():
+            made.append(_of_batch(folder, out, progress))
+        elif out is not None:
+            raise SettingError(f"{flag('out')}: {folder} is no batch, and keeps its pages itself")
+        elif is_track(folder):
+            made.append(_of_track(folder, bool(export)))
+        else:
+            made.append(_of_result(folder, bool(export), shared_library, progress))
+    return made
+
+
+def answer(made: list[Answer], _given: Mapping[str, Any]) -> list[Answer]:
+    """One after another."""
+    return made
 
 
 def _of_result(
     folder: Path, export: bool, shared_library: bool, progress: Progress | None
-) -> Reported:
-    from algid.api import identify
+) -> Answer:
     from algid.report.export import export_mcap
-    from algid.report.page import write_pages
-    from algid.results import read_result
+    from algid.report.page import result_document, write_pages
+    from algid.results import read_result, result_json
 
     result = read_result(folder)
     written = write_pages(folder, shared_library, progress)
     if export:
         written.append(export_mcap(folder, progress))
-    return Reported(
-        written,
-        lambda: identify.document(result),
-        lambda: identify.as_json(result),
-    )
+    return Answer(lambda: [result_document(result)], lambda: result_json(result), _lines(written))
 
 
-def _of_track(folder: Path, export: bool) -> Reported:
-    from algid.api import track
-    from algid.tracks.page import write_pages
+def _of_track(folder: Path, export: bool) -> Answer:
+    from algid.tracks.page import track_document, write_pages
     from algid.tracks.read import read_track
+    from algid.tracks.result import track_json
 
     result = read_track(folder)
     written = write_pages(result, folder, export)
-    return Reported(
-        written,
-        lambda: track.document(result),
-        lambda: track.as_json(result),
+    return Answer(lambda: [track_document(result)], lambda: track_json(result), _lines(written))
+
+
+def _of_batch(folder: Path, out: str | Path | None, progress: Progress | None) -> Answer:
+    from algid.fleet.history import history_of, write_history
+    from algid.fleet.page import fleet_document
+
+    history = history_of(folder / "jobs.parquet", progress)
+    written = write_history(history, Path(out or folder), folder)
+    return Answer(
+        lambda: [fleet_document(history)],
+        lambda: json.dumps(history.as_dict(), indent=2, allow_nan=False) + "\n",
+        _lines(written),
     )
+
+
+def _lines(written: list[Path]) -> list[str]:
+    return [f"wrote {path}" for path in written]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 from algid import results
 from algid.api.given import meant
-from algid.api.options import meaning
+from algid.api.options import LogOptions, ProfileLike, meaning
 
 if TYPE_CHECKING:
     import polars as pl
     from plotly.graph_objects import Figure
 
-    from algid.api.options import ProfileLike
     from algid.identification.source import LogLike
 
 
@@ -31,7 +30,7 @@ class Result(results.Result):  # noqa: D101
         *,
         loaded: bool = False,
         profile: ProfileLike | None = None,
-        **options: Any,
+        **options: Unpack[LogOptions],
     ) -> pl.DataFrame:
         """The torque that the result predicts along a log, beside the measured one.
 

@@ -2,54 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from algid.api.answer import Answer
 from algid.api.given import folder_or_none, meant
-from algid.api.options import meaning
-from algid.api.ranges import check
+from algid.api.options import (
+    AnyLog,
+    Export,
+    Folder,
+    Force,
+    Length,
+    LogOptions,
+    ProfileLike,
+    meaning,
+)
+from algid.api.signature import check
+from algid.exits import exit_of
+from algid.options import Option
 
 if TYPE_CHECKING:
-    from algid.api.options import ProfileLike
     from algid.identification.source import LogLike
     from algid.progress import Progress
-    from algid.report.document import Document
     from algid.results import Result
     from algid.tracks.result import TrackResult
 
 
+UNIT = "passes"
+"""What progress counts."""
+
+
 def track(
-    log: LogLike,
-    parameters: Result | str | Path,
+    log: AnyLog,
+    parameters: Annotated[Result | str | Path, Option(kind=Path, flags=("--parameters",))],
     *,
-    l1: float | None = None,
-    l2: float | None = None,
+    l1: Length | None = None,
+    l2: Length | None = None,
     profile: ProfileLike | None = None,
-    out: str | Path | None = None,
-    force: bool = False,
-    export: bool = False,
+    out: Folder | None = None,
+    force: Force = False,
+    export: Export = False,
     command: str | None = None,
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[LogOptions],
 ) -> TrackResult:
-    """Find when the payload changed during a log, and what each stretch weighs.
+    """Find when the payload changed and what each stretch weighs; write LOG.track.
 
     Parameters
     ----------
     log : path, `Log`, pandas or polars frame, or dict of arrays
-        Of the arm while objects are picked and placed.
+        A log of the arm while objects are picked and placed.
     parameters : Result or path of one
-        The arm, with error bars.
-    l1, l2 : float, m
-        Link lengths; what the result knows best by default.
+        Result of the arm, with error bars.
+    l1 : float, m
+        Length of link 1, m; by default the result's.
+    l2 : float, m
+        Length of link 2, m; by default the result's.
     profile : Profile, path of one, or dict of what would stand in its file
-        Where it is silent, what was said of the result's logs.
+        algid.toml: what names and units mean. Where it is silent, what was said of the result's
+        logs.
     out : Path
-        Folder to write the folder ``LOG.track`` into; None writes nothing.
+        Folder for the folder LOG.track. None writes nothing.
     force : bool
-        Replace a track that is there.
+        Replace what is there.
     export : bool
-        Also write ``track.mcap``.
+        Also write track.mcap, for Foxglove and PlotJuggler.
     command : str
         The command line behind the call, for the result.
     progress : callable
@@ -74,6 +92,8 @@ def track(
 
     Examples
     --------
+    $ algid track picking.mcap --parameters case1-unloaded.algid -o tracks
+
     >>> import algid
     >>> noise = {"duration": 6.0, "torque_noise": 1e-2, "excitation": "wide"}
     >>> arm = algid.identify(*algid.synthesise("case1", **noise), model="plain")
@@ -85,7 +105,7 @@ def track(
     from algid.tracks.page import track_folder, write_track
     from algid.tracks.run import track_log
 
-    check("track", l1=l1, l2=l2)
+    check(track, locals())
     own = meaning(profile, options)
     log = meant(log, own)
     folder = None
@@ -99,36 +119,22 @@ def track(
     with folder_or_none(folder, force) as temporary:
         result = track_log(log, parameters, l1=l1, l2=l2, profile=own, settings=settings)
         if temporary is not None:
-            write_track(result, temporary, mcap=export)
+            write_track(result, temporary, mcap=bool(export))
     return result
 
 
-def folder_of(log: str | Path, out: Path) -> Path:
-    """Where the track of a log goes."""
-    from algid.tracks.page import track_folder
-
-    return track_folder(str(log), out)
-
-
-def failed(result: TrackResult) -> bool:
-    """Whether a track must not be used as it is."""
+def answer(result: TrackResult, given: Mapping[str, Any]) -> Answer:
+    """The report; 3 where the track must not be used as it is, 4 where data were lost."""
+    from algid.tracks.page import track_document, track_folder
+    from algid.tracks.result import track_json
     from algid.tracks.tables import verdict
 
-    return verdict(result).failed or not result.complete
-
-
-def document(result: TrackResult) -> Document:
-    """The report of a track."""
-    from algid.tracks.page import track_document
-
-    return track_document(result)
-
-
-def as_json(result: TrackResult) -> str:
-    """The text of ``track.json``."""
-    from algid.tracks.result import track_json
-
-    return track_json(result)
+    return Answer(
+        lambda: [track_document(result)],
+        lambda: track_json(result),
+        [f"wrote {track_folder(str(given['log']), given['out'])}"],
+        exit=exit_of(failed=verdict(result).failed or not result.complete, lost=result.data_lost),
+    )
 
 
 def _name(log: LogLike) -> str:

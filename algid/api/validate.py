@@ -2,46 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from algid.api.answer import Answer
 from algid.api.given import called, meant, opened
-from algid.api.options import meaning
-from algid.api.ranges import check
+from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, meaning
+from algid.api.signature import check
+from algid.check import Judged, judge
+from algid.errors import SettingError
+from algid.exits import Exit
+from algid.options import Option, flag
 from algid.results import Result
 
 if TYPE_CHECKING:
-    from algid.api.options import ProfileLike
-    from algid.identification.source import LogLike
     from algid.identification.validated import Validated
     from algid.progress import Progress
+    from algid.report.document import Table
 
 
 def validate(
-    result: Result | str | Path,
-    logs: LogLike | Iterable[LogLike] | None,
-    loaded: LogLike | Iterable[LogLike] | None = None,
+    result: AnyResult,
+    logs: Logs | None = None,
+    loaded: Annotated[Logs | None, Option(kind=list[Path])] = None,
     *,
-    max_nrmse: float | None = None,
+    max_nrmse: Annotated[float, Option(range=(0, 1e9))] | None = None,
+    max_error: Annotated[float | str | Path, Option(kind=str)] | None = None,
     simulate: bool = False,
     profile: ProfileLike | None = None,
     progress: Progress | None = None,
-    **options: Any,
+    **options: Unpack[LogOptions],
 ) -> Validated:
-    """How well a result, or a URDF file, predicts the torque of logs.
+    """Print how well a result predicts the torque of logs; exit code 1 past a limit.
+
+    RMSE, normalised RMSE and R². Without logs the errors of a synthetic log's result are compared
+    with their limits.
 
     Parameters
     ----------
     result : Result, path of one, or of a URDF file
-    logs, loaded : logs as `algid.identify` takes them
-        Of the arm without and with the payload.
+        A result folder, its result.json, or a URDF file.
+    logs : logs as `algid.identify` takes them
+        Logs of the arm without payload.
+    loaded : logs as `algid.identify` takes them
+        A log of the loaded arm; may be repeated.
     max_nrmse : float
-        The largest RMSE over the torque's RMS allowed, for either joint: see `Validated.over`.
+        Largest RMSE over the torque's RMS allowed, for either joint. See `Validated.over`.
+    max_error : float, in percent, 'paper' or path
+        Largest error of a synthetic log's result, percent; paper; or a TOML file. The paper's are
+        those of its Table 4; a file holds a table ``[max_error_percent]``: parameter = percent.
     simulate : bool
         Also simulate the arm over 0.1, 0.5 and 2 s.
     profile : Profile, path of one, or dict of what would stand in its file
-        Where it is silent, what was said of the result's logs.
+        algid.toml: what names and units mean. Where it is silent, what was said of the result's
+        logs.
     progress : callable
         Called as samples are read.
     **options : settings of `Profile` by their names
@@ -49,37 +64,50 @@ def validate(
     Returns
     -------
     Validated
-        RMSE, normalised RMSE and R² of each log and of all, and warnings.
+        RMSE, normalised RMSE and R² of each log and of all, errors beside their limits, and
+        warnings.
 
     Raises
     ------
     ResultError
-        If the result cannot be read, or lacks a parameter that the prediction needs.
+        If the result cannot be read, lacks a parameter that the prediction needs, or has no truth
+        to compare errors with.
     LogError
         If a log cannot be used.
     SettingError
-        If a setting is not known or wrong.
+        If a setting is not known or wrong, or there is neither a log nor `max_error`.
 
     Examples
     --------
+    $ algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
+
     >>> import algid
     >>> log, _ = algid.synthesise("case1", duration=4.0, excitation="wide")
     >>> result = algid.identify(log.part(0, 2000), estimator="weak")
     >>> algid.validate(result, log.part(2000, 4001)).total.r2[0] > 0.999
     True
     """
+    check(validate, locals())
     from algid.identification.identify import reused
     from algid.identification.source import open_sources, read_otherwise
     from algid.identification.survey import Survey
     from algid.identification.validate import predictor_of
     from algid.identification.validate import simulate as roll
-    from algid.identification.validate import validate as judge
+    from algid.identification.validate import validate as predicted
     from algid.identification.validated import Validated
 
     known, own = None, meaning(profile, options)
-    logs, loaded = meant(logs, own), meant(loaded, own)
-    check("validate", max_nrmse=max_nrmse)
     file = called(result)
+    judged: tuple[Judged, ...] = ()
+    if max_error is not None:
+        judged = tuple(judge(opened(result), max_error))
+    if logs is None and loaded is None:
+        if max_error is None:
+            raise SettingError(
+                f"validate: expected a log, found none; give one, or {flag('max_error')}"
+            )
+        return Validated({}, None, judged=judged)
+    logs, loaded = meant(logs, own), meant(loaded, own)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
         from algid.exports.read_urdf import read_urdf
 
@@ -92,11 +120,25 @@ def validate(
     sources += open_sources(loaded, "loaded", own, gravity)
     survey = Survey(sources, progress)
     survey.begin("prediction")
-    validation = judge(model, survey)
+    validation = predicted(model, survey)
     rolled, warnings = None, []
     if simulate:
         rolled = roll(model, survey)
     if known is not None:
         summaries = [survey.summary(log) for log in survey.logs]
         warnings = [one.sentence for one in read_otherwise(summaries, known, file)]
-    return Validated(validation.logs, validation.total, rolled, tuple(warnings), max_nrmse)
+    return Validated(validation.logs, validation.total, rolled, tuple(warnings), max_nrmse, judged)
+
+
+def answer(found: Validated, given: Mapping[str, Any]) -> Answer:
+    """The tables, and what is past its limit."""
+
+    def shown() -> Iterable[Table | str]:
+        yield from (row.text for row in found.judged)
+        if found.logs:
+            yield from found.tables()
+        if found.past:
+            yield f"OVER: normalised RMSE past {given['max_nrmse']:g}"
+
+    ended = Exit.LIMIT if found.over else Exit.OK
+    return Answer(shown, found.as_json, complaints=found.warnings, exit=ended)

@@ -48,6 +48,28 @@ def _command() -> int:
         gc.freeze()  # else the interpreter's end searches all that was imported for cycles
 
 
+def _called(arguments: Sequence[str]) -> int:
+    """Call the command; what typer refuses is one line too."""
+    from algid.cli.app import called
+    from algid.errors import SettingError
+    from algid.moved import refuse_moved
+
+    if not arguments:
+        _called(["--help"])
+        return Exit.USAGE
+    refuse_moved(arguments)
+    command = called(arguments[0])
+    try:
+        return int(command.main(list(arguments), prog_name="algid", standalone_mode=False) or 0)
+    except Exception as error:
+        told = getattr(error, "format_message", None)
+        if told is None:
+            raise
+        context = getattr(error, "ctx", None)
+        more = f"; {context.command_path} --help lists all" if context is not None else ""
+        raise SettingError(f"{told().rstrip('.')}{more}") from error
+
+
 def run(arguments: Sequence[str]) -> int:
     """Run a command and return its exit code: the outermost place, where errors become lines.
 
@@ -65,12 +87,9 @@ def run(arguments: Sequence[str]) -> int:
 
     try:
         try:
-            from algid.cli.app import called
-
-            called(arguments)(list(arguments))
+            return _called(arguments)
         finally:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
-        return 0
     except (SystemExit, KeyboardInterrupt):
         raise
     except BaseException as error:  # whatever a library raises, a panic too

@@ -11,11 +11,15 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from algid import text as letters
+from algid.api.answer import Manual
 from algid.errors import without_credentials
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
     from rich.segment import Segment
+
+    from algid.api.answer import Answer
+    from algid.report.document import Document, Table
 
 
 def printable(text: str) -> str:
@@ -62,3 +66,47 @@ def console(**options: Any) -> Console:
                 )
 
     return Printable(**options)
+
+
+def shown(answer: Answer, json: bool, quiet: bool, verbose: bool) -> None:
+    """Print what a verb gave: results alone to standard output, so that they can be piped."""
+    for line in answer.details() if verbose else ():
+        remark(line)
+    for line in answer.complaints:
+        complain(line)
+    if quiet:
+        return
+    remarks = answer.remarks
+    if json and answer.json is not None:
+        say(answer.json(), end="")
+    elif answer.brief is not None and not verbose:
+        remarks = remarks[-1:]
+        for line in answer.brief():
+            say(line)
+    else:
+        for part in answer.shown():
+            _print(part)
+    for line in remarks:
+        remark(line)
+
+
+def _print(part: Document | Table | str) -> None:
+    if isinstance(part, Manual):
+        if not sys.stdout.isatty():
+            print(part, end="")  # its examples of credentials are none
+            return
+        from rich.markdown import Markdown
+
+        console(width=min(console().width, 120)).print(Markdown(part))
+    elif isinstance(part, str):
+        say(part)
+    else:
+        from algid.report.document import Table
+        from algid.report.terminal import print_document, print_table
+
+        terminal = console()
+        if isinstance(part, Table):
+            print_table(part, terminal)
+            terminal.print()
+        else:
+            print_document(part, terminal)

@@ -14,7 +14,8 @@ from algid.arm import FloatArray
 from algid.designs.limits import HANGING, Limits
 from algid.errors import SettingError
 from algid.files import read_toml
-from algid.options import flag, range_of
+from algid.limits import PLANNED
+from algid.options import flag
 
 Positive = Annotated[float, Field(gt=0)]  # inf is no limit
 Pair = Positive | tuple[Positive, Positive]
@@ -28,7 +29,7 @@ SMALLEST, LARGEST = 1e-6, 1e6
 
 def _within(name: str) -> Any:
     """What a number of the file may be: as the option of that name."""
-    low, high = range_of("design", name)
+    low, high = PLANNED[name]
     return Field(ge=low, le=high, allow_inf_nan=False)
 
 

@@ -12,7 +12,6 @@ horizontal plane.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -44,9 +43,9 @@ def with_effort(fit: Fit, settings: Settings) -> Settings:
     if fit.shared.model.gravity == 0:
         return settings
     if settings.effort is None and _arm_weightless(fit):
-        settings = replace(settings, effort="gravity-compensated")
+        settings = settings.but(effort="gravity-compensated")
     if settings.effort == "gravity-compensated" and _payload_weightless(fit):
-        settings = replace(settings, gravity=0.0)
+        settings = settings.but(gravity=0.0)
     return settings
 
 

@@ -32,7 +32,7 @@ from algid.physics.effort import absent
 from algid.progress import Progress
 from algid.results import Result, read_result, write_result
 from algid.runtime import one_blas_thread
-from algid.settings import OF_BOTH, Settings, refuse_contradictions
+from algid.settings import DEFAULTS, OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
     from algid.estimators.fit import Fit
@@ -182,10 +182,10 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
         own = {name: getattr(meaning, name) for name in OF_BOTH if name in meaning.model_fields_set}
         refuse_contradictions(own)
         stated |= own
-    set_by_user = {name for name in stated if getattr(settings, name) != getattr(Settings, name)}
+    set_by_user = {name for name in stated if getattr(settings, name) != DEFAULTS[name]}
     for name in set_by_user:
         del stated[name]
-    return replace(settings, **stated)
+    return settings.but(**stated)
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
@@ -279,7 +279,7 @@ def _by_likelihood(
     if settings != asked:
         fit, predictions, chosen = _fitted(survey, settings, earlier)
         sure = with_doubt(fit, survey, settings, chosen)
-    settings = replace(settings, torque_hold=chosen.hold)
+    settings = settings.but(torque_hold=chosen.hold)
     survey.begin("prediction")
     outcome = outcome_of(sure, predictions, survey, settings, chosen)
     outcome = replace(outcome, notices=outcome.notices + of_driver)
@@ -325,11 +325,11 @@ def _fitted(
         chosen = choose_model(survey, settings, earlier.result)
         prior = prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
-    settings = replace(settings, torque_hold=chosen.hold)
+    settings = settings.but(torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
     better = without_nothing(with_hold_of_fit(fit, chosen), fit, settings)
     if (better.model, better.delay, better.hold) != (chosen.model, chosen.delay, chosen.hold):
-        settings = replace(settings, torque_hold=better.hold)
+        settings = settings.but(torque_hold=better.hold)
         fit, predictions, chosen = run_fit(survey, settings, better, prior)
     else:
         chosen = better

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from algid.report.document import Kind, Table
 from algid.report.tables import by_state
 from algid.results import TorquePrediction
 from algid.text import ABSENT, file_name, significant, visible
+
+if TYPE_CHECKING:
+    from algid.check import Judged
 
 EVERY = "all logs"
 
@@ -30,6 +33,7 @@ class Validated:
     simulation : the arm simulated forward, where that was asked for
     warnings : what its reader should know
     max_nrmse : the largest normalised RMSE allowed, if any
+    judged : errors beside their limits, of a synthetic log's result
     """
 
     logs: dict[str, TorquePrediction | None]
@@ -37,6 +41,7 @@ class Validated:
     simulation: Simulation | None = None
     warnings: tuple[str, ...] = ()
     max_nrmse: float | None = None
+    judged: tuple[Judged, ...] = ()
 
     def __repr__(self) -> str:
         r2 = "unknown"
@@ -46,6 +51,11 @@ class Validated:
 
     @property
     def over(self) -> bool:
+        """Whether something is past its limit, or missing."""
+        return self.past or not all(one.passed for one in self.judged)
+
+    @property
+    def past(self) -> bool:
         """Whether the normalised RMSE of a joint is past the limit, or missing."""
         if self.max_nrmse is None:
             return False
@@ -71,6 +81,8 @@ class Validated:
             "total": _as_json(self.total),
             "over": self.over,
         }
+        if self.judged:
+            content["errors"] = [vars(one) for one in self.judged]
         if self.simulated:
             content["simulation"] = self.simulated
         return json.dumps(content, indent=2, allow_nan=False) + "\n"

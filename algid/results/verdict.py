@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
 from algid.names import outside
 from algid.notices import Notice, Remedy, flat, has_code, notes_of, of_codes, warnings_of
-from algid.options import PROFILE, flag, options_of
+from algid.options import flag
 from algid.significance import SURE
 from algid.text import joined, significant, visible
 from algid.verdict import Verdict, graded
@@ -101,13 +101,20 @@ def _of_reading(result: Result) -> list[str]:
     made = result.settings.get("command")
     if not isinstance(made, str):
         return list(Remedy(flat(result.profile)).flags)
-    taken = {flag(one.name) for one in options_of(PROFILE)}
+    from algid.profile import KEYWORDS
+
     flags: list[str] = []
     words = iter(shlex.split(made))
     for word in words:
-        name, equals, _ = word.partition("=")
-        if name in taken:
-            flags += [word] if equals else [word, next(words, "")]
+        name, equals, value = word.partition("=")
+        if not name.startswith("--"):
+            continue
+        setting = name.removeprefix("--").replace("-", "_")
+        if setting in KEYWORDS or name in (flag("profile"), flag("set")):
+            both = [word] if equals else [word, next(words, "")]
+            key = (value if equals else both[1]).partition("=")[0].partition(".")[0]
+            if name != flag("set") or key in KEYWORDS:
+                flags += both
     return flags
 
 
@@ -123,7 +130,7 @@ def again(result: Result, flags: Sequence[str]) -> str:
 
 def _call(result: Result) -> list[str]:
     """The command that does what Python was asked for."""
-    from algid.settings import Settings
+    from algid.settings import DEFAULTS, Settings
 
     asked = Settings.of(result.settings)
     words = ["algid", "identify"]
@@ -134,13 +141,12 @@ def _call(result: Result) -> list[str]:
         else:
             words.append(log.path)
     words += loaded
-    for name, value in vars(asked).items():
-        default = getattr(Settings, name)
-        if name == "poles" or value == default or (name == "gravity" and name in result.profile):
-            continue
-        words.append(flag(name))
-        if value is not True:
-            words.append(str(value))
+    own = {
+        name: value
+        for name, value in asked
+        if value != DEFAULTS[name] and name != "poles" and name not in result.profile
+    }
+    words += Remedy(own).flags
     return words + list(Remedy(flat(result.profile)).flags)
 
 

@@ -19,7 +19,8 @@ from typing import Any, Literal, get_args, get_origin
 import polars as pl
 import typer
 
-from algid.cli.app import COMMANDS, gathered
+from algid.cli.app import gathered
+from algid.cli.derive import COMMANDS
 from pipelines.hostile import places, values
 from pipelines.mutations import damage
 
@@ -46,7 +47,6 @@ CALLS: dict[str, tuple[str, ...]] = {
     "identify": (UNLOADED, "-o", "out", *QUICK),
     "validate": ("full.algid", UNLOADED),
     "export": ("full.algid", "--to", "urdf", "-o", "out/arm.urdf"),
-    "fleet": ("results", "-o", "out"),
     "track": (
         LOADED,
         "--parameters",
@@ -58,7 +58,6 @@ CALLS: dict[str, tuple[str, ...]] = {
         "-o",
         "out",
     ),
-    "check": ("full.algid", "--max-error", "50"),
     "report": ("weak.algid",),
     "compare": ("full.algid", "weak.algid", "-o", "out"),
     "synth": ("case1", "-o", "out", "--duration", "0.2", "--rate", "50"),
@@ -108,7 +107,7 @@ def draw_call(seed: int, place: Path) -> Call:
 @cache
 def options(command: str) -> tuple[Any, ...]:
     """A command's options, as typer reads them."""
-    group = typer.main.get_command(gathered([command, "guide" if command != "guide" else "check"]))
+    group = typer.main.get_command(gathered([command, "guide" if command != "guide" else "report"]))
     every = group.commands[command].params  # type: ignore[attr-defined]
     return tuple(
         one for one in every if one.param_type_name == "option" and one.opts[-1] not in NEVER
@@ -212,7 +211,7 @@ def toml(draw: random.Random, place: Path) -> Call:
         (places.ARM, ("synth", file, "-o", "out", "--duration", "0.2", "--rate", "50")),
         (places.ARM, ("design", file, "-o", "out", *DESIGN)),
         (places.LIMITS, ("design", "case1", "-o", "out", "--limits", file, *NOISE)),
-        (places.TOLERANCES, ("check", "full.algid", "--tolerance-file", file)),
+        (places.TOLERANCES, ("validate", "full.algid", "--max-error", file)),
         (places.MANIFEST, ("batch", file, "-o", "out", "--workers", "1", *QUICK, "-q")),
     )
     content, arguments = draw.choice(known[:-1] if draw.random() < 0.95 else known)
@@ -296,17 +295,17 @@ def _differing(content: Any, written: bytes) -> str:
 def _reading(folder: str, draw: random.Random) -> tuple[str, ...]:
     """A command that reads that result or track."""
     if folder.endswith(".track"):
-        shown = draw.choice(("table", "json", "markdown"))
+        shown = draw.choice(("table", "json"))
         return ("report", folder, "--format", shown, *draw.choice(((), ("--export", "mcap"))))
-    form = ("--format", draw.choice(("table", "json", "markdown")))
+    form = ("--format", draw.choice(("table", "json")))
     track = ("track", LOADED, "--parameters", folder, "-o", "out")
     known: tuple[tuple[str, ...], ...] = (
         ("report", folder, *form),
         ("report", folder, "--export", "mcap"),
         ("compare", folder, "weak.algid", "-o", "out", *form),
         ("compare", "full.algid", folder, *form),
-        ("check", folder, "--max-error", "50"),
-        ("check", folder, "--against", "paper"),
+        ("validate", folder, "--max-error", "50"),
+        ("validate", folder, "--max-error", "paper"),
         ("validate", folder, UNLOADED, *form),
         ("validate", folder, UNLOADED, "--loaded", LOADED, "--simulate"),
         *(
@@ -336,7 +335,7 @@ def series(draw: random.Random, place: Path) -> Call:
         _copied(place / "results", place / "hostile")
         file = place / "hostile" / "jobs.parquet"
         arguments: tuple[str, ...] = (
-            "fleet",
+            "report",
             "hostile",
             "-o",
             "out",

@@ -6,14 +6,9 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any
 
-from typer.main import get_command
-
-import algid.cli.app
 from algid.cli import run
 
 ARM = {
@@ -95,20 +90,6 @@ _SHORT = (
     "--torque-noise",
     "1e-2",
 )
-
-
-def called_once() -> Callable[[Sequence[str]], Any]:
-    """What reads a command line, made once a command: typer takes long to make it."""
-    made: dict[str, Any] = {}
-
-    def reader(arguments: Sequence[str]) -> Any:
-        first = arguments[0] if arguments and arguments[0] in algid.cli.app.COMMANDS else ""
-        if first not in made:
-            made[first] = get_command(original(arguments))
-        return made[first]
-
-    original = algid.cli.app.called
-    return reader
 
 
 def called(*arguments: str) -> tuple[int, str, str]:

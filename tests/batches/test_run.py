@@ -149,7 +149,7 @@ def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
     shutil.rmtree(logs.parent / "out/r1/b.algid")
     _run(logs, executor)
     assert executor.ran == ["r1/b"]
-    _run(logs, executor, replace(CONFIG, settings=replace(WEAK, window=0.3)))
+    _run(logs, executor, replace(CONFIG, settings=WEAK.but(window=0.3)))
     assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
 
 

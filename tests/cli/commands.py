@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from typer.main import get_command
-
-from algid.cli.app import COMMANDS, called, gathered
-from algid.errors import AlgidError
-from algid.exits import Exit
+from algid.api.options import meaning
+from algid.cli import run
+from algid.cli.app import gathered
+from algid.cli.derive import COMMANDS, take
+from algid.profile import Profile
 
 app = gathered(COMMANDS)
-_COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
-NAMES = [name for name, one in _COMMANDS.items() if not hasattr(one, "commands")]
-"""What the application calls its commands, without the group of those about profiles."""
+NAMES = list(COMMANDS)
 
 
 @dataclass(frozen=True)
@@ -31,30 +29,19 @@ class Done:
     out: str
     err: str
 
-    @property
-    def boxed(self) -> str:
-        """What stands in typer's box about a wrong call, as one line."""
-        return " ".join(
-            line.strip("│").strip() for line in self.err.splitlines() if line.startswith("│")
-        )
-
 
 def call(*arguments: str | Path) -> Done:
-    """Run a command in this process; an error of algid's is told as the command line tells it."""
+    """Run a command in this process."""
     words = list(map(str, arguments))
-    out, err, code = io.StringIO(), io.StringIO(), 0
+    out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err), patch.dict(os.environ, COLUMNS="200"):
-        try:
-            _command(words[0])(words)
-        except AlgidError as error:
-            print(f"algid: {error}", file=err)
-            code = Exit.USAGE
-        except SystemExit as end:
-            code = int(end.code or 0)
-    return Done(code, out.getvalue(), err.getvalue())
+        code = run(words)
+    return Done(int(code), out.getvalue(), err.getvalue())
 
 
-@cache
-def _command(first: str) -> Any:
-    """What reads a call that begins so: typer takes long to make it."""
-    return get_command(called([first]))
+def profile_from(flags: Mapping[str, Any]) -> Profile | None:
+    """The profile that flags mean, as a command hands them to its verb."""
+    options = {name: value for name, value in flags.items() if name != "set"}
+    for line in flags.get("set", []):
+        take(options, line, {}, True)
+    return meaning(None, options)

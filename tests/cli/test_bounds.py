@@ -33,7 +33,7 @@ def empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def refused(*arguments: str) -> str:
     done = call(*arguments)
     assert done.code == 2, done
-    return done.boxed or done.err.rstrip("\n")
+    return done.err.rstrip("\n")
 
 
 @pytest.mark.parametrize(
@@ -46,18 +46,18 @@ def refused(*arguments: str) -> str:
             "1e+06 s at --rate 1e+06 Hz are 1e+12 samples; expected at most",
         ),
         (
-            ("--start-time", "0001-01-01"),
-            "--start-time: expected a date from 1970 to 2037, found 0001-01-01T00:00:00",
+            ("--set", "start_time=0001-01-01"),
+            "--set start_time: expected a date from 1970 to 2037, found 0001-01-01T00:00:00",
         ),
-        (("--start-time", "1600-01-01"), "expected a date from 1970 to 2037"),
-        (("--start-time", "2300-01-01"), "expected a date from 1970 to 2037"),
+        (("--set", "start_time=1600-01-01"), "expected a date from 1970 to 2037"),
+        (("--set", "start_time=2300-01-01"), "expected a date from 1970 to 2037"),
         (
-            ("--initial", "1e9,0,0,0"),
-            "--initial: expected angles within 1e+06 rad and 10000 rad/s, found '1e9,0,0,0'",
+            ("--set", "initial=1e9,0,0,0"),
+            "--set initial: expected angles within 1e+06 rad and 10000 rad/s, found '1e9,0,0,0'",
         ),
         (
-            ("--initial", "0,0,0,1e5"),
-            "--initial: expected angles within 1e+06 rad and 10000 rad/s, found '0,0,0,1e5'",
+            ("--set", "initial=0,0,0,1e5"),
+            "--set initial: expected angles within 1e+06 rad and 10000 rad/s, found '0,0,0,1e5'",
         ),
         (("--payload-schedule", "1=1e300"), "expected increasing times and payloads of 0 or more"),
         (("--position-noise", "1e308"), "less than or equal to 1000"),
@@ -70,7 +70,9 @@ def test_no_log_is_made_of_what_no_arm_does(flags: tuple[str, ...], told: str) -
 @pytest.mark.parametrize("year", ["1970", "2026", "2037"])
 def test_dates_that_stamps_can_hold_are_taken(year: str, tmp_path: Path) -> None:
     out = tmp_path / "inner" / "out"
-    done = call("synth", "case1", "-o", out, "--duration", "0.1", "--start-time", f"{year}-01-02")
+    done = call(
+        "synth", "case1", "-o", out, "--duration", "0.1", "--set", f"start_time={year}-01-02"
+    )
     assert done.code == 0, done.err
     for path in out.iterdir():
         path.unlink()

@@ -17,21 +17,20 @@ from tests.cli.commands import app
 FREE = {
     *(
         "topic",
+        "gravity",
         "joints",
         "rate",
-        "columns",
         "start",
         "end",
-        "segment",
         "name",
-        "poles",
         "out",
         "sources",
         "scheduler",
+        "part",
+        "flange",
         "memory_limit",
-        "initial",
     ),
-    *("payload_schedule", "span", "speed", "acceleration", "runs", "wanted"),
+    *("payload_schedule", "range", "speed", "runs", "wanted", "max_error"),
 }
 """Options of text that is the user's own."""
 ROOT = typer.main.get_command(app)
@@ -90,6 +89,8 @@ def test_every_choice_completes(
         ("set", "tau1.s", ["tau1.source=", "tau1.sign="]),
         ("set", "tau1.sign=", ["tau1.sign=1", "tau1.sign=-1"]),
         ("set", "velocity=t", ["velocity=true"]),
+        ("set", "obs", ["observer="]),
+        ("set", "observer=z", ["observer=zero-phase"]),
         ("accept", "DEGREES,EFFORT_Z", ["DEGREES,EFFORT_ZERO"]),
         ("model", "coulomb,ro", ["coulomb,rotor"]),
         ("estimator", "re", ["refined"]),

@@ -12,15 +12,14 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-import typer
 
-from algid.api.batch import Batched, watched
+from algid.api.batch import Batched, answer, watched
 from algid.api.compare import labels_of as labels
 from algid.api.design import campaign_of, noise_of
 from algid.batches.jobs import Job
 from algid.batches.records import JobRecord, JobStatus
-from algid.batches.run import BatchOutcome, Progress
-from algid.cli import batch as command
+from algid.batches.run import BatchOutcome
+from algid.cli.output import shown
 from algid.designs.prior import KnownBefore, prior_of
 from algid.designs.request import request
 from algid.errors import SettingError
@@ -93,31 +92,12 @@ def test_a_batch_says_what_became_of_its_jobs(
         ended.records, ended.ran, ended.left, "out", interrupted=stopped, stopped=ended.stopped
     )
     for quiet in (False, True):
-        left = 0
-        try:
-            command._conclude(batched, quiet)
-        except typer.Exit as end:
-            left = end.exit_code
-        assert left == code
-        shown = capsys.readouterr()
-        assert shown.out.splitlines() == ([] if quiet else lines)
-        assert shown.err == ("" if ended.stopped is None else f"algid: {ended.stopped}\n")
-
-
-def test_progress_is_one_line_that_is_gone_at_the_end(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    last = Progress(3, 7, record("x" * 60, JobStatus.OK))
-    with command._progress(False) as silent:
-        silent(last)
-    assert capsys.readouterr().err == ""
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with command._progress(True) as quiet:
-        quiet(last)
-    assert capsys.readouterr().err == ""
-    with command._progress(False) as show:
-        show(last)
-    assert capsys.readouterr().err == f"\r\x1b[2K3/7 {'x' * 50}: ok\r\x1b[2K"
+        told = answer(batched, {})
+        assert told.exit == code
+        shown(told, False, quiet, False)
+        printed = capsys.readouterr()
+        assert printed.out.splitlines() == ([] if quiet else lines)
+        assert printed.err == ("" if ended.stopped is None else f"algid: {ended.stopped}\n")
 
 
 class Watched:
@@ -205,7 +185,7 @@ def test_velocities_are_in_a_log_only_where_its_angles_are_exact(tmp_path: Path)
     } < {*exact.columns}
     for name, flags in {
         "noise": ("--position-noise", "1e-4"),
-        "encoder": ("--encoder-bits", "12"),
+        "encoder": ("--set", "encoder_bits=12"),
     }.items():
         assert "omega1" not in synthetic(tmp_path / name, *flags).columns
     step = 2 * math.pi / 2**12
@@ -232,7 +212,7 @@ def test_a_drive_holds_or_ramps_the_torque(tmp_path: Path) -> None:
 
 
 def test_a_start_and_a_schedule_are_taken(tmp_path: Path) -> None:
-    began = synthetic(tmp_path / "began", "--initial", "-1,0.25,0.5,-0.75")
+    began = synthetic(tmp_path / "began", "--set", "initial=-1,0.25,0.5,-0.75")
     first = began.row(0, named=True)
     assert [first[name] for name in ("theta1", "theta2", "omega1", "omega2")] == [
         -1,

@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--torque-noise",
         "1e-2",
     )
-    run("synth", "case1", "-o", place, *noisy, "--start-time", "2026-01-31T12:00:00")
+    run("synth", "case1", "-o", place, *noisy, "--set", "start_time=2026-01-31T12:00:00")
     run("identify", place / "case1-unloaded.mcap", "-o", place, "--no-report", "-q")
     return place
 
@@ -44,7 +44,7 @@ def test_a_synthetic_log_starts_when_it_is_told_to(folder: Path) -> None:
     assert stamps[-1] - stamps[0] == 2 * 10**9
 
 
-def test_validate_prints_json_and_markdown_of_what_it_prints_in_words(folder: Path) -> None:
+def test_validate_prints_json_of_what_it_prints_in_words(folder: Path) -> None:
     command = ("validate", folder / "case1-unloaded.algid", folder / "case1-unloaded.mcap")
     words = run(*command)
     content = json.loads(run(*command, "--format", "json", "--max-nrmse", "1e-9", code=1))
@@ -54,5 +54,3 @@ def test_validate_prints_json_and_markdown_of_what_it_prints_in_words(folder: Pa
         rows = [line.split() for line in words.splitlines() if line.startswith("all logs")]
         assert float(rows[joint - 1][3]) == pytest.approx(rmse, rel=1e-3)
     assert json.loads(run(*command, "--format", "json"))["over"] is False
-    table = run(*command, "--format", "markdown")
-    assert "| all logs | 2 |" in table

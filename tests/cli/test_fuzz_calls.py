@@ -36,7 +36,7 @@ from pipelines.hostile.values import anything, changed
     ],
 )
 def test_the_judge_sees_every_bad_end(code: int, out: str, err: str, kind: str) -> None:
-    assert judged(Call("flags", ("check", "x")), code, out, err)[0] == kind
+    assert judged(Call("flags", ("report", "x")), code, out, err)[0] == kind
     assert (kind in FAILURES) == (kind not in ("done", "refused", "library"))
 
 

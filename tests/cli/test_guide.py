@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import algid
-from algid.api.guide import SUMMARIES, text_of
+from algid.api.guide import text_of, topics
 from algid.notices import MESSAGES
 from tests.cli.commands import app
 
@@ -34,7 +34,7 @@ def test_every_code_has_its_entry_in_the_guide() -> None:
     assert entries - codes() == set()
 
 
-@pytest.mark.parametrize("topic", SUMMARIES)
+@pytest.mark.parametrize("topic", topics())
 def test_every_topic_can_be_read(topic: str) -> None:
     shown = CliRunner().invoke(app, ["guide", topic])
     assert shown.exit_code == 0
@@ -44,8 +44,4 @@ def test_every_topic_can_be_read(topic: str) -> None:
 
 def test_without_a_topic_all_topics_are_listed() -> None:
     shown = CliRunner().invoke(app, ["guide"])
-    assert all(f"algid guide {topic}" in shown.stdout for topic in SUMMARIES)
-
-
-def test_no_page_is_without_a_topic() -> None:
-    assert {path.stem for path in (ROOT / "guide").glob("*.md")} == set(SUMMARIES)
+    assert all(f"algid guide {topic}" in shown.stdout for topic in topics())

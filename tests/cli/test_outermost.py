@@ -136,11 +136,11 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
         ("inspect", log),
         ("identify", log, "-o", tmp_path, "--no-report"),
         ("validate", result, log, "--format", "json"),
-        ("check", result, "--max-error", "50"),
+        ("validate", result, "--max-error", "50"),
         ("compare", result, result),
         ("report", result),
         ("synth", "case1", "-o", tmp_path, "--duration", "0.1"),
-        ("profile", "new", log, "-o", tmp_path / "new.toml"),
+        ("inspect", log, "--write-profile", tmp_path / "new.toml"),
     )
     for arguments in calls:
         with Path("/dev/full").open("wb") as full, (tmp_path / "err").open("wb") as err:
@@ -161,7 +161,7 @@ def test_a_full_standard_output_is_one_line_of_every_command(result: Path, tmp_p
 
 def test_a_full_standard_error_changes_no_exit_code(tmp_path: Path) -> None:
     with Path("/dev/full").open("wb") as full, (tmp_path / "out").open("wb") as out:
-        assert begin("check", "absent.algid", stdout=out.fileno(), stderr=full.fileno())() == 2
+        assert begin("report", "absent.algid", stdout=out.fileno(), stderr=full.fileno())() == 2
         assert begin("--version", stdout=out.fileno(), stderr=full.fileno())() == 0
 
 
@@ -193,12 +193,12 @@ def test_a_tampered_result_drives_no_terminal(result: Path, tmp_path: Path) -> N
     folder.mkdir()
     (folder / "result.json").write_text(json.dumps(content))
     for arguments in (
-        ("check", folder, "--max-error", "50"),
+        ("validate", folder, "--max-error", "50"),
         ("compare", folder, result),
         ("compare", folder, result, "--format", "json"),
         ("report", folder),
         ("report", folder, "--format", "json"),
-        ("report", folder, "--format", "markdown"),
+        ("report", folder, "--format", "json"),
         ("export", folder, "--to", "c"),
         ("validate", folder, result.parent / "case1-unloaded.mcap"),
     ):

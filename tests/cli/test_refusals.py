@@ -76,12 +76,11 @@ def test_no_memory_and_too_little_is_refused(text: str) -> None:
             "log.csv",
         ),
         (["validate", "absent.algid", "log.csv"], "absent.algid"),
-        (["check", "absent.algid"], "absent.algid"),
+        (["validate", "absent.algid", "--max-error", "1"], "absent.algid"),
         (["track", "log.csv", "--parameters", "absent.algid"], "absent.algid"),
         (["compare", "absent.algid", "other.algid"], "absent.algid"),
         (["report", "absent.algid"], "absent.algid"),
         (["export", "absent.algid", "--to", "urdf"], "absent.algid"),
-        (["fleet", "absent"], "absent"),
     ],
     ids=lambda value: " ".join(value[:4]) if isinstance(value, list) else None,
 )

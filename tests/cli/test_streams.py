@@ -22,7 +22,7 @@ def test_a_reader_that_leaves_is_no_error(result: Path, errors_too: bool, tmp_pa
         errors = writing if errors_too else stream.fileno()
         for arguments in (
             ["compare", result, result],
-            ["check", result, "--max-error", "50"],
+            ["validate", result, "--max-error", "50"],
             ["--help"],
         ):
             assert begin(*arguments, stdout=writing, stderr=errors)() == 0, arguments
@@ -36,7 +36,7 @@ def test_a_failure_is_one_for_a_reader_that_leaves_too(result: Path) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
-        [*ALGID, "check", result, "--max-error", "1e-9"], stdout=writing, check=False
+        [*ALGID, "validate", result, "--max-error", "1e-9"], stdout=writing, check=False
     )
     os.close(writing)
     assert done.returncode == 1

@@ -18,7 +18,7 @@ from tests.processes import Outcome, begin
 
 WIDTH, HEIGHT = 80, 25
 CONTROL = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])|(\r)|(\n)")
-RESULTS = ("identify", "validate", "track", "check", "batch", "synth", "export", "convert")
+RESULTS = ("identify", "validate", "track", "batch", "synth", "export", "convert")
 """What has a screen at most; a log's channels, tables of a report and comparisons may be many."""
 CALLS = [
     "synth case1 --duration 1 -o {out}",
@@ -29,11 +29,10 @@ CALLS = [
     "validate {result} {log}",
     "track {log} --parameters {result} --l1 0.1626 --l2 0.1232 -o {out}",
     "compare {result} {result} {result}",
-    "check {result} --against truth --max-error 5",
+    "validate {result} --max-error 5",
     "report {result}",
     "export {result} --to urdf -o {out}/arm.urdf",
     "convert {log} -o {out}/arm.csv",
-    "profile new {log} -o {out}/arm.toml",
     "batch {log} -o {out} --no-report",
 ]
 

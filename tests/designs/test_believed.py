@@ -156,7 +156,7 @@ WEAK = BARE.model_copy(update={"fit": None, "estimator": "weak"})
 NO_PAYLOAD = "it knows no payload for the loaded runs; give --payload KG, or --runs 1,0"
 NO_BARS = (
     "the result of --estimator weak has no error bars; identify from logs that determine them, "
-    "or say how wrong it may be: --prior-error"
+    "or say how wrong it may be: --set prior_error"
 )
 IMPOSSIBLE = (
     "its inertia matrix is not positive definite (k1 0.5, k3 0.0145, k5 0.196 kg m²); no arm is "

@@ -42,10 +42,10 @@ LIMITS = [
     "3",
     "--torque",
     "1.9,0.95",
-    "--acceleration",
-    "40",
-    "--tip-height",
-    "-0.27",
+    "--set",
+    "acceleration=40",
+    "--set",
+    "tip_height=-0.27",
 ]
 SENSORS = ["--position-noise", "1e-3", "--torque-noise", "1e-2"]
 DURATION = 2.0
@@ -273,12 +273,12 @@ REFUSED = [
         "--torque: the loaded arm asks for",
     ),
     (
-        ["case1", *SENSORS, *LIMITS, "--tip-height", "0.1"],
-        "--tip-height: within the range the tip rises no higher",
+        ["case1", *SENSORS, *LIMITS, "--set", "tip_height=0.1"],
+        "--set tip_height: within the range the tip rises no higher",
     ),
     (
-        ["case1", *SENSORS, *LIMITS, "--tip-height", "5"],
-        "--tip-height: expected less than the arm's reach",
+        ["case1", *SENSORS, *LIMITS, "--set", "tip_height=5"],
+        "--set tip_height: expected less than the arm's reach",
     ),
     (
         ["case1", *SENSORS, *LIMITS, "--torque", "1.9,0"],

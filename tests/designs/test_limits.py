@@ -161,7 +161,7 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
         resting(high, Model(), [])
     best = 0.4 * np.sin(-0.5) + 0.3 * np.sin(-0.4)
     assert str(refused.value) == (
-        f"--tip-height: within the range the tip rises no higher than {best:.3g} m, the limit "
+        f"--set tip_height: within the range the tip rises no higher than {best:.3g} m, the limit "
         "asks for 0.5 m "
         "(margin included); lower it, or widen --range"
     )

@@ -53,7 +53,7 @@ def test_a_result_without_error_bars_needs_to_be_told_how_wrong_it_is(
     result: Result, tmp_path: Path
 ) -> None:
     file = saved(result, tmp_path, fit=None)
-    with pytest.raises(ResultError, match=r"no error bars; .*--prior-error"):
+    with pytest.raises(ResultError, match=r"no error bars; .*--set prior_error"):
         prior_of(file, None, KnownBefore())
     belief = prior_of(file, None, KnownBefore(error=0.2)).belief
     np.testing.assert_allclose(SURE * belief.std, 0.2 * np.abs(belief.mean), rtol=1e-6)

@@ -12,6 +12,7 @@ import pytest
 
 from algid.designs.request import limits_of, request
 from algid.errors import SettingError
+from algid.options import flag
 
 LENGTHS = np.array([0.4, 0.3])
 LIMITS = "--limits; inf is no limit at all"
@@ -73,7 +74,7 @@ WRONG = {
 def test_flags_that_mean_nothing_are_refused(name: str, text: str) -> None:
     with pytest.raises(SettingError) as refused:
         request(None, {name: text})
-    assert str(refused.value) == f"--{name}: expected {LIKE[name]}, found {text!r}"
+    assert str(refused.value) == f"{flag(name)}: expected {LIKE[name]}, found {text!r}"
 
 
 def test_numbers_pass_and_none_leaves_the_file_alone(tmp_path: Path) -> None:
@@ -154,12 +155,12 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
             LENGTHS,
             "--range: without any limit no motion is the best, found inf for all; give one",
         ),
-        ({"tip_height": 0.7}, LENGTHS, ("--tip-height: expected less than the arm's reach, 0.7 m, "
-                                       "found 0.7 m")),
+        ({"tip_height": 0.7}, LENGTHS, ("--set tip_height: expected less than the arm's reach, "
+                                       "0.7 m, found 0.7 m")),
         (
             {"tip_height": -0.1},
             np.array([0.4, np.nan]),
-            "--tip-height: the link lengths are not known; give --l1 and --l2",
+            "--set tip_height: the link lengths are not known; give --l1 and --l2",
         ),
     ],
 )  # fmt: skip

@@ -68,8 +68,8 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     assert (note.code, note.text) == (
         "CONSTRAINED",
         (
-            f"--constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), which "
-            "the logs contradict"
+            f"--set constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), "
+            "which the logs contradict"
         ),
     )
     before = Notice("BEFORE", "before")
@@ -91,7 +91,7 @@ def test_bounds_that_no_point_keeps_leave_the_free_estimates(
         np.testing.assert_array_equal(found.values, fit.values)
         (note,) = found.notes
         assert note.code == "NOT_FEASIBLE"
-        assert note.text.startswith("--constrain cannot obey k6 >= 0 (")
+        assert note.text.startswith("--set constrain cannot obey k6 >= 0 (")
 
 
 def test_a_bound_is_broken_by_what_is_known_alone() -> None:

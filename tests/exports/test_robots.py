@@ -260,10 +260,13 @@ def test_lengths_that_the_result_was_told_are_taken_and_flags_beat_them() -> Non
 @pytest.mark.parametrize(
     ("knowns", "message"),
     [
-        (Knowns(m2=5.0, l1=0.4), "check --m2 or --l1, or leave it out"),
-        (Knowns(m2=5.0), "check --m2, or leave it out"),
-        (Knowns(m1=0.01, m2=0.7), "check --m1 or --m2, or leave it out"),
-        (Knowns(rotor1=0.2, m1=1.0, l2=0.2), "check --rotor1 or --l2 or --m1, or leave it out"),
+        (Knowns(m2=5.0, l1=0.4), "check --set m2 or --l1, or leave it out"),
+        (Knowns(m2=5.0), "check --set m2, or leave it out"),
+        (Knowns(m1=0.01, m2=0.7), "check --set m1 or --set m2, or leave it out"),
+        (
+            Knowns(rotor1=0.2, m1=1.0, l2=0.2),
+            "check --set rotor1 or --l2 or --set m1, or leave it out",
+        ),
     ],
 )
 def test_a_refusal_names_every_flag_that_may_be_wrong(knowns: Knowns, message: str) -> None:

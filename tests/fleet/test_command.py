@@ -1,4 +1,4 @@
-"""`algid fleet` as its users call it, on what `algid batch` writes."""
+"""`algid report` of a batch as its users call it, on what `algid batch` writes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = START)
 
 
 def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["fleet", str(_batch(tmp_path)), "-o", str(tmp_path / "page")])
+    done = CliRunner().invoke(app, ["report", str(_batch(tmp_path)), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
     assert "2 robots, 20 logs: 1 drift and 1 finding" in done.stdout
     assert "payload unlike its label" in done.stdout
@@ -100,10 +100,10 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
 
 
-def test_json_and_markdown_say_the_same(tmp_path: Path) -> None:
+def test_json_holds_what_was_found(tmp_path: Path) -> None:
     _batch(tmp_path)
     content = json.loads(
-        CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "json"]).stdout
+        CliRunner().invoke(app, ["report", str(tmp_path), "--format", "json"]).stdout
     )
     assert [(row["robot"], row["logs"], row["tested"]) for row in content["robots"]] == [
         ("r0", 10, True),
@@ -114,13 +114,10 @@ def test_json_and_markdown_say_the_same(tmp_path: Path) -> None:
         ("r0/0", "payload", 0.5)
     ]
     assert content["untested"] == []
-    text = CliRunner().invoke(app, ["fleet", str(tmp_path), "--format", "markdown"]).stdout
-    assert "| r0 | k6 |" in text
-    assert "2 robots, 20 logs: 1 drift and 1 finding" in text
 
 
 def test_logs_whose_stamps_have_no_date_still_show_their_robots(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["fleet", str(_batch(tmp_path, robots=1, logs=2, start_ns=0))])
+    done = CliRunner().invoke(app, ["report", str(_batch(tmp_path, robots=1, logs=2, start_ns=0))])
     assert done.exit_code == 0, done.output
     assert "No drift was looked for in 2 logs without a date" in " ".join(done.stdout.split())
     assert "1 robot, 2 logs: 0 drifts and 1 finding" in done.stdout
@@ -211,14 +208,14 @@ def test_an_outlier_has_a_ring(tmp_path: Path) -> None:
 
 def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
     pl.DataFrame({"a": [1]}).write_parquet(tmp_path / "jobs.parquet")
-    done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
+    done = CliRunner().invoke(app, ["report", str(tmp_path)])
     assert isinstance(done.exception, ResultError)
     assert "no column job, robot, status, time; expected jobs.parquet of algid batch" in str(
         done.exception
     )
     _written(tmp_path, {})
     with pytest.raises(ResultError, match="no job has given parameters"):
-        CliRunner().invoke(app, ["fleet", str(tmp_path)], catch_exceptions=False)
+        CliRunner().invoke(app, ["report", str(tmp_path)], catch_exceptions=False)
 
 
 def test_the_page_is_three_tables_and_a_figure_and_leads_to_reports(tmp_path: Path) -> None:
@@ -226,7 +223,7 @@ def test_the_page_is_three_tables_and_a_figure_and_leads_to_reports(tmp_path: Pa
     for job in ("r0/9", "r0/0", "r1/3"):
         (batch / f"{job}.algid").mkdir(parents=True)
         (batch / f"{job}.algid/report.html").write_text("a report")
-    done = CliRunner().invoke(app, ["fleet", str(batch), "-o", str(tmp_path / "page")])
+    done = CliRunner().invoke(app, ["report", str(batch), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
     page = Page((tmp_path / "page/fleet.html").read_text(encoding="utf-8"))
     assert list(page.tables) == ["Drift and steps", "Logs that stand out", "Robots"]
@@ -247,7 +244,7 @@ def test_a_fleet_that_stays_as_it_is_says_so_and_shows_it(tmp_path: Path) -> Non
                 {"k1": (k1, 0.01, "OK")},
             )
     _written(tmp_path, known)
-    done = CliRunner().invoke(app, ["fleet", str(tmp_path)])
+    done = CliRunner().invoke(app, ["report", str(tmp_path)])
     told = " ".join(done.stdout.split())
     assert "Good: 2 robots, 40 logs: 0 drifts and 0 findings; the clearest trend is k1 of r" in told
     assert "which does not pass p < 9e-4" in told
@@ -262,7 +259,7 @@ def test_a_name_that_attacks_leads_nowhere(tmp_path: Path) -> None:
     _written(tmp_path, {"javascript:alert(1)": ("<b>r</b>", START, {"k1": (1.0, 0.01, "OK")})})
     (tmp_path / "javascript:alert(1).algid").mkdir()
     (tmp_path / "javascript:alert(1).algid/report.html").write_text("a report")
-    assert CliRunner().invoke(app, ["fleet", str(tmp_path)]).exit_code == 0
+    assert CliRunner().invoke(app, ["report", str(tmp_path)]).exit_code == 0
     page = (tmp_path / "fleet.html").read_text(encoding="utf-8")
     assert 'href="./javascript%3Aalert%281%29.algid/report.html"' in page
     assert "<b>r</b>" not in page

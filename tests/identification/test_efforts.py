@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -195,7 +194,7 @@ def test_the_command_line_refuses_gravity_of_external_torque(tmp_path: Path) -> 
 def test_a_current_is_in_amperes() -> None:
     with pytest.raises(LogError, match="torque_constant"):
         opened(["t", "q1", "q2", "tau1", "tau2"], {"effort": "current"})
-    assert replace(Settings(), effort="command").effort == "command"
+    assert Settings().but(effort="command").effort == "command"
 
 
 def test_the_table_of_efforts_names_one_and_applies_its_flag() -> None:

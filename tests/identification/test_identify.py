@@ -272,7 +272,7 @@ def test_a_joint_that_stands_still_is_a_status(wide: tuple[Log, Log], tmp_path: 
 )
 def test_numbers_without_a_meaning_are_refused(name: str, value: float) -> None:
     with pytest.raises(SettingError, match=f"{name}: expected"):
-        replace(Settings(), **{name: value})  # type: ignore[arg-type]
+        Settings().but(**{name: value})
 
 
 @pytest.mark.parametrize(
@@ -396,7 +396,7 @@ def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> Non
             found["k3"] + found["k1"] * cosine,
         )
         assert np.all(np.linalg.eigvalsh([[m11, m12], [m12, m22]]) > 0)
-    assert any("--constrain enforces" in warning for warning in result.warnings)
+    assert any("--set constrain enforces" in warning for warning in result.warnings)
 
 
 def test_a_bound_broken_by_chance_is_no_failure() -> None:

@@ -149,10 +149,10 @@ def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_
     columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, *log.tau])
     file = tmp_path / "log.csv"
     np.savetxt(file, columns, delimiter=",", header="t,theta1,theta2,tau1,tau2", comments="")
-    with pytest.raises(LogError, match=r"EFFORT_ZERO.*--passive 2"):
+    with pytest.raises(LogError, match=r"EFFORT_ZERO.*--set passive=2"):
         identify(file)
     done = CliRunner().invoke(
-        app, ["identify", str(file), "--passive", "2", "-o", str(tmp_path), "--no-report"]
+        app, ["identify", str(file), "--set", "passive=2", "-o", str(tmp_path), "--no-report"]
     )
     assert done.exit_code == 0, done.output
     assert "EFFORT_ZERO" not in done.output

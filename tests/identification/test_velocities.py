@@ -37,7 +37,7 @@ def observed(log: Log, rows: int, *, luenberger: bool = False, **settings: objec
     blocks = [log.part(first, min(first + rows, len(log))) for first in range(0, len(log), rows)]
     source = replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=0)
     whole: list[Segment] = []
-    wanted = replace(Settings(bandwidth=BANDWIDTH), **settings)  # type: ignore[arg-type]
+    wanted = Settings(bandwidth=BANDWIDTH).but(**settings)
     for part in with_velocities(Survey([source]), source, wanted, luenberger=luenberger):
         if part.continues:
             whole[-1] = append(whole[-1], part)

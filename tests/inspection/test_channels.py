@@ -60,7 +60,7 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
     assert zero.clause == (
         f"tau2 (effort) is zero in every sample: name the measured torque: {other}; for a joint "
         "without a motor: "
-        "--passive 2"
+        "--set passive=2"
     )
     none = [*channels.efforts(logged(tau=0 * tau))]  # a joint that is passive needs another's motor
     assert [one.advice for one in none] == [

@@ -10,29 +10,23 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-import typer
 from pydantic import BaseModel
 from typer.testing import CliRunner
 
-from algid.cli import convert, inspect, profile
 from algid.errors import OutputError, SettingError
 from algid.inspection.report import inspect_log
 from algid.profile import Angle, Profile, Torque, Velocity, load_profile
 from algid.readers import read_log
 from algid.writers import FORMATS, write_log
+from tests.cli.commands import app
 from tests.inspection.test_checks import moving_log
 from tests.readers.large import WRITERS
 from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
 from tests.readers.mcaps import joint_state, write_mcap
 
-APP = typer.Typer()
-APP.command("inspect")(inspect.inspect)
-APP.command("convert")(convert.convert)
-APP.command("new")(profile.new)
-
 
 def run(*arguments: str | Path, code: int = 0) -> str:
-    result = CliRunner().invoke(APP, [str(one) for one in arguments])
+    result = CliRunner().invoke(app, [str(one) for one in arguments])
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise result.exception
     assert result.exit_code == code, result.output
@@ -168,10 +162,10 @@ def test_convert_refuses_unknown_formats_and_settings(tmp_path: Path) -> None:
 def test_a_new_profile_reads_the_log_as_before(kind: str, tmp_path: Path) -> None:
     log = noise_log()
     write_log(tmp_path / f"arm.{kind}", log)
-    run("new", tmp_path / f"arm.{kind}", "-o", tmp_path / "algid.toml")
+    run("inspect", tmp_path / f"arm.{kind}", "--write-profile", tmp_path / "algid.toml")
     assert same(read_log(tmp_path / f"arm.{kind}", load_profile(tmp_path / "algid.toml")), log)
     with pytest.raises(OutputError, match="--force"):
-        run("new", tmp_path / f"arm.{kind}", "-o", tmp_path / "algid.toml")
+        run("inspect", tmp_path / f"arm.{kind}", "--write-profile", tmp_path / "algid.toml")
 
 
 def test_inspect_of_a_refused_mcap_shows_joints_and_fields(tmp_path: Path) -> None:
@@ -217,7 +211,7 @@ def keys(model: type[BaseModel]) -> set[str]:
 @pytest.mark.parametrize("kind", FORMATS)
 def test_a_new_profile_writes_all_that_can_be_set(kind: str, tmp_path: Path) -> None:
     write_log(tmp_path / f"arm.{kind}", moving_log())
-    run("new", tmp_path / f"arm.{kind}", "-o", tmp_path / "algid.toml")
+    run("inspect", tmp_path / f"arm.{kind}", "--write-profile", tmp_path / "algid.toml")
     text = (tmp_path / "algid.toml").read_text()
     head, *tables = re.split(r"^\[", text, flags=re.MULTILINE)
     assert keys(Profile) - set(re.findall(r"^(?:# )?(\w+) = ", head, re.MULTILINE)) == set()

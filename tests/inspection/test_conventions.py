@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.cli.settings import profile_from
 from algid.inspection.checks import examine
 from algid.inspection.conventions import Mend, judged, mend
 from algid.log import Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
+from tests.cli.commands import profile_from
 from tests.inspection.test_checks import moving_log
 
 RIGHT = moving_log()
@@ -105,9 +105,9 @@ def test_settings_change_what_a_profile_said(tmp_path: Path) -> None:
 def test_a_finding_names_flags_that_the_command_line_takes(tmp_path: Path) -> None:
     path = written(tmp_path / "arm.csv", *recorded("base, tau2 reversed"))
     (finding,) = [one for one in examine(read_log(path)) if one.code == "WRONG_CONVENTION"]
-    assert "--drive base" in finding.clause
-    assert finding.remedies[0].flags == ("--set", "tau2.sign=-1", "--drive", "base")
-    profile = profile_from({"set": ["tau2.sign=-1"], "drive": "base"})
+    assert "--set drive=base" in finding.clause
+    assert finding.remedies[0].flags == ("--set", "tau2.sign=-1", "--set", "drive=base")
+    profile = profile_from({"set": ["tau2.sign=-1", "drive=base"]})
     assert profile is not None
     log = read_log(path, profile)
     assert log.tau == pytest.approx(RIGHT.tau)

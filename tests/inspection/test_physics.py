@@ -14,7 +14,6 @@ import polars as pl
 import pytest
 
 from algid.arm import Arm, inverse_dynamics
-from algid.cli.settings import profile_from
 from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.conventions import Mend, advised, is_right, judged, mend
 from algid.inspection.draft import draft_profile
@@ -23,6 +22,7 @@ from algid.log import Log, Origin, Reading
 from algid.profile import load_profile
 from algid.readers import read_log
 from algid.readers.table import CHANNELS
+from tests.cli.commands import profile_from
 from tests.inspection.test_checks import moving_log
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
@@ -340,7 +340,7 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             "θ2 counts from the horizontal or the vertical, not from link 1",
             "--second-angle absolute",
         ),
-        (Convention(base=True), "the second motor stands at the base", "--drive base"),
+        (Convention(base=True), "the second motor stands at the base", "--set drive=base"),
         (Convention(scale=(DEGREES, 1.0)), "θ1 is in degrees", "--set theta1.unit=deg"),
         (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in turns", "--set theta2.unit=rev"),
         (

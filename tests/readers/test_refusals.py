@@ -33,7 +33,7 @@ from tests.readers.mcaps import joint_state, write_mcap
 FLAGS = {
     "--joints": "joints",
     "--topic": "topic",
-    "--clock": "clock",
+    "--set clock": "clock",
     "--accept": "accept",
     "--zero": "zero",
 }
@@ -242,7 +242,9 @@ def flat(seconds: float) -> Callable[[Path], Path]:
     return make
 
 
-REFUSALS["header stamps that are none"] = Refusal(flat(1e300), "header stamp with", "--clock log")
+REFUSALS["header stamps that are none"] = Refusal(
+    flat(1e300), "header stamp with", "--set clock=log"
+)
 
 TAKEN = {"source": "position[a]", "topic": "/other"}
 WRONG: dict[str, tuple[Callable[[Path], Path], dict[str, Any], str]] = {

@@ -112,9 +112,9 @@ def test_a_file_of_two_runs_and_each_alone(tmp_path: Path) -> None:
         alone = read_log(path, Profile(segment=number))
         assert np.array_equal(alone.theta[0], theta1[own])
         assert alone.origin.reading.segment == number
-        assert len(inspect(path, segment=str(number)).notices) == 1
+        assert len(inspect(path, segment=number).notices) == 1
     with pytest.raises(
-        LogError, match=r"no segment 3: its time makes 2 runs; the last one: --segment 2"
+        LogError, match=r"no segment 3: its time makes 2 runs; the last one: --set segment=2"
     ):
         read_log(path, Profile(segment=3))
     with pytest.raises(SettingError, match=r"segment: expected greater than or equal to 1"):

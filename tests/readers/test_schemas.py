@@ -73,7 +73,7 @@ def test_seconds_that_are_no_time_late_in_json_are_refused(seconds: float, tmp_p
         tmp_path / "log.mcap",
         json_messages(log, row150={"header": {"stamp": {"sec": seconds, "nanosec": 0}}}),
     )
-    with pytest.raises(LogError, match=r"header stamp with .* --clock log"):
+    with pytest.raises(LogError, match=r"header stamp with .* --set clock=log"):
         read_log(tmp_path / "log.mcap")
     assert same(read_log(tmp_path / "log.mcap", Profile(clock="log")), log)
 

@@ -5,18 +5,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from algid.api.compare import labels_of as labels
-from algid.cli.compare import compare
-from algid.cli.report import report
 from algid.errors import SettingError
 from algid.results import read_result, result_json
-
-app = typer.Typer()
-app.command()(report)
-app.command()(compare)
+from tests.cli.commands import app
 
 
 @pytest.fixture
@@ -49,18 +43,11 @@ def test_json_is_the_result_alone(folder: Path) -> None:
     assert (folder.parent / "plotly.min.js").exists()
 
 
-def test_markdown_is_report_md(folder: Path) -> None:
-    out, _ = run("report", folder, "--format", "markdown")
-    assert out == (folder / "report.md").read_text(encoding="utf-8")
-
-
 def test_compare_tells_sigma_in_every_format(folder: Path) -> None:
     table, _ = run("compare", folder, folder / "result.json")
     assert "Every setting is the same, and every log was read the same way." in " ".join(
         table.split()
     )
-    text, _ = run("compare", folder, folder, "--format", "markdown")
-    assert "**Estimates side by side**" in text
     found = json.loads(run("compare", folder, folder, "--format", "json")[0])
     assert found["parameters"]["k1"]["sigma"] == [None, 0.0]
     assert found["settings"] == {}

@@ -83,22 +83,22 @@ SCHEDULE = (
             "nocase: no such case; expected case1, case2 or a .toml file that describes an arm",
         ),
         (
-            ["case1", "--initial", "0,0,0"],
-            "--initial: expected four numbers like -1.57,0,0,0, found '0,0,0'",
+            ["case1", "--set", "initial=0,0,0"],
+            "--set initial: expected four numbers like -1.57,0,0,0, found '0,0,0'",
         ),
         (
-            ["case1", "--initial", "0,0,0,inf"],
-            "--initial: expected four numbers like -1.57,0,0,0, found '0,0,0,inf'",
+            ["case1", "--set", "initial=0,0,0,inf"],
+            "--set initial: expected four numbers like -1.57,0,0,0, found '0,0,0,inf'",
         ),
         (
             ["case1", "--torque", "fast"],
             "--torque fast: expected case, wide, none or a log, found neither",
         ),
         (
-            ["case1", "--motion", "x", "--initial", "0,0,0,0"],
+            ["case1", "--motion", "x", "--set", "initial=0,0,0,0"],
             (
-                "--initial 0,0,0,0: a motion starts where it was planned and carries one payload; "
-                "leave it out"
+                "--set initial 0,0,0,0: a motion starts where it was planned and carries one "
+                "payload; leave it out"
             ),
         ),
         (["case1", "--motion", "x"], "x: not the trajectory of a design ("),

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
+from algid.api.answer import Answer
 from algid.api.given import parts_of
-from algid.api.ranges import check
+from algid.api.options import Folder, Force
+from algid.api.signature import check, keywords
+from algid.api.words import cases, excitations
 from algid.errors import SettingError
 from algid.files import refuse_existing
 from algid.limits import PHYSICAL
 from algid.log import Log
-from algid.options import flag
+from algid.options import Option, flag
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
@@ -27,7 +31,6 @@ if TYPE_CHECKING:
 
 FIRST_YEAR, LAST_YEAR = 1970, 2037
 """Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
-HOLDS, FORMATS = ("exact", "zoh", "foh"), ("mcap", "parquet", "csv")
 
 State = Sequence[float]
 Schedule = Sequence[tuple[float, float]]
@@ -58,96 +61,87 @@ def synthesise(
     progress: Progress | None = None,
 ) -> tuple[Log, Log]: ...
 @overload
-def synthesise(
-    case: str,
+def synthesise(case: str, *, payload_schedule: Schedule | str, **options: Any) -> tuple[Log]: ...
+def synthesise(  # type: ignore[misc]  # its options are the keywords of the other
+    case: Annotated[str, Option(complete=cases)],
     *,
-    duration: float | None = None,
-    rate: float = 1000.0,
-    excitation: str | Path | Log | None = None,
+    duration: Annotated[float, Option(range=PHYSICAL.duration)] | None = None,
+    rate: Annotated[float, Option(range=PHYSICAL.rate)] = 1000.0,
+    excitation: Annotated[
+        str | Path | Log, Option(kind=str, flags=("--torque",), complete=excitations)
+    ]
+    | None = None,
     motion: str | Path | None = None,
     torque_hold: Literal["exact", "zoh", "foh"] = "exact",
-    initial: State | str | None = None,
+    initial: Annotated[State | str, Option(kind=str)] | None = None,
     sensors: Sensors | None = None,
-    position_noise: float | None = None,
-    torque_noise: float | None = None,
-    encoder_bits: int | None = None,
-    jitter: float | None = None,
-    drop: float | None = None,
-    seed: int | None = None,
-    start_time: datetime | None = None,
-    payload_schedule: Schedule | str,
-    out: str | Path | None = None,
-    kind: Literal["mcap", "parquet", "csv"] = "mcap",
-    force: bool = False,
-    progress: Progress | None = None,
-) -> tuple[Log]: ...
-def synthesise(
-    case: str,
-    *,
-    duration: float | None = None,
-    rate: float = 1000.0,
-    excitation: str | Path | Log | None = None,
-    motion: str | Path | None = None,
-    torque_hold: Literal["exact", "zoh", "foh"] = "exact",
-    initial: State | str | None = None,
-    sensors: Sensors | None = None,
-    position_noise: float | None = None,
-    torque_noise: float | None = None,
-    encoder_bits: int | None = None,
-    jitter: float | None = None,
-    drop: float | None = None,
-    seed: int | None = None,
-    start_time: datetime | None = None,
-    payload_schedule: Schedule | str | None = None,
-    out: str | Path | None = None,
-    kind: Literal["mcap", "parquet", "csv"] = "mcap",
-    force: bool = False,
+    position_noise: Annotated[float, Option(range=PHYSICAL.noise)] | None = None,
+    torque_noise: Annotated[float, Option(range=PHYSICAL.noise)] | None = None,
+    encoder_bits: Annotated[int, Option(range=(4, 32))] | None = None,
+    jitter: Annotated[float, Option(range=PHYSICAL.noise)] | None = None,
+    drop: Annotated[float, Option(range=(0, 0.9))] | None = None,
+    seed: Annotated[int, Option(range=(0, 2**63))] | None = None,
+    start_time: Annotated[datetime | date | str, Option(kind=str)] | None = None,
+    payload_schedule: Annotated[Schedule | str, Option(kind=str)] | None = None,
+    out: Folder | None = None,
+    kind: Annotated[Literal["mcap", "parquet", "csv"], Option(flags=("--format",))] = "mcap",
+    force: Force = False,
     progress: Progress | None = None,
 ) -> tuple[Log, ...]:
-    """Logs of a simulated arm: unloaded and, if it has a payload, loaded.
+    """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
 
-    Or one of a changing payload.
+    Velocities are in the logs only where angles are exact: with noise or an encoder the arm
+    measures none. `example` writes four runs of a real-looking arm, one with a payload and their
+    profile, for the guide's examples.
 
     Parameters
     ----------
     case : str
-        Name of a case that ships with algid, or path of a TOML file that describes an arm.
-    duration, rate : float, s and Hz
-        1 s, or as long as the motion; 1000 Hz.
+        case1, case2, example, or a TOML file that describes an arm.
+    duration : float, s
+        Length of each log, s; 1, or as long as the motion.
+    rate : float, Hz
+        Samples a second, Hz; 1000 by default.
     excitation : 'case' (the default), 'wide', 'none', or a log whose torque is replayed
+        case, wide (0.3 to 8 Hz), none, or a log to replay.
     motion : path
-        Folder of a design: a controller follows its motion, instead of an excitation.
+        Folder of a design to follow, instead of a torque.
     torque_hold : 'exact', 'zoh' or 'foh'
-        Whether the drive holds or ramps the torque between samples.
+        Torque between samples: exact, zoh (held), foh (linear).
     initial : four float, rad and rad/s
-        The state θ1, θ2, ω1, ω2 to start from; hanging at rest by default.
+        The state θ1,θ2,ω1,ω2 to start from; hanging at rest by default.
     sensors : Sensors
         All that follows down to `seed` as one value; none by default.
-    position_noise, torque_noise, jitter : float, rad, N m and s
-        Standard deviations.
+    position_noise : float, rad
+        Noise of the angles, rad (standard deviation).
+    torque_noise : float, N m
+        Noise of the torques, N m (standard deviation).
     encoder_bits : int
-        Angles are rounded to 2π / 2^bits.
+        Round angles to 2π / 2^bits.
+    jitter : float, s
+        Jitter of the stamps, s (standard deviation).
     drop : float
         Share of samples lost at random.
     seed : int
-        Of noise, jitter and losses.
+        Seed of noise, jitter and losses.
     start_time : datetime
         When the log starts, UTC where it names no zone; stamps count from zero by default.
     payload_schedule : pairs of time in s and payload in kg
-        One log instead, its payload changing; bare before the first time.
+        One log, its payload changing: S=KG,…, like 2=0.05,4=0. Bare before the first time.
     out : Path
-        Folder to write the logs into; None writes nothing.
+        Folder to write into. None writes nothing.
     kind : 'mcap', 'parquet' or 'csv'
-        Format of what is written.
+        Format of the logs: mcap, parquet or csv.
     force : bool
-        Replace logs that are there.
+        Replace what is there.
     progress : callable
         Called as the simulation goes on.
 
     Returns
     -------
     tuple of Log
-        Each of them with its truth; of an arm without payload the first alone.
+        Each of them with its truth; of an arm without payload the first alone. The example's are
+        five, without their truth.
 
     Raises
     ------
@@ -158,25 +152,23 @@ def synthesise(
 
     Examples
     --------
+    $ algid synth case1 -o logs --position-noise 1e-3 --torque-noise 1e-2 --duration 10
+    --torque wide
+
     >>> import algid
     >>> unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide")
     >>> unloaded.theta.shape, loaded.origin.truth.payload
     ((2, 2001), 0.3515)
     """
-    given = {
-        "position_noise": position_noise,
-        "torque_noise": torque_noise,
-        "encoder_bits": encoder_bits,
-        "jitter": jitter,
-        "drop": drop,
-        "seed": seed,
-    }
-    check("synth", duration=duration, rate=rate, **given)
-    _among(flag("torque_hold"), torque_hold, HOLDS)
-    _among(flag("format"), kind, FORMATS)
+    own = locals()
+    check(synthesise, own)
+    if case == "example":
+        return _example(own)
+    sensed = ("position_noise", "torque_noise", "encoder_bits", "jitter", "drop", "seed")
+    given = {name: own[name] for name in sensed}
     described = load_case(case)
     wished = {name: value for name, value in given.items() if value is not None}
-    measured = replace(sensors or Sensors(), **wished)  # type: ignore[arg-type]
+    measured = replace(sensors or Sensors(), **wished)
     if start_time is not None:
         measured = replace(measured, start_ns=_start_ns(start_time))
     asked = _Asked(described, rate, duration, measured, _Files(out, kind, force), progress)
@@ -186,6 +178,31 @@ def synthesise(
     else:
         logs = _driven(asked, excitation, torque_hold, initial, payload_schedule)
     asked.files.write(logs)
+    return tuple(logs)
+
+
+def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
+    """The files."""
+    from algid.example import PROFILE
+
+    names = [f"{log.origin.path}.{given['kind']}" for log in logs]
+    if given["case"] == "example":
+        names = [*(f"{log.origin.path}.csv" for log in logs), PROFILE]
+    return Answer(lambda: [str(Path(given["out"]) / name) for name in names])
+
+
+def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
+    """The logs of `algid.example`, which are what they are."""
+    from algid.example import example_logs, write_example
+
+    for name, one in keywords(synthesise).items():
+        default = inspect.signature(synthesise).parameters[name].default
+        if name not in ("case", "out", "force") and given[name] not in (None, default):
+            typed = one.option.flags[-1] if one.option.flags else flag(name)
+            raise SettingError(f"{typed}: the example is always the same; leave it out")
+    logs = example_logs()
+    if given["out"] is not None:
+        write_example(given["out"], logs, given["force"])
     return tuple(logs)
 
 
@@ -304,13 +321,14 @@ def _driven(
     return list(logs)[: len(asked.roles)]
 
 
-def _among(flag: str, value: object, known: Sequence[str]) -> None:
-    if value not in known:
-        raise SettingError(f"{flag}: expected one of {', '.join(known)}, found {value!r:.60}")
-
-
-def _start_ns(start: datetime) -> int:
+def _start_ns(given: datetime | date | str) -> int:
     """A date in ns since 1970, in UTC where it names no zone."""
+    try:
+        start = datetime.fromisoformat(str(given))
+    except ValueError:
+        raise SettingError(
+            f"{flag('start_time')}: expected a date like 2026-01-31T12:00:00, found {given!r:.60}"
+        ) from None
     if not FIRST_YEAR <= start.year <= LAST_YEAR:
         span = f"from {FIRST_YEAR} to {LAST_YEAR}"
         raise SettingError(

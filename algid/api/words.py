@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-from algid.api.choices import CASES
+from algid.options import BY_SET
 
 Completion = Callable[[str], list[str]]
 
@@ -31,37 +31,44 @@ def refusing_checks() -> list[str]:
     return list(get_args(Check))
 
 
-def of_profile(setting: str, channel: str | None = None) -> Completion:
-    """Completes what a setting of a profile, or of one of its channels, may be."""
+def terms() -> list[str]:
+    """What ``--model`` may hold."""
+    from algid.model import CHOICES
 
-    def complete(incomplete: str) -> list[str]:
-        from algid.profile import Profile
-
-        model: Any = Profile if channel is None else Profile.model_fields[channel].annotation
-        known = _choices(model.model_fields[setting].annotation)
-        return [word for word in known if word.startswith(incomplete)]
-
-    return complete
+    return ["auto", "plain", *CHOICES]
 
 
-def settings_of_profile(incomplete: str) -> list[str]:
-    """Completes ``KEY=`` of a profile's line, and what may stand behind it."""
+def of_profile(setting: str) -> Completion | None:
+    """Completes what a setting of a profile may be; None where that is the user's own."""
+    from algid.profile import CHANNELS_OF, Profile
+
+    model: Any = Profile
+    if setting in CHANNELS_OF:
+        model = Profile.model_fields[CHANNELS_OF[setting][0]].annotation
+        setting = "unit"
+    known = _choices(model.model_fields[setting].annotation)
+    if not known:
+        return None
+    return lambda incomplete: [word for word in known if word.startswith(incomplete)]
+
+
+def set_lines(incomplete: str) -> list[str]:
+    """Completes ``KEY=`` of a profile's line or of a setting, and what may stand behind it."""
     from algid.profile import Profile
+    from algid.settings import Settings
 
     key, equals, value = incomplete.partition("=")
-    completions = []
-    for line, annotation in _lines(Profile):
-        if not equals and line.startswith(key):
-            completions.append(f"{line}=")
-        elif equals and line == key:
-            words = [word for word in _choices(annotation) if word.startswith(value)]
-            completions += [f"{key}={word}" for word in words]
-    return completions
+    lines = dict(_lines(Settings))
+    lines = {name: kind for name, kind in lines.items() if name in BY_SET} | dict(_lines(Profile))
+    if not equals:
+        return [f"{line}=" for line in lines if line.startswith(key)]
+    words = _choices(lines.get(key))
+    return [f"{key}={word}" for word in words if word.startswith(value)]
 
 
-def _lines(profile: Any) -> Iterator[tuple[str, Any]]:
-    """A profile's settings, those of channels by their dotted names, with their annotations."""
-    for name, field in profile.model_fields.items():
+def _lines(model: Any) -> Iterator[tuple[str, Any]]:
+    """A model's fields, those of channels by their dotted names, with their annotations."""
+    for name, field in model.model_fields.items():
         channel = getattr(field.annotation, "model_fields", None)
         if channel is None:
             yield name, field.annotation
@@ -82,8 +89,16 @@ def or_files(*known: str) -> Completion:
     return complete
 
 
+CASES = ("case1", "case2")
 cases = or_files(*CASES)
 """Completes the cases that algid knows, and files."""
+excitations = or_files("case", "wide", "none")
+COMPLETED: Mapping[str, Completion] = {
+    "model": listed(terms),
+    "accept": listed(refusing_checks),
+    "set": set_lines,
+}
+"""Settings that are text and take some words, beside those whose words a type states."""
 
 
 def _choices(annotation: Any) -> list[str]:

@@ -1,0 +1,50 @@
+"""What a command shows of what its verb gives, and how it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from algid.exits import Exit
+
+if TYPE_CHECKING:
+    from algid.report.document import Document, Table
+
+
+def _nothing() -> Iterable[str]:
+    return ()
+
+
+class Manual(str):
+    """Markdown, which a terminal shows as such."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is printed, and the exit code.
+
+    Parameters
+    ----------
+    shown : callable
+        Gives documents, tables and lines for standard output.
+    json : callable, or None
+        Gives the same as the text of a JSON file.
+    remarks : sequence of str
+        Lines for standard error.
+    complaints : sequence of str
+        Lines for standard error that say what is wrong.
+    exit : Exit
+    brief : callable, or None
+        Gives the lines that are printed where the whole is not asked for.
+    details : sequence of str
+        Lines for standard error where the whole is asked for.
+    """
+
+    shown: Callable[[], Iterable[Document | Table | str]] = _nothing
+    json: Callable[[], str] | None = None
+    remarks: Sequence[str] = ()
+    complaints: Sequence[str] = ()
+    exit: Exit = Exit.OK
+    brief: Callable[[], Iterable[str]] | None = None
+    details: Callable[[], Iterable[str]] = _nothing

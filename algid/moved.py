@@ -1,0 +1,48 @@
+"""What version 0.2 had under another name, and what to do instead: commands, flags, keywords.
+
+A flag that became a setting behind ``--set`` is not listed: `algid.options.BY_SET` names it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from algid.errors import SettingError
+from algid.options import BY_SET, flag
+
+MOVED: Mapping[str, str] = {
+    # commands
+    "algid example": "algid synth example",
+    "algid check": "algid validate RESULT --max-error 0.5",
+    "algid fleet": "algid report BATCH",
+    "algid profile": "algid inspect LOG --write-profile algid.toml",
+    # flags
+    "--report": "leave it out: pages are written by default",
+    "--against": "--max-error paper, or --max-error PERCENT",
+    "--tolerance-file": "--max-error FILE.toml",
+    "--format=markdown": "--format json, or read report.md",
+    "--to=yaml": "--to payload",
+    "--save-plots": "the figure's own button saves it as SVG",
+    "--plot-format": "the figure's own button saves it as SVG",
+}
+"""By the old name what stands in its place."""
+
+
+def refuse_moved(arguments: Sequence[str]) -> None:
+    """Refuse a call that uses a name of version 0.2.
+
+    Raises
+    ------
+    SettingError
+        If the command, or a flag, has moved: it says what to do instead.
+    """
+    words = [word.partition("=")[0] for word in arguments if word.startswith("--")]
+    names = [f"algid {arguments[0]}" if arguments else "", *words]
+    spaced = " ".join(arguments).replace("=", " ")
+    names += [name for name in MOVED if "=" in name and name.replace("=", " ") in spaced]
+    for name in names:
+        setting = name.removeprefix("--").replace("-", "_")
+        if name in MOVED:
+            raise SettingError(f"{name} is not in this version; instead: {MOVED[name]}")
+        if name.startswith("--") and setting in BY_SET:
+            raise SettingError(f"{name} is not in this version; instead: {flag(setting)}=VALUE")
