@@ -275,7 +275,7 @@ class Log:
         step = median(np.diff(times))
         if step > SLOWEST:
             numbers = {"column": "t", "unit": "s", "rate": 1 / step}
-            notices = (Notice("SLOW_CLOCK", numbers=numbers),)
+            notices = (Notice("OTHER_UNIT", numbers={"case": "slow time"} | numbers),)
         log = cls(
             stamp_ns=np.round(times * 1e9).astype(np.int64),
             theta=_two_rows(name, "theta", theta, times.size),

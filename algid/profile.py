@@ -41,8 +41,6 @@ Effort = Literal[
 """As `algid.physics.effort.Effort`, of which a profile knows the words alone."""
 Check = Literal[
     "EFFORT_ZERO",
-    "EFFORT_DENORMAL",
-    "EFFORT_CONSTANT",
     "WRAPPED_ANGLE",
     "DEGREES",
     "LOST_SAMPLES",

@@ -152,7 +152,6 @@ class Settings(BaseModel):
         SettingError
             As for a new one.
         """
-        content = _without_short_forms(content)
         return cls(**{name: content[name] for name in cls.model_fields if name in content})
 
     def but(self, **changes: Any) -> Settings:
@@ -262,26 +261,3 @@ def _refusal(error: ValidationError) -> SettingError:
         found = reprlib.repr(error.errors()[0]["input"])
         why = f"expected a number from {ends['ge']:g} to {ends['le']:g}, found {found}"
     return SettingError(f"{flag(name)}: {why}")
-
-
-_SHORT_FORMS = {
-    ("friction", "coulomb"): "coulomb",
-    ("torque_offset", True): "offset",
-    ("rotor_inertia", True): "rotor",
-    ("delay", "estimate"): "delay",
-}
-"""Settings of results before schema 3 that stood for a term of the model."""
-
-
-def _without_short_forms(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of a result, where `model` alone names the terms."""
-    short = [term for (name, value), term in _SHORT_FORMS.items() if content.get(name) == value]
-    if not short:
-        return dict(content)
-    model, delay = content.get("model", "auto"), content.get("delay", 0.0)
-    terms = []
-    if model not in ("auto", "plain"):
-        terms = [name.strip() for name in str(model).split(",")]
-    if delay == "estimate":
-        delay = 0.0
-    return dict(content) | {"model": ",".join(dict.fromkeys(terms + short)), "delay": delay}

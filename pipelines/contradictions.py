@@ -5,7 +5,7 @@
 Each set is some runs of one build of a real arm, with joint 2's torque multiplied by a factor. One
 half of the sets is drawn from the ten runs of C.1, one from the nine of A.0. "Named" are those with
 JOINTS_CONTRADICT, which leaves k1 … k5 without an error bar (exit 3); "gain" those with
-UNLIKE_GAINS instead; "silent" those of which a smaller factor was remarked on and this one is not.
+TORQUE_GAIN instead; "silent" those of which a smaller factor was remarked on and this one is not.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 from pipelines.run_to_run import BUILDS, runs
 
 FACTORS = (1.0, 1.1, 1.2, 1.3, 1.41, 1.7, 2.0, 0.71)
-REMARKS = ("JOINTS_CONTRADICT", "UNLIKE_GAINS")
+REMARKS = ("JOINTS_CONTRADICT", "TORQUE_GAIN")
 
 
 def remarks(folder: Path, build: str, places: Sequence[int], factor: float) -> set[str]:
@@ -62,7 +62,7 @@ def main() -> None:
             job = partial(remarks, given.folder, factor=factor)
             found = list(pool.map(job, *zip(*sets, strict=True)))
             named = sum("JOINTS_CONTRADICT" in one for one in found)
-            gain = sum("UNLIKE_GAINS" in one for one in found)
+            gain = sum("TORQUE_GAIN" in one for one in found)
             silent = sum(old and not one for old, one in zip(before, found, strict=True))
             if factor > 1:
                 before = [old or bool(one) for old, one in zip(before, found, strict=True)]

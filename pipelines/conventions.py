@@ -89,7 +89,7 @@ def _turned(theta: FloatArray, tau: FloatArray) -> Pair:
 SPOILED: dict[str, tuple[Spoil, str]] = {
     "zero of θ1 off by 40°": (_turned, "PHASES"),
     "5 % of the samples lost, time renumbered": (_without_five_percent, "LOST_SAMPLES"),
-    "τ2 dead for 1 s": (_dead_for_a_second, "DEAD_EFFORT"),
+    "τ2 dead for 1 s": (_dead_for_a_second, "SENSOR_FAULT"),
 }
 """What installation, sensors and recorders do to a log, and the code that tells it."""
 EXCHANGED = "loaded and unloaded exchanged"
@@ -210,9 +210,9 @@ def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
         for kind in (True, False)
     )
     result = identify(loaded, unloaded, report=False)
-    passed = _noticed(result, "EXCHANGED_LOGS", k)
+    passed = _noticed(result, "LOGS_APART", k)
     far, level = f"{furthest(result, k):.3g}", GRADE_WORDS[result.verdict.grade]
-    return _line(EXCHANGED, arm, friction, far, level, "EXCHANGED_LOGS", passed)
+    return _line(EXCHANGED, arm, friction, far, level, "LOGS_APART", passed)
 
 
 def lines_of(arm: str) -> list[tuple[str, bool]]:

@@ -25,8 +25,8 @@ from pipelines.experiment import experiment
 from pipelines.planar import ARMS, Row, motions, noisy, scene
 
 NAMES = {
-    "gravity-compensated": ("WEIGHT_OF_PAYLOAD", "GRAVITY_COMPENSATED"),
-    "friction-compensated": ("NO_FRICTION",),
+    "gravity-compensated": ("GRAVITY_COMPENSATED", "GRAVITY_COMPENSATED"),
+    "friction-compensated": ("FRICTION_COMPENSATED",),
     "external": ("EXTERNAL_EFFORT",),
     "raw": (),
 }

@@ -46,15 +46,14 @@ NOISE = (1e-4, 1e-2)  # rad
 TORQUE_NOISE = 0.01  # of each torque's RMS
 COULOMB, WIDTH = 0.05, 0.02  # of each torque's largest; rad/s
 TRUE = (
-    "JITTER",
+    "UNEVEN_STAMPS",
     "GAPS",
-    "NEAR_STAMPS",
     "SLOW_SAMPLING",
     "WIDE_INTERVAL",
     "NOT_SIGNIFICANT",
     "NOT_IDENTIFIABLE",
     "OPEN_DIRECTION",
-    "REFINED_FAILED",
+    "REFUTED",
 )
 """Reasons that are true of these logs: of their stamps, and of what noise leaves open.
 

@@ -207,7 +207,7 @@ def outcome(path: Path, log: Log | None, rows: int = 0) -> tuple[str, str]:
     if log is None:
         if path.suffix == ".jsonl":  # where nothing tells of lines that are gone
             rows = sum(1 for line in path.read_bytes().split(b"\n") if line.strip())
-        twice = [one for one in found.notices if one.code == "DUPLICATE_STAMPS"]
+        twice = [one for one in found.notices if one.code == "UNEVEN_STAMPS"]
         kept = len(found) + sum(int(one.text.split()[0].replace(",", "")) for one in twice)
         lost = kept < rows and not any(notice.lossy for notice in found.notices)
         return ("silent", f"{len(found)} samples of {rows}") if lost else ("read", "")

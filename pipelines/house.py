@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from algid.notices import MESSAGES
+from algid.notices import messages
 
 BUDGETS = {
     "input, output, batches": (57_000, 50),
@@ -156,7 +156,7 @@ def main() -> None:
     commands, options = commands_and_options()
     for name, count, allowed in (
         *((idea, count, 1) for idea, count in ideas()),
-        ("codes of notices", len(MESSAGES), 70),
+        ("codes of notices", len(messages()), 70),
         ("commands", commands, 12),
         ("options", options, 60),
     ):

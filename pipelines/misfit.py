@@ -2,7 +2,7 @@
 
 Each row is an error of the drive, in a share of the torque's RMS, unlogged, on logs of two arms
 under a wide torque, by sensors with white noise; the motors overcome Coulomb friction too. It gives
-how many results say that the model lacks something (MISFIT or REFUTED), how many are Good, how many
+how many results say that the model lacks something (REFUTED), how many are Good, how many
 95 % intervals of k1 … k5 hold the truth, of all and of those that are Good, and the largest
 distance of a Good one in standard deviations. The first row has no error: what it says is a false
 alarm. Errors that the score test has no shape for are among them.
@@ -113,7 +113,7 @@ def judged(job: tuple[str, str, float, int]) -> Counter[str]:
         result = identify(log_of(name, error, share, seed), report=False)
         codes = {notice.code for notice in result.notices}
         good = result.verdict.grade == "good"
-        total.update(draws=1, said=bool(codes & {"MISFIT", "REFUTED"}), good=good)
+        total.update(draws=1, said=bool(codes & {"REFUTED"}), good=good)
         for number in range(5):
             one = result.parameters[f"k{number + 1}"]
             if not one.usable or one.estimate is None or not one.std or one.ci95 is None:

@@ -18,7 +18,7 @@ import pytest
 import algid
 from algid.errors import LogError, OutputError, ResultError, SettingError
 from algid.log import ChannelReading, Reading
-from algid.results import Result, Status, write_result
+from algid.results import Result, write_result
 from tests.report.folders import build
 
 
@@ -116,27 +116,24 @@ def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path
     assert len(str(hostile).splitlines()) == len(lines)
 
 
-def test_a_result_of_the_first_schema_is_still_read(tmp_path: Path) -> None:
-    """The file as version 1 wrote it: without what later versions added, its warnings sentences."""
+def test_a_result_of_schema_3_is_still_read(tmp_path: Path) -> None:
+    """Its notices have the codes of now, with the texts that they had."""
     build(tmp_path / "a.algid", duration=1.0)
     file = tmp_path / "a.algid" / "result.json"
     content = json.loads(file.read_text(encoding="utf-8"))
-    content["schema_version"] = 1
-    for name in ("profile", "notices", "verdict"):
-        del content[name]
-    content |= {"warnings": ["arm.csv: JITTER: stamps jitter"], "notes": ["cut"]}
-    del content["log"]["reading"]
-    del content["fit"]["endogeneity"]
+    content["schema_version"] = 3
+    one = {"text": "stamps jitter", "lossy": False, "note": False, "refuse": False}
+    rest: dict[str, Any] = {"numbers": {}, "remedies": [], "logs": ["arm.csv"]}
+    content["notices"] = [{"code": "UNEVEN_STAMPS"} | one | rest]
     file.write_text(json.dumps(content), encoding="utf-8")
     old: Result = algid.read_result(file)
-    assert old.schema_version == 3
-    assert old.log.reading is None
-    assert [(one.code, one.text, one.note) for one in old.notices] == [
-        ("EARLIER", "arm.csv: JITTER: stamps jitter", False),
-        ("EARLIER", "cut", True),
+    assert [(notice.key, notice.text) for notice in old.notices] == [
+        ("UNEVEN_STAMPS:", "stamps jitter")
     ]
-    assert old.verdict.grade == "reservations"
-    assert old.parameters["k1"].status is Status.OK
+    content["schema_version"] = 2
+    file.write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(ResultError, match="expected 3 or 4, found 2; identify again"):
+        algid.read_result(file)
 
 
 READING = Reading(
@@ -417,7 +414,7 @@ def test_rows_of_a_frame_that_lack_a_value_go_with_a_notice(
     torque = [None if row == 7 else value for row, value in enumerate(columns["tau2"].tolist())]
     log = algid.read_log(made(columns | {"tau2": torque}))
     assert len(log) == 2000
-    assert "EMPTY_CELLS" in [notice.code for notice in log.notices]
+    assert "NOT_FINITE" in [notice.code for notice in log.notices]
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,12 @@ import pytest
 
 import algid
 from algid.notices import (
-    MESSAGES,
     Notice,
     Remedy,
-    from_flags,
+    code_of_now,
     merged,
+    message,
+    messages,
 )
 from algid.profile import Profile, with_settings
 from algid.results.verdict import CAUSES
@@ -71,10 +72,26 @@ def test_what_only_the_user_knows_is_left_open() -> None:
 
 
 def test_every_cause_has_its_text() -> None:
-    # these bring their words
-    assert set(CAUSES) - set(MESSAGES) == {
-        "EARLIER_CAUSE",
-    }
+    for cause in CAUSES:
+        code, _, case = cause.partition(":")
+        text = message(code).text
+        assert text if not case else case in text
+
+
+def test_every_code_of_an_earlier_version_has_one_of_now() -> None:
+    earlier = [old for one in messages() for old in one.was]
+    assert len(set(earlier)) == len(earlier)
+    assert not set(earlier) & {one.code for one in messages()}
+    assert code_of_now("CUT_OFF") == "CUT_OFF"
+    assert code_of_now("CUT_OFF") == "CUT_OFF"
+
+
+def test_every_entry_is_whole() -> None:
+    """A code has a cause; its notes and losses name cases that it has."""
+    for one in messages():
+        assert one.cause, one.code
+        for cases in (one.note, one.lossy):
+            assert isinstance(cases, bool) or set(cases) <= set(one.text), one.code
 
 
 def test_numbers_agree_with_their_nouns() -> None:
@@ -92,23 +109,16 @@ def test_numbers_agree_with_their_nouns() -> None:
 
 
 def test_equal_notices_of_several_logs_become_one_and_each_loss_stays() -> None:
-    jitter = [Notice("JITTER", f"by {place} ms", logs=(f"{place}.csv",)) for place in range(5)]
+    jitter = [
+        Notice("UNEVEN_STAMPS", f"by {place} ms", logs=(f"{place}.csv",)) for place in range(5)
+    ]
     lost = [
         Notice("NOT_FINITE", f"{place} samples", lossy=True, logs=("0.csv",)) for place in range(2)
     ]
     found = merged([*jitter, *lost])
-    assert [one.code for one in found] == ["JITTER", "NOT_FINITE", "NOT_FINITE"]
+    assert [one.code for one in found] == ["UNEVEN_STAMPS", "NOT_FINITE", "NOT_FINITE"]
     assert found[0].logs == ("0.csv", "1.csv", "2.csv", "3.csv", "4.csv")
     assert found[0].sentence == "0.csv and 4 more: by 0 ms"
-
-
-def test_flags_of_an_earlier_schema_become_settings() -> None:
-    flags = ["--zero", "hanging", "--set", "tau1.sign=-1", "--second-angle", "absolute"]
-    assert from_flags(flags).settings == {
-        "zero": "hanging",
-        "tau1.sign": -1,
-        "second_angle": "absolute",
-    }
 
 
 def test_a_notice_is_plain_data() -> None:
@@ -125,12 +135,12 @@ def test_a_notice_is_plain_data() -> None:
     [
         ("CUT_OFF", {"case": "end"}, "the file breaks off behind its last whole record"),
         (
-            "DAMAGED_CHUNK",
+            "DAMAGED",
             {"case": "row", "count": 1, "why": "zeros", "missing": 0},
             "1 damaged row left out; the first: zeros",
         ),
         (
-            "DAMAGED_CHUNK",
+            "DAMAGED",
             {"case": "chunk", "count": 2, "why": "zeros", "missing": 1200},
             "2 damaged chunks left out; the first: zeros; 1,200 messages are missing",
         ),
@@ -146,7 +156,7 @@ def test_a_notice_is_plain_data() -> None:
         ),
         (
             "GAPS",
-            {"count": 1, "seconds": 2.0, "accepted": True, "looked_at": 30},
+            {"case": "gaps", "count": 1, "seconds": 2.0, "accepted": True, "looked_at": 30},
             (
                 "1 gap, the longest 2 s; no window spans one (accepted by --accept) "
                 "(in its first 30 s)"
@@ -166,13 +176,12 @@ def test_an_unknown_case_is_refused() -> None:
 
 
 def test_every_notice_of_the_code_is_made_of_numbers() -> None:
-    """Notices with a text of their own stand where results of earlier schemas are read alone."""
     own = []
     for path in sorted(Path(algid.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Notice":
                 own += [ast.literal_eval(node.args[0])] if len(node.args) > 1 else []
-    assert set(own) == {"EARLIER", "EARLIER_CAUSE"}
+    assert own == []
 
 
 ASSERTED = {
@@ -183,7 +192,6 @@ ASSERTED = {
     ("inspection/conventions.py", ""),  # found by the search, or tried
     ("readers/convert.py", ""),  # all the user's own
     ("results/verdict.py", ""),  # the call as it was
-    ("notices.py", ""),  # as an earlier result has it
 }
 """By module the settings of remedies that name no case which they are for."""
 

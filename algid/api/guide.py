@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from algid.api.answer import Answer, Manual
 from algid.errors import SettingError
 from algid.exits import rows
+from algid.notices import Message, code_of_now, message, messages
 from algid.options import BY_SET, Option, flag
 
 FIRST = ("start", "lab", "arm", "logs", "motion", "report", "warnings")
@@ -36,7 +37,7 @@ def guide(topic: Annotated[str, Option(complete=_begun)] | None = None) -> str:
     Parameters
     ----------
     topic : str
-        One of the topics; the list of them without.
+        One of the topics, or the code of a message; the list of topics without.
 
     Returns
     -------
@@ -46,7 +47,7 @@ def guide(topic: Annotated[str, Option(complete=_begun)] | None = None) -> str:
     Raises
     ------
     SettingError
-        If there is no such topic.
+        If it is neither.
 
     Examples
     --------
@@ -55,9 +56,15 @@ def guide(topic: Annotated[str, Option(complete=_begun)] | None = None) -> str:
     if topic is None:
         table = "".join(f"| `algid guide {name}` | {words} |\n" for name, words in topics().items())
         return f"# The guide\n\n| | |\n|---|---|\n{table}"
-    if topic not in topics():
-        raise SettingError(f"guide: expected one of {', '.join(topics())}, found {topic!r:.60}")
-    return text_of(topic)
+    if topic in topics():
+        return text_of(topic)
+    try:
+        return _entry(message(code_of_now(topic.upper())), "#")
+    except KeyError:
+        known = ", ".join(topics())
+        raise SettingError(
+            f"guide: expected one of {known}, or a message's code; found {topic!r:.60}"
+        ) from None
 
 
 def answer(text: str, _given: Mapping[str, Any]) -> Answer:
@@ -71,6 +78,25 @@ def text_of(topic: str) -> str:
     for mark, table in TABLES.items():
         if mark in text:
             text = text.replace(mark, _markdown(*table()))
+    return text.replace("<!-- messages -->", "\n".join(_messages()))
+
+
+def _messages() -> Iterator[str]:
+    """The entries of all codes, under the headings of their groups."""
+    for one in messages():
+        if one.group:
+            yield f"## {one.group}\n"
+        yield _entry(one, "###")
+
+
+def _entry(one: Message, mark: str) -> str:
+    """Markdown of what `messages.toml` says of a code."""
+    lossy = "*Lossy.* " if one.lossy is True and "*Lossy.*" not in one.cause else ""
+    text = f"{mark} {one.code}\n\n{lossy}{one.cause}\n"
+    if one.do:
+        text += f"\n**Do:** {one.do}\n"
+    if one.was:
+        text += f"\nBefore 0.3: {', '.join(one.was)}.\n"
     return text
 
 

@@ -241,7 +241,7 @@ def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
     if planned == model.terms:
         return model, ()
     titles = [TERMS[term].title for term in outside(model.terms, planned)]
-    left = Notice("TERMS_LEFT_OUT", numbers={"terms": titles})
+    left = Notice("NOT_REACHED", numbers={"case": "terms", "terms": titles})
     return replace(model, terms=planned), (left,)
 
 

@@ -155,10 +155,12 @@ def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
     reasons = []
     if design.open_parameters:
         numbers = {"names": list(design.open_parameters)}
-        reasons.append(Notice("NOT_REACHED", numbers=numbers, remedies=_WIDER))
+        reasons.append(
+            Notice("NOT_REACHED", numbers={"case": "parameters"} | numbers, remedies=_WIDER)
+        )
     reasons += doubts
     if design.interrupted:
-        reasons.append(Notice("BROKEN_OFF"))
+        reasons.append(Notice("NOT_REACHED", numbers={"case": "stopped"}))
     return graded(_headline(design), reasons)
 
 

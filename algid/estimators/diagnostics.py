@@ -227,8 +227,10 @@ def constrained(fit: Fit) -> Fit:
         moved = replace(fit, values=fit.values + scale * x)
         disobeyed = broken_bounds(moved)
         if not disobeyed:
-            return moved.noted(Notice("CONSTRAINED", numbers={"bounds": _named(enforced)}))
-    note = Notice("NOT_FEASIBLE", numbers={"bounds": _named(disobeyed)})
+            return moved.noted(
+                Notice("BROKEN_BOUND", numbers={"case": "active", "bounds": _named(enforced)})
+            )
+    note = Notice("BROKEN_BOUND", numbers={"case": "infeasible", "bounds": _named(disobeyed)})
     after: dict[str, Status] = {"OK": "NOT_CONVERGED"}
     status = tuple(after.get(word, "NOT_IDENTIFIABLE") for word in fit.status)
     return replace(fit, converged=False, status=status).noted(note)

@@ -83,7 +83,7 @@ def doubted_without_motor(
         for joint in range(2):
             acting = float(np.diag(gram[joint])[:-1] @ c**2)
             if power[joint] == 0 and acting < LEAST_ACTING**2 * float(power[1 - joint]):
-                note = Notice("MOTORLESS_UNTOLD", numbers={"joint": joint + 1})
+                note = Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": joint + 1})
                 return fit.marked("WEAK_EXCITATION", RIGID).noted(note)
     return fit
 
@@ -103,7 +103,7 @@ def _doubt(
     few = len(fit.logs) < FEWEST_LOGS
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if few and still:
-        return Notice("JOINT_STILL", numbers={"joints": still})
+        return Notice("HARDLY_DRIVEN", numbers={"case": "still", "joints": still})
     settings = _delayed(fit, settings)
     for kind, sources in ((False, unloaded), (True, loaded)):
         normals = weak.normals_of(sources, settings)
@@ -120,7 +120,10 @@ def _doubt(
             return Notice("JOINTS_CONTRADICT", numbers=numbers)
         hardly = _hardly_driven(normals)
         if few and hardly and not _confirmed(fit, hardly, kind, sources, settings):
-            return Notice("HARDLY_DRIVEN", numbers={"joint": hardly, "percent": 100 * MOTORLESS})
+            return Notice(
+                "HARDLY_DRIVEN",
+                numbers={"case": "torque", "joint": hardly, "percent": 100 * MOTORLESS},
+            )
     return None
 
 

@@ -110,10 +110,8 @@ def settled(
         return fit
     if following is None and tests.answers:
         return fit.noted(feedback(tests.silent))
-    code = "REFERENCE_STANDS"
-    if following is None:
-        code = "INSTRUMENTS_STAND"
-    note = Notice(code, numbers={"distance": tests.moved}, note=True)
+    case = "torque" if following is None else "reference"
+    note = Notice("INSTRUMENTS", numbers={"case": case, "distance": tests.moved})
     return replace(corrected, endogeneity=tests.distance, notes=fit.notes).noted(note)
 
 

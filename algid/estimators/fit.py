@@ -182,12 +182,12 @@ class Fit:
 
         It rejected its likelihood, or did not converge.
         """
-        return has_code(self.notes, "REFUTED", "MISFIT", "SLOW_SAMPLING", "REFINED_FAILED")
+        return has_code(self.notes, "REFUTED", "SLOW_SAMPLING:turn")
 
     @property
     def beyond_errors(self) -> bool:
         """Whether bounds of physics are broken by what the error bars leave out: see `doubt`."""
-        return has_code(self.notes, "BOUNDS_DOUBTED")
+        return has_code(self.notes, "HARDLY_DRIVEN:bounds")
 
     def noted(self, note: Notice) -> Fit:
         """The fit with one more thing to say of it."""

@@ -132,7 +132,7 @@ def widened_by_integration(fit: Fit, imprints: Sequence[Imprint], prior: Prior |
     if factor < _FELT:
         return fit
     numbers = {"samples": largest, "factor": factor}
-    return fit.noted(Notice("INTEGRATION", numbers=numbers, note=True))
+    return fit.noted(Notice("SLOW_SAMPLING", numbers={"case": "integration"} | numbers))
 
 
 def _shifted(fit: Fit) -> bool:

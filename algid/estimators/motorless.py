@@ -61,7 +61,7 @@ def by_instruments(
     checked = doubted_without_motor(better, unloaded, (), settings)
     if checked is not better:
         return None
-    return better.noted(Notice("MOTORLESS_INSTRUMENTS", note=True))
+    return better.noted(Notice("INSTRUMENTS", numbers={"case": "passive"}))
 
 
 def _equally_weighted(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:

@@ -116,7 +116,7 @@ def fit(
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
         return start.noted(Notice("SLOW_SAMPLING", numbers=numbers))
-    refuted = start.noted(Notice("REFUTED", numbers={"kept": start.estimator}))
+    refuted = start.noted(Notice("REFUTED", numbers={"case": "noise", "kept": start.estimator}))
     try:
         if len(logs) >= _MANY:
             steps = _refuted_alone(shared, logs[0], start.values, anchored)
@@ -136,7 +136,9 @@ def fit(
     except np.linalg.LinAlgError:
         settled, iterations = False, 0
     if not settled:
-        failed = start.noted(Notice("REFINED_FAILED", numbers={"kept": start.estimator}))
+        failed = start.noted(
+            Notice("REFUTED", numbers={"case": "not converged", "kept": start.estimator})
+        )
         return replace(failed, iterations=iterations)
     deviance = sum(outcome.deviance for outcome in outcomes)
     whiteness = judge(reduce(add, [outcome.innovations for outcome in outcomes]))
@@ -162,7 +164,7 @@ def fit(
         some = evenly_spread(logs, _MOST_TESTED)
         lacking = misfit(fitted, _imprints(fitted, some, columns), prior)
         if lacking.significant:
-            note = Notice("MISFIT", numbers={"kept": start.estimator})
+            note = Notice("REFUTED", numbers={"case": "motion", "kept": start.estimator})
             refuted = start.noted(note)
             return replace(refuted, misfit=lacking, iterations=iterations, deviance=deviance)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.

@@ -217,7 +217,10 @@ class History:
         apart = (dated["first"].shift(-1) > dated["last"]).head(-1).all() if len(dated) else False
         if self.robots < MANY or 2 * few <= self.robots or not (apart or not len(dated)):
             return None
-        return Notice("SCATTERED", numbers={"few": few, "robots": self.robots, "logs": FEW})
+        return Notice(
+            "NOT_TESTED",
+            numbers={"case": "sessions", "few": few, "robots": self.robots, "logs": FEW},
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""

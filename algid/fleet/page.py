@@ -112,7 +112,9 @@ def _drifting(history: History) -> Notice:
     rest = history.drifts.height - len(shown)
     if rest:
         names.append(f"{rest} more")
-    return Notice("DRIFTS", numbers={"count": history.drifts.height, "names": names})
+    return Notice(
+        "FLEET_CHANGE", numbers={"case": "drift", "count": history.drifts.height, "names": names}
+    )
 
 
 def _standing_out(history: History) -> Notice:
@@ -126,7 +128,7 @@ def _standing_out(history: History) -> Notice:
     rest = worst.height - len(names)
     if rest:
         names.append(f"{rest} more")
-    return Notice("STAND_OUT", numbers={"count": worst.height, "names": names})
+    return Notice("FLEET_CHANGE", numbers={"case": "log", "count": worst.height, "names": names})
 
 
 def _changed(changes: pl.DataFrame) -> Notice:
@@ -140,4 +142,4 @@ def _changed(changes: pl.DataFrame) -> Notice:
         "percent": 100 * row["share"],
         "count": count if count > 1 else 0,
     }
-    return Notice("CHANGED", numbers=numbers)
+    return Notice("FLEET_CHANGE", numbers={"case": "step"} | numbers)

@@ -25,7 +25,6 @@ from algid.identification.survey import Survey
 from algid.methods import estimator_of
 from algid.model import DELAYS, TERMS, Model
 from algid.names import within
-from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.runtime import Worker
 from algid.settings import Settings
@@ -241,7 +240,7 @@ def _shrunk(
         return shrunk.fit(unloaded, loaded, replace(shaped, model=model), settings.lengths, known)
 
     fit = load_scatter.widened(fit, refit, least)
-    notes = refuted.notes + (Notice("SHRUNK_TERMS", note=True),) + fit.notes
+    notes = refuted.notes + fit.notes
     fit = replace(fit, notes=notes)
     terms = fit.shared.model.terms
     if fit.shared.delay:

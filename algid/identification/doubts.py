@@ -69,7 +69,7 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
         lawful = constrained(fit)
         if not lawful.converged or _explains_little(lawful, survey, settings):
             return fit
-        doubt = Notice("BOUNDS_DOUBTED", numbers={"bounds": far})
+        doubt = Notice("HARDLY_DRIVEN", numbers={"case": "bounds", "bounds": far})
         return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
     unloaded, loaded = passes(survey, settings)
     common = replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))

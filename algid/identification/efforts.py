@@ -53,20 +53,24 @@ def of_effort(fit: Fit, shown: Settings, asked: Settings) -> list[Notice]:
     """Notices of the effort that the logs of `fit` show, in `shown`, where none was `asked` for."""
     notices = []
     if shown.gravity != asked.gravity:
-        notices.append(Notice("PAYLOAD_WEIGHTLESS", note=True))
+        notices.append(Notice("GRAVITY_COMPENSATED", numbers={"case": "payload"}))
     if asked.effort is not None:
         return notices
     flag = Remedy({"effort": "gravity-compensated"}, "for such a driver")
     if shown.effort is not None and fit.shared.payload and shown.gravity > 0:
-        notices.append(Notice("WEIGHT_OF_PAYLOAD", remedies=(flag,), note=True))
+        notices.append(
+            Notice("GRAVITY_COMPENSATED", numbers={"case": "arm alone"}, remedies=(flag,))
+        )
     elif shown.effort is not None:
         level = Remedy({"gravity": 0}, "for a horizontal plane")
-        notices.append(Notice("GRAVITY_COMPENSATED", remedies=(flag, level)))
+        notices.append(
+            Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}, remedies=(flag, level))
+        )
     elif _external(fit):
         notices.append(Notice("EXTERNAL_EFFORT", remedies=(Remedy({"effort": "external"}),)))
     elif _without_friction(fit):
         compensated = Remedy({"effort": "friction-compensated"}, "for such a driver")
-        notices.append(Notice("NO_FRICTION", remedies=(compensated,), note=True))
+        notices.append(Notice("FRICTION_COMPENSATED", remedies=(compensated,)))
     return notices
 
 

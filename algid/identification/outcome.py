@@ -81,7 +81,7 @@ def outcome_of(
     summary = fit_summary(fit, predictions, survey, settings, chosen)
     notices = list(fit_warnings(fit, torque_unit(survey.logs)))
     if settings.cross_validate and summary.cross_validation is None:
-        notices.append(Notice("NO_CROSS_VALIDATION"))
+        notices.append(Notice("SHORT_LOG", numbers={"case": "validation"}))
     outcome = Identified(
         parameters=parameters,
         loaded=combined,

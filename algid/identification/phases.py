@@ -43,8 +43,8 @@ def phase_note(fit: Fit) -> Notice | None:
         first, of_first = whole - second, of_whole - of_second
         numbers["first"] = _in_degrees(fit, first, of_first)
         numbers["load"] = _in_degrees(fit, load - first, of_load - of_first)
-        return Notice("PHASES", numbers=numbers, note=True)
-    return Notice("PHASE", numbers=numbers, note=True)
+        return Notice("PHASES", numbers={"case": "gravity"} | numbers)
+    return Notice("PHASES", numbers={"case": "no gravity"} | numbers)
 
 
 LEAST_TURN = np.radians(20.0)

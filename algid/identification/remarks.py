@@ -60,7 +60,8 @@ def fit_warnings(fit: Fit, unit: float | None = None) -> Iterator[Notice]:
     if fit.shared.model.gravity == 0:
         needed = fit.shared.payload and not fit.shared.lengths
         yield Notice(
-            "NO_GRAVITY",
+            "GRAVITY_COMPENSATED",
+            numbers={"case": "stated"},
             remedies=(Remedy({"l1": None}, "a length tells its mass"),) if needed else (),
         )
     phases = phase_note(fit)
@@ -82,10 +83,10 @@ def fit_warnings(fit: Fit, unit: float | None = None) -> Iterator[Notice]:
             numbers={"length": length, "half": fit.quantile * std, "given": given},
         )
     if exchanged(fit):
-        yield Notice("EXCHANGED_LOGS")
+        yield Notice("LOGS_APART", numbers={"case": "exchanged"})
     apart = payload_distance(fit)
     if apart is not None and apart > FAR_APART:
-        yield Notice("LOGS_APART", numbers={"distance": apart})
+        yield Notice("LOGS_APART", numbers={"case": "apart", "distance": apart})
 
 
 def _of_mass(fit: Fit, unit: float | None) -> Iterator[Notice]:
@@ -126,7 +127,7 @@ def _of_gains(fit: Fit) -> Iterator[Notice]:
     place = free.names.index("gain2")
     gain, half = float(free.values[place]), free.quantile * float(free.std[place])
     if abs(gain) > half:
-        yield Notice("UNLIKE_GAINS", numbers={"ratio": 1 + gain, "half": half})
+        yield Notice("TORQUE_GAIN", numbers={"case": "joints", "ratio": 1 + gain, "half": half})
 
 
 def _of_payload(fit: Fit) -> Iterator[Notice]:
@@ -143,21 +144,21 @@ def fit_notes(fit: results.FitSummary) -> Iterator[Notice]:
     if fit.torque_hold is not None:
         yield from _of_hold(fit.torque_hold)
     if fit.intervals == "sandwich":
-        yield Notice("ONE_RUN", note=True)
+        yield Notice("REPEATABILITY", numbers={"case": "unknown"})
     if fit.repeatability is not None:
         masses = ", ".join(f"{mass:.4g}" for mass in fit.repeatability.masses)
         low, high = fit.repeatability.ci95
         numbers = {"masses": masses, "std": fit.repeatability.std, "low": low, "high": high}
-        yield Notice("REPEATABILITY", numbers=numbers, note=True)
+        yield Notice("REPEATABILITY", numbers={"case": "payload"} | numbers)
     gain = fit.torque_gain
     if gain is not None and (gain.estimate is None or gain.ci95 is None):
-        yield Notice("NO_TORQUE_GAIN", note=True)
+        yield Notice("TORQUE_GAIN", numbers={"case": "unknown"})
     elif gain is not None and gain.ci95 is not None:
         numbers = {"gain": gain.estimate, "low": gain.ci95[0], "high": gain.ci95[1]}
         gears = Remedy(
             {"tau1.torque_constant": None, "tau2.torque_constant": None}, "set them, or gear_ratio"
         )
-        yield Notice("TORQUE_GAIN", numbers=numbers, remedies=(gears,), note=True)
+        yield Notice("TORQUE_GAIN", numbers={"case": "known"} | numbers, remedies=(gears,))
 
 
 def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
@@ -167,9 +168,11 @@ def _of_hold(hold: results.TorqueHold) -> Iterator[Notice]:
     if hold.faster:
         known = Remedy({"delay": None}, "half of the controller's period, in s")
         even = Remedy({"torque_hold": "foh"}, "for a torque that is not held")
-        yield Notice("FASTER_CONTROLLER", remedies=(known, even), note=True)
+        yield Notice("TORQUE_HOLD", numbers={"case": "fast controller"}, remedies=(known, even))
     elif not hold.told:
         held = Remedy({"torque_hold": "zoh"}, "for a digital controller that logs what it sets")
-        yield Notice("HOLD_UNTOLD", numbers={"half": 1e3 * hold.half}, remedies=(held,), note=True)
+        yield Notice(
+            "TORQUE_HOLD", numbers={"case": "unknown", "half": 1e3 * hold.half}, remedies=(held,)
+        )
     elif hold.used == "zoh":
-        yield Notice("HELD_TORQUE", numbers={"late": 1e3 * hold.half}, note=True)
+        yield Notice("TORQUE_HOLD", numbers={"case": "held", "late": 1e3 * hold.half})

@@ -204,7 +204,7 @@ def open_sources(
         if source.digest is not None and lengths[source.promised] > 1:
             place = places.setdefault(source.digest(), len(kept))
             if place < len(kept):
-                twin = Notice("SAME_LOG", numbers={"name": source.name})
+                twin = Notice("SAME_LOG", numbers={"case": "twice", "name": source.name})
                 kept[place] = kept[place].noted(twin)
                 continue
         kept.append(source)
@@ -226,7 +226,7 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
     for source in loaded:
         if source.digest is not None and source.digest() in names:
             numbers = {"name": source.name, "twin": names[source.digest()]}
-            source = source.noted(Notice("SAME_LOG_LOADED", numbers=numbers))
+            source = source.noted(Notice("SAME_LOG", numbers={"case": "loaded"} | numbers))
         sources.append(source)
     return sources
 
@@ -286,5 +286,5 @@ def read_otherwise(logs: Sequence[LogSummary], earlier: Result, file: str) -> li
         if differences:
             numbers = {"file": file, "differences": ", ".join(differences)}
             name = PurePath(log.path).name
-            notices.append(Notice("READ_OTHERWISE", numbers=numbers, logs=(name,)))
+            notices.append(Notice("OTHER_ARM", numbers={"case": "reading"} | numbers, logs=(name,)))
     return notices

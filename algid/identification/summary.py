@@ -32,14 +32,14 @@ def _contradicts(notice: Notice) -> bool:
 
 
 def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
-    """Codes of checks of single logs that the fit of all of them makes more precisely."""
+    """Checks, as code and case, of single logs that the fit of all of them makes more precisely."""
     codes = []
-    if has_code(outcome.notices, "PHASES", "PHASE"):
-        codes.append("ZERO_OFFSET")
+    if has_code(outcome.notices, "PHASES:gravity", "PHASES:no gravity"):
+        codes.append("PHASES:zeros")
     if has_code(outcome.notices, "WRONG_ZERO"):
-        codes.append("WRONG_ZERO")
+        codes.append("WRONG_ZERO:")
     if settings.effort is not None:
-        codes.append("GRAVITY_COMPENSATED")
+        codes.append("GRAVITY_COMPENSATED:arm")
     return tuple(codes)
 
 
@@ -80,7 +80,7 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
     accepted = {code for log in survey.logs for code in log.origin.reading.accepted}
     for log, is_down in zip(survey.logs, down, strict=True):
         for notice in survey.notices(log):
-            if notice.code in replaced or (is_down and notice.code in _OF_GRAVITY):
+            if notice.key in replaced or (is_down and notice.code in _OF_GRAVITY):
                 continue
             of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs
             lost |= notice.lossy
@@ -117,5 +117,7 @@ def _other_arms(survey: Survey, truth: Truth | None) -> list[Notice]:
         own = log.origin.truth
         if truth and own and own.arm != truth.arm:
             numbers = {"first": survey.logs[0].name}
-            notices.append(Notice("OTHER_ARM", numbers=numbers, logs=(log.name,)))
+            notices.append(
+                Notice("OTHER_ARM", numbers={"case": "metadata"} | numbers, logs=(log.name,))
+            )
     return notices

@@ -48,13 +48,22 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
             remedies = tuple(torques_beside(log, name)) or (other,)
             if log.tau[2 - joint].any() and not log.origin.reading.passive:
                 remedies += (Remedy({"passive": joint}, "for a joint without a motor"),)
-            yield Notice("EFFORT_ZERO", numbers={"channel": what}, refuse=True, remedies=remedies)
+            yield Notice(
+                "EFFORT_ZERO",
+                numbers={"case": "zero", "channel": what},
+                refuse=True,
+                remedies=remedies,
+            )
         elif largest < _DENORMAL:
             seen = {"channel": what, "largest": largest}
-            yield Notice("EFFORT_DENORMAL", numbers=seen, refuse=True, remedies=(other,))
+            yield Notice(
+                "EFFORT_ZERO", numbers={"case": "tiny"} | seen, refuse=True, remedies=(other,)
+            )
         elif tau.min() == tau.max():
             seen = {"channel": what, "value": float(tau[0])}
-            yield Notice("EFFORT_CONSTANT", numbers=seen, refuse=True, remedies=(other,))
+            yield Notice(
+                "EFFORT_ZERO", numbers={"case": "constant"} | seen, refuse=True, remedies=(other,)
+            )
         elif joint not in cut_off:
             share = saturated_share(tau)
             if share > 0.01:
@@ -87,7 +96,7 @@ def dead_efforts(log: Log) -> Iterator[Notice]:
                 "seconds": length * log.period,
                 "start": first * log.period,
             }
-            yield Notice("DEAD_EFFORT", numbers=numbers)
+            yield Notice("SENSOR_FAULT", numbers={"case": "torque"} | numbers)
 
 
 def held_efforts(log: Log) -> Iterator[Notice]:
@@ -147,7 +156,7 @@ def angles(log: Log) -> Iterator[Notice]:
             start = (int(moving[frozen[0]]) + 1) * log.period
             length = int(runs[frozen[0]]) * log.period
             numbers = {"channel": what, "seconds": length, "start": start}
-            yield Notice("STUCK_SENSOR", numbers=numbers)
+            yield Notice("SENSOR_FAULT", numbers={"case": "angle"} | numbers)
 
 
 def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
@@ -232,7 +241,7 @@ def spikes(log: Log) -> Iterator[Notice]:
         if places.size:
             first = float(log.t[places[0]])
             seen = {"channel": _source(log, name), "count": len(places), "start": first}
-            yield Notice("SPIKES", numbers=seen)
+            yield Notice("SENSOR_FAULT", numbers={"case": "spikes"} | seen)
 
 
 def _alone(values: FloatArray, places: NDArray[np.int64], size: FloatArray) -> NDArray[np.bool_]:

@@ -68,7 +68,7 @@ class Mend:
         """What there is to say of the log."""
         numbers = {"wrong": self.words, "contradiction": self.contradiction}
         if not self.another:
-            return Notice("ZERO_OFFSET", numbers=numbers, note=True)
+            return Notice("PHASES", numbers={"case": "zeros"} | numbers)
         return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(self.remedy,))
 
     @property

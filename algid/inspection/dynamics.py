@@ -133,7 +133,7 @@ def gravity_findings(figures: DynamicFigures) -> Suspicion | None:
     left = 1 - figures.explained
     weightless = math.hypot(figures.weight1, figures.weight2) < _LEAST_PULL * abs(figures.inertia)
     if figures.seen > 0.15 and figures.gravity_share < 0.01 and weightless:
-        return Suspicion(Notice("GRAVITY_COMPENSATED"), weightless=True)
+        return Suspicion(Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}), weightless=True)
     if figures.seen < 0.015 or figures.gravity_share < max(0.02, _OF_LEFT * left):
         return None
     return _of_turn(figures)

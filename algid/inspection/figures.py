@@ -139,6 +139,6 @@ def clock_figures(log: Log) -> ClockFigures:
 def _without_pauses(gaps: FloatArray, pause: float, notices: Iterable[Notice]) -> FloatArray:
     """The gaps (N,), in s, less as many of a pause's length as runs were joined."""
     joined = 0
-    for one in of_codes(notices, "RESTARTS"):
+    for one in of_codes(notices, "GAPS"):
         joined += one.numbers.get("joined", 0)
     return np.delete(gaps, np.argsort(np.abs(gaps - pause))[:joined])

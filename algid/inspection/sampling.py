@@ -27,7 +27,7 @@ def sampling(log: Log) -> Iterator[Notice]:
     clock = clock_figures(log)
     period = 1e3 / clock.rate
     if clock.duration < _SHORTEST:
-        yield Notice("SHORT_LOG", numbers={"seconds": clock.duration})
+        yield Notice("SHORT_LOG", numbers={"case": "estimate", "seconds": clock.duration})
     samples = samples_a_period(log)
     if samples < _FEWEST:
         yield Notice(
@@ -35,18 +35,23 @@ def sampling(log: Log) -> Iterator[Notice]:
         )
     near = near_stamps(log.stamp_ns, log.period)
     if near:
-        yield Notice("NEAR_STAMPS", numbers={"count": near, "share": NEAR, "period": period})
+        yield Notice(
+            "UNEVEN_STAMPS",
+            numbers={"case": "near", "count": near, "share": NEAR, "period": period},
+        )
     lost = lost_steps(log)
     if lost:
         override = Remedy({"accept": "LOST_SAMPLES"}, "to use it nevertheless")
         yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=(override,))
     if clock.gaps:
-        yield Notice("GAPS", numbers={"count": clock.gaps, "seconds": clock.longest_gap})
+        yield Notice(
+            "GAPS", numbers={"case": "gaps", "count": clock.gaps, "seconds": clock.longest_gap}
+        )
     if clock.jitter * clock.rate > 0.01:
         error = np.sqrt(np.mean(np.diff(log.theta, 2, axis=1) ** 2, axis=1)) / 8
         small = all(error <= [noise_floor(theta) for theta in log.theta])
         seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": float(error.max())}
-        yield Notice("JITTER", numbers=seen, note=small)
+        yield Notice("UNEVEN_STAMPS", numbers={"case": "jitter"} | seen, note=small)
 
 
 def samples_a_period(log: Log) -> float:
@@ -131,7 +136,7 @@ def rests(log: Log, whole: bool) -> Iterator[Notice]:
         words.append(f"for its last {after:.3g} s")
         cut["end"] = float(f"{log.duration - after:.4g}")
     if words:
-        yield Notice("RESTS", numbers={"rests": words}, remedies=(Remedy(cut),), note=True)
+        yield Notice("RESTS", numbers={"rests": words}, remedies=(Remedy(cut),))
 
 
 def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> float:

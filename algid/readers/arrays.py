@@ -290,7 +290,7 @@ def open_json_lines(path: Path) -> TableFile:
     whole = text.rfind(b"\n") + 1
     if not _is_object(text[whole:]):
         numbers = {"case": "row", "row": text.count(b"\n") + 1}
-        text, notices = text[:whole], (Notice("CUT_OFF", numbers=numbers, lossy=True),)
+        text, notices = text[:whole], (Notice("CUT_OFF", numbers=numbers),)
     # polars takes the cube of the depth of lists and objects; brackets within texts are none
     deep = re.compile(rb"(?:[\[{][^\[\]{}]*){%d}" % LIMITS.json_depth)
     if deep.search(text) and deep.search(re.sub(rb'"(?:[^"\\]|\\.)*"', b"", text)):

@@ -167,7 +167,7 @@ class TableReader:
         if held is not None:
             last = "the end" if end is None else f"{end:g} s"
             numbers = {"count": left_out, "start": start or 0.0, "end": last}
-            yield held.noting(Notice("CUT", numbers=numbers, note=True))
+            yield held.noting(Notice("CUT", numbers=numbers))
 
     def _finite(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """Tables of finite numbers.
@@ -191,7 +191,7 @@ class TableReader:
                     self._check(name, values, first)
             first += len(table)
         if held is not None and dropped:
-            held = held.noting(Notice("NOT_FINITE", numbers={"count": dropped}, lossy=True))
+            held = held.noting(Notice("NOT_FINITE", numbers={"case": "number", "count": dropped}))
         if held is not None:
             yield held
 

@@ -91,7 +91,7 @@ def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
         raise LogError(f"{folder}: the bag mixes files of .db3 and .mcap; read one file of it")
     missing = [name for name in names if folder / name not in there]
     numbers = {"missing": len(missing), "files": len(names), "names": ", ".join(missing[:3])}
-    notices = (Notice("MISSING_SPLIT", numbers=numbers, lossy=True),) if missing else ()
+    notices = (Notice("DAMAGED", numbers={"case": "split"} | numbers),) if missing else ()
     return there, notices
 
 
@@ -175,7 +175,7 @@ def database_file(path: Path) -> MessageFile:
         total, first, last, *sums = base.execute(query).fetchone()
     counts = dict(zip(channels, map(int, sums), strict=True))
     strays = total - sum(counts.values())
-    stray = Notice("STRAY_MESSAGES", numbers={"count": strays}, lossy=True)
+    stray = Notice("MESSAGES_LEFT_OUT", numbers={"case": "topic", "count": strays})
     span = (first, last) if type(first) is type(last) is int else None
 
     def rows(wanted: frozenset[int]) -> Iterator[tuple[Any, Any]]:

@@ -103,13 +103,13 @@ def in_order(
 def _mended(late: int, repeated: int, lost: int) -> Iterator[Notice]:
     """What to say of samples that came late, and of repeated stamps, of which some are lost."""
     if late:
-        yield Notice("UNSORTED_STAMPS", numbers={"count": late})
+        yield Notice("UNEVEN_STAMPS", numbers={"case": "late", "count": late})
     if repeated:
         others = ""
         if lost:
             others = f"; {counted(lost, 'with other values is', 'with other values are')} lost"
         numbers = {"count": repeated, "others": others}
-        yield Notice("DUPLICATE_STAMPS", numbers=numbers, lossy=lost > 0)
+        yield Notice("UNEVEN_STAMPS", numbers={"case": "repeated"} | numbers, lossy=lost > 0)
 
 
 def _restarts(runs: int, only: int | None) -> tuple[Notice]:
@@ -120,7 +120,7 @@ def _restarts(runs: int, only: int | None) -> tuple[Notice]:
         said, mends = f"number {only} is read alone", ()
     joined = runs - 1 if only is None else 0
     numbers = {"count": runs - 1, "runs": runs, "said": said, "joined": joined}
-    return (Notice("RESTARTS", numbers=numbers, note=True, remedies=mends),)
+    return (Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=mends),)
 
 
 class _Clock:
@@ -416,9 +416,9 @@ def aligned(
         if other.topic in between:
             rate = 1e9 / other.period if other.period else 0.0
             numbers = {"topic": other.topic, "rate": rate, "error": other.error()}
-            said.append(Notice("ALIGNED", numbers=numbers))
+            said.append(Notice("ALIGNED", numbers={"case": "interpolated"} | numbers))
     if lost:
-        said.append(Notice("NOT_COVERED", numbers={"count": lost}, lossy=True))
+        said.append(Notice("ALIGNED", numbers={"case": "not covered", "count": lost}))
     for other in others:
         said += other.table.notices
     if held is not None:

@@ -257,7 +257,10 @@ def _of_foreign_units(
                 f"is no unit of a joint; {right}"
             )
         column = {"column": sources[name], "name": name}
-        yield Notice("FOREIGN_UNIT", numbers={**column, "unit": foreign[name], "given": given})
+        yield Notice(
+            "OTHER_UNIT",
+            numbers={"case": "foreign", **column, "unit": foreign[name], "given": given},
+        )
 
 
 def _of_motors(
@@ -276,7 +279,7 @@ def _of_motors(
         given = profile.channel(name).unit
         if given in TORQUE:
             numbers = {"column": sources[name], "name": name, "given": given}
-            yield Notice("CURRENT_AS_TORQUE", numbers=numbers)
+            yield Notice("OTHER_UNIT", numbers={"case": "current"} | numbers)
     of_joints = False
     open_ones = []
     for name in JOINT_CHANNELS:
@@ -296,7 +299,7 @@ def _of_motors(
     )
     if of_joints:
         raise LogError(f"{path}: {named}: signals of motors beside those of joints; {gears}")
-    yield Notice("MOTOR_SIDE", numbers={"columns": named}, remedies=(gears,))
+    yield Notice("OTHER_UNIT", numbers={"case": "motor", "columns": named}, remedies=(gears,))
 
 
 def _of_other_units(
@@ -315,4 +318,7 @@ def _of_other_units(
             numbers = {"unit": other, "taken": unit, "why": "as its name says"}
         else:
             continue
-        yield Notice("OTHER_UNIT", numbers={"name": name, "column": sources[name], **numbers})
+        yield Notice(
+            "OTHER_UNIT",
+            numbers={"case": "stated", "name": name, "column": sources[name], **numbers},
+        )

@@ -81,7 +81,7 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         quoted = b'"' in source
         if not source.endswith(b"\n"):  # its last number may lack digits
             source = source[: source.rfind(b"\n") + 1]
-            notices = (Notice("NO_LINE_END", lossy=True),)
+            notices = (Notice("CUT_OFF", numbers={"case": "cell"}),)
         if not dialect.separator:  # runs of blanks become one tab
             source = re.sub(rb"[ \t]+", b"\t", source)
             source = re.sub(rb"(?m)^\t|\t(?=\r?$)", b"", source)

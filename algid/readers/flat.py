@@ -356,7 +356,7 @@ def samples(
                 raise LogError(f"{path}: a time is not finite; expected a number in every row")
             unit = time_unit(times)
             if unit != "s":
-                notices.append(Notice("TIME_UNIT", numbers={"unit": unit}))
+                notices.append(Notice("OTHER_UNIT", numbers={"case": "time", "unit": unit}))
         try:
             if columns.rate is not None:
                 stamps = np.rint((done + np.arange(times.size)) * (1e9 / columns.rate))
@@ -382,7 +382,7 @@ def samples(
             "common stamps"
         )
     if lost == 1 and cut_off:
-        held = held.noting(Notice("CUT_OFF", numbers={"case": "row", "row": rows}, lossy=True))
+        held = held.noting(Notice("CUT_OFF", numbers={"case": "row", "row": rows}))
     elif lost and columns.rate is not None:
         raise LogError(
             f"{path}: rows lack a value, and without a time the rows behind them have none; "
@@ -390,7 +390,7 @@ def samples(
         )
     elif lost:
         numbers = {"count": lost, "rows": rows}
-        held = held.noting(Notice("EMPTY_CELLS", numbers=numbers, lossy=True))
+        held = held.noting(Notice("NOT_FINITE", numbers={"case": "empty"} | numbers))
     yield held
     wrong = [name for name, total in seen.items() if total != expected[name]]
     if wrong:
@@ -464,4 +464,4 @@ def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
     likely = _unit_of_step(step / NANOSECONDS[unit])
     numbers = {"column": column, "unit": unit, "rate": 1e9 / step}
     other = Remedy({"time_unit": likely}, f"if they are in {likely}")
-    return [Notice("SLOW_CLOCK", numbers=numbers, remedies=(other,))]
+    return [Notice("OTHER_UNIT", numbers={"case": "slow time"} | numbers, remedies=(other,))]

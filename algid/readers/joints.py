@@ -94,7 +94,9 @@ def order_notice(
     numbers = {"first": first, "second": second, "why": why}
     swapped = Remedy({"joints": [second, first]}, "to swap them")
     note = by == "names"
-    return (Notice("JOINT_ORDER", numbers=numbers, remedies=(swapped,), note=note),)
+    return (
+        Notice("JOINT_ORDER", numbers={"case": "names"} | numbers, remedies=(swapped,), note=note),
+    )
 
 
 def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[Notice, ...]]:

@@ -65,12 +65,12 @@ def mcap_file(path: Path) -> MessageFile:
     """
     with _stream(path) as stream:
         size = stream.seek(0, io.SEEK_END)
-        notice, why = Notice("NO_INDEX"), []
+        notice, why = Notice("DAMAGED_INDEX", numbers={"case": "none"}), []
         try:
             found = _from_summary(stream, size)
         except Exception as error:  # what the package raises of bytes that are no records
             found, why = None, [f"its summary: {error}"]
-            notice = Notice("DAMAGED_SUMMARY", numbers={"why": str(error)})
+            notice = Notice("DAMAGED_INDEX", numbers={"case": "summary", "why": str(error)})
         if found is None:
             found = _walked(stream, size)
             found.notices.insert(0, notice)
@@ -287,10 +287,10 @@ def _walked(stream: IO[bytes], size: int) -> _Contents:
             found.damage.append(str(error))
             if last["case"] == "end":
                 numbers = {"bytes": size - whole, "first": whole, "why": str(error)}
-                found.notices.append(Notice("BROKEN_RECORD", numbers=numbers, lossy=True))
+                found.notices.append(Notice("DAMAGED", numbers={"case": "bytes"} | numbers))
                 ended = True
     if not ended:
-        found.notices.append(Notice("CUT_OFF", numbers=last, lossy=True))
+        found.notices.append(Notice("CUT_OFF", numbers=last))
     for number, part in enumerate(found.parts):
         try:
             records = _records(stream, part)
@@ -390,7 +390,7 @@ def _records(stream: IO[bytes], part: _Part) -> _Records:
         raise ValueError("its records do not fill it")
     offsets = np.array(found, np.int64)
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
-    if part.torn and end != size:  # nothing vouches for what is there, which TORN_CHUNK says
+    if part.torn and end != size:  # nothing vouches for what is there, which CUT_OFF says
         return _Records(octets[:end], offsets, heads, others, True, (end, size))
     return _Records(octets, offsets, heads, others, checked)
 

@@ -272,5 +272,4 @@ def settings_unused(
         yield Notice(
             "STATED_UNUSED",
             numbers={"case": "setting", "said": ", ".join(sorted(names))},
-            note=True,
         )

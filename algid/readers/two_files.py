@@ -140,7 +140,7 @@ def _overlap(path: str, main: Iterator[SampleTable], other: Series) -> Iterator[
     if held is not None:
         if rows > inside:
             numbers = {"file": other.topic, "count": rows - inside}
-            held = held.noting(Notice("OVERLAP", numbers=numbers, note=True))
+            held = held.noting(Notice("ALIGNED", numbers={"case": "file"} | numbers))
         yield held
 
 

@@ -22,14 +22,14 @@ from algid.files import first_misfit, read_text, whole_file
 from algid.limits import LIMITS
 from algid.log import Reading
 from algid.model import DELAYS
-from algid.notices import Notice, from_flags, notes_of, warnings_of
+from algid.notices import Notice, code_of_now, notes_of, warnings_of
 from algid.significance import NORMAL
 from algid.text import visible
 from algid.verdict import Verdict
 from algid.words import counted
 
-SCHEMA_VERSION: Literal[3] = 3
-READABLE = (1, 2, 3)
+SCHEMA_VERSION: Literal[4] = 4
+READABLE = (3, 4)
 """Versions that are read; what the first one did not hold has its default."""
 
 
@@ -347,7 +347,7 @@ class Result(_Model):
         How far to trust it.
     """
 
-    schema_version: Literal[3] = SCHEMA_VERSION
+    schema_version: Literal[4] = SCHEMA_VERSION
     version: str
     estimator: str
     parameters: dict[str, Estimate]
@@ -700,18 +700,8 @@ def _check_size(place: str, value: float | None, *, positive: bool = False) -> N
 
 
 def _current(content: dict[str, Any]) -> dict[str, Any]:
-    """A result of an earlier schema in this one: sentences become notices without numbers."""
+    """A result of schema 3 in this one: its notices have the codes of now, and their own texts."""
     if content["schema_version"] == SCHEMA_VERSION:
         return content
-    current = dict(content)
-    notices = []
-    for one in current.pop("causes", []):
-        remedies = []
-        if one.get("flags"):
-            remedies.append(from_flags(one["flags"]))
-        notices.append(Notice("EARLIER_CAUSE", one["cause"], remedies=tuple(remedies)))
-    for key in ("warnings", "notes"):
-        is_note = key == "notes"
-        for text in current.pop(key, []):
-            notices.append(Notice("EARLIER", text, note=is_note))
-    return current | {"schema_version": SCHEMA_VERSION, "notices": notices}
+    notices = [one | {"code": code_of_now(one["code"])} for one in content["notices"]]
+    return content | {"schema_version": SCHEMA_VERSION, "notices": notices}

@@ -42,21 +42,18 @@ STATUS_WORDS = {
     "NOT_SIGNIFICANT": "not significant",
 }
 CAUSES = (
-    "EARLIER_CAUSE",
     "OTHER_JOINTS",
-    "EXCHANGED_LOGS",
+    "LOGS_APART:exchanged",
     "WRONG_CONVENTION",
     "FLIPPED_SIGN",
     "WRONG_ZERO",
     "EXTERNAL_EFFORT",
-    "GRAVITY_COMPENSATED",
-    "STUCK_SENSOR",
-    "DEAD_EFFORT",
+    "GRAVITY_COMPENSATED:arm",
+    "SENSOR_FAULT:angle",
+    "SENSOR_FAULT:torque",
     "LOST_SAMPLES",
 )
 """Notices that say why estimates would be wrong, the likeliest first: they lead the reasons."""
-CHANGED = ("REFINED_FAILED", "REFUTED", "MISFIT", "INSTRUMENTS_STAND", "REFERENCE_STANDS")
-"""Notices that say why another estimator's numbers are reported."""
 
 
 def judge(result: Result) -> Verdict:
@@ -299,13 +296,12 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     those of a log.
     """
     doubts = warnings_of(result.notices)
-    causes = of_codes(doubts, *CAUSES)
-    causes.sort(key=lambda one: CAUSES.index(one.code))
+    causes = [one for cause in CAUSES for one in of_codes(doubts, cause)]
     poor = any(_worse_than_constant(result.fit))
     if failed and not causes and (is_implausible(result) or poor):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
-    changed = of_codes(doubts, *CHANGED)
+    changed = of_codes(doubts, "REFUTED")  # why another estimator's numbers are reported
     yield from changed
     yield from _of_statuses(_asked_for(result), caused=bool(causes))
     if result.fit is not None:
@@ -360,7 +356,7 @@ def _of_fit(fit: FitSummary, *, failed: bool) -> Iterator[Notice]:
             if bound.distance_sigma is not None:
                 far = _distance(bound.distance_sigma)
             numbers = {"bound": visible(bound.bound), "value": bound.value, "distance": far}
-            yield Notice("BROKEN_BOUND", numbers=numbers)
+            yield Notice("BROKEN_BOUND", numbers={"case": "free"} | numbers)
     coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
     if coloured and fit.intervals == "likelihood":
         yield Notice("NOT_WHITE", numbers={"names": coloured})
@@ -375,7 +371,7 @@ def _worse_than_constant(fit: FitSummary | None) -> Iterator[Notice]:
     prediction = _prediction(fit)
     if prediction is not None:
         for joint in prediction.unexplained(least=0.0):
-            yield Notice("WORSE_THAN_MEAN", numbers={"joint": joint})
+            yield Notice("LITTLE_EXPLAINED", numbers={"case": "mean", "joint": joint})
 
 
 def _unexplained(fit: FitSummary) -> Iterator[Notice]:
@@ -385,10 +381,10 @@ def _unexplained(fit: FitSummary) -> Iterator[Notice]:
         return
     for joint, r2 in enumerate(prediction.r2, start=1):
         if r2 < 0:
-            yield Notice("WORSE_THAN_MEAN", numbers={"joint": joint})
+            yield Notice("LITTLE_EXPLAINED", numbers={"case": "mean", "joint": joint})
         elif r2 < LEAST_R2:
             numbers = {"joint": joint, "percent": 100 * r2, "band": prediction.band}
-            yield Notice("LITTLE_EXPLAINED", numbers=numbers)
+            yield Notice("LITTLE_EXPLAINED", numbers={"case": "part"} | numbers)
 
 
 def _far_from_truth(result: Result) -> Iterator[Notice]:

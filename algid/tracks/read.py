@@ -92,7 +92,6 @@ class _Change(BaseModel):
 class _Arm(BaseModel):
     path: str
     sha256: str
-    sentence: str | None = None
 
 
 class _File(BaseModel):
@@ -110,8 +109,7 @@ class _File(BaseModel):
     settings: dict[str, Any]
     log: LogSummary
     data_lost: bool
-    warnings: list[str] = []
-    notices: list[Notice] | None = None
+    notices: list[Notice]
 
 
 def _result(file: _File, curve: Block) -> TrackResult:
@@ -143,16 +141,6 @@ def _result(file: _File, curve: Block) -> TrackResult:
         settings=file.settings,
         version=file.version,
         schedule=schedule,
-        notices=_notices(file),
+        notices=tuple(file.notices),
         data_lost=file.data_lost,
     )
-
-
-def _notices(file: _File) -> tuple[Notice, ...]:
-    """What was noticed; of a track of schema version 1 its sentences."""
-    if file.notices is not None:
-        return tuple(file.notices)
-    sentences = list(file.warnings)
-    if file.arm.sentence is not None:
-        sentences.insert(0, f"the arm's own result: {file.arm.sentence}")
-    return tuple(Notice("EARLIER", text) for text in sentences)

@@ -129,10 +129,7 @@ STRANGE = 1e4
 ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
 MOST_NAMED = 4
 
-STATUS_CODES = {
-    StretchStatus.WEAK_EXCITATION: "STRETCHES_WEAK",
-    StretchStatus.NEGATIVE_MASS: "STRETCHES_NEGATIVE",
-}
+CASES = {StretchStatus.WEAK_EXCITATION: "weak", StretchStatus.NEGATIVE_MASS: "negative"}
 
 
 def verdict(result: TrackResult) -> Verdict:
@@ -194,20 +191,22 @@ def _failure(result: TrackResult) -> str | None:
 
 
 def _reasons(result: TrackResult) -> Iterator[Notice]:
-    for status, code in STATUS_CODES.items():
+    for status, case in CASES.items():
         numbers = []
         for place, given in enumerate(result.statuses, start=1):
             if given is status:
                 numbers.append(str(place))
         if numbers:
-            yield Notice(code, numbers={"numbers": numbers})
+            yield Notice("STRETCHES", numbers={"case": case, "numbers": numbers})
     if result.track.explained < LEAST_R2:
         yield Notice(
-            "TORQUE_UNEXPLAINED", numbers={"percent": max(100 * result.track.explained, 0.0)}
+            "LITTLE_EXPLAINED",
+            numbers={"case": "track", "percent": max(100 * result.track.explained, 0.0)},
         )
     if result.track.colour > COLOURED:
         yield Notice(
-            "TORQUE_ERRORS", numbers={"times": significant(float(result.track.colour) ** 0.5, 2)}
+            "LITTLE_EXPLAINED",
+            numbers={"case": "errors", "times": significant(float(result.track.colour) ** 0.5, 2)},
         )
     if result.data_lost and not lossy(result.notices):
         yield Notice("DATA_LOST")

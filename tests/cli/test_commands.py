@@ -305,7 +305,7 @@ def test_how_a_log_was_read_is_reused_and_compared(logs: Path, tmp_path: Path) -
         "other",
     )
     (warning,) = [
-        one["text"] for one in json.loads(other.out)["notices"] if one["code"] == "READ_OTHERWISE"
+        one["text"] for one in json.loads(other.out)["notices"] if one["code"] == "OTHER_ARM"
     ]
     assert "zero horizontal instead of hanging" in warning
     good = Outcome("validate", tmp_path / "unloaded.algid", tmp_path / "unloaded.csv")

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import algid
 from algid.api.guide import text_of, topics
-from algid.notices import MESSAGES
+from algid.notices import messages
 from tests.cli.commands import app
 
 ROOT = Path(algid.__file__).parent
@@ -20,7 +20,7 @@ STATUS = re.compile(r'^    ([A-Z_]+) = "\1"$', re.MULTILINE)
 
 def codes() -> set[str]:
     """The codes of notices, findings and statuses, out of the source."""
-    found: set[str] = set(MESSAGES)
+    found: set[str] = {one.code for one in messages()}
     for path in ROOT.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         found |= set(CALLS.findall(text)) | set(STATUS.findall(text))

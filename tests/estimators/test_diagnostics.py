@@ -66,7 +66,7 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     distance = 0.05 / fit.std[broken]
     (note,) = found.notes
     assert (note.code, note.text) == (
-        "CONSTRAINED",
+        "BROKEN_BOUND",
         (
             f"--set constrain enforces {name} >= 0 ({distance:.2g} standard deviations beyond), "
             "which the logs contradict"
@@ -90,7 +90,7 @@ def test_bounds_that_no_point_keeps_leave_the_free_estimates(
         assert found.status == ("NOT_CONVERGED", "NOT_IDENTIFIABLE", *("NOT_CONVERGED",) * 5)
         np.testing.assert_array_equal(found.values, fit.values)
         (note,) = found.notes
-        assert note.code == "NOT_FEASIBLE"
+        assert note.code == "BROKEN_BOUND"
         assert note.text.startswith("--set constrain cannot obey k6 >= 0 (")
 
 

@@ -26,7 +26,7 @@ from algid.synth.simulator import simulate
 
 from .conftest import DT, Bench
 
-REFUTED = Notice("REFUTED", numbers={"kept": "weak"})
+REFUTED = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
 
 
 def _statuses(fit: Fit) -> dict[str, str]:

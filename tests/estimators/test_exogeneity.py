@@ -76,7 +76,7 @@ def test_instruments_stand_where_the_torque_is_endogenous_and_answers_nothing() 
     assert off(least, made).max() > 1
     assert found.estimator == "instruments"
     assert off(found, made).max() < 1
-    assert [note.code for note in found.notes] == ["INSTRUMENTS_STAND"]
+    assert [note.code for note in found.notes] == ["INSTRUMENTS"]
 
 
 @pytest.mark.slow
@@ -98,7 +98,7 @@ def test_a_reference_is_the_instrument_under_feedback() -> None:
     made = scene(1, feedback=True)
     least, found = settled(made, reference=True)
     assert found.estimator == "instruments"
-    assert [note.code for note in found.notes] == ["REFERENCE_STANDS"]
+    assert [note.code for note in found.notes] == ["INSTRUMENTS"]
     assert off(found, made).max() < 1
     assert off(found, made)[0] < 0.5 * off(least, made)[0]  # k1 is attenuated most
     sources = sources_of(made, reference=True)

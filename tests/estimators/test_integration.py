@@ -110,7 +110,7 @@ def test_intervals_hold_what_an_integrator_of_first_order_makes_of_an_arm(
 ) -> None:
     result = identified(*simulated())
     assert np.all(np.abs(distances(result)) < 1)
-    assert "INTEGRATION" in [note.code for note in result.verdict.notes]
+    assert "SLOW_SAMPLING" in [note.code for note in result.verdict.notes]
     # no wider than what the step makes: b h / 2 of the inertia that it acts on
     k5 = result.parameters["k5"]
     assert k5.std is not None
@@ -120,7 +120,7 @@ def test_intervals_hold_what_an_integrator_of_first_order_makes_of_an_arm(
 def test_a_log_that_is_solved_exactly_keeps_its_small_intervals() -> None:
     result = identified(*exactly())
     assert np.all(np.abs(distances(result)) < 1)
-    assert not [note for note in result.verdict.notes if note.code == "INTEGRATION"]
+    assert not [note for note in result.verdict.notes if note.code == "SLOW_SAMPLING"]
     errors = [result.parameters[name].std for name in CONSTANT_NAMES]
     assert np.max(np.array(errors) / K) < 1e-6
 
@@ -131,7 +131,7 @@ def test_noise_that_hides_the_integrator_leaves_the_intervals_as_they_are() -> N
     angles = angles + 1e-3 * rng.standard_normal(angles.shape)
     torques = torques + 2e-2 * rng.standard_normal(torques.shape)
     result = identified(angles, torques)
-    assert not [note for note in result.verdict.notes if note.code == "INTEGRATION"]
+    assert not [note for note in result.verdict.notes if note.code == "SLOW_SAMPLING"]
 
 
 @pytest.mark.parametrize("seed", [3, 5])

@@ -28,7 +28,7 @@ def test_steps_that_do_not_settle_leave_the_weak_estimate(
     before = weak.fit([source])
     assert (fit.estimator, fit.refuted, fit.iterations) == ("weak", True, 1)
     assert fit.status == before.status == ("OK",) * 7
-    assert [note.code for note in fit.notes] == ["REFINED_FAILED"]
+    assert [note.code for note in fit.notes] == ["REFUTED"]
     np.testing.assert_array_equal(fit.values, before.values)
     np.testing.assert_array_equal(fit.covariance, before.covariance)
 

@@ -357,7 +357,7 @@ def test_many_robots_of_a_log_each_may_be_one_in_many_folders(tmp_path: Path) ->
     one = _jobs(1, 15, seed=24).with_columns(robot=pl.col("job"))
     scattered = _history(one, tmp_path).scattered
     assert scattered is not None
-    assert scattered.numbers == {"few": 15, "robots": 15, "logs": 2}
+    assert scattered.numbers == {"case": "sessions", "few": 15, "robots": 15, "logs": 2}
     assert "name it in a manifest" in " ".join(
         reason.text for reason in verdict(_history(one, tmp_path)).reasons
     )

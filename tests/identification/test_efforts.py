@@ -104,7 +104,7 @@ def test_gravity_that_is_compensated_is_told_by_the_logs() -> None:
     result = told("gravity-compensated")
     assert result.complete
     assert not result.verdict.failed
-    assert "WEIGHT_OF_PAYLOAD" in codes(result)
+    assert "GRAVITY_COMPENSATED" in codes(result)
     assert result.settings["effort"] == "gravity-compensated"
     assert not {"k2", "k4", "k2+z5", "k4+z4"} & set(result.estimates)
     right(result, "k1 k3 k5 k6 k7 m_p l1 l2")
@@ -128,8 +128,8 @@ def test_an_unloaded_arm_without_weight_may_lie_or_be_compensated() -> None:
 def test_a_payload_that_is_compensated_too_needs_a_length() -> None:
     result = told("payload-compensated")
     assert not result.complete
-    assert "PAYLOAD_WEIGHTLESS" in codes(result)
-    (asked,) = (one for one in result.notices if one.code == "NO_GRAVITY")
+    assert "GRAVITY_COMPENSATED" in codes(result)
+    (asked,) = (one for one in result.notices if one.code == "GRAVITY_COMPENSATED")
     assert asked.remedies[0].flags == ("--l1", "M")
     given = identify(*logs("payload-compensated"), report=False, l1=CASE.arm.l1)
     assert given.complete
@@ -137,7 +137,8 @@ def test_a_payload_that_is_compensated_too_needs_a_length() -> None:
 
 
 @pytest.mark.parametrize(
-    ("effort", "code"), [("friction-compensated", "NO_FRICTION"), ("external", "EXTERNAL_EFFORT")]
+    ("effort", "code"),
+    [("friction-compensated", "FRICTION_COMPENSATED"), ("external", "EXTERNAL_EFFORT")],
 )
 def test_other_efforts_are_named_and_their_flag_gives_the_payload(effort: str, code: str) -> None:
     (named,) = (one for one in told(effort).notices if one.code == code)

@@ -49,7 +49,7 @@ def test_a_log_tells_its_hold(held: bool) -> None:
     hold = fit.torque_hold
     assert (hold.asked, hold.used, hold.told) == ("auto", "zoh" if held else "foh", True)
     assert result.settings["torque_hold"] == hold.used
-    assert ("HELD_TORQUE" in [one.code for one in result.notices]) is held
+    assert ("TORQUE_HOLD" in [one.code for one in result.notices]) is held
     assert "delay" not in result.parameters
     assert np.abs(distances(result, k)).max() < FARTHEST
     wrong = Settings(torque_hold="foh" if held else "zoh", model="plain")
@@ -83,7 +83,7 @@ def test_where_a_log_does_not_tell_the_intervals_hold_both(held: bool) -> None:
     hold = result.fit.torque_hold if result.fit is not None else None
     assert hold is not None
     assert hold.told is False
-    assert "HOLD_UNTOLD" in [one.code for one in result.notices]
+    assert "TORQUE_HOLD" in [one.code for one in result.notices]
     assert result.verdict.grade == "good"
     delay = result.parameters["delay"]
     assert delay.ci95 is not None
@@ -108,7 +108,7 @@ def test_a_slow_log_of_a_faster_controller_leaves_open_how_late_it_acts(held: bo
     here = scene("slow100", held, 302)
     log = here.log(np.random.default_rng([302, 3, held]))
     result = identify(log, report=False)
-    assert "FASTER_CONTROLLER" in [one.code for one in result.notices]
+    assert "TORQUE_HOLD" in [one.code for one in result.notices]
     delay = result.parameters["delay"]
     assert delay.estimate is not None
     assert delay.std is not None

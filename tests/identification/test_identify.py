@@ -89,13 +89,13 @@ def test_the_robust_estimate_has_its_own_verdict_where_the_likelihood_does_not_c
     assert failed.estimates == weak.estimates
     assert (failed.verdict.grade, failed.verdict.reasons[0].code) == (
         "reservations",
-        "REFINED_FAILED",
+        "REFUTED",
     )
     # with no terms chosen it is the fit of shrunk ones, whose intervals hold the truth
     result = identify(*noisy, report=False)
     assert (result.verdict.grade, result.verdict.reasons[0].code) == (
         "reservations",
-        "REFINED_FAILED",
+        "REFUTED",
     )
     assert noisy[0].origin.truth is not None
     truth = noisy[0].origin.truth.arm.constants()
@@ -347,7 +347,7 @@ def test_a_result_names_the_estimator_whose_numbers_it_holds(shared_data: Path) 
         f"by the {result.estimator} estimator in place of the refined one"
         in result.verdict.sentence
     )
-    (jitter,) = (notice for notice in result.notices if notice.code == "JITTER")
+    (jitter,) = (notice for notice in result.notices if notice.code == "UNEVEN_STAMPS")
     assert jitter.logs == (logs[0].name, logs[1].name)
 
 

@@ -290,11 +290,11 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
 def test_a_negative_mass_by_far_says_exchanged() -> None:
     for mass, told in ((-0.099 * ACCUSED, False), (-0.101 * ACCUSED, True)):
         fit = with_stds(with_values(fit_of(), m_p=mass), m_p=0.1)
-        assert bool(found(fit, "EXCHANGED_LOGS")) is told
+        assert bool(found(fit, "LOGS_APART")) is told
 
 
 def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
-    note = Notice("REFUTED", numbers={"kept": "weak"})
+    note = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
     assert list(fit_warnings(replace(fit_of(), notes=(note,)))) == [note]
 
 
@@ -307,7 +307,9 @@ def notes(**changes: Any) -> list[Notice]:
 
 
 def test_what_one_run_leaves_out_is_noted_once() -> None:
-    assert [(one.code, one.note) for one in notes(intervals="sandwich")] == [("ONE_RUN", True)]
+    assert [(one.code, one.note) for one in notes(intervals="sandwich")] == [
+        ("REPEATABILITY", True)
+    ]
     assert notes() == notes(intervals="jackknife") == []
 
 
@@ -323,14 +325,14 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
     (one,) = notes(torque_gain=gain)
     assert "the torques have to be multiplied by 1.25 (95 %: 1.23 to 1.27), and" in one.text
     (one,) = notes(torque_gain=unknown("1"))
-    assert one.code == "NO_TORQUE_GAIN"
+    assert one.code == "TORQUE_GAIN"
 
 
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
     outcome = outcome_of(
         fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False)
     )
-    assert [one.code for one in outcome.notices] == ["NO_CROSS_VALIDATION"]
+    assert [one.code for one in outcome.notices] == ["SHORT_LOG"]
 
 
 def test_an_interval_that_contains_zero_is_never_ok() -> None:

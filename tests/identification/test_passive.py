@@ -180,7 +180,7 @@ def test_instruments_tell_what_least_squares_takes_for_nothing(passive: int) -> 
     result = identify(log_of("case1", passive, 0), report=False)
     assert result.estimator == "instruments"
     assert result.verdict.grade == "reservations"
-    assert "MOTORLESS_INSTRUMENTS" in [notice.code for notice in result.notices]
+    assert "INSTRUMENTS" in [notice.code for notice in result.notices]
     for name, value in zip(CONSTANT_NAMES, case_of("case1").arm.constants().tolist(), strict=True):
         found = result.parameters[name]
         low, high = found.ci95 or (None, None)
@@ -197,7 +197,7 @@ def test_nothing_is_no_solution_where_instruments_do_not_tell_either(
     monkeypatch.setattr(motorless, "by_instruments", lambda *_: None)
     result = identify(log_of("case1", 1, 0), report=False)
     assert not any(result.parameters[name].usable for name in ("k1", "k2", "k3", "k4", "k5"))
-    assert "MOTORLESS_UNTOLD" in [notice.code for notice in result.notices]
+    assert "HARDLY_DRIVEN" in [notice.code for notice in result.notices]
 
 
 def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:
@@ -210,7 +210,7 @@ def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:
 
 def test_cables_of_two_percent_leave_the_constants_told() -> None:
     result = identify(log_of("arm22", 2, 0), report=False)
-    assert {"MOTORLESS_UNTOLD", "JOINTS_CONTRADICT"}.isdisjoint(
+    assert {"HARDLY_DRIVEN", "JOINTS_CONTRADICT"}.isdisjoint(
         notice.code for notice in result.notices
     )
     true = case_of("arm22").arm.constants().tolist()

@@ -109,7 +109,7 @@ def test_phases_that_are_shrunk_to_nothing_bring_no_note(shared_data: Path) -> N
     assert result.fit is not None
     assert result.fit.model is not None
     assert "k1s" in result.fit.model.shrunk
-    assert not [one for one in result.notices if one.code.startswith("PHASE")]
+    assert not [one for one in result.notices if one.code.startswith("PHASES")]
 
 
 @pytest.mark.parametrize("distance", [0.5, 6.0])

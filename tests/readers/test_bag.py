@@ -157,7 +157,7 @@ def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> No
     bag = open_bag(folder, "rosbag2")
     assert [list(one().counts.values()) for one in bag.files] == [[20], [10], [30]]
     (lost,) = bag.notices
-    assert (lost.code, lost.lossy) == ("MISSING_SPLIT", True)
+    assert (lost.code, lost.lossy) == ("DAMAGED", True)
     assert lost.text == "1 of 4 files of the bag missing: bag_10.db3"
 
 
@@ -238,7 +238,7 @@ def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_pat
     assert log.omega is None
     assert log.stamp_ns.tolist() == [5 * 10**9 + row * 1_000_000 for row in (0, 2, 4)]
     assert (log.origin.reading.joints, log.origin.reading.joints_told) == (("a", "b"), "names")
-    assert [notice.text for notice in log.notices if notice.code == "OTHER_MESSAGES"] == [
+    assert [notice.text for notice in log.notices if notice.code == "MESSAGES_LEFT_OUT"] == [
         "2 messages on '/joint_states' left out: of other joints"
     ]
     # the recorder's own times, where a user asks for them

@@ -115,7 +115,7 @@ def test_an_index_that_lists_fewer_messages_than_it_counts_is_told(tmp_path: Pat
     poked(path, pairs + 4, "<I", count + 3)
     found = read_log(path)
     assert same(found, LOG)
-    assert codes(found) == {"MISSING_MESSAGES": True}
+    assert codes(found) == {"DAMAGED": True}
 
 
 def test_a_bag_is_read_up_to_its_first_damaged_chunk(tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_a_bag_is_read_up_to_its_first_damaged_chunk(tmp_path: Path) -> None:
     assert 20 < len(found) < 100
     assert same(found, LOG.part(0, len(found)))
     (notice,) = found.notices
-    assert (notice.code, notice.lossy) == ("DAMAGED_CHUNK", True)
+    assert (notice.code, notice.lossy) == ("DAMAGED", True)
     assert f"{len(LOG) - len(found)} messages are missing" in notice.text
 
 
@@ -209,7 +209,7 @@ def test_rows_without_a_time_are_counted(tmp_path: Path) -> None:
     found = read_log(file)
     assert len(found) == len(log) - 2
     (notice,) = found.notices
-    assert (notice.code, notice.lossy) == ("DAMAGED_CHUNK", True)
+    assert (notice.code, notice.lossy) == ("DAMAGED", True)
     assert "2 damaged rows left out; the first: b'" not in notice.text
     assert "2 messages are missing" in notice.text
     changed(file, "UPDATE messages SET timestamp = 'noon'")
@@ -225,7 +225,7 @@ def test_messages_of_no_topic_are_told(tmp_path: Path) -> None:
     changed(file, "UPDATE messages SET topic_id = 99 WHERE rowid > 150")
     found = read_log(file)
     assert len(found) == 150
-    assert codes(found) == {"STRAY_MESSAGES": True}
+    assert codes(found) == {"MESSAGES_LEFT_OUT": True}
     assert (
         found.notices[0].text
         == f"{len(log) - 150} messages of no topic that the table 'topics' lists; left out"
@@ -296,7 +296,7 @@ def test_messages_without_effort_are_lost_and_counted(form: str, tmp_path: Path)
     found = read_log(path)
     assert len(found) == 30
     (notice,) = (notice for notice in found.notices if notice.lossy)
-    assert notice.code == "LACKING_MESSAGES"
+    assert notice.code == "MESSAGES_LEFT_OUT"
     assert notice.text.startswith("60 messages on '/joint_states' left out for want of effort[")
 
 

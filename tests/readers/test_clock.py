@@ -60,9 +60,9 @@ def test_late_and_repeated_samples_in_any_tables(data: st.DataObject) -> None:
         return
     assert found.stamp_ns.tolist() == unique.tolist()
     assert found.columns["q"].tolist() == values[first].tolist()
-    said = {notice.code: int(notice.text.split()[0]) for notice in found.notices}
-    assert said.get("DUPLICATE_STAMPS", 0) == stamps.size - unique.size
-    assert ("UNSORTED_STAMPS" in said) == bool(np.any(np.diff(stamps) < 0))
+    said = {notice.key: int(notice.text.split()[0]) for notice in found.notices}
+    assert said.get("UNEVEN_STAMPS:repeated", 0) == stamps.size - unique.size
+    assert ("UNEVEN_STAMPS:late" in said) == bool(np.any(np.diff(stamps) < 0))
 
 
 @pytest.mark.parametrize(("late", "fits"), [(HORIZON, True), (HORIZON + 1, False)])
@@ -90,7 +90,7 @@ def test_all_samples_may_come_a_few_places_late(apart: int, fits: bool) -> None:
     if fits:
         found = ordered(table(order[:900]), table(order[900:]))
         assert found.stamp_ns.tolist() == stamps.tolist()
-        assert [notice.code for notice in found.notices] == ["UNSORTED_STAMPS"]
+        assert [notice.code for notice in found.notices] == ["UNEVEN_STAMPS"]
     else:
         with pytest.raises(LogError, match="time goes backwards"):
             ordered(table(order))
@@ -218,13 +218,13 @@ def test_alignment_does_not_depend_on_the_clock_or_the_tables(shift: int, cut: i
     assert (found.stamp_ns - shift).tolist() == own[inside].tolist()
     assert found.columns["theta1"].tolist() == own[inside].tolist()
     assert np.allclose(found.columns["tau1"], 2.0 + 1e-9 * (own[inside] - theirs[0]), rtol=1e-14)
-    texts = {notice.code: notice for notice in found.notices}
+    texts = {notice.case: notice for notice in found.notices}
     assert (
-        texts["NOT_COVERED"].text
+        texts["not covered"].text
         == f"{60 - inside.sum()} samples were dropped, where another topic or file has none"
     )
-    assert texts["NOT_COVERED"].lossy
-    assert texts["ALIGNED"].text.startswith(
+    assert texts["not covered"].lossy
+    assert texts["interpolated"].text.startswith(
         "'/other' (333.333 Hz) was interpolated; error, root mean square"
     )
 
@@ -240,7 +240,7 @@ def test_all_topics_must_cover_a_sample() -> None:
     assert found.stamp_ns.tolist() == own[10:20].tolist()
     assert found.columns.keys() == {"theta1", "tau1", "tau2"}
     # samples of the same stamps are taken as they are
-    assert [notice.code for notice in found.notices] == ["NOT_COVERED", "LATE"]
+    assert [notice.code for notice in found.notices] == ["ALIGNED", "LATE"]
 
 
 def test_a_topic_is_read_whole_in_order_or_refused() -> None:

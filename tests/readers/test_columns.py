@@ -177,7 +177,7 @@ def test_currents_are_in_amperes_unless_their_unit_is_told() -> None:
     assert units(current_2="Nm") == ["A", "A"]
     told = assigned(header, {"tau1": {"unit": "N m"}, "tau2": CONSTANTS["tau2"]})
     text = "'current_1' for tau1 is a current by its name, and is taken for a torque in N m as"
-    assert said(told) == [("CURRENT_AS_TORQUE", f"{text} configured")]
+    assert said(told) == [("OTHER_UNIT", f"{text} configured")]
 
 
 def test_the_file_and_the_user_differ_about_a_unit() -> None:
@@ -236,7 +236,7 @@ def test_motors_beside_joints_need_a_gear() -> None:
         "the joint, 1 for a direct drive: --set tau1.gear_ratio=N"
     )
     motors = assigned("t motor1_pos motor2_pos motor1_torque motor2_torque")
-    assert [code for code, _ in said(motors)] == ["MOTOR_SIDE"]
+    assert [code for code, _ in said(motors)] == ["OTHER_UNIT"]
     # a current's constant tells of its gear
     assert said(assigned("t q1 q2 motor1_current motor2_current", CONSTANTS)) == []
 

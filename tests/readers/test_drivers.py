@@ -105,14 +105,14 @@ def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Pat
     ]
     write_mcap(tmp_path / "a.mcap", messages)
     log = read_log(tmp_path / "a.mcap")
-    (notice,) = (notice for notice in log.notices if notice.code == "TOPIC_CHOICE")
+    (notice,) = (notice for notice in log.notices if notice.code == "JOINT_ORDER")
     assert notice.note
     assert (
         notice.text == "the joints are taken from '/joint_states'; there are two also on /arm/state"
     )
     assert [remedy.settings for remedy in notice.remedies] == [{"topic": "/arm/state"}]
     chosen = read_log(tmp_path / "a.mcap", Profile(topic="/arm/state"))
-    assert not [notice for notice in chosen.notices if notice.code == "TOPIC_CHOICE"]
+    assert not [notice for notice in chosen.notices if notice.code == "JOINT_ORDER"]
 
 
 def held_beside(log: Log, joint: int) -> list[dict[str, object]]:

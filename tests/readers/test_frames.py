@@ -212,7 +212,7 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
         "in motion: "
         "if they are in ms: --set time_unit=ms"
     )
-    assert [(notice.code, notice.clause) for notice in said] == [("SLOW_CLOCK", text)] * told
+    assert [(notice.code, notice.clause) for notice in said] == [("OTHER_UNIT", text)] * told
     assert read_log(path, Profile(time_unit="s")).notices == ()
 
 
@@ -220,10 +220,10 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
     ("gaps", "code", "text"),
     [
         ([29], "CUT_OFF", "the last row, row 30, breaks off and was dropped"),
-        ([15], "EMPTY_CELLS", "1 of 30 rows dropped for want of a value"),
-        ([15, 29], "EMPTY_CELLS", "2 of 30 rows dropped for want of a value"),
-        (list(range(20, 30)), "EMPTY_CELLS", "10 of 30 rows dropped for want of a value"),
-        (list(range(10)), "EMPTY_CELLS", "10 of 30 rows dropped for want of a value"),
+        ([15], "NOT_FINITE", "1 of 30 rows dropped for want of a value"),
+        ([15, 29], "NOT_FINITE", "2 of 30 rows dropped for want of a value"),
+        (list(range(20, 30)), "NOT_FINITE", "10 of 30 rows dropped for want of a value"),
+        (list(range(10)), "NOT_FINITE", "10 of 30 rows dropped for want of a value"),
     ],
 )
 def test_rows_that_lack_a_value_are_dropped_and_told(

@@ -55,7 +55,7 @@ def test_the_judge_sees_what_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
     assert fewest(log, 20) == "read"
     assert fewest(log, 21) == fewest(_noting(log, other), 21) == "silent"
     assert fewest(_noting(log, lossy), 21) == "read"
-    twice = Notice("DUPLICATE_STAMPS", "1 sample repeats a stamp; the first of each was kept")
+    twice = Notice("UNEVEN_STAMPS", "1 sample repeats a stamp; the first of each was kept")
     assert [fewest(_noting(log, twice), rows) for rows in (21, 22)] == ["read", "silent"]
 
     def fails(_: Path) -> Log:

@@ -79,7 +79,7 @@ def test_names_that_change_place_are_followed(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages)
     found = read_log(tmp_path / "log.mcap", Profile(joints=("a1", "a2")))
     assert same(found, log)
-    assert [notice.code for notice in found.notices] == ["OTHER_MESSAGES"]
+    assert [notice.code for notice in found.notices] == ["MESSAGES_LEFT_OUT"]
 
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
@@ -103,11 +103,14 @@ def test_messages_that_lack_a_quantity_are_lost_and_those_of_other_joints_are_no
     write_mcap(tmp_path / "log.mcap", messages, encoding=encoding)
     found = read_log(tmp_path / "log.mcap")
     assert found.stamp_ns.tolist() == log.stamp_ns[::3].tolist()
-    told = {notice.code: (notice.lossy, notice.text) for notice in found.notices}
+    told = {notice.case: (notice.lossy, notice.text) for notice in found.notices}
     fields = f"{lacking}[j1], {lacking}[j2]"
     assert told == {
-        "LACKING_MESSAGES": (True, f"30 messages on '/joint_states' left out for want of {fields}"),
-        "OTHER_MESSAGES": (False, "30 messages on '/joint_states' left out: of other joints"),
+        "fields": (
+            True,
+            f"30 messages on '/joint_states' left out for want of {fields}",
+        ),
+        "joints": (False, "30 messages on '/joint_states' left out: of other joints"),
     }
 
 
@@ -228,7 +231,7 @@ def test_stamps_that_stand_still_give_way_to_log_times(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages)
     found = read_log(tmp_path / "log.mcap")
     assert same(found, log)
-    assert [notice.code for notice in found.notices] == ["LOG_TIME"]
+    assert [notice.code for notice in found.notices] == ["UNEVEN_STAMPS"]
 
 
 def test_a_file_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:

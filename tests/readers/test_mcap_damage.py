@@ -166,7 +166,7 @@ def test_a_summary_that_does_not_agree_with_the_file_is_not_used(
     found = read_log(path)
     assert same(found, LOG)
     (notice,) = found.notices
-    assert (notice.code, notice.lossy) == ("DAMAGED_SUMMARY", False)
+    assert (notice.code, notice.lossy) == ("DAMAGED_INDEX", False)
     assert re.search(rf"cannot be used \(({told})", notice.text)
 
 
@@ -177,9 +177,9 @@ def test_a_summary_that_does_not_agree_with_the_file_is_not_used(
         (unindexed, []),
         (redefined(Schema), []),
         (redefined(Channel), []),
-        (without(Statistics), ["NO_INDEX"]),
-        (without(ChunkIndex), ["NO_INDEX"]),
-        (without(Statistics, ChunkIndex, Channel, Schema), ["NO_INDEX"]),
+        (without(Statistics), ["DAMAGED_INDEX"]),
+        (without(ChunkIndex), ["DAMAGED_INDEX"]),
+        (without(Statistics, ChunkIndex, Channel, Schema), ["DAMAGED_INDEX"]),
     ],
 )
 def test_a_summary_that_agrees_is_used_and_one_that_says_too_little_is_no_damage(
@@ -214,7 +214,7 @@ def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) 
     path.write_bytes(summarised(path.read_bytes(), hide))
     found = read_log(path)
     assert same(found, LOG)
-    assert [notice.code for notice in found.notices] == ["DAMAGED_SUMMARY"]
+    assert [notice.code for notice in found.notices] == ["DAMAGED_INDEX"]
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_two_files_behind_one_another_are_not_one(whole: bytes, tmp_path: Path) 
     path.write_bytes(whole + whole)
     found = read_log(path)
     assert same(found, LOG)
-    assert f"its end stands at byte {len(whole) - 8}" in lost(found)["BROKEN_RECORD"]
+    assert f"its end stands at byte {len(whole) - 8}" in lost(found)["DAMAGED"]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
@@ -295,9 +295,9 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     assert 0.53 < len(found) / len(log) < 0.61
     assert same(found, log.part(0, len(found)))
     told = lost(found)
-    assert told.keys() == {"CUT_OFF", "TORN_CHUNK"}
-    assert f"{len(found):,} messages" in told["TORN_CHUNK"]
-    count = re.search(r"about ([\d,]+) are lost", told["TORN_CHUNK"])
+    assert told.keys() == {"CUT_OFF"}
+    assert f"{len(found):,} messages" in told["CUT_OFF"]
+    count = re.search(r"about ([\d,]+) are lost", told["CUT_OFF"])
     assert count is not None
     # all messages are of one size, the schema and the channel are the rest
     assert abs(int(count[1].replace(",", "")) - (len(log) - len(found))) < 200
@@ -313,7 +313,7 @@ def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
     (tmp_path / "cut.mcap").write_bytes(content[: last.chunk_start_offset + last.chunk_length // 2])
     found = read_log(tmp_path / "cut.mcap")
     assert same(found, log.part(0, len(found)))
-    assert lost(found).keys() == {"CUT_OFF", "DAMAGED_CHUNK"}
+    assert lost(found).keys() == {"CUT_OFF", "DAMAGED"}
 
 
 @pytest.mark.parametrize("chunked", [True, False])
@@ -338,7 +338,7 @@ def test_a_file_is_read_up_to_its_first_broken_record(
     # a chunk that claims more bytes than the file has is torn, and whole
     assert 960 < len(found) < 1040
     told = lost(found)
-    assert told.keys() & {"BROKEN_RECORD", "CUT_OFF"}
+    assert told.keys() & {"DAMAGED", "CUT_OFF"}
     assert any(
         str(number) in "".join(told.values()).replace(",", "")
         for number in (place, len(content) - place)
@@ -355,9 +355,9 @@ def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
         found = read_log(path)
         assert len(found) > 1900
         assert LONG.theta[0, 1000] not in found.theta
-        assert lost(found).keys() == {"DAMAGED_CHUNK"}
+        assert lost(found).keys() == {"DAMAGED"}
         missing = f"{len(LONG) - len(found):,} messages are missing"
-        assert missing in lost(found)["DAMAGED_CHUNK"]
+        assert missing in lost(found)["DAMAGED"]
 
 
 def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:
@@ -369,7 +369,7 @@ def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Pat
     log = read_log(path)
     assert len(log) == 999
     assert 500 * 10**6 not in log.stamp_ns
-    assert "1 message is missing" in lost(log)["DAMAGED_CHUNK"]
+    assert "1 message is missing" in lost(log)["DAMAGED"]
 
 
 @pytest.mark.parametrize("size", [0, 1 << 60])
@@ -381,7 +381,7 @@ def test_a_chunk_that_claims_another_size_is_left_out(size: int, tmp_path: Path)
     path.write_bytes(poked(content, place, "<Q", size))
     log = read_log(path)
     assert len(log) == 49
-    assert lost(log).keys() == {"DAMAGED_CHUNK"}
+    assert lost(log).keys() == {"DAMAGED"}
 
 
 @pytest.mark.parametrize("offset", [31, 1 << 40, -8])
@@ -426,9 +426,9 @@ def test_behind_a_definition_that_changes_nothing_of_it_is_read(
     assert 46 <= len(found) <= 50  # the chunk itself goes too
     assert same(found, LOG.part(0, len(found)))
     told = lost(found)
-    assert "defined anew and differently" in told["DAMAGED_CHUNK"]
-    assert told.keys() == ({"DAMAGED_CHUNK"} if summary else {"DAMAGED_CHUNK", "CUT_OFF"})
-    assert f"{len(LOG) - len(found)} messages are missing" in told["DAMAGED_CHUNK"]
+    assert "defined anew and differently" in told["DAMAGED"]
+    assert told.keys() == ({"DAMAGED"} if summary else {"DAMAGED", "CUT_OFF"})
+    assert f"{len(LOG) - len(found)} messages are missing" in told["DAMAGED"]
 
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:

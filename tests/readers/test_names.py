@@ -136,7 +136,7 @@ def test_dialects(text: str, tmp_path: Path) -> None:
     found = read_log(tmp_path / "log.csv")
     assert found.theta.tolist() == [[1.5, 1.5], [2, 2]]
     assert found.tau.tolist() == [[3, 3], [4, 4]]
-    cut = [Notice("NO_LINE_END", lossy=True)]
+    cut = [Notice("CUT_OFF", numbers={"case": "cell"}, lossy=True)]
     assert [one for one in found.notices if one.lossy] == (cut if text.endswith("2") else [])
 
 
@@ -166,7 +166,7 @@ def test_late_samples_are_put_in_place_also_across_tables() -> None:
     second[0] = 95
     stamps, codes = sorted_stamps(first, second)
     assert stamps == sorted({*first, *second})
-    assert codes == ["UNSORTED_STAMPS"]
+    assert codes == ["UNEVEN_STAMPS"]
 
 
 def test_two_recordings_in_one_file_are_not_mixed() -> None:

@@ -118,9 +118,9 @@ def test_signals_on_several_topics_are_aligned(tmp_path: Path) -> None:
     )
     assert np.abs(found.theta[0] - np.sin(times)).max() < 1e-15  # not interpolated
     assert not np.any((times > 0.9) & (times < 0.998))
-    codes = [notice.code for notice in found.notices]
-    assert codes.count("ALIGNED") == 2
-    assert any(notice.code == "NOT_COVERED" and notice.lossy for notice in found.notices)
+    cases = [notice.key for notice in found.notices]
+    assert cases.count("ALIGNED:interpolated") == 2
+    assert "ALIGNED:not covered" in cases
 
 
 @pytest.mark.parametrize(

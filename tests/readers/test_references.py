@@ -227,4 +227,4 @@ def test_one_that_cannot_be_read_leaves_the_log(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages, schemas)
     found = read_log(tmp_path / "log.mcap")
     assert found.reference is None
-    assert [notice.code for notice in found.notices] == ["REFERENCE_LEFT_OUT"]
+    assert [notice.code for notice in found.notices] == ["MESSAGES_LEFT_OUT"]

@@ -130,8 +130,8 @@ REFUSALS = {
     "degrees accepted": accepted("DEGREES"),
     "wrapped": accepted("WRAPPED_ANGLE"),
     "zero torque": accepted("EFFORT_ZERO"),
-    "denormal torque": accepted("EFFORT_DENORMAL"),
-    "constant torque": accepted("EFFORT_CONSTANT"),
+    "denormal torque": accepted("EFFORT_ZERO"),
+    "constant torque": accepted("EFFORT_ZERO"),
     "current without its constant": Refusal(
         table("t,q1,q2,current1,current2"),
         "torque_constant",
@@ -139,7 +139,7 @@ REFUSALS = {
     ),
     "current that is a torque": Refusal(
         table("t,q1,q2,current1,current2"), "unit",
-        '--set tau1.unit="N m" --set tau2.unit="N m"', "CURRENT_AS_TORQUE",
+        '--set tau1.unit="N m" --set tau2.unit="N m"', "OTHER_UNIT",
     ),
     "counts": Refusal(
         table("t,q1_counts,q2_counts,tau1,tau2"), "counts a turn", "--set theta1.counts=4096 "
@@ -147,7 +147,7 @@ REFUSALS = {
     ),
     "inches": Refusal(
         table("t,q1 [inch],q2,tau1,tau2"), "'inch', which is no unit",
-        '--set theta1.unit="rad"', "FOREIGN_UNIT",
+        '--set theta1.unit="rad"', "OTHER_UNIT",
     ),
     "a torque in degrees": Refusal(
         table("t,q1,q2,tau1 [deg],tau2"), "expected one of", '--set tau1.unit="N m"'
@@ -346,7 +346,7 @@ def test_words_that_are_no_joints_are_let_be(header: str, tmp_path: Path) -> Non
 
 def test_signals_of_motors_are_told(tmp_path: Path) -> None:
     path = table("t,motor1_pos,motor2_pos,motor1_torque,motor2_torque")(tmp_path)
-    (said,) = [one for one in read_log(path).notices if one.code == "MOTOR_SIDE"]
+    (said,) = [one for one in read_log(path).notices if one.code == "OTHER_UNIT"]
     assert "--set tau1.gear_ratio=N" in said.advice
     ratios: dict[str, Any] = {
         name: {"gear_ratio": 4} for name in ("theta1", "theta2", "tau1", "tau2")
@@ -354,7 +354,7 @@ def test_signals_of_motors_are_told(tmp_path: Path) -> None:
     geared = read_log(path, Profile.model_validate(ratios))
     assert np.allclose(geared.tau, 4 * read_log(path).tau)
     assert np.allclose(geared.theta, read_log(path).theta / 4)
-    assert "MOTOR_SIDE" not in [one.code for one in geared.notices]
+    assert "OTHER_UNIT" not in [one.code for one in geared.notices]
 
 
 @pytest.mark.parametrize(

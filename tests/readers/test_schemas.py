@@ -58,7 +58,7 @@ def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Pa
     if digits > 4300:  # Python refuses to read it: no JSON message
         found = read_log(tmp_path / "log.mcap")
         assert len(found) == 19
-        assert any(notice.code == "MISFIT_MESSAGES" and notice.lossy for notice in found.notices)
+        assert any(notice.code == "MESSAGES_LEFT_OUT" and notice.lossy for notice in found.notices)
     elif digits > 308:
         with pytest.raises(LogError, match=r"theta1 .* sample 8: expected a finite number"):
             read_log(tmp_path / "log.mcap")
@@ -134,7 +134,7 @@ def test_two_types_on_one_topic_are_told_apart(tmp_path: Path) -> None:
     found = read_log(tmp_path / "log.mcap")
     assert same(found, log)
     (notice,) = found.notices
-    assert notice.code == "OTHER_TYPE"
+    assert notice.code == "MESSAGES_LEFT_OUT"
     assert notice.lossy
     assert "std_msgs/msg/Int8" in notice.text
 
@@ -290,7 +290,7 @@ def test_a_protobuf_message_that_is_none_is_left_out(damage: str, tmp_path: Path
     )
     found = read_log(tmp_path / "log.mcap")
     assert np.array_equal(found.stamp_ns, np.delete(log.stamp_ns, 9))
-    assert [notice.code for notice in found.notices if notice.lossy] == ["MISFIT_MESSAGES"]
+    assert [notice.code for notice in found.notices if notice.lossy] == ["MESSAGES_LEFT_OUT"]
 
 
 def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
@@ -408,7 +408,7 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
         tmp_path / "log.mcap", Profile.model_validate({"topic": "/arm", "clock": "log", **places})
     )
     lost = [
-        notice.text for notice in log.notices if notice.code == "LACKING_MESSAGES" and notice.lossy
+        notice.text for notice in log.notices if notice.code == "MESSAGES_LEFT_OUT" and notice.lossy
     ]
     if presence == "proto3":  # it cannot tell 0 from unset
         assert (len(log), lost) == (40, [])

@@ -161,7 +161,7 @@ def test_a_clock_that_is_set_back_starts_a_run(step: float, place: int, tmp_path
     stamps[place:] -= min(step, 0.09 if place == 100 else step)
     pq.write_table(pa.table({"t": stamps, **signals(t)}), tmp_path / "log.parquet")
     log = read_log(tmp_path / "log.parquet")
-    assert [one.numbers["runs"] for one in log.notices if one.code == "RESTARTS"] == [2]
+    assert [one.numbers["runs"] for one in log.notices if one.code == "GAPS"] == [2]
     assert np.array_equal(log.theta[0], signals(t)["theta1"])
     steps = np.diff(log.stamp_ns)
     assert np.flatnonzero(steps > 10_000_000).tolist() == [place - 1]

@@ -88,7 +88,7 @@ def test_rows_with_empty_cells_are_dropped_and_counted(blank: str, tmp_path: Pat
     log = read_log(written(tmp_path, text.replace(",", blank)))
     assert log.stamp_ns.tolist() == [0, 1_000_000, 2_000_000, 5_000_000]
     (said,) = [one for one in log.notices if one.lossy]
-    assert (said.code, said.text[:11]) == ("EMPTY_CELLS", "2 of 6 rows")
+    assert (said.code, said.text[:11]) == ("NOT_FINITE", "2 of 6 rows")
 
 
 def test_topics_that_share_no_row_are_refused(tmp_path: Path) -> None:

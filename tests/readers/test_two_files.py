@@ -59,7 +59,7 @@ def test_torques_of_other_stamps_are_interpolated_where_both_were_recorded(tmp_p
     assert np.array_equal(log.theta, THETA[:, 503:3504])
     # a line between samples 3 ms apart misses by (3 ms)² / 8 times the second derivative
     assert np.abs(log.tau - TAU[:, 503:3504]).max() < 4 * (3e-3) ** 2 / 8 + 1e-12
-    assert codes(log) == ["OVERLAP", "ALIGNED"]
+    assert codes(log) == ["ALIGNED", "ALIGNED"]
     assert [one.lossy for one in log.notices] == [False, False]
     assert log.notices[0].text == (
         "999 samples lie before or behind what t.csv holds, and are left out"
@@ -72,7 +72,7 @@ def test_a_hole_in_the_torques_is_a_loss(tmp_path: Path) -> None:
     log = read_log(angles(tmp_path / "a.csv"), Profile(torque_file="t.csv"))
     assert len(log) == ROWS - 100
     (lost,) = [one for one in log.notices if one.lossy]
-    assert lost == Notice("NOT_COVERED", numbers={"count": 100}, lossy=True)
+    assert lost == Notice("ALIGNED", numbers={"case": "not covered", "count": 100}, lossy=True)
 
 
 def test_files_that_do_not_overlap_are_refused(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ def test_a_line_that_lacks_a_number_is_counted(tmp_path: Path) -> None:
     log = read_log(lines(tmp_path / "a.jsonl", rows))
     assert len(log) == 57
     (notice,) = (notice for notice in log.notices if notice.lossy)
-    assert notice.code == "EMPTY_CELLS"
+    assert notice.code == "NOT_FINITE"
 
 
 @pytest.mark.parametrize(

@@ -301,7 +301,9 @@ def build_recorded(folder: Path, csv: Path) -> Result:
             "payload": {},
             "paper_payload": {},
             "table4": [],
-            "notices": [Notice("JITTER", "stamps jitter by up to 0.9 ms; resampled at 2 ms")],
+            "notices": [
+                Notice("UNEVEN_STAMPS", "stamps jitter by up to 0.9 ms; resampled at 2 ms")
+            ],
         }
     )
     write_result(result, folder / "result.json")

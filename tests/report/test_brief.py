@@ -55,7 +55,11 @@ def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
 
 def test_a_call_that_is_too_long_is_told_what_to_add(result: Result) -> None:
     made = shlex.join(["algid", "identify", *(f"runs/of/the/arm/{n:03}.csv" for n in range(60))])
-    wrong = Notice("GRAVITY_COMPENSATED", remedies=(Remedy({"zero": "hanging"}, "hanging"),))
+    wrong = Notice(
+        "GRAVITY_COMPENSATED",
+        numbers={"case": "arm"},
+        remedies=(Remedy({"zero": "hanging"}, "hanging"),),
+    )
     failing = result.model_copy(
         update={"notices": [wrong], "settings": {**result.settings, "command": made}}
     )

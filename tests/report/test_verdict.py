@@ -405,14 +405,14 @@ def test_what_the_call_has_said_is_not_advised_again(result: Result) -> None:
 def test_what_changed_the_estimator_comes_before_what_is_of_a_log(result: Result) -> None:
     jitter = {"jitter": 0.06, "period": 2.0, "error": 1e-6}
     notices = [
-        Notice("JITTER", numbers=jitter, logs=("a.csv",)),
-        Notice("LOGS_APART", numbers={"distance": 9.0}),
-        Notice("REFUTED", numbers={"kept": "weak"}),
+        Notice("UNEVEN_STAMPS", numbers={"case": "jitter"} | jitter, logs=("a.csv",)),
+        Notice("LOGS_APART", numbers={"case": "apart", "distance": 9.0}),
+        Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),
     ]
     found = result.model_copy(update={"notices": notices}).verdict
     codes = [one.code for one in found.reasons]
     assert codes[0] == "REFUTED"
-    assert codes[-2:] == ["LOGS_APART", "JITTER"]
+    assert codes[-2:] == ["LOGS_APART", "UNEVEN_STAMPS"]
 
 
 def test_a_command_is_forced_once(result: Result) -> None:

@@ -142,7 +142,7 @@ def test_the_period_of_bursts_is_their_mean_pace() -> None:
 
 
 def test_how_many_are_near_is_told() -> None:
-    (found,) = [one for one in examine(log_of(*late_pairs())) if one.code == "NEAR_STAMPS"]
+    (found,) = [one for one in examine(log_of(*late_pairs())) if one.code == "UNEVEN_STAMPS"]
     assert found.text.startswith("100 samples follow the one before")
     assert not found.refuse
     assert "GAPS" not in [one.code for one in examine(log_of(*bursts()))]
@@ -183,7 +183,7 @@ def test_pairs_two_microseconds_apart_leave_the_estimates_alone() -> None:
     )
     for found in others:
         assert found.estimator == clean.estimator
-        assert any("NEAR_STAMPS" in warning for warning in found.warnings)
+        assert any("UNEVEN_STAMPS" in warning for warning in found.warnings)
         for name, wanted in clean.parameters.items():
             estimate = found.parameters[name]
             if wanted.estimate is not None and wanted.std:

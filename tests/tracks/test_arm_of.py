@@ -162,14 +162,14 @@ def test_what_the_log_tells_stands_in_the_track(
     write_log(tmp_path / "log.mcap", log, truth=log.origin.truth)
     plain = track_log(tmp_path / "log.mcap", weighed)
     assert not plain.data_lost
-    assert "READ_OTHERWISE" not in [one.code for one in plain.notices]
+    assert "OTHER_ARM" not in [one.code for one in plain.notices]
     whole = (tmp_path / "log.mcap").read_bytes()
     (tmp_path / "torn.mcap").write_bytes(whole[: int(0.9 * len(whole))])
     broken = track_log(tmp_path / "torn.mcap", weighed)
     assert broken.data_lost
     assert "CUT_OFF" in [one.code for one in broken.notices]
     other = track_log(tmp_path / "log.mcap", weighed, profile=Profile(theta1=Angle(offset=0.01)))
-    (read,) = (one for one in other.notices if one.code == "READ_OTHERWISE")
+    (read,) = (one for one in other.notices if one.code == "OTHER_ARM")
     assert read.numbers["file"] == str(weighed)
 
 

@@ -127,8 +127,10 @@ def test_stretches_stand_against_the_schedule() -> None:
 
 def test_a_report_shows_changes_and_holes_where_there_are_any() -> None:
     assert verdict(track([0.1])).grade == "good"
-    still = track([0.1], notices=(Notice("JITTER", "it jitters"), Notice("CUT", "cut", note=True)))
-    assert [one.code for one in verdict(still).reasons] == ["JITTER"]
+    still = track(
+        [0.1], notices=(Notice("UNEVEN_STAMPS", "it jitters"), Notice("CUT", "cut", note=True))
+    )
+    assert [one.code for one in verdict(still).reasons] == ["UNEVEN_STAMPS"]
     assert [one.code for one in verdict(still).notes] == ["CUT"]
     titles = [[one.title for one in track_document(still).tables(away)] for away in (False, True)]
     folded = ["Fit", "Logs", "Channels", "Settings", "Provenance"]

@@ -118,15 +118,15 @@ class Losses:
                 "why": self.reason,
                 "missing": promised - self.found,
             }
-            said.append(Notice("DAMAGED_CHUNK", numbers=numbers, lossy=True))
+            said.append(Notice("DAMAGED", numbers=numbers))
         elif promised != self.found:
             numbers = {"promised": promised, "found": self.found}
-            said.append(Notice("MISSING_MESSAGES", numbers=numbers, lossy=True))
+            said.append(Notice("DAMAGED", numbers={"case": "count"} | numbers))
         if self.torn:
             taken, held, size = self.torn
             numbers = {"taken": taken, "held": held, "bytes": size}
             numbers["lost"] = round(taken * (size - held) / held) if taken else 0  # by their bytes
-            said.append(Notice("TORN_CHUNK", numbers=numbers, lossy=True))
+            said.append(Notice("CUT_OFF", numbers={"case": "torn"} | numbers))
         if self.unchecked:
             said.append(Notice("NO_CHECKSUM", numbers={"case": "file"}))
         return said

@@ -216,7 +216,7 @@ def _choice_notice(usual: _JointTopic) -> tuple[Notice, ...]:
         return ()
     numbers = {"topic": usual.topic, "others": ", ".join(usual.beside[:4])}
     other = Remedy({"topic": usual.beside[0]}, "for the other")
-    return (Notice("TOPIC_CHOICE", numbers=numbers, note=True, remedies=(other,)),)
+    return (Notice("JOINT_ORDER", numbers={"case": "topic"} | numbers, remedies=(other,)),)
 
 
 def _topic(

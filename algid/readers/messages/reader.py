@@ -85,7 +85,9 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
                 if set(paths) - set(REFERENCES):
                     raise
                 numbers = {"topic": one.name, "why": str(error).removeprefix(f"{name}: ")}
-                left_out.append(Notice("REFERENCE_LEFT_OUT", numbers=numbers, note=True))
+                left_out.append(
+                    Notice("MESSAGES_LEFT_OUT", numbers={"case": "reference"} | numbers)
+                )
                 continue
             (needed if set(paths) - set(REFERENCES) else followed).append(series)
         return aligned(in_order(name, samples), needed, followed, left_out)

@@ -177,7 +177,9 @@ class Topic:
         path = file.path
         channels = channels_of(file, self.name, self.type)
         if not channels:
-            missing = Notice("NO_TOPIC", numbers={"file": path, "topic": self.name}, lossy=True)
+            missing = Notice(
+                "MESSAGES_LEFT_OUT", numbers={"case": "file", "file": path, "topic": self.name}
+            )
             yield SampleTable(np.empty(0, np.int64), {}, (missing,))
             return
         wanted = dict(self.fields.paths)
@@ -228,7 +230,7 @@ class Topic:
                 if self.clock != "header" and len(table) > 1 and not np.any(header != header[0]):
                     self._chosen = "log"
                     numbers = {"topic": self.name, "stamp": int(header[0])}
-                    notices = (Notice("LOG_TIME", numbers=numbers),)
+                    notices = (Notice("UNEVEN_STAMPS", numbers={"case": "still"} | numbers),)
             if self._chosen == "header":
                 stamps = header
         if stamps is table.stamp_ns and len(table) and stamps.min() < 0:
@@ -266,13 +268,13 @@ class Topic:
         if decoder.lacking:
             lacks = ", ".join(dict.fromkeys(decoder.wanted.get(n, n) for n in decoder.lacks))
             numbers = {"count": decoder.lacking, "topic": self.name, "fields": lacks}
-            said.append(Notice("LACKING_MESSAGES", numbers=numbers, lossy=True))
+            said.append(Notice("MESSAGES_LEFT_OUT", numbers={"case": "fields"} | numbers))
         if decoder.skipped:
             numbers = {"count": decoder.skipped, "topic": self.name}
-            said.append(Notice("OTHER_MESSAGES", numbers=numbers))
+            said.append(Notice("MESSAGES_LEFT_OUT", numbers={"case": "joints"} | numbers))
         if decoder.misfits:
             numbers = {"count": decoder.misfits, "topic": self.name, "first": str(decoder.misfit)}
-            said.append(Notice("MISFIT_MESSAGES", numbers=numbers, lossy=True))
+            said.append(Notice("MESSAGES_LEFT_OUT", numbers={"case": "schema"} | numbers))
         said += [
             several(path, values) for path, values in decoder.labels.items() if len(values) > 1
         ]
@@ -282,5 +284,5 @@ class Topic:
                 types.add(channel.type or "no schema")
         if types:
             numbers = {"topic": self.name, "types": ", ".join(sorted(types)[:4])}
-            said.append(Notice("OTHER_TYPE", numbers=numbers, lossy=True))
+            said.append(Notice("MESSAGES_LEFT_OUT", numbers={"case": "type"} | numbers))
         return said
