@@ -126,17 +126,9 @@ def commands_and_options() -> tuple[int, int]:
         call = [sys.executable, "-m", "algid", *words, "--help"]
         return subprocess.run(call, capture_output=True, text=True, check=True).stdout
 
-    def below(*words: str) -> list[tuple[str, ...]]:
-        panel = helped(*words).partition("─ Commands")[2]
-        return [(*words, name) for name in re.findall(r"^│ ([a-z][a-z-]*) {2,}\S", panel, re.M)]
-
-    commands = [leaf for one in below() for leaf in below(*one) or [one]]
-    rows = [
-        row
-        for words in commands
-        for row in re.findall(r"^│ [* ]*(--[a-z].*?)(?: <| {3})", helped(*words), re.M)
-    ]
-    flags = {flag for row in rows for flag in re.findall(r"--[a-z][\w-]*", row)}
+    commands = re.findall(r"^  ([a-z]+) {2,}\S", helped().partition("Commands:")[2], re.M)
+    rows = [row for one in commands for row in re.findall(r"^  (--?[a-z].*)$", helped(one), re.M)]
+    flags = {flag for row in rows for flag in re.findall(r"(?:^|, |/)(--[a-z][\w-]*)", row)}
     return len(commands), len(flags - {"--help"})
 
 

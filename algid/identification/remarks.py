@@ -113,7 +113,7 @@ def _of_mass(fit: Fit, unit: float | None) -> Iterator[Notice]:
             if AIR * length**3 <= lighter <= STEEL * length**3:
                 remedies = (Remedy({"torque_unit": "mN m"}, "where torques are in mN m"),)
         numbers = {"mass": mass, "length": length}
-        yield Notice("HEAVY_ARM", numbers=numbers, remedies=remedies)
+        yield Notice("OTHER_UNIT", numbers={"case": "heavy"} | numbers, remedies=remedies)
 
 
 def _of_gains(fit: Fit) -> Iterator[Notice]:

@@ -131,7 +131,10 @@ def angles(log: Log) -> Iterator[Notice]:
         sizes = np.abs(steps, out=steps)
         largest = sizes.max()
         if not largest:
-            yield Notice("ANGLE_CONSTANT", numbers={"channel": what, "value": float(theta[0])})
+            yield Notice(
+                "HARDLY_DRIVEN",
+                numbers={"case": "constant", "channel": what, "value": float(theta[0])},
+            )
             continue
         wraps = 0
         if largest > 0.8 * _TURN:  # of most logs no step is, and none has to be looked at

@@ -91,7 +91,7 @@ def test_masses_that_no_arm_has_are_asked_about() -> None:
     log = currents(loaded=False)
     for factor, heavy in ((CONSTANT, False), (1e3 * CONSTANT, True)):
         result = identify(replace(log, tau=factor * log.tau), report=False)
-        asked = [one for one in result.notices if one.code == "HEAVY_ARM"]
+        asked = [one for one in result.notices if one.key == "OTHER_UNIT:heavy"]
         assert bool(asked) is heavy
         for one in asked:
             assert one.remedies[0].flags == ("--torque-unit", "mN m")

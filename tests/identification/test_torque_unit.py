@@ -31,7 +31,7 @@ def log_of(factor: float = 1.0, *, loaded: bool = False) -> Log:
 
 
 def heavy(result: Result) -> list[Notice]:
-    return [one for one in result.notices if one.code == "HEAVY_ARM"]
+    return [one for one in result.notices if one.key == "OTHER_UNIT:heavy"]
 
 
 def test_the_unit_that_is_advised_ends_in_an_answer_as_typed(tmp_path: Path) -> None:

@@ -198,7 +198,7 @@ def test_a_sensor_that_freezes_and_jumps_is_told_with_when_and_how_long(
 def test_an_angle_that_never_changes_is_told_beside_what_the_other_one_does() -> None:
     theta = np.stack([np.full(ROWS, 0.5), np.linspace(0, 7, ROWS) % (2 * math.pi)])
     found = [*channels.angles(logged(theta, mapping={"theta1": "q[0]"}))]
-    assert [one.code for one in found] == ["ANGLE_CONSTANT", "WRAPPED_ANGLE"]
+    assert [one.code for one in found] == ["HARDLY_DRIVEN", "WRAPPED_ANGLE"]
     assert found[0].text == "theta1 (q[0]) is 0.5 rad in every sample"
 
 

@@ -84,7 +84,7 @@ def spoiled(name: str) -> Log:
             return replace(log, tau=tau[:, np.arange(len(log)) // 10 * 10])
         case "SATURATED_EFFORT":
             return replace(log, tau=np.clip(tau, -4, 4))
-        case "ANGLE_CONSTANT":
+        case "HARDLY_DRIVEN":
             return replace(log, theta=with_row(theta, 1, 0.5), omega=None)
         case "WRAPPED_ANGLE":
             return replace(log, theta=np.angle(np.exp(1j * (theta + 2.5))))
@@ -122,7 +122,7 @@ REFUSED = ("EFFORT_ZERO", "EFFORT_ZERO", "EFFORT_ZERO", "WRAPPED_ANGLE", "DEGREE
 TOLD = (
     "HELD_EFFORT",
     "SATURATED_EFFORT",
-    "ANGLE_CONSTANT",
+    "HARDLY_DRIVEN",
     "SENSOR_FAULT",
     "SENSOR_FAULT",
     "GAPS",
