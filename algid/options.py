@@ -19,8 +19,8 @@ BY_SET = frozenset(
     {
         *("acceleration", "bandwidth", "clock", "columns", "constrain", "delay", "drive", "drop"),
         *("encoder_bits", "initial", "jitter", "m1", "m2", "margin", "observer", "offsets"),
-        *("passive", "poles", "prior_error", "rotor1", "segment", "signs", "start_time", "time"),
-        *("time_unit", "tip_height", "window"),
+        *("noise_from", "passive", "poles", "prior_error", "rotor1", "segment", "shared_library"),
+        *("signs", "start_time", "time", "time_unit", "tip_height", "window"),
     }
 )
 """Settings without a flag of their own."""

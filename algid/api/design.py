@@ -327,7 +327,7 @@ def noise_of(
         else:
             raise SettingError(
                 f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give it, "
-                f"or {flag('noise_from')} LOG"
+                f"or {flag('noise_from')}=LOG"
             )
     return NoiseLevels(**levels)
 

@@ -12,8 +12,11 @@ from algid.exits import rows
 from algid.notices import Message, code_of_now, message, messages
 from algid.options import BY_SET, Option, flag
 
-FIRST = ("start", "lab", "arm", "logs", "motion", "report", "warnings")
-"""Pages at the head of the list; the others follow by name."""
+FIRST = (
+    *("start", "arm", "lab", "logs", "motion", "report", "warnings", "payload", "export", "batch"),
+    *("python", "estimators", "measured", "contributing"),
+)
+"""The order of the pages; one that is not named here comes behind them."""
 
 
 def topics() -> dict[str, str]:

@@ -11,7 +11,7 @@ import inspect
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal, get_origin
 import typer
 from typer.core import TyperCommand
 
-from algid.api.signature import Keyword, head, keywords, summary
+from algid.api.signature import Keyword, head, keywords, kind_of, summary
 from algid.cli.output import complain, shown
 from algid.errors import SettingError
 from algid.exits import epilog
@@ -106,7 +106,6 @@ def _command(name: str, module: Any, verb: Callable[..., Any]) -> Callable[..., 
     own = dict(keywords(verb))
     takes = inspect.signature(verb).parameters
     rest = [one for one in takes.values() if one.kind is one.VAR_KEYWORD]
-    flags = {word for one in own.values() for word in one.option.flags}
     declared = [_declared(one) for one in own.values() if one.name not in BY_SET]
     if rest:
         declared += _of_models("Unpack[Options]" in str(rest[0].annotation))
@@ -118,7 +117,6 @@ def _command(name: str, module: Any, verb: Callable[..., Any]) -> Callable[..., 
     if name == "identify":
         declared.append(_option("verbose", bool, False, "All tables, logs, settings.", ADVANCED))
     declared.append(_option("quiet", bool, False, "Print nothing but errors.", ADVANCED))
-    assert "--format" not in flags or name not in PRINTED
 
     def run(**typed: Any) -> None:
         from algid.report.progress import progress
@@ -136,12 +134,9 @@ def _command(name: str, module: Any, verb: Callable[..., Any]) -> Callable[..., 
         given = getattr(module, "typed", dict)(given)
         callers: dict[str, Any] = {"command": shlex.join(["algid", *sys.argv[1:]])}
         callers["complain"] = complain
-        places = [one for one in own.values() if one.place is not inspect.Parameter.KEYWORD_ONLY]
-        by_name = dict(given)
-        inline: list[Any] = []
-        for one in places:
-            if one.place is inspect.Parameter.VAR_POSITIONAL:
-                inline = by_name.pop(one.name)
+        several = [one.name for one in takes.values() if one.kind is one.VAR_POSITIONAL]
+        by_name = {key: value for key, value in given.items() if key not in several}
+        inline = [value for name in several for value in given[name]]
         with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
             callers["progress"] = bar
             called = {key: value for key, value in callers.items() if key in takes}
@@ -253,7 +248,7 @@ def _of_models(with_settings: bool) -> list[inspect.Parameter]:
         declared.append(_option(name, kind, None, one.description or "", panel, option))
     for name, one in Settings.model_fields.items() if with_settings else ():
         if name not in BY_SET:
-            kind, panel = _kind(one.annotation), _panel(one)
+            kind, panel = kind_of(one.annotation), _panel(one)
             default = False if kind is bool else None
             option = Option(complete=COMPLETED.get(name))
             declared.append(_option(name, kind, default, one.description or "", panel, option))
@@ -262,13 +257,6 @@ def _of_models(with_settings: bool) -> list[inspect.Parameter]:
 
 def _panel(field: Any) -> str:
     return (field.json_schema_extra or {}).get("panel") or ADVANCED
-
-
-def _kind(annotation: Any) -> Any:
-    """The one type of an annotation that may be None."""
-    from algid.api.signature import kind_of
-
-    return kind_of(annotation)
 
 
 def _set(own: Mapping[str, Keyword], of_logs: bool) -> inspect.Parameter:
@@ -298,11 +286,3 @@ def take(given: dict[str, Any], line: str, own: Mapping[str, Keyword], of_logs: 
         if isinstance(value, Mapping) and isinstance(given.get(name), Mapping):
             value = {**given[name], **value}
         given[name] = value
-
-
-def options_of(name: str) -> Iterator[str]:
-    """The flags of a command, for what must know them without calling it."""
-    app = typer.Typer()
-    add(app, name)
-    for one in typer.main.get_command(app).params:
-        yield from one.opts

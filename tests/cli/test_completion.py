@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
@@ -11,7 +10,6 @@ from typing import Any, Literal, get_origin
 import pytest
 import typer
 
-from algid.inspection import findings
 from tests.cli.commands import app
 
 FREE = {
@@ -108,10 +106,3 @@ def test_cases_and_files_complete(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     Path("case.toml").touch()
     command = ROOT.commands["synth"]  # type: ignore[attr-defined]
     assert completed(command, command.params[0], "cas") == ["case1", "case2", "case.toml", "cases/"]
-
-
-def test_the_checks_that_refuse_are_those_of_the_table() -> None:
-    assert (
-        tuple(re.findall(r"^([A-Z_]+) +yes ", findings.__doc__ or "", re.MULTILINE))
-        == findings.REFUSED
-    )

@@ -285,12 +285,12 @@ OWN = [
     ("design", ("--joints", "a,"), "--joints: expected two names like shoulder,elbow, found 'a,'"),
     ("design", ("--joints", "a"), "--joints: expected two names like shoulder,elbow, found 'a'"),
     ("design", (), ("--position-noise: case1 does not tell how noisy the sensors are; give it, or "
-                   "--noise-from LOG")),
+                   "--set noise_from=LOG")),
     (
         "design",
         ("--position-noise", "1e-3"),
-        ("--torque-noise: case1 does not tell how noisy the sensors are; give it, or --noise-from "
-        "LOG"),
+        ("--torque-noise: case1 does not tell how noisy the sensors are; give it, or --set "
+        "noise_from=LOG"),
     ),
     (
         "design",

@@ -38,7 +38,7 @@ def test_report_writes_its_files_and_prints_the_table(folder: Path) -> None:
 
 
 def test_json_is_the_result_alone(folder: Path) -> None:
-    out, _ = run("report", folder, "--format", "json", "--shared-library")
+    out, _ = run("report", folder, "--format", "json", "--set", "shared_library=true")
     assert out == result_json(read_result(folder))
     assert (folder.parent / "plotly.min.js").exists()
 
