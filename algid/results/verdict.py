@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 CONSTANTS = (K1, K2, K3, K4, K5, K6, K7)
 LEAST_R2 = 0.9  # below, a tenth of the torque's power is not the model's
 WORST_R2 = 0.5  # below, most of it is not: wrong angles, signs or units, or not this arm
+MOST_CLIPPED = 2.0  # percent of the samples: with more, a torque that is cut off leads the reasons
 LEAST_USABLE = 0.5  # share of the parameters that must have an estimate
 WIDE = 0.2  # half an interval beyond a fifth of the estimate says little more than its size
 
@@ -292,8 +293,8 @@ def _prediction(fit: FitSummary | None) -> TorquePrediction | None:
 def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     """Reasons for doubt in a result, the weightiest first.
 
-    Causes, what changed the estimator, statuses, the fit, and notices: those of the fit before
-    those of a log.
+    Causes, torques that are cut off in many samples, what changed the estimator, statuses, the fit,
+    and notices: those of the fit before those of a log.
     """
     doubts = warnings_of(result.notices)
     causes = [one for cause in CAUSES for one in of_codes(doubts, cause)]
@@ -301,13 +302,18 @@ def _reasons(result: Result, *, failed: bool) -> Iterator[Notice]:
     if failed and not causes and (is_implausible(result) or poor):
         yield Notice("UNKNOWN_CAUSE")
     yield from causes
+    clipped = []
+    for one in of_codes(doubts, "SATURATED_EFFORT", "CLIPPED_TORQUE"):
+        if one.numbers.get("percent", 0.0) > MOST_CLIPPED:
+            clipped.append(one)
+    yield from clipped
     changed = of_codes(doubts, "REFUTED")  # why another estimator's numbers are reported
     yield from changed
     yield from _of_statuses(_asked_for(result), caused=bool(causes))
     if result.fit is not None:
         yield from _of_fit(result.fit, failed=failed)
     yield from _far_from_truth(result)
-    yield from sorted(outside(doubts, causes + changed), key=lambda one: bool(one.logs))
+    yield from sorted(outside(doubts, causes + clipped + changed), key=lambda one: bool(one.logs))
 
 
 def _asked_for(result: Result) -> dict[str, Estimate]:

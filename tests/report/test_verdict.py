@@ -443,6 +443,18 @@ def test_joints_that_move_beside_those_read_lead_the_reasons(result: Result) -> 
     assert found.command is None
 
 
+@pytest.mark.parametrize(("percent", "first"), [(2.5, True), (1.5, False)])
+def test_a_torque_that_is_cut_off_in_many_samples_leads_the_reasons(
+    percent: float, first: bool, result: Result
+) -> None:
+    numbers = {"case": "open", "channel": "tau1", "percent": percent}
+    refuted = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
+    notices = [refuted, Notice("SATURATED_EFFORT", numbers=numbers, logs=("a.csv",))]
+    found = result.model_copy(update={"notices": notices}).verdict
+    assert found.grade == "reservations"
+    assert (found.reasons[0].code == "SATURATED_EFFORT") is first
+
+
 @pytest.mark.parametrize(("chosen_by", "doubted"), [("logs", False), ("settings", True)])
 def test_terms_that_the_logs_chose_bring_no_reservation(
     chosen_by: str, doubted: bool, result: Result
