@@ -461,6 +461,6 @@ def test_a_payload_without_gravity_raises_no_warning_of_numpy() -> None:
         rate=500.0, duration=4.0, sensors=Sensors(position_noise=1e-4, torque_noise=1e-3)
     )
     logs = synthesise(case, wide_multi_sine(flat, 3), recording)
-    result = identify(*logs, replace(WEAK, gravity=0.0, l1=flat.l1))
+    result = identify(*logs, WEAK.but(gravity=0.0, l1=flat.l1))
     found = result.payload["m_p"]
     assert found.estimate == pytest.approx(case.payload, rel=0.02)
