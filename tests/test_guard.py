@@ -21,7 +21,7 @@ from algid.guard import Notes
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = """
-import contextlib, os, pathlib, signal, sys, time
+import contextlib, os, pathlib, signal, sys, time, types
 import algid.cli, algid.cli.app, algid.guard
 from algid.staging import staged
 from algid.faults import during
@@ -84,12 +84,12 @@ def work(kind):
         raise SystemExit(3)
 
 def command(_arguments):
-    def run(words):
+    def run(words, **_):
         for _ in range(3 if words[0] == "samples" else 1):
             with during("reading", words[1]) if len(words) > 1 else contextlib.nullcontext():
                 spin(0.3) if words[0] == "samples" else work(words[0])
         spin(1.0) if words[0] == "samples" else None
-    return run
+    return types.SimpleNamespace(main=run)
 
 algid.guard.SILENCE = float(os.environ.get("SILENCE", "10"))
 algid.cli.app.called = command

@@ -36,20 +36,8 @@ def test_text_of_a_setting_that_means_nothing_names_it(text: str) -> None:
         Settings(poles=text)  # type: ignore[arg-type]
 
 
-def test_short_forms_of_older_results_name_terms_of_the_model() -> None:
-    older = {
-        "friction": "coulomb",
-        "torque_offset": True,
-        "rotor_inertia": True,
-        "delay": "estimate",
-    }
-    short = Settings.of({"model": "auto", **older})
-    assert short == Settings(model="coulomb,offset,rotor,delay")
-    assert Settings.of({"model": "rotor", "friction": "coulomb"}).terms == ("rotor", "coulomb")
-    plain = {"friction": "viscous", "torque_offset": False, "rotor_inertia": False, "delay": 0.002}
-    assert Settings.of({"model": "auto", **plain}) == Settings(delay=0.002)
+def test_auto_chooses_and_plain_has_no_terms() -> None:
     assert Settings().chooses
-    assert not short.chooses
     assert not Settings(model="plain").chooses
     assert Settings(model="plain").terms == ()
 

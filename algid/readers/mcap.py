@@ -32,6 +32,7 @@ from algid.readers.messages.batch import MessageBatch, Messages, gaps_between, g
 from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.messages.reader import MessageLog
 from algid.runtime import ahead
+from algid.words import counted
 
 _MAGIC = b"\x89MCAP0\r\n"
 _FRAME = struct.Struct("<BQ")
@@ -376,7 +377,7 @@ def _records(stream: IO[bytes], part: _Part) -> _Records:
         size, checked = chunk.uncompressed_size, chunk.uncompressed_crc != 0
         content = _unpacked(chunk)
         if len(content) != size and not part.torn:
-            raise ValueError(f"a chunk of {size} bytes unpacks to {len(content)}")
+            raise ValueError(f"a chunk of {counted(size, 'byte')} unpacks to {len(content):,}")
         if len(content) == size and checked and zlib.crc32(content) != chunk.uncompressed_crc:
             raise ValueError("a chunk's checksum is wrong")
         index = _read(stream, part.start + part.length, part.index_length)
@@ -399,7 +400,9 @@ def _unpacked(chunk: Chunk) -> bytes:
     """What a chunk holds, as far as its bytes go; memory is bounded by what it claims."""
     size = chunk.uncompressed_size
     if size > LIMITS.chunk_bytes:
-        raise ValueError(f"a chunk claims {size} bytes unpacked, more than {LIMITS.chunk_bytes}")
+        raise ValueError(
+            f"a chunk claims {counted(size, 'byte')} unpacked, more than {LIMITS.chunk_bytes:,}"
+        )
     if chunk.compression == "zstd":
         with zstandard.ZstdDecompressor().stream_reader(chunk.data) as unpacker:
             return unpacker.read(size)

@@ -129,7 +129,7 @@ def test_a_payload_that_is_compensated_too_needs_a_length() -> None:
     result = told("payload-compensated")
     assert not result.complete
     assert "GRAVITY_COMPENSATED" in codes(result)
-    (asked,) = (one for one in result.notices if one.code == "GRAVITY_COMPENSATED")
+    (asked,) = (one for one in result.notices if one.key == "GRAVITY_COMPENSATED:stated")
     assert asked.remedies[0].flags == ("--l1", "M")
     given = identify(*logs("payload-compensated"), report=False, l1=CASE.arm.l1)
     assert given.complete

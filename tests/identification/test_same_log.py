@@ -61,7 +61,11 @@ def test_one_log_as_unloaded_and_as_loaded_is_told_in_one_line(tmp_path: Path) -
     settings = Settings(estimator="weak", model="plain")
     result = identify(tmp_path / "one.csv", tmp_path / "copy.csv", settings, report=False)
     (said,) = (one for one in result.notices if one.code == "SAME_LOG")
-    assert said.numbers == {"name": str(tmp_path / "copy.csv"), "twin": str(tmp_path / "one.csv")}
+    assert said.numbers == {
+        "case": "loaded",
+        "name": str(tmp_path / "copy.csv"),
+        "twin": str(tmp_path / "one.csv"),
+    }
 
 
 @pytest.mark.parametrize(

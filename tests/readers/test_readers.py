@@ -148,7 +148,7 @@ def test_format_is_told_by_content(packed: str, tmp_path: Path) -> None:
         (CSV + "0,1,2,3,4\n0.1,1,2,3,4,5\n0.2,1,2,3,4\n", "row 2 has more cells"),
         (CSV + "0,1,2,3,4\n", "1 sample;"),
         (CSV, "no rows"),
-        (CSV + "".join(f"{9 - row},1,2,3,4\n" for row in range(9)), "time goes backwards"),
+        (CSV + "".join(f"{40 - row},1,2,3,4\n" for row in range(40)), "time goes backwards"),
         (CSV + "5,1,2,3,4\n" * 9, "time stands still"),
         ("0,1,2,3,4\n1,1,2,3,4\n", "no header"),
         ("\x00\x01\x02", "unknown format"),

@@ -142,7 +142,7 @@ def test_the_period_of_bursts_is_their_mean_pace() -> None:
 
 
 def test_how_many_are_near_is_told() -> None:
-    (found,) = [one for one in examine(log_of(*late_pairs())) if one.code == "UNEVEN_STAMPS"]
+    (found,) = [one for one in examine(log_of(*late_pairs())) if one.key == "UNEVEN_STAMPS:near"]
     assert found.text.startswith("100 samples follow the one before")
     assert not found.refuse
     assert "GAPS" not in [one.code for one in examine(log_of(*bursts()))]
