@@ -171,5 +171,5 @@ def _headline(design: Design) -> str:
     row, used = design.binding[0]
     return (
         f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; {name} is "
-        f"the least certain); {limit_name(row)} is used to {percent(used, 1.0, 3)} %"
+        f"the least certain); active limit: {limit_name(row)} ({percent(used, 1.0, 3)} %)"
     )
