@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from algid.api.track import track
     from algid.api.validate import validate
     from algid.arm import Arm
-    from algid.errors import AlgidError
+    from algid.base.errors import AlgidError
     from algid.log import Log
     from algid.profile import Profile
     from algid.settings import Settings
@@ -61,7 +61,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "AlgidError": "algid.errors",
+    "AlgidError": "algid.base.errors",
     "Arm": "algid.arm",
     "Log": "algid.log",
     "Profile": "algid.profile",

@@ -9,8 +9,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from algid.errors import ResultError, SettingError
-from algid.files import read_toml
+from algid.base.errors import ResultError, SettingError
+from algid.base.files import read_toml
 from algid.options import flag
 from algid.results import Result
 from algid.results.model import Table4Row

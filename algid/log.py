@@ -32,9 +32,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from algid.arm import Arm, FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.quantiles import median
 from algid.notices import Notice
-from algid.quantiles import median
 
 IntArray = NDArray[np.int64]
 

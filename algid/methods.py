@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
+    from algid.base.progress import Progress
     from algid.estimators.combine import Prior
     from algid.estimators.fit import Fit
     from algid.estimators.weak import WeakSettings
-    from algid.progress import Progress
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.names import by_name, names_in, outside, within
+from algid.base.names import by_name, names_in, outside, within
 from algid.physics.expressions import Expression, Product, Values
 from algid.physics.motion import Motion, Widths, sine_cosine
 from algid.physics.parameters import BODY, PAYLOAD, Parameter

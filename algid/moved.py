@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.options import BY_SET, flag
 
 MOVED: Mapping[str, str] = {

@@ -19,9 +19,9 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
+from algid.base.text import joined
+from algid.base.words import counted
 from algid.options import BY_SET, FLAGS, VALUES, flag
-from algid.text import joined
-from algid.words import counted
 
 
 def _own(name: str, value: object) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from algid.limits import Range
+from algid.base.limits import Range
 
 EVERYDAY, ADVANCED = "Options", "Advanced"
 """Panels of a command's help."""

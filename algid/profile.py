@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
-from algid.errors import SettingError
-from algid.files import misfit, read_toml
-from algid.limits import PHYSICAL
+from algid.base.errors import SettingError
+from algid.base.files import misfit, read_toml
+from algid.base.limits import PHYSICAL
+from algid.base.units import names_of, unit_of
 from algid.options import EVERYDAY
-from algid.units import names_of, unit_of
 
 
 def _usual(unit: object) -> object:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
-from algid.errors import SettingError
-from algid.files import misfit
-from algid.limits import PHYSICAL
+from algid.base.errors import SettingError
+from algid.base.files import misfit
+from algid.base.limits import PHYSICAL
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 from algid.options import EVERYDAY, flag
 from algid.profile import Effort, documented, field

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
+from algid.base.limits import LIMITS
 from algid.estimators.paper import STAGE1_NAMES
-from algid.limits import LIMITS
 from algid.log import Truth
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Table4Row

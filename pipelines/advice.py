@@ -32,9 +32,9 @@ from unittest.mock import patch
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.base.errors import AlgidError
+from algid.base.exits import Exit
 from algid.cli.app import called
-from algid.errors import AlgidError
-from algid.exits import Exit
 from algid.results import Result, read_result
 from algid.results.verdict import CAUSES, again
 from algid.synth.excitation import Torque, wide_multi_sine

@@ -29,9 +29,9 @@ import numpy as np
 import polars as pl
 
 from algid import synthesise
+from algid.base.runtime import keep_freed, keep_to_one_core
 from algid.batches.workers import THREADS
 from algid.identification.identify import identify
-from algid.runtime import keep_freed, keep_to_one_core
 from algid.writers import write_log
 
 BATCH = [sys.executable, "-m", "algid", "batch"]

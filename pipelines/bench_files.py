@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from algid.files import whole_file
+from algid.base.files import whole_file
+from algid.base.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin
-from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import write_log
 from algid.writers.mcap import messages
 

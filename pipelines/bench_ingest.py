@@ -25,9 +25,9 @@ from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 
+from algid.base.runtime import cores
 from algid.log import Log, Origin
 from algid.readers import open_log, read_log
-from algid.runtime import cores
 from pipelines import bench_files
 
 COLUMNS = ["stamp_ns", "theta1", "theta2", "tau1", "tau2", "omega1", "omega2"]

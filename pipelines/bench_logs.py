@@ -16,9 +16,9 @@ import numpy as np
 import zstandard
 
 from algid.arm import FloatArray, inverse_dynamics
-from algid.files import whole_file
+from algid.base.files import whole_file
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.synth.cases import load_case
 from algid.writers import write_log
 from algid.writers.mcap import TOPIC, messages

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from statistics import median
 
+from algid.base.runtime import one_blas_thread
 from algid.estimators.prediction import PredictionSums
 from algid.estimators.weak import WeakSettings, fit, normal_equations
 from algid.identification.identify import identify
 from algid.readers import open_log
-from algid.runtime import one_blas_thread
 from algid.settings import Settings
 from algid.signals.segments import Segment, segments
 

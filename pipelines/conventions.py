@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.verdict import GRADE_WORDS
 from algid.estimators.convention_search import judge
 from algid.estimators.conventions import AS_READ
 from algid.identification.identify import identify
@@ -28,7 +29,6 @@ from algid.log import Log, Origin, Reading
 from algid.results import Result
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
-from algid.verdict import GRADE_WORDS
 from pipelines.accuracy_scenes import case_of
 
 ARMS = ("case1", "case2", "arm21", "arm22", "arm23")

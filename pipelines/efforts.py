@@ -18,7 +18,7 @@ import numpy as np
 
 from algid.api.identify import identify
 from algid.arm import FloatArray, inverse_dynamics, passive_torque
-from algid.exits import exit_of
+from algid.base.exits import exit_of
 from algid.results import Result
 from algid.synth.simulator import SimulatedMotion
 from pipelines.experiment import experiment

@@ -32,7 +32,7 @@ import numpy as np
 from scipy.stats import beta
 
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray, inverse_dynamics
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.log import Log, Origin
 from algid.synth.excitation import wide_multi_sine

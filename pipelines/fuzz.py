@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
 from pipelines.hostile import corpus

@@ -30,14 +30,14 @@ from typing import Any, NoReturn
 
 import polars as pl
 
+from algid.base.errors import AlgidError
+from algid.base.files import refuse_links, whole_folder
+from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.job import failed_record
 from algid.batches.records import JobStatus, stat_of
 from algid.batches.run import Batch, BatchConfig, sweep
-from algid.errors import AlgidError
-from algid.files import refuse_links, whole_folder
 from algid.settings import Settings
-from algid.stores import open_store
 from pipelines.hostile.batches import furnish_output, grow, manifest, record
 
 CASES = 5_000

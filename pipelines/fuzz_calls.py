@@ -26,8 +26,8 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from algid.faults import EXIT_INTERNAL
-from algid.text import printable
+from algid.base.faults import EXIT_INTERNAL
+from algid.base.text import printable
 from pipelines.hostile.calls import Call, draw_call
 from pipelines.hostile.places import called, furnish
 

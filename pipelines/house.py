@@ -86,6 +86,12 @@ def _is_text(node: ast.AST) -> bool:
     )
 
 
+def room_of(path: Path) -> str:
+    """The room of a file below `algid/`; one of `base` is counted where it came from."""
+    parts = path.parts[1:] if path.parts[0] == "base" else path.parts
+    return parts[0].removesuffix(".py")
+
+
 def part_of(room: str) -> str:
     """The part of the house to which a room of `algid/` belongs."""
     return next((part for part, rooms in PARTS.items() if room in rooms.split()), "face")
@@ -99,7 +105,7 @@ def sizes(root: Path = Path()) -> dict[str, Size]:
             own = size(path.read_text(encoding="utf-8"))
             names = [top]
             if top == "algid":
-                room = path.relative_to(root / top).parts[0].removesuffix(".py")
+                room = room_of(path.relative_to(root / top))
                 names += [part_of(room), f"algid/{room}"]
             for name in names:
                 found.setdefault(name, Size()).add(own)
@@ -111,7 +117,7 @@ def ideas(root: Path = Path("algid")) -> Iterator[tuple[str, int]]:
     texts = [
         (f"{path.stem}.{node.name}", ast.unparse(node))
         for path in sorted(root.rglob("*.py"))
-        if part_of(path.relative_to(root).parts[0].removesuffix(".py")) == "core"
+        if part_of(room_of(path.relative_to(root))) == "core"
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef)
     ]

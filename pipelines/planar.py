@@ -29,7 +29,7 @@ import numpy as np
 from scipy.stats import binom
 
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.estimators import refined
 from algid.estimators.body import with_body_of
 from algid.estimators.fit import Fit

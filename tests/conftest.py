@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from algid.limits import LIMITS
-from algid.runtime import bound_by_environment
+from algid.base.limits import LIMITS
+from algid.base.runtime import bound_by_environment
 
 bound_by_environment()  # as the command does, before anything loads numpy
 
@@ -27,7 +27,7 @@ Limited = Callable[..., None]
 
 @pytest.fixture
 def limited() -> Iterator[Limited]:
-    """Sets bounds of `algid.limits.LIMITS` for one test, so that a small file reaches them."""
+    """Sets bounds of `algid.base.limits.LIMITS` for one test, so that a small file reaches them."""
     before = dict(vars(LIMITS))
 
     def change(**bounds: float) -> None:

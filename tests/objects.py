@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.base.stores import connect
 from algid.log import Log
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
-from algid.stores import connect
 from algid.writers.mcap import messages
 
 DENIED = (

@@ -26,7 +26,7 @@ from pkgutil import walk_packages
 from typing import Any, NoReturn
 
 import algid
-from algid.runtime import bound_by_environment
+from algid.base.runtime import bound_by_environment
 
 ROOT = Path(__file__).parents[1]
 SERVER = "from tests.processes import serve; serve()"

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pytest
 
 import algid
-from algid.errors import LogError, OutputError, ResultError, SettingError
+from algid.base.errors import LogError, OutputError, ResultError, SettingError
 from algid.log import ChannelReading, Reading
 from algid.results import Result, write_result
 from tests.report.folders import build

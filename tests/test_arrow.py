@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow
 import pytest
 
-from algid.arrow import numbers_of, table_of_columns, whole_column
+from algid.base.arrow import numbers_of, table_of_columns, whole_column
 
 
 @pytest.mark.parametrize("dtype", ["i1", "i4", "i8", "u2", "f4", "f8"])

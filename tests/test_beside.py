@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from algid.runtime import Beside, Worker, ahead, executor, keep_to_one_core
+from algid.base.runtime import Beside, Worker, ahead, executor, keep_to_one_core
 
 
 def test_items_read_ahead_keep_their_order() -> None:
@@ -80,7 +80,7 @@ def test_work_beside_gives_its_result_or_its_error() -> None:
 
 @pytest.fixture
 def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.runtime._has_other_cores", True)  # to be put back
+    monkeypatch.setattr("algid.base.runtime._has_other_cores", True)  # to be put back
     keep_to_one_core()
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from algid.base.errors import ResultError, SettingError
 from algid.check import judge
-from algid.errors import ResultError, SettingError
 from algid.results import LogSummary, Result, Table4Row
 
 ROWS = (

@@ -11,7 +11,7 @@ import pytest
 from scipy import special
 from scipy.linalg import lapack as theirs
 
-from algid.compiled import (
+from algid.base.compiled import (
     chi2_exceeded,
     chi2_tail,
     lapack,
@@ -70,7 +70,7 @@ import importlib.machinery, json, sys
 if {broken}:
     def refuse(self, module): raise ImportError("not here")
     importlib.machinery.ExtensionFileLoader.exec_module = {refusal}
-from algid import compiled
+from algid.base import compiled
 packages = [name for name in ("scipy.linalg", "scipy.special") if name in sys.modules]
 tail = float(compiled.chi2_tail(4, 3.0))
 import scipy.linalg, scipy.special

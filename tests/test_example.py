@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.errors import OutputError
-from algid.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
+from algid.api.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
+from algid.base.errors import OutputError
 from algid.inspection.report import inspect_log
 from algid.profile import load_profile
 from tests.processes import Outcome

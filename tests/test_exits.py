@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.api.guide import text_of
-from algid.exits import MEANINGS, OF_COMMAND, WHAT_TO_DO, Exit, epilog, exit_of, rows
+from algid.base.exits import MEANINGS, OF_COMMAND, WHAT_TO_DO, Exit, epilog, exit_of, rows
 from tests.cli.commands import NAMES, app
 
 README = Path(__file__).parents[1] / "README.md"

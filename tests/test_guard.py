@@ -23,8 +23,8 @@ ROOT = Path(__file__).parents[1]
 SCRIPT = """
 import contextlib, os, pathlib, signal, sys, time, types
 import algid.cli, algid.cli.app, algid.guard
-from algid.staging import staged
-from algid.faults import during
+from algid.base.staging import staged
+from algid.base.faults import during
 
 def spin(seconds):
     end = time.process_time() + seconds

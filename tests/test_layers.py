@@ -60,7 +60,6 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow zstandard"),
-    "example": room("arm files log options synth writers", "numpy"),
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "
         "quantiles ros2 runtime units words",
@@ -104,7 +103,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("arm compiled errors files limits model notices physics progress report "
                   "significance text verdict words", "numpy polars scipy"),
     "api": room(
-        "batches check designs errors estimators example exits exports files fleet identification "
+        "arm batches check designs errors estimators exits exports files fleet identification "
         "inspection limits log methods model moved notices options physics profile progress "
         "readers report results runtime settings stores synth text tracks units words writers",
         "numpy plotly polars",
@@ -118,11 +117,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
 
 @cache
 def sources() -> dict[str, str]:
-    """The text of every module of algid by its name."""
+    """The text of every module of algid by its name; each file of `base` is a room of its own."""
     found = {}
     for path in sorted(ROOT.rglob("*.py")):
         parts = ("algid", *path.relative_to(ROOT).with_suffix("").parts)
-        found[".".join(parts).removesuffix(".__init__")] = path.read_text(encoding="utf-8")
+        name = ".".join(parts).removesuffix(".__init__").replace("algid.base.", "algid.")
+        text = path.read_text(encoding="utf-8")
+        found[name] = text.replace("algid.base.", "algid.").replace("algid.base ", "algid ")
+    del found["algid.base"]
     return found
 
 

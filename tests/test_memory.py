@@ -11,7 +11,7 @@ import pytest
 CODE = """
 import resource, sys
 import numpy as np
-from algid.runtime import keep_freed
+from algid.base.runtime import keep_freed
 if sys.argv[1] == "keep":
     keep_freed()
 def work():

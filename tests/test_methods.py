@@ -7,7 +7,7 @@ import re
 import pytest
 
 from algid.api.guide import text_of
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.methods import ESTIMATORS, NAMES, estimator_of, settles
 from algid.options import flag
 from algid.settings import Settings

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.model import K1, K2, K3, PARAMETERS
-from algid.names import (
+from algid.base.names import (
     by_name,
     evenly_spread,
     names_in,
@@ -15,6 +14,7 @@ from algid.names import (
     vector,
     within,
 )
+from algid.model import K1, K2, K3, PARAMETERS
 
 
 def test_what_is_chosen_keeps_its_order() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from algid.quantiles import distinct, median, medians, quantile
+from algid.base.quantiles import distinct, median, medians, quantile
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 9, 10, 1001])

@@ -8,7 +8,7 @@ import json
 
 import pytest
 
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.settings import Settings
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import norm
 
 import algid
-from algid.significance import (
+from algid.base.significance import (
     BUDGET,
     CERTAIN,
     LEVEL,

@@ -16,15 +16,15 @@ from pathlib import Path
 
 import pytest
 
-from algid import staging
-from algid.errors import OutputError
-from algid.files import temporary_folder, whole_file, whole_folder
-from algid.staging import delete_leftovers
+from algid.base import staging
+from algid.base.errors import OutputError
+from algid.base.files import temporary_folder, whole_file, whole_folder
+from algid.base.staging import delete_leftovers
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from algid.files import temporary_folder, whole_file, whole_folder
+from algid.base.files import temporary_folder, whole_file, whole_folder
 makes = {"file": whole_file, "folder": lambda path: whole_folder(path, force=True)}
 with makes[sys.argv[1]](Path(sys.argv[2])) as temporary, temporary_folder():
     if temporary.is_dir() and len(sys.argv) > 3:

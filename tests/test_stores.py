@@ -9,12 +9,12 @@ import polars as pl
 import pytest
 
 import algid
+from algid.base.errors import LogError, OutputError
+from algid.base.stores import list_urls, object_stat, open_store, reading
 from algid.batches.discover import jobs_of
 from algid.batches.records import JobStatus
 from algid.batches.run import Batch, BatchConfig
-from algid.errors import LogError, OutputError
 from algid.settings import Settings
-from algid.stores import list_urls, object_stat, open_store, reading
 from algid.synth.sensors import Sensors
 from tests.batches.test_run import Here
 from tests.objects import Served, s3
@@ -111,9 +111,9 @@ def test_objects_below_a_url_and_one_that_is_not_there(served: Served) -> None:
 def test_a_listing_is_bounded(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("a", "b", "c"):
         open_store(served.url("logs")).write(f"{name}.csv", b"1")
-    monkeypatch.setattr("algid.stores.MOST_LISTED", 3)
+    monkeypatch.setattr("algid.base.stores.MOST_LISTED", 3)
     assert len(list_urls(served.url("logs"))) == 3
-    monkeypatch.setattr("algid.stores.MOST_LISTED", 2)
+    monkeypatch.setattr("algid.base.stores.MOST_LISTED", 2)
     with pytest.raises(OutputError, match="expected at most 2 objects, found 3; name a prefix"):
         list_urls(served.url("logs"))
 

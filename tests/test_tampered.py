@@ -12,7 +12,7 @@ from typing import Any
 import polars as pl
 import pytest
 
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.fleet.history import history_of, read_jobs
 from algid.results import misfit_of_numbers, read_result
 from tests.report.folders import build

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from algid.runtime import one_blas_thread
+from algid.base.runtime import one_blas_thread
 
 
 def test_blas_is_bounded_within_the_block() -> None:

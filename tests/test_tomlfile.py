@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from algid.base.errors import SettingError
+from algid.base.files import parsed_toml
 from algid.batches.discover import jobs_of
 from algid.designs.request import request
-from algid.errors import SettingError
-from algid.files import parsed_toml
 from algid.profile import load_profile
 from algid.synth.cases import load_case
 

@@ -7,7 +7,7 @@ import math
 import pytest
 from scipy import constants
 
-from algid.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, VELOCITY, is_foreign, unit_of
+from algid.base.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, VELOCITY, is_foreign, unit_of
 
 INCH_POUND = constants.inch * constants.pound_force
 

@@ -23,8 +23,8 @@ import pytest
 import algid
 from algid.api.options import LogOptions, Options
 from algid.api.signature import keywords
+from algid.base.errors import ResultError, SettingError
 from algid.cli.derive import COMMANDS, listed
-from algid.errors import ResultError, SettingError
 from algid.options import flag
 from algid.profile import CHANNELS_OF, Profile
 from algid.settings import Settings

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.words import counted
+from algid.base.words import counted
 
 ROOT = Path(algid.__file__).parent
 VERBS = frozenset(

@@ -16,20 +16,20 @@ from algid.api.answer import Answer
 from algid.api.given import opened
 from algid.api.options import OUT, AnyResult, Options, ProfileLike, profile_of, with_options
 from algid.api.signature import check
-from algid.errors import AlgidError, SettingError
-from algid.exits import Exit
+from algid.base.errors import AlgidError, SettingError
+from algid.base.exits import Exit
+from algid.base.text import visible
 from algid.options import Option, flag
-from algid.text import visible
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from algid.base.progress import Progress
     from algid.batches.jobs import Job
     from algid.batches.records import JobRecord
     from algid.batches.run import Batch, BatchOutcome
     from algid.batches.run import Progress as JobProgress
     from algid.profile import Profile
-    from algid.progress import Progress
     from algid.settings import Settings
 
 UNIT = "jobs"
@@ -171,10 +171,10 @@ def batch(
     {'ok': 1}
     """
     check(batch, locals())
+    from algid.base.stores import absolute, open_store, shown
     from algid.batches.discover import jobs_of
     from algid.batches.lock import locked
     from algid.batches.run import Batch, BatchConfig, stopped_by_signals, sweep
-    from algid.stores import absolute, open_store, shown
 
     if isinstance(sources, str | Path):
         sources = [sources]
@@ -287,13 +287,13 @@ def _workers(
     out: str, scheduler: str | None, workers: int | None, memory_limit: int | None, timeout: float
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
+    from algid.base.runtime import cores
     from algid.batches.workers import Workers
-    from algid.runtime import cores
 
     if scheduler is not None:
+        from algid.base.stores import is_url
         from algid.batches.cluster import cluster
         from algid.batches.records import FOLDER
-        from algid.stores import is_url
 
         folder = None if is_url(out) else Path(out, FOLDER)
         with cluster(scheduler, folder, timeout) as pool_and_size:

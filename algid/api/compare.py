@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from algid.api.answer import Answer
 from algid.api.given import opened
 from algid.api.options import Force, Place
-from algid.errors import SettingError
-from algid.files import refuse_existing
+from algid.base.errors import SettingError
+from algid.base.files import refuse_existing
 from algid.options import Option
 from algid.results import Result
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.options import OUT, Force, LogOptions, ProfileLike, meaning
-from algid.errors import OutputError
-from algid.exits import exit_of
-from algid.files import refuse_existing
+from algid.base.errors import OutputError
+from algid.base.exits import exit_of
+from algid.base.files import refuse_existing
 from algid.options import Option
 
 if TYPE_CHECKING:
+    from algid.base.progress import Progress
     from algid.log import Log
     from algid.notices import Notice
-    from algid.progress import Progress
 
 
 def convert(

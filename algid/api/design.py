@@ -12,23 +12,23 @@ from algid.api.given import called, folder_or_none, parts_of
 from algid.api.options import AnyLog, Folder, Force, Length, two_names
 from algid.api.signature import check
 from algid.api.words import cases
-from algid.errors import SettingError
-from algid.exits import exit_of
-from algid.files import refuse_existing
-from algid.limits import KNOWN_MASS, PHYSICAL, PLANNED, Range
+from algid.base.errors import SettingError
+from algid.base.exits import exit_of
+from algid.base.files import refuse_existing
+from algid.base.limits import KNOWN_MASS, PHYSICAL, PLANNED, Range
 from algid.options import Option, flag
 from algid.results import Result
 
 if TYPE_CHECKING:
     import polars as pl
 
+    from algid.base.progress import Progress
     from algid.designs.campaign import Campaign, Design
     from algid.designs.prior import BelievedArm
     from algid.designs.request import Request
     from algid.designs.write import Provenance
     from algid.estimators.whitening import NoiseLevels
     from algid.identification.source import LogLike
-    from algid.progress import Progress
     from algid.report.document import Document
 
 RATE, DURATION = 1000.0, 10.0
@@ -195,11 +195,11 @@ def design(
     >>> plan.open_parameters
     []
     """
+    from algid.base.runtime import one_blas_thread
     from algid.designs.campaign import plan
     from algid.designs.prior import KnownBefore, prior_of
     from algid.designs.request import request
     from algid.designs.write import Provenance, write_design
-    from algid.runtime import one_blas_thread
 
     check(design, locals())
     of_flags = {

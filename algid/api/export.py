@@ -13,9 +13,9 @@ from algid.api.answer import Answer
 from algid.api.given import called, opened, parts_of
 from algid.api.options import AnyResult, Folder, Force, Length
 from algid.api.signature import check
-from algid.errors import SettingError
-from algid.files import refuse_existing, whole_file, whole_folder
-from algid.limits import KNOWN_MASS
+from algid.base.errors import SettingError
+from algid.base.files import refuse_existing, whole_file, whole_folder
+from algid.base.limits import KNOWN_MASS
 from algid.options import Option, flag
 
 if TYPE_CHECKING:

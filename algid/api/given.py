@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.files import whole_folder
+from algid.base.files import whole_folder
 
 if TYPE_CHECKING:
     from algid.identification.source import LogLike

@@ -7,8 +7,8 @@ from importlib import resources
 from typing import Annotated, Any
 
 from algid.api.answer import Answer, Manual
-from algid.errors import SettingError
-from algid.exits import rows
+from algid.base.errors import SettingError
+from algid.base.exits import rows
 from algid.notices import Message, code_of_now, message, messages
 from algid.options import BY_SET, Option, flag
 
@@ -142,7 +142,7 @@ def _formats() -> Iterator[Sequence[str]]:
 
 
 def _units() -> Iterator[Sequence[str]]:
-    from algid.units import UNITS
+    from algid.base.units import UNITS
 
     yield "unit", "of", "also written"
     for unit in UNITS:

@@ -18,15 +18,15 @@ from algid.api.options import (
     ProfileLike,
     with_options,
 )
-from algid.errors import SettingError
-from algid.exits import exit_of
+from algid.base.errors import SettingError
+from algid.base.exits import exit_of
+from algid.base.text import visible
+from algid.base.words import counted
 from algid.options import ADVANCED, Option, flag
-from algid.text import visible
-from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.api.result import Result
-    from algid.progress import Progress
+    from algid.base.progress import Progress
     from algid.results import Result as PlainResult
     from algid.settings import Settings
 
@@ -143,7 +143,7 @@ def typed(given: dict[str, Any]) -> dict[str, Any]:
 
 def answer(result: PlainResult, given: Mapping[str, Any]) -> Answer:
     """The estimates; 3 where the result must not be used as it is, 4 where data were lost."""
-    from algid.files import result_folder
+    from algid.base.files import result_folder
     from algid.report.brief import brief
     from algid.report.page import result_document
     from algid.results import result_json

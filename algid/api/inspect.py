@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from algid.api.answer import Answer
 from algid.api.given import meant
 from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meaning
-from algid.errors import SettingError
-from algid.exits import Exit, exit_of
-from algid.files import refuse_existing, whole_file
+from algid.base.errors import SettingError
+from algid.base.exits import Exit, exit_of
+from algid.base.files import refuse_existing, whole_file
+from algid.base.text import lines_of
 from algid.options import Option, flag
-from algid.text import lines_of
 
 if TYPE_CHECKING:
     from algid.inspection.report import Inspection

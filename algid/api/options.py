@@ -7,9 +7,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
-from algid.errors import SettingError
-from algid.files import parsed_toml
-from algid.limits import KNOWN_LENGTH, LIMITS
+from algid.base.errors import SettingError
+from algid.base.files import parsed_toml
+from algid.base.limits import KNOWN_LENGTH, LIMITS
 from algid.options import ADVANCED, Option, flag
 from algid.profile import (
     CHANNELS_OF,

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
 from algid.api.options import Export, Place
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.options import Option, flag
 
 if TYPE_CHECKING:
-    from algid.progress import Progress
+    from algid.base.progress import Progress
 
 
 def report(

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.options import Option, flag
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels", "cwd")

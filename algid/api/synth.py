@@ -15,9 +15,9 @@ from algid.api.given import parts_of
 from algid.api.options import Folder, Force
 from algid.api.signature import check, keywords
 from algid.api.words import cases, excitations
-from algid.errors import SettingError
-from algid.files import refuse_existing
-from algid.limits import PHYSICAL
+from algid.base.errors import SettingError
+from algid.base.files import refuse_existing
+from algid.base.limits import PHYSICAL
 from algid.log import Log
 from algid.options import Option, flag
 from algid.synth import run
@@ -25,7 +25,7 @@ from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
 
 if TYPE_CHECKING:
-    from algid.progress import Progress
+    from algid.base.progress import Progress
     from algid.synth.cases import Case
     from algid.synth.excitation import Torque
 
@@ -183,7 +183,7 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
 
 def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     """The files."""
-    from algid.example import PROFILE
+    from algid.api.example import PROFILE
 
     names = [f"{log.origin.path}.{given['kind']}" for log in logs]
     if given["case"] == "example":
@@ -192,8 +192,8 @@ def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
 
 
 def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
-    """The logs of `algid.example`, which are what they are."""
-    from algid.example import example_logs, write_example
+    """The logs of `algid.api.example`, which are what they are."""
+    from algid.api.example import example_logs, write_example
 
     for name, one in keywords(synthesise).items():
         default = inspect.signature(synthesise).parameters[name].default

@@ -19,12 +19,12 @@ from algid.api.options import (
     meaning,
 )
 from algid.api.signature import check
-from algid.exits import exit_of
+from algid.base.exits import exit_of
 from algid.options import Option
 
 if TYPE_CHECKING:
+    from algid.base.progress import Progress
     from algid.identification.source import LogLike
-    from algid.progress import Progress
     from algid.results import Result
     from algid.tracks.result import TrackResult
 

@@ -10,15 +10,15 @@ from algid.api.answer import Answer
 from algid.api.given import called, meant, opened
 from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, meaning
 from algid.api.signature import check
+from algid.base.errors import SettingError
+from algid.base.exits import Exit
 from algid.check import Judged, judge
-from algid.errors import SettingError
-from algid.exits import Exit
 from algid.options import Option, flag
 from algid.results import Result
 
 if TYPE_CHECKING:
+    from algid.base.progress import Progress
     from algid.identification.validated import Validated
-    from algid.progress import Progress
     from algid.report.document import Table
 
 

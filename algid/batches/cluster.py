@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from algid import __version__
+from algid.base.errors import AlgidError, SettingError, text_of
+from algid.base.runtime import cores
 from algid.batches.workers import CallFailedError, WorkerDiedError, Workers
-from algid.errors import AlgidError, SettingError, text_of
 from algid.options import flag
-from algid.runtime import cores
 
 SECONDS = 10  # for a scheduler to answer
 

@@ -18,11 +18,11 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from urllib.parse import unquote
 
+from algid.base.errors import SettingError
+from algid.base.stores import is_url, list_urls, shown
 from algid.batches.jobs import TABLE, Job, name_fault, redacted_path, safe_name
 from algid.batches.manifest import is_manifest, read_manifest
-from algid.errors import SettingError
 from algid.readers.formats import SUFFIXES
-from algid.stores import is_url, list_urls, shown
 
 BAG = "metadata.yaml"
 """What makes a folder a bag."""

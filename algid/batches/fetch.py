@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.errors import AlgidError, LogError
+from algid.base.errors import AlgidError, LogError
+from algid.base.stores import public, reading
 from algid.identification.source import Staged
-from algid.stores import public, reading
 
 if TYPE_CHECKING:
     from pyarrow import NativeFile

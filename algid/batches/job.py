@@ -16,22 +16,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
+from algid.base.errors import AlgidError, chain_of, text_of
+from algid.base.files import refuse_links, temporary_folder
+from algid.base.runtime import keep_freed, keep_to_one_core
+from algid.base.stores import is_url, open_store, put_folder
 from algid.batches.fetch import errors_name_url, staged
 from algid.batches.jobs import Job, redacted_path
 from algid.batches.records import Input, JobRecord, JobStatus, estimates_of, hash_of, stat_of
-from algid.errors import AlgidError, chain_of, text_of
-from algid.files import refuse_links, temporary_folder
 from algid.identification.identify import identify
 from algid.identification.source import Staged
 from algid.options import flag
 from algid.results import Result
-from algid.runtime import keep_freed, keep_to_one_core
 from algid.settings import Settings
-from algid.stores import is_url, open_store, put_folder
 
 if TYPE_CHECKING:
+    from algid.base.verdict import Verdict
     from algid.profile import Profile
-    from algid.verdict import Verdict
 
 NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
 NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own

@@ -10,9 +10,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from algid.errors import SettingError
-from algid.limits import LIMITS
-from algid.stores import public
+from algid.base.errors import SettingError
+from algid.base.limits import LIMITS
+from algid.base.stores import public
 
 Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

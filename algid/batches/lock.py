@@ -16,11 +16,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from algid.base.errors import OutputError
+from algid.base.files import refuse_links
+from algid.base.stores import is_url, public
 from algid.batches.records import FOLDER
-from algid.errors import OutputError
-from algid.files import refuse_links
 from algid.options import flag
-from algid.stores import is_url, public
 
 DYING = 2.0  # s that the processes of a killed batch may take to be gone
 

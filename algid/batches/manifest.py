@@ -16,12 +16,12 @@ from datetime import date, datetime
 from datetime import time as clock
 from pathlib import Path
 
+from algid.base.errors import SettingError
+from algid.base.files import parsed_toml, read_start, read_text
+from algid.base.limits import LIMITS
+from algid.base.text import visible
+from algid.base.words import repeated
 from algid.batches.jobs import Job, Label, checked_name, utc_of
-from algid.errors import SettingError
-from algid.files import parsed_toml, read_start, read_text
-from algid.limits import LIMITS
-from algid.text import visible
-from algid.words import repeated
 
 
 def is_manifest(path: Path) -> bool:

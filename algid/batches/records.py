@@ -10,6 +10,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
+from algid.base.errors import LogError, OutputError
+from algid.base.files import refuse_links, sha256_of, writing
+from algid.base.limits import LIMITS
+from algid.base.stores import Store, is_url, object_stat
 from algid.batches.jobs import (
     COLUMNS,
     TABLE,
@@ -20,12 +24,8 @@ from algid.batches.jobs import (
     redacted_path,
     utc_of,
 )
-from algid.errors import LogError, OutputError
-from algid.files import refuse_links, sha256_of, writing
-from algid.limits import LIMITS
 from algid.options import flag
 from algid.results import Result
-from algid.stores import Store, is_url, object_stat
 
 FOLDER = ".jobs"
 
@@ -245,7 +245,7 @@ def _record_in(content: bytes, place: str) -> JobRecord:
     """
     from pydantic import TypeAdapter, ValidationError
 
-    from algid.files import first_misfit
+    from algid.base.files import first_misfit
 
     try:
         record = TypeAdapter(JobRecord).validate_json(content)

@@ -16,6 +16,9 @@ from types import FrameType
 from typing import Any
 
 from algid import __version__
+from algid.base.errors import AlgidError, OutputError, SettingError, text_of
+from algid.base.staging import TEMPORARY, delete_leftovers
+from algid.base.stores import Store
 from algid.batches.job import DiskFull, Task, basis_of, failed_record, is_full, redacted, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
@@ -33,13 +36,10 @@ from algid.batches.records import (
 )
 from algid.batches.table import write_jobs
 from algid.batches.workers import CallFailedError, WorkerDiedError
-from algid.errors import AlgidError, OutputError, SettingError, text_of
 from algid.options import flag
 from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
-from algid.staging import TEMPORARY, delete_leftovers
-from algid.stores import Store
 
 MOST_KILLS = 3
 RUN_AGAIN = "run again: what is finished is kept"

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+from algid.base.stores import Store
 from algid.batches.jobs import TABLE, Label, utc_of
 from algid.batches.records import Input, JobRecord
-from algid.stores import Store
 
 if TYPE_CHECKING:
     import polars as pl

@@ -19,7 +19,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection, Pipe
 from typing import Any
 
-from algid.errors import text_of
+from algid.base.errors import text_of
 from algid.guard import BREAKING, Notes, begin
 from algid.options import flag
 

@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from algid.exits import Exit
+from algid.base.exits import Exit
 
 SELDOM = (20_000, 20, 20)
 """Thresholds of Python's search for cycles: its own let a short command search for a seventh of its
@@ -36,7 +36,7 @@ def main() -> None:
 
 def _command() -> int:
     """Run the command of this process's arguments."""
-    from algid.runtime import bound_by_environment
+    from algid.base.runtime import bound_by_environment
 
     gc.set_threshold(*SELDOM)
     if not sys.warnoptions:
@@ -50,8 +50,8 @@ def _command() -> int:
 
 def _called(arguments: Sequence[str]) -> int:
     """Call the command; what typer refuses is one line too."""
+    from algid.base.errors import SettingError
     from algid.cli.app import called
-    from algid.errors import SettingError
     from algid.moved import refuse_moved
 
     if not arguments:
@@ -80,9 +80,9 @@ def run(arguments: Sequence[str]) -> int:
     KeyboardInterrupt
         If a caller without a guard is stopped.
     """
+    from algid.base.errors import AlgidError
+    from algid.base.faults import fault
     from algid.cli.output import complain, remark
-    from algid.errors import AlgidError
-    from algid.faults import fault
     from algid.guard import TRACEBACK
 
     try:

@@ -21,11 +21,11 @@ import typer
 from typer.core import TyperCommand
 
 from algid.api.signature import Keyword, head, keywords, kind_of, summary
+from algid.base.errors import SettingError
+from algid.base.exits import epilog
+from algid.base.text import lines_of
 from algid.cli.output import complain, shown
-from algid.errors import SettingError
-from algid.exits import epilog
 from algid.options import ADVANCED, BY_SET, EVERYDAY, VALUES, Option, flag
-from algid.text import lines_of
 
 COMMANDS: Mapping[str, str] = {
     "inspect": "inspect",
@@ -119,8 +119,8 @@ def _command(name: str, module: Any, verb: Callable[..., Any]) -> Callable[..., 
     declared.append(_option("quiet", bool, False, "Print nothing but errors.", ADVANCED))
 
     def run(**typed: Any) -> None:
+        from algid.base.runtime import keep_freed
         from algid.report.progress import progress
-        from algid.runtime import keep_freed
 
         keep_freed()
         form, quiet = typed.pop("format", "table"), typed.pop("quiet")
@@ -225,9 +225,9 @@ def _metavar(name: str, kind: Any) -> str:
 def _of_models(with_settings: bool) -> list[inspect.Parameter]:
     """An option for each field of `Profile`, and of `Settings`, that has a flag."""
     from algid.api.words import COMPLETED, of_profile
+    from algid.base.units import names_of
     from algid.profile import ALL_CHANNELS, Profile
     from algid.settings import OF_BOTH, Settings
-    from algid.units import names_of
 
     units = {
         "angle_unit": ", ".join(names_of("angle")),

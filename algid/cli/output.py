@@ -10,9 +10,9 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from algid import text as letters
 from algid.api.answer import Manual
-from algid.errors import without_credentials
+from algid.base import text as letters
+from algid.base.errors import without_credentials
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType

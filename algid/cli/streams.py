@@ -9,7 +9,7 @@ import sys
 import unicodedata
 from typing import Any
 
-from algid.errors import OutputError
+from algid.base.errors import OutputError
 
 SPELLINGS = {
     "–": "-", "—": "-", "−": "-", "…": "...", "±": "+-", "•": "*", "·": "*", "×": "x",

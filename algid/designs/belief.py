@@ -29,12 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.errors import SettingError
+from algid.base.errors import SettingError
+from algid.base.significance import SURE
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS, Shared
 from algid.model import DELAYS
 from algid.options import flag
-from algid.significance import SURE
 
 UNKNOWN = 1e3  # relative bound at which a parameter that the motion leaves open is held
 _ROUND = 1e-6  # of the largest torque: how the corners of |Y F| are rounded

@@ -9,16 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.criteria import UNDETERMINED
+from algid.base.criteria import UNDETERMINED
+from algid.base.errors import SettingError
+from algid.base.progress import Progress
 from algid.designs.belief import Asked, Belief
 from algid.designs.information import Experiment, Information, Slopes, informations
 from algid.designs.limits import Limits, Row, Usage, resting, usage
 from algid.designs.optimise import optimise
 from algid.designs.position import JUDGED_RATE, PositionProblem
-from algid.errors import SettingError
 from algid.model import Motion
 from algid.options import flag
-from algid.progress import Progress
 
 MARGIN = 0.05
 """Of each limit, kept for what a controller overshoots while its model is a fifth wrong."""

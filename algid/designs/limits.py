@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.errors import SettingError
 from algid.designs.belief import Load
 from algid.designs.information import COMPONENTS, Slopes
-from algid.errors import SettingError
 from algid.model import Model, Motion
 from algid.options import flag
 

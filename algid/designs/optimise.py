@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.progress import Progress
+from algid.base.progress import Progress
 
 _DONE = 1e-5  # change of the figure at which a stage ends
 _HALVINGS = 24

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid import __version__
+from algid.base.text import file_name, significant
 from algid.designs.campaign import SECOND, Design
 from algid.designs.figures import motion
 from algid.designs.tables import bound_table, limit_table, verdict
@@ -15,7 +16,6 @@ from algid.report.arm import ArmDrawing
 from algid.report.document import Document, Section
 from algid.report.figures import shares_of_time
 from algid.report.render import page
-from algid.text import file_name, significant
 
 
 def page_html(design: Design, source: str, doubts: Sequence[Notice] = ()) -> str:

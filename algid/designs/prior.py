@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray
+from algid.base.errors import ResultError, SettingError
+from algid.base.names import outside, vector
+from algid.base.significance import SURE
 from algid.designs.belief import Belief
-from algid.errors import ResultError, SettingError
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.known import (
@@ -23,11 +25,9 @@ from algid.identification.known import (
     wrong_inertia,
 )
 from algid.model import DELAYS, SINES, TERMS, Model
-from algid.names import outside, vector
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result, read_result
-from algid.significance import SURE
 from algid.synth.cases import Case, load_case
 
 PHASES = next(name for name, term in TERMS.items() if term.sines)

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from algid.arm import FloatArray
+from algid.base.errors import SettingError
+from algid.base.files import read_toml
+from algid.base.limits import PLANNED
 from algid.designs.limits import HANGING, Limits
-from algid.errors import SettingError
-from algid.files import read_toml
-from algid.limits import PLANNED
 from algid.options import flag
 
 Positive = Annotated[float, Field(gt=0)]  # inf is no limit

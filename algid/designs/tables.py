@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from algid.base.text import ABSENT, percent, resolved, significant, unit_text
+from algid.base.verdict import Verdict, graded
+from algid.base.words import counted
 from algid.designs.campaign import Design
 from algid.designs.limits import Row
 from algid.model import UNITS
 from algid.notices import Notice, Remedy
 from algid.report.document import Kind, Table
-from algid.text import ABSENT, percent, resolved, significant, unit_text
-from algid.verdict import Verdict, graded
-from algid.words import counted
 
 # of what the margin leaves: a limit that is used as far is what keeps the error bars from being
 # less

@@ -16,11 +16,11 @@ import numpy as np
 
 from algid import __version__
 from algid.arm import FloatArray
+from algid.base.files import whole_file
 from algid.designs.campaign import Design
 from algid.designs.limits import Row
 from algid.designs.page import page_html
 from algid.designs.tables import amounts, verdict
-from algid.files import whole_file
 from algid.log import Log, Origin
 from algid.model import UNITS
 from algid.notices import Notice

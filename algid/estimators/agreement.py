@@ -25,10 +25,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.significance import ONE_SIDED
 from algid.estimators.combine import LogInformation, scaled_pinv, scores_of
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
-from algid.significance import ONE_SIDED
 
 
 def agree(

@@ -12,14 +12,14 @@ from itertools import combinations
 
 import numpy as np
 
+from algid.base.names import outside, vector, within
+from algid.base.significance import sigmas
 from algid.estimators.combine import likelihood
 from algid.estimators.fit import Fit, conclude
 from algid.estimators.parametrisation import BODY_PARAMETERS
 from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
-from algid.names import outside, vector, within
 from algid.physics.parameters import BODY
-from algid.significance import sigmas
 
 FALSE = 0.05
 """Chance of an offset or an inertia being chosen for a payload that is a point on link 2's line."""

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays, read_only
+from algid.base.names import outside
 from algid.estimators.parametrisation import Shared
-from algid.names import outside
 
 RANK_TOLERANCE = 1e-13  # relative eigenvalue of the scaled information that counts as nothing
 _STEPS = 60

@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.names import evenly_spread, outside, vector
+from algid.base.significance import SURE
 from algid.estimators.convention_sums import (
     COLUMNS,
     WINDOW,
@@ -36,8 +38,6 @@ from algid.estimators.convention_sums import (
 )
 from algid.estimators.conventions import AS_READ, Convention
 from algid.model import F1, F2, J2, K1, K2, K3, K4, K5, K6, K7, LARGEST_PHASE, MOMENTS, PARAMETERS
-from algid.names import evenly_spread, outside, vector
-from algid.significance import SURE
 
 # of a torque's power: what the arm's true convention leaves on a log that is nearly all model
 _CLEAN = 1e-3

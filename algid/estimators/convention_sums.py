@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.criteria import AT_REST
+from algid.base.criteria import AT_REST
+from algid.base.names import outside
 from algid.estimators.conventions import Convention
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.model import SINE_OF, SINES, Model
-from algid.names import outside
 from algid.physics.motion import Motion
 from algid.physics.terms.coulomb import COULOMB
 from algid.physics.terms.offset import OFFSET

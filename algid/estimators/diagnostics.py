@@ -19,7 +19,9 @@ from functools import partial
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.compiled import chi2_exceeded, chi2_tail, normal_exceeded
+from algid.base.compiled import chi2_exceeded, chi2_tail, normal_exceeded
+from algid.base.names import within
+from algid.base.significance import sigmas
 from algid.estimators.combine import (
     LogInformation,
     Prior,
@@ -44,10 +46,8 @@ from algid.model import (
     inertia,
     phasor,
 )
-from algid.names import within
 from algid.notices import Notice
 from algid.physics.terms import OPTIONAL
-from algid.significance import sigmas
 
 _NOT_NEGATIVE = tuple(name for name, parameter in PARAMETERS.items() if parameter.sign == "+")
 _NUDGE = 1e-6  # of a parameter's size: step of the differences

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from algid.criteria import STILL
+from algid.base.criteria import STILL
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import joints_apart

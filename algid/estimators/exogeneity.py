@@ -30,7 +30,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.compiled import chi2_tail
+from algid.base.compiled import chi2_tail
+from algid.base.significance import LEVEL, chance
 from algid.estimators import instruments, weak
 from algid.estimators.combine import combine, long_run_variance, scaled_pinv, scores_of
 from algid.estimators.fit import Fit
@@ -42,7 +43,6 @@ from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import RIGID
 from algid.notices import Notice, Remedy
-from algid.significance import LEVEL, chance
 
 ANSWERS = 0.01
 """p value of feedback below which instruments do not replace a biased least squares."""

@@ -10,7 +10,9 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays, read_only
-from algid.compiled import student_quantile
+from algid.base.compiled import student_quantile
+from algid.base.names import outside, places_outside
+from algid.base.significance import LEVEL, NORMAL
 from algid.estimators.agreement import agree
 from algid.estimators.combine import (
     LogInformation,
@@ -31,9 +33,7 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
 from algid.estimators.whitening import NoiseLevels
 from algid.model import DELAYS
-from algid.names import outside, places_outside
 from algid.notices import Notice, has_code
-from algid.significance import LEVEL, NORMAL
 
 Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]

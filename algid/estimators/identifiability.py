@@ -31,12 +31,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays
-from algid.compiled import chi2_tail
-from algid.criteria import STILL, UNDETERMINED
+from algid.base.compiled import chi2_tail
+from algid.base.criteria import STILL, UNDETERMINED
+from algid.base.significance import LEVEL
 from algid.model import PARAMETERS, RIGID
 from algid.notices import Notice
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
-from algid.significance import LEVEL
 
 # of √(inertia × gravity), half the critical damping: an arm may be free of friction, and that be
 # known

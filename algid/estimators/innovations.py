@@ -23,8 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
-from algid.compiled import chi2_exceeded
-from algid.significance import NORMAL
+from algid.base.compiled import chi2_exceeded
+from algid.base.significance import NORMAL
 
 LAGS = 40
 ALIKE = 0.01  # relative difference of two periods that counts as none

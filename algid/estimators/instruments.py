@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.criteria import SETTLED_SIMULATED
+from algid.base.criteria import SETTLED_SIMULATED
 from algid.estimators import weak
 from algid.estimators.combine import (
     BlockSums,

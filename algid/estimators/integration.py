@@ -36,14 +36,14 @@ from dataclasses import replace
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.compiled import chi2_tail
+from algid.base.compiled import chi2_tail
+from algid.base.significance import LEVEL
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.fit import Fit
 from algid.estimators.imprint import Imprint, summed
 from algid.model import PARAMETERS, RIGID, SINES, Model, Motion, partials, torque
 from algid.notices import Notice
 from algid.physics.parameters import VISCOUS
-from algid.significance import LEVEL
 
 DEVIATIONS = ("velocity of friction", "velocity of inertia", "position", "bend", "stamps")
 """Friction at another velocity, Coriolis' torque at another one, gravity and inertia at another

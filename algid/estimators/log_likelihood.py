@@ -15,6 +15,7 @@ from operator import add
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.quantiles import medians
 from algid.estimators.combine import BlockSums, LogInformation
 from algid.estimators.identifiability import Correlations, correlations
 from algid.estimators.imprint import Imprint
@@ -35,7 +36,6 @@ from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.model import Model, Motion
-from algid.quantiles import medians
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces

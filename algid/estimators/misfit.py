@@ -33,7 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.compiled import chi2_tail
+from algid.base.compiled import chi2_tail
+from algid.base.names import vector
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.fit import Fit, Misfit, Overlooked
 from algid.estimators.imprint import Imprint, summed
@@ -50,7 +51,6 @@ from algid.model import (
     smooth_sign,
     torque,
 )
-from algid.names import vector
 from algid.signals.filters import smoothed
 
 _SHAPES = (

@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.quantiles import medians
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, forward
-from algid.quantiles import medians
 
 _DIFFERENCE = 6  # order of the difference that leaves only noise of a smooth signal
 _FED_BACK = 0.9

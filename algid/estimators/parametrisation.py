@@ -20,8 +20,8 @@ from functools import cached_property
 import numpy as np
 
 from algid.arm import FloatArray, payload_phasors
+from algid.base.names import names_in, outside
 from algid.model import DELAYS, PARAMETERS, SINE_OF, SINES, Model
-from algid.names import names_in, outside
 from algid.physics.parameters import BODY, PAYLOAD
 from algid.physics.terms.rigid import K1, K2
 

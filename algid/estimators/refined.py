@@ -18,7 +18,10 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.criteria import SETTLED
+from algid.base.criteria import SETTLED
+from algid.base.names import evenly_spread
+from algid.base.progress import Progress
+from algid.base.quantiles import quantile
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, conclude
@@ -34,10 +37,7 @@ from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.estimators.widths import Width, has_width, likeliest_width
-from algid.names import evenly_spread
 from algid.notices import Notice
-from algid.progress import Progress
-from algid.quantiles import quantile
 from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
 

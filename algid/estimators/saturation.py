@@ -34,12 +34,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.quantiles import median
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP, Windows
 from algid.estimators.selection import FIRST_TERMS
 from algid.estimators.weak import WeakSettings, grams, overlapping
 from algid.model import Model
-from algid.quantiles import median
 from algid.signals.segments import Segment, append
 
 Cause = Literal["sensor", "drive"]

@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.names import evenly_spread, outside
 from algid.estimators.hold import Hold, Lateness
 from algid.estimators.term_grams import CHANGE, Coefficients, Grams, Training
 from algid.estimators.weak import Source, WeakSettings
@@ -41,7 +42,6 @@ from algid.model import (
     terms_named,
     without_delay,
 )
-from algid.names import evenly_spread, outside
 from algid.physics.motion import Widths
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)

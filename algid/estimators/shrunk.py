@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.criteria import AT_REST
+from algid.base.criteria import AT_REST
+from algid.base.names import within
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.fit import Fit
@@ -26,7 +27,6 @@ from algid.estimators.shrinkage import Expected, dispersion, divided, joined, sh
 from algid.estimators.shrunk_fit import concluded
 from algid.estimators.weak import Normal, Source, WeakSettings
 from algid.model import EVERY_TERM, K3, SINES, TERMS
-from algid.names import within
 
 _DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _ROUNDS = 3

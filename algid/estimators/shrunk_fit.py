@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.names import outside, places_outside
 from algid.estimators.combine import LogInformation, Prior, combine, scaled_pinv
 from algid.estimators.fit import Fit, Intervals, Status
 from algid.estimators.identifiability import examine
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, merged
 from algid.estimators.shrinkage import spread
-from algid.names import outside, places_outside
 from algid.notices import Notice
 
 QUANTILE = 2.3

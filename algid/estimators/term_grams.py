@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.names import vector
 from algid.estimators.combine import long_run_variances, scaled_pinv, scaled_pinvs
 from algid.estimators.hold import Lateness
 from algid.estimators.modulating_functions import OVERLAP, Known, row_weights
 from algid.estimators.too_short import OF_A_WINDOW, TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings, normal_equations
 from algid.model import DELAYS, loads_of, names_of, terms_named, without_delay
-from algid.names import vector
 from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
 

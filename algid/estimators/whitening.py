@@ -30,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
-from algid.compiled import lapack
+from algid.base.compiled import lapack
 from algid.model import Model, Motion, partials, regressor, sensitivity, torque
 from algid.signals.differences import HELD, POINTS, Stencil, held_torque
 from algid.signals.filters import recursion

@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.errors import ResultError, SettingError
+from algid.base.errors import ResultError, SettingError
+from algid.base.text import joined
 from algid.exports.links import Knowns, Link, links_of, turn_of
 from algid.identification.known import (
     contradictions,
@@ -35,7 +36,6 @@ from algid.model import K1, K2, SINES, TERMS, UNITS, Model, length_by_coupling, 
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Estimate, Result
-from algid.text import joined
 
 
 @dataclass(frozen=True)

@@ -22,15 +22,15 @@ import numpy as np
 from scipy.optimize import brentq
 
 from algid import __version__
-from algid.compiled import student_quantile
-from algid.errors import ResultError, SettingError
+from algid.base.compiled import student_quantile
+from algid.base.errors import ResultError, SettingError
+from algid.base.names import within
 from algid.estimators.diagnostics import bounds
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.exports.description import Description, describe
 from algid.exports.formats import FORMATS, takes, written
 from algid.exports.links import Knowns
 from algid.identification.known import given_lengths, model_of, prior_of, with_error_bar
-from algid.names import within
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from algid.errors import ResultError, SettingError
+from algid.base.errors import ResultError, SettingError
 from algid.exports.description import Description, describe
 from algid.exports.links import Knowns
 from algid.exports.programs import program

@@ -37,7 +37,7 @@ from dataclasses import dataclass
 from scipy.optimize import minimize_scalar
 from scipy.special import expit
 
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.model import K3, K5, moments_of
 from algid.options import flag
 

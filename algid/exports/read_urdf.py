@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import Arm, FloatArray
-from algid.errors import ResultError
-from algid.files import read_text
+from algid.base.errors import ResultError
+from algid.base.files import read_text
+from algid.base.words import counted
 from algid.identification.source import Role
 from algid.identification.validate import Predictor
 from algid.model import SINES, TERMS, Model
-from algid.words import counted
 
 GRAVITY = 9.81
 _PARALLEL = 1e-3  # sine of the angle between axes that count as one direction

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.significance import CERTAIN, sigmas
+from algid.base.significance import CERTAIN, sigmas
 
 if TYPE_CHECKING:
     import polars as pl

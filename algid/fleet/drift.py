@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from algid.significance import LEVEL
+from algid.base.significance import LEVEL
 
 if TYPE_CHECKING:
     import polars as pl

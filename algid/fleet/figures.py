@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.significance import NORMAL
+from algid.base.text import unit_text
 from algid.fleet.drift import SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
 from algid.report.plot import BLUE, GREY, ORANGE, RED, Panels, Plot
-from algid.significance import NORMAL
-from algid.text import unit_text
 
 if TYPE_CHECKING:
     import polars as pl

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from algid.significance import CERTAIN, sigmas
+from algid.base.significance import CERTAIN, sigmas
 
 if TYPE_CHECKING:
     import polars as pl

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.errors import ResultError
-from algid.files import whole_file
+from algid.base.errors import ResultError
+from algid.base.files import whole_file
+from algid.base.limits import LIMITS
+from algid.base.progress import Progress
+from algid.base.words import counted
 from algid.fleet.changes import with_stints
 from algid.fleet.drift import FEWEST, SPAN, windows
 from algid.fleet.findings import mislabelled, outliers
-from algid.limits import LIMITS
 from algid.notices import Notice
 from algid.physics.terms import ALWAYS, OPTIONAL
-from algid.progress import Progress
-from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from algid import __version__
+from algid.base.text import joined, significant, visible
+from algid.base.verdict import Verdict, graded
+from algid.base.words import counted
 from algid.fleet.drift import ALPHA
 from algid.fleet.figures import overview
 from algid.fleet.history import History
 from algid.fleet.tables import MOST_ROWS, change_table, finding_table, robot_table
 from algid.notices import Notice
 from algid.report.document import Document, Section
-from algid.text import joined, significant, visible
-from algid.verdict import Verdict, graded
-from algid.words import counted
 
 if TYPE_CHECKING:
     import polars as pl

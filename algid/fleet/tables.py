@@ -8,13 +8,13 @@ from datetime import datetime
 import numpy as np
 import polars as pl
 
-from algid.compiled import student_quantile
+from algid.base.compiled import student_quantile
+from algid.base.text import ABSENT, joined, significant, visible
+from algid.base.words import counted
 from algid.fleet.changes import ALPHA as CHANGED
 from algid.fleet.drift import ALPHA, SPAN
 from algid.fleet.history import History
 from algid.report.document import Kind, Table
-from algid.text import ABSENT, joined, significant, visible
-from algid.words import counted
 
 MOST_ROWS = 200
 KINDS = {"payload": "payload unlike its label", "outlier": "outlier"}

@@ -8,6 +8,9 @@ from functools import partial
 
 import numpy as np
 
+from algid.base.names import within
+from algid.base.runtime import Worker
+from algid.base.significance import LEVEL
 from algid.estimators import exogeneity, load_scatter, motorless, shrunk, weak
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
@@ -24,12 +27,9 @@ from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.methods import estimator_of
 from algid.model import DELAYS, TERMS, Model
-from algid.names import within
 from algid.physics.effort import absent
-from algid.runtime import Worker
 from algid.settings import Settings
 from algid.signals.segments import Segment
-from algid.significance import LEVEL
 
 Predictions = Mapping[LogSource, PredictionSums]
 """What scores a prediction of a log by any coefficients."""

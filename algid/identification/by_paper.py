@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, FloatArray, mass_matrix
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.estimators.diagnostics import FAR_BEYOND
 from algid.estimators.paper import (
     SHORTEST,

@@ -16,15 +16,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.names import within
+from algid.base.significance import SURE
 from algid.estimators.combine import of_kind
 from algid.estimators.diagnostics import by_themselves
 from algid.estimators.fit import Fit
 from algid.model import EVERY_TERM, K3, K4, K5, K6, K7, MOMENTS, SINE_OF, names_of, terms_named
-from algid.names import within
 from algid.notices import Notice, Remedy
 from algid.physics.effort import FRICTION
 from algid.settings import Settings
-from algid.significance import SURE
 
 LONGEST, BOTH_LONG = 5.0, 2.0
 """m: no link is longer, and no two links are."""

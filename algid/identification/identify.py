@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES
-from algid.errors import LogError, ResultError, SettingError
+from algid.base.errors import LogError, ResultError, SettingError
+from algid.base.files import refuse_misleading, result_folder, whole_folder
+from algid.base.progress import Progress
+from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
-from algid.files import refuse_misleading, result_folder, whole_folder
 from algid.identification.by_paper import run_paper
 from algid.identification.known import contradictions
 from algid.identification.outcome import Identified
@@ -29,9 +31,7 @@ from algid.identification.survey import Survey
 from algid.methods import estimator_of, settles
 from algid.options import flag
 from algid.physics.effort import absent
-from algid.progress import Progress
 from algid.results import Result, read_result, write_result
-from algid.runtime import one_blas_thread
 from algid.settings import DEFAULTS, OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:

@@ -8,7 +8,9 @@ from math import isclose
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.errors import ResultError
+from algid.base.errors import ResultError
+from algid.base.names import outside, vector, within
+from algid.base.significance import CERTAIN, sigmas
 from algid.estimators.combine import Prior
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
@@ -25,14 +27,12 @@ from algid.model import (
     phasor_of,
     without_delay,
 )
-from algid.names import outside, vector, within
 from algid.notices import Notice
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.results import Result
 from algid.settings import Settings
 from algid.signals.shift import TorqueShift
-from algid.significance import CERTAIN, sigmas
 
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
 SAME_LENGTH = 0.01  # of a length: what two rulers differ by

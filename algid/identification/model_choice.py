@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from algid.base.names import outside, within
 from algid.estimators.fit import Fit
 from algid.estimators.hold import Hold
 from algid.estimators.selection import CHOICE, Selection, TermTrial, lateness, needs_shape, select
@@ -15,7 +16,6 @@ from algid.identification.known import model_of
 from algid.identification.passes import long_enough, passes, weak_settings
 from algid.identification.survey import Survey
 from algid.model import CHOICES, COLUMN_NAMES, DELAYS, EVERY_TERM, Model, without_delay
-from algid.names import outside, within
 from algid.physics.effort import absent, without_terms
 from algid.results import Result
 from algid.settings import Settings

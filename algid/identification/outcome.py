@@ -11,6 +11,8 @@ import numpy as np
 
 from algid import results
 from algid.arm import CONSTANT_NAMES, FloatArray
+from algid.base.names import outside, places_outside, within
+from algid.base.significance import LEVEL, chance
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit, own_estimates
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
@@ -22,12 +24,10 @@ from algid.identification.remarks import fit_notes, fit_warnings, torque_unit
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.identification.survey import Survey
 from algid.model import DELAYS, UNITS
-from algid.names import outside, places_outside, within
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
 from algid.settings import Settings
-from algid.significance import LEVEL, chance
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
 

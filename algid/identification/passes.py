@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.estimators import weak
 from algid.estimators.selection import Selection
 from algid.estimators.too_short import TooShortError

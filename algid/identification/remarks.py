@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from algid import results
+from algid.base.significance import CERTAIN, sigmas
+from algid.base.units import TORQUE
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
 from algid.estimators.shrunk_fit import unshrunk
@@ -14,8 +16,6 @@ from algid.identification.phases import phase_note
 from algid.identification.source import LogSource
 from algid.model import K4
 from algid.notices import Notice, Remedy, has_code
-from algid.significance import CERTAIN, sigmas
-from algid.units import TORQUE
 
 STEEL, AIR = 8000.0, 1.2  # kg/m³
 LEAST_SURE = 10.0  # standard deviations that a length has to have

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.arrow import table_of_columns
+from algid.base.arrow import table_of_columns
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
 from algid.estimators.noise import first_guess

@@ -10,14 +10,14 @@ from functools import cache, partial
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Literal
 
-from algid.errors import LogError
-from algid.files import sha256_of
+from algid.base.errors import LogError
+from algid.base.files import sha256_of
+from algid.base.runtime import ahead
 from algid.log import Log, Origin
 from algid.notices import Notice
 from algid.readers.clock import check_step
 from algid.readers.memory import Columns, is_columns, refuse_others
 from algid.results import LogSummary, Result
-from algid.runtime import ahead
 
 if TYPE_CHECKING:
     from algid.profile import Profile

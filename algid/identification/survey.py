@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import chain, islice
 from typing import TYPE_CHECKING
 
+from algid.base.names import evenly_spread
+from algid.base.progress import Progress
+from algid.base.runtime import Beside
 from algid.identification.source import LogSource, refuse_shared_torques
 from algid.log import Log
-from algid.names import evenly_spread
 from algid.notices import Notice
-from algid.progress import Progress
 from algid.results import LogSummary
-from algid.runtime import Beside
 from algid.signals.segments import Segment, segments
 
 if TYPE_CHECKING:

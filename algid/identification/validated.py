@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from algid.base.text import ABSENT, file_name, significant, visible
 from algid.estimators.rollout import HORIZONS, RolloutScore
 from algid.identification.validate import Simulation
 from algid.report.document import Kind, Table
 from algid.report.tables import by_state
 from algid.results import TorquePrediction
-from algid.text import ABSENT, file_name, significant, visible
 
 if TYPE_CHECKING:
     from algid.check import Judged

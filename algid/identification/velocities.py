@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.identification.source import LogSource
 from algid.identification.survey import Survey
 from algid.options import flag

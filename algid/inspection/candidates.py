@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.notices import Remedy
 from algid.readers.formats import Entry, entries_at

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.criteria import CUT
+from algid.base.criteria import CUT
+from algid.base.quantiles import median, quantile
 from algid.estimators.saturation import UNSEEN, Saturation
 from algid.inspection.candidates import torques_beside
 from algid.inspection.figures import differences, robust_deviation, saturated_share, thinned
 from algid.log import Log
 from algid.notices import Notice, Remedy
-from algid.quantiles import median, quantile
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache, partial
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.estimators.saturation import Saturation
 from algid.inspection.channels import (
     angles,

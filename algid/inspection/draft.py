@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from algid.base.units import names_of
 from algid.inspection.report import look
 from algid.log import Origin, Reading
 from algid.readers import open_log
 from algid.readers.formats import FORMATS
 from algid.readers.table import CHANNELS
-from algid.units import names_of
 
 _HEAD = """\
 # What the log's names, units and signs mean: edit what is wrong.

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.criteria import GAP
+from algid.base.criteria import GAP
+from algid.base.quantiles import distinct, median
 from algid.log import Log
 from algid.notices import Notice, of_codes
-from algid.quantiles import distinct, median
 from algid.readers.clock import PAUSE
 from algid.signals.spacing import near_stamps, spaced
 

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from algid.errors import LogError
-from algid.faults import during
+from algid.base.errors import LogError
+from algid.base.faults import during
 from algid.inspection.checks import examine
 from algid.inspection.clipping import clipped, saturation
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures

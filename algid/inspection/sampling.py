@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.quantiles import median, medians, quantile
 from algid.inspection.figures import ENOUGH, clock_figures, differences, noise_floor, signal_figures
 from algid.log import Log
 from algid.notices import Notice, Remedy
-from algid.quantiles import median, medians, quantile
 from algid.signals.spacing import NEAR, near_stamps
 
 _LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0

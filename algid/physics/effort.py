@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Literal
 
-from algid.names import outside, within
+from algid.base.names import outside, within
 from algid.physics.terms import ALWAYS, OPTIONAL
 from algid.physics.terms.viscous import VISCOUS
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.names import names_in
+from algid.base.names import names_in
 
 if TYPE_CHECKING:
     from algid.physics.motion import Motion, Widths

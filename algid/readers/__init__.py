@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.faults import during
+from algid.base.faults import during
 from algid.log import Log
 
 if TYPE_CHECKING:

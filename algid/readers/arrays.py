@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arrow import table_of_columns
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.arrow import table_of_columns
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.words import counted, repeated
 from algid.notices import Notice
 from algid.readers.attributes import ATTRIBUTES
 from algid.readers.flat import BATCH_ROWS, TableFile, as_log_error
 from algid.readers.names import TIMES
-from algid.words import counted, repeated
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
 from algid.readers.flat import BATCH_ROWS, TableFile, as_log_error

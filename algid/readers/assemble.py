@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.errors import LogError
-from algid.faults import during
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.faults import during
+from algid.base.limits import LIMITS
+from algid.base.words import counted
 from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order
 from algid.readers.convert import ROWS, Conversion, GrowingBuffer, channel_readings, laws_of
 from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, stack
-from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile

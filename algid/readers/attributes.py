@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.arrow import numbers_of
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.arrow import numbers_of
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
 from algid.readers.names import STEMS
 from algid.readers.stated import BAD, GOOD, GROUPS, several
 

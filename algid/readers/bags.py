@@ -17,15 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from algid.errors import LogError
-from algid.files import read_start
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.files import read_start
+from algid.base.limits import LIMITS
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.notices import Notice
 from algid.readers.mcap import open_mcap
 from algid.readers.messages.batch import MessageBatch, Messages
 from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.messages.reader import MessageLog
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
 _PAD = 8

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.criteria import BRIDGED
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.criteria import BRIDGED
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.quantiles import median
+from algid.base.words import counted
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
-from algid.quantiles import median
 from algid.readers.table import SampleTable, stack
-from algid.words import counted
 
 HORIZON = 1024
 """Rows a sample may come late: a network reorders neighbours, it does not mix two recordings."""

@@ -6,7 +6,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.units import CURRENT, TORQUE, unit_of
 from algid.log import Reading
 from algid.notices import Notice, Remedy
 from algid.readers.joints import reading_of
@@ -20,7 +21,6 @@ from algid.readers.names import (
     take_apart,
 )
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES
-from algid.units import CURRENT, TORQUE, unit_of
 
 if TYPE_CHECKING:
     from algid.profile import Profile

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.units import CURRENT, TORQUE, VELOCITY
 from algid.log import ChannelReading, IntArray
 from algid.notices import Remedy
 from algid.options import flag
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES, SampleTable
-from algid.units import CURRENT, TORQUE, VELOCITY
 
 if TYPE_CHECKING:
     from algid.profile import Angle, Profile, Torque, Velocity

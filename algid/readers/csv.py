@@ -8,8 +8,8 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.errors import LogError
-from algid.files import read_whole
+from algid.base.errors import LogError
+from algid.base.files import read_whole
 from algid.log import Companion, loads
 from algid.notices import Notice
 from algid.readers.dialect import Dialect, detect

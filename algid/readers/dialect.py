@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.units import is_foreign, unit_of
+from algid.base.words import counted
 from algid.notices import Remedy
 from algid.options import flag
-from algid.units import is_foreign, unit_of
-from algid.words import counted
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|", "")

@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.arrow import whole_column
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.arrow import whole_column
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.quantiles import median
+from algid.base.units import ANGLE, NANOSECONDS
+from algid.base.words import repeated
 from algid.log import Companion, IntArray, Origin, add, word_sum
 from algid.notices import Notice, Remedy
-from algid.quantiles import median
 from algid.readers.assemble import TableReader, make_reader
 from algid.readers.attributes import decoded, honoured
 from algid.readers.columns import Columns, assign
@@ -26,8 +28,6 @@ from algid.readers.joints import moving_joints
 from algid.readers.names import has_a_time
 from algid.readers.stated import lines_of, units_in
 from algid.readers.table import SampleTable
-from algid.units import ANGLE, NANOSECONDS
-from algid.words import repeated
 
 if TYPE_CHECKING:
     import pyarrow as pa

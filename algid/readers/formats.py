@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from algid.errors import LogError
-from algid.files import read_start
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.files import read_start
+from algid.base.limits import LIMITS
 from algid.readers.text import GZIP, MCAP, NUL_AMONG_ROWS, ZSTD, head_of, looks_like_text
 
 if TYPE_CHECKING:

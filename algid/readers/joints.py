@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from algid.criteria import BESIDE_STILL, SWINGING
-from algid.errors import LogError
+from algid.base.criteria import BESIDE_STILL, SWINGING
+from algid.base.errors import LogError
 from algid.log import Reading
 from algid.notices import Notice, Remedy
 from algid.readers.table import SampleTable

@@ -24,15 +24,15 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, Metadata, MetadataIndex, Schema, Statistics
 from numpy.typing import NDArray
 
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.runtime import ahead
+from algid.base.words import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
 from algid.readers.messages.batch import MessageBatch, Messages, gaps_between, gather
 from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.messages.reader import MessageLog
-from algid.runtime import ahead
-from algid.words import counted
 
 _MAGIC = b"\x89MCAP0\r\n"
 _FRAME = struct.Struct("<BQ")

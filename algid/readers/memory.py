@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
-from algid.errors import LogError, SettingError
+from algid.base.errors import LogError, SettingError
 from algid.log import Log
 from algid.readers.arrays import of_arrays, of_arrow
 from algid.readers.attributes import decoded

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import chain
 
-from algid.limits import LIMITS
+from algid.base.limits import LIMITS
+from algid.base.units import is_foreign, unit_of
+from algid.base.words import counted
 from algid.readers.joints import along_the_arm
-from algid.units import is_foreign, unit_of
-from algid.words import counted
 
 
 def words(text: str) -> tuple[str, ...]:

@@ -13,11 +13,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, TypeGuard
 
-from algid.limits import LIMITS
+from algid.base.limits import LIMITS
+from algid.base.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, VELOCITY, is_foreign, unit_of
 from algid.log import KEY, IntArray, Reading, usual_period
 from algid.notices import Notice, Remedy
 from algid.readers.names import CURRENTS, STEMS, TIMES, take_apart, words
-from algid.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, VELOCITY, is_foreign, unit_of
 
 if TYPE_CHECKING:
     from algid.profile import Profile

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.blocks import concatenated, rows_of
+from algid.base.blocks import concatenated, rows_of
 from algid.log import IntArray
 from algid.notices import Notice
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from algid.errors import LogError
-from algid.limits import LIMITS
-from algid.words import counted
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.words import counted
 
 MCAP = b"\x89MCAP0\r\n"
 ZSTD = b"\x28\xb5\x2f\xfd"

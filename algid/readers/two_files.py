@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice, Remedy
 from algid.readers.assemble import TableReader

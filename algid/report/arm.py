@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.text import significant
 from algid.model import SINES, length_by_coupling, moments_of
 from algid.options import flag
 from algid.report.series import Drawn
 from algid.results import Result
-from algid.text import significant
 
 FRAMES = 30.0  # a second
 MOST_FRAMES = 6_000

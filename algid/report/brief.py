@@ -7,15 +7,15 @@ import textwrap
 from collections.abc import Iterable, Sequence
 
 from algid.arm import CONSTANT_NAMES as ARM
+from algid.base.text import ABSENT, lines_of, resolved, significant, visible
+from algid.base.verdict import MOST_REASONS, Verdict
+from algid.base.words import counted
 from algid.model import DELAYS, SINES
 from algid.notices import Notice
 from algid.report.phasors import moments
 from algid.results import Result, Status
 from algid.results.rows import rows_of
 from algid.results.verdict import share_text
-from algid.text import ABSENT, lines_of, resolved, significant, visible
-from algid.verdict import MOST_REASONS, Verdict
-from algid.words import counted
 
 WIDTH, HEIGHT = 80, 25
 MOST_TERMS = 2

@@ -11,14 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from algid import __version__
-from algid.files import whole_file
-from algid.report.document import Document, Kind, Section, Table
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot
-from algid.report.render import page
-from algid.report.tables import flat_settings
-from algid.results import Estimate, LogSummary, Result, Status
-from algid.significance import NORMAL, sigmas
-from algid.text import (
+from algid.base.files import whole_file
+from algid.base.significance import NORMAL, sigmas
+from algid.base.text import (
     ABSENT,
     file_name,
     formatted,
@@ -28,8 +23,13 @@ from algid.text import (
     unit_text,
     visible,
 )
-from algid.verdict import Verdict
-from algid.words import counted
+from algid.base.verdict import Verdict
+from algid.base.words import counted
+from algid.report.document import Document, Kind, Section, Table
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot
+from algid.report.render import page
+from algid.report.tables import flat_settings
+from algid.results import Estimate, LogSummary, Result, Status
 
 NAME = "compare.html"
 FAR = sigmas()

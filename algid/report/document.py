@@ -10,10 +10,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from algid.base.text import ABSENT
+from algid.base.verdict import Verdict
 from algid.report.arm import ArmDrawing
 from algid.report.plot import Plot
-from algid.text import ABSENT
-from algid.verdict import Verdict
 
 Kind = Literal["name", "number", "text", "status"]
 

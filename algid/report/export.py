@@ -29,13 +29,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.blocks import stacked
-from algid.errors import ResultError
-from algid.files import whole_file
-from algid.progress import Progress
+from algid.base.blocks import stacked
+from algid.base.errors import ResultError
+from algid.base.files import whole_file
+from algid.base.progress import Progress
+from algid.base.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 from algid.report.series import blocks, by_log, facts_of
 from algid.results import read_result
-from algid.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 
 if TYPE_CHECKING:
     from mcap.writer import Writer

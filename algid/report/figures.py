@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
-from algid.errors import ResultError
+from algid.base.errors import ResultError
+from algid.base.quantiles import median, quantile
+from algid.base.text import file_name, joined, significant, unit_text
 from algid.model import K1, K3, K5
-from algid.quantiles import median, quantile
 from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, Plot
 from algid.report.series import POINTS, Drawn, between, drawn, table
 from algid.results import Estimate, FitSummary, Result
 from algid.results.rows import known_truth
 from algid.results.verdict import share_text
-from algid.text import file_name, joined, significant, unit_text
 
 STRONG = 0.95
 MOST_CELLS = 600

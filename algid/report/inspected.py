@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from algid.base.text import visible
+from algid.base.words import counted
 from algid.inspection.report import Inspection
 from algid.report.document import Kind, Table
-from algid.text import visible
-from algid.words import counted
 
 MOST_SHOWN = 100
 """Entries of a log that are listed."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from algid.arm import CONSTANT_NAMES
-from algid.errors import ResultError
+from algid.base.errors import ResultError
+from algid.base.progress import Progress
+from algid.base.text import file_name, significant
+from algid.base.words import counted
 from algid.methods import settles
-from algid.progress import Progress
 from algid.report.arm import arm_of
 from algid.report.document import Content, Document, Section
 from algid.report.figures import figures, intervals, of_paper
@@ -27,8 +29,6 @@ from algid.report.tables import (
     used_settings,
 )
 from algid.results import Result, read_result
-from algid.text import file_name, significant
-from algid.words import counted
 
 
 def write_pages(

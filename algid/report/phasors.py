@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.base.text import resolved, significant
 from algid.model import SINES
 from algid.results import Result
-from algid.text import resolved, significant
 
 
 @dataclass(frozen=True)

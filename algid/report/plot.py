@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.quantiles import median
-from algid.text import visible
+from algid.base.quantiles import median
+from algid.base.text import visible
 
 BLUE, ORANGE, GREEN, GREY, RED = "#3b82c4", "#d9772b", "#2e9c6a", "#8b95a4", "#d0453c"
 """Legible on white and on the dark page."""

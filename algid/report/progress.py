@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from algid.progress import Progress
+from algid.base.progress import Progress
 
 WIDEST = 40
 BESIDE = 60  # columns that words, counts and the time left take beside the bar

@@ -21,12 +21,12 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from algid.files import whole_file
+from algid.base.files import whole_file
+from algid.base.text import visible
+from algid.base.verdict import MOST_REASONS
 from algid.report.document import Document, Table
 from algid.results import Result
 from algid.results.rows import rows_of
-from algid.text import visible
-from algid.verdict import MOST_REASONS
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.arrow import numbers_of
-from algid.blocks import concatenated, rows_of
-from algid.criteria import CUT
-from algid.errors import ResultError
-from algid.progress import Progress
-from algid.quantiles import median
+from algid.base.arrow import numbers_of
+from algid.base.blocks import concatenated, rows_of
+from algid.base.criteria import CUT
+from algid.base.errors import ResultError
+from algid.base.progress import Progress
+from algid.base.quantiles import median
 
 Block = dict[str, FloatArray]
 ROWS = 1 << 18

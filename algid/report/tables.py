@@ -9,16 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from algid.arm import CONSTANT_NAMES
-from algid.methods import settles
-from algid.model import DELAYS
-from algid.notices import NAMED
-from algid.report.document import Kind, Table
-from algid.report.phasors import moments
-from algid.report.series import LogFacts
-from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
-from algid.results.rows import known_truth, rows_of
-from algid.results.verdict import replaced_estimator
-from algid.text import (
+from algid.base.text import (
     ABSENT,
     file_name,
     formatted,
@@ -29,6 +20,15 @@ from algid.text import (
     visible,
     yes_or_no,
 )
+from algid.methods import settles
+from algid.model import DELAYS
+from algid.notices import NAMED
+from algid.report.document import Kind, Table
+from algid.report.phasors import moments
+from algid.report.series import LogFacts
+from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
+from algid.results.rows import known_truth, rows_of
+from algid.results.verdict import replaced_estimator
 
 LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
 CONVENTIONS = ("zero", "second_angle", "drive", "signs", "offsets")

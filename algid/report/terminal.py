@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from algid.base.text import lines_of, visible
+from algid.base.verdict import Grade, Verdict
+from algid.base.words import counted
 from algid.report.brief import run_first
 from algid.report.document import Document, Table
 from algid.results import Status
-from algid.text import lines_of, visible
-from algid.verdict import Grade, Verdict
-from algid.words import counted
 
 if TYPE_CHECKING:
     from rich.console import Console

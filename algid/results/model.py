@@ -17,16 +17,16 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, ValidationError, computed_field, model_validator
 
-from algid.errors import ResultError, SettingError
-from algid.files import first_misfit, read_text, whole_file
-from algid.limits import LIMITS
+from algid.base.errors import ResultError, SettingError
+from algid.base.files import first_misfit, read_text, whole_file
+from algid.base.limits import LIMITS
+from algid.base.significance import NORMAL
+from algid.base.text import visible
+from algid.base.verdict import Verdict
+from algid.base.words import counted
 from algid.log import Reading
 from algid.model import DELAYS
 from algid.notices import Notice, code_of_now, notes_of, warnings_of
-from algid.significance import NORMAL
-from algid.text import visible
-from algid.verdict import Verdict
-from algid.words import counted
 
 SCHEMA_VERSION: Literal[4] = 4
 READABLE = (3, 4)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from algid.base.text import ABSENT, digits_of, percent, resolved, significant, unit_text, visible
 from algid.model import PARAMETERS
-from algid.text import ABSENT, digits_of, percent, resolved, significant, unit_text, visible
 
 if TYPE_CHECKING:
     from algid.results.model import Estimate, Result

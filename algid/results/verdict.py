@@ -7,14 +7,14 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from algid.base.names import outside
+from algid.base.significance import SURE
+from algid.base.text import joined, significant, visible
+from algid.base.verdict import Verdict, graded
+from algid.base.words import counted
 from algid.model import CHOICES, EVERY_TERM, K1, K2, K3, K4, K5, K6, K7
-from algid.names import outside
 from algid.notices import Notice, Remedy, flat, has_code, notes_of, of_codes, warnings_of
 from algid.options import flag
-from algid.significance import SURE
-from algid.text import joined, significant, visible
-from algid.verdict import Verdict, graded
-from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.results.model import (

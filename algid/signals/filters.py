@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.compiled import lapack
+from algid.base.compiled import lapack
 
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth

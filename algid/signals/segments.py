@@ -15,7 +15,7 @@ from itertools import chain, pairwise
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
-from algid.criteria import CUT
+from algid.base.criteria import CUT
 from algid.log import IntArray, Log, join, joined, usual_period
 from algid.signals.spacing import spaced
 

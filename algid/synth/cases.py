@@ -14,9 +14,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from algid.arm import Arm, FloatArray
-from algid.errors import SettingError
-from algid.files import read_toml
-from algid.limits import PHYSICAL, Range
+from algid.base.errors import SettingError
+from algid.base.files import read_toml
+from algid.base.limits import PHYSICAL, Range
 from algid.synth.excitation import MultiSine
 
 

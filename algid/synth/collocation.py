@@ -32,7 +32,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 
 from algid.arm import FloatArray
-from algid.limits import PHYSICAL
+from algid.base.limits import PHYSICAL
 
 Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
 """Accelerations (n, M) from angles (n, M) and velocities (n, M), at times set before."""

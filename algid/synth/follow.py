@@ -25,8 +25,8 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
-from algid.errors import SettingError
-from algid.files import read_text
+from algid.base.errors import SettingError
+from algid.base.files import read_text
 from algid.synth.simulator import Driven, SimulatedMotion, steered
 
 STIFFNESS = 2 * np.pi * 10.0

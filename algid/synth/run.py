@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from algid.base.progress import Progress
 from algid.log import Log, Truth
-from algid.progress import Progress
 from algid.synth.cases import Case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
 from algid.synth.follow import Reference, follow

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from algid.arm import FloatArray, forward_dynamics
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.synth.collocation import Acceleration, integrate
 from algid.synth.excitation import SampledTorque, Torque
 

@@ -28,7 +28,8 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.errors import ResultError
+from algid.base.errors import ResultError
+from algid.base.names import names_in, outside, within
 from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
@@ -44,7 +45,6 @@ from algid.identification.known import (
     with_error_bar,
 )
 from algid.model import K3, K6, K7, SINES, TERMS, Model
-from algid.names import names_in, outside, within
 from algid.options import flag
 from algid.results import Result
 from algid.signals.differences import POINTS, Stencil

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.compiled import chi2_exceeded, student_quantile
+from algid.base.compiled import chi2_exceeded, student_quantile
 from algid.tracks.bins import Cells
 from algid.tracks.drift import BLOCK, Drift, drift_of
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.criteria import HOLE
+from algid.base.criteria import HOLE
+from algid.base.significance import NORMAL
 from algid.report.plot import BLUE, GREEN, ORANGE, Panels, Plot
-from algid.significance import NORMAL
 from algid.tracks.bins import CELL
 from algid.tracks.payload import HALF_BAND
 from algid.tracks.result import TrackResult

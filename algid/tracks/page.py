@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from algid.files import whole_file
+from algid.base.files import whole_file
+from algid.base.significance import NORMAL
+from algid.base.text import file_name, significant
+from algid.base.words import counted
 from algid.report.document import Document, Section
 from algid.report.export import START_KEY, write_series
 from algid.report.render import markdown, page, write_texts
 from algid.report.tables import settings_table
-from algid.significance import NORMAL
-from algid.text import file_name, significant
 from algid.tracks.figures import payload_figure
 from algid.tracks.result import TrackResult, track_json
 from algid.tracks.tables import (
@@ -26,7 +27,6 @@ from algid.tracks.tables import (
     track_provenance,
     verdict,
 )
-from algid.words import counted
 
 
 def track_document(result: TrackResult) -> Document:

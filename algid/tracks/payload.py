@@ -18,10 +18,10 @@ from operator import itemgetter
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.criteria import HOLE
+from algid.base.criteria import HOLE
+from algid.base.significance import NORMAL
 from algid.estimators.too_short import TooShortError
 from algid.signals.segments import Segment
-from algid.significance import NORMAL
 from algid.tracks.bins import CELL, Cells, IdentifiedArm, cells_of, joined, with_friction
 from algid.tracks.change_points import (
     AHEAD,

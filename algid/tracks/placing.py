@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
+from algid.base.names import outside
 from algid.estimators.whitening import (
     adjoint,
     along_stencil,
@@ -33,7 +34,6 @@ from algid.estimators.whitening import (
     triangular,
 )
 from algid.model import Model, Motion, partials, sensitivity, torque
-from algid.names import outside
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, append

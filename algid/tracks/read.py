@@ -9,12 +9,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
-from algid.errors import ResultError
-from algid.files import first_misfit, read_text
+from algid.base.errors import ResultError
+from algid.base.files import first_misfit, read_text
+from algid.base.significance import NORMAL
 from algid.notices import Notice
 from algid.report.series import Block, blocks
 from algid.results import LogSummary, misfit_of_numbers
-from algid.significance import NORMAL
 from algid.tracks.payload import Stretch, Track
 from algid.tracks.result import TrackResult
 

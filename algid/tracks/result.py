@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from algid.criteria import UNDETERMINED
+from algid.base.criteria import UNDETERMINED
+from algid.base.significance import SURE
 from algid.notices import Notice
 from algid.results import LogSummary
-from algid.significance import SURE
 from algid.tracks.payload import Stretch, Track
 
 SCHEMA_VERSION = 2

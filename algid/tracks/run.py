@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.files import read_whole
+from algid.base.runtime import one_blas_thread
 from algid.estimators.too_short import TooShortError
-from algid.files import read_whole
 from algid.identification.identify import reused
 from algid.identification.known import contradictions
 from algid.identification.source import LogLike, open_source, read_otherwise
 from algid.identification.survey import Survey
 from algid.notices import Notice, lossy, merged
 from algid.results import Result, read_result, result_json
-from algid.runtime import one_blas_thread
 from algid.tracks.bins import arm_of
 from algid.tracks.payload import track
 from algid.tracks.result import TrackResult

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from algid.base.text import ABSENT, file_name, joined, significant
+from algid.base.verdict import Verdict, graded
+from algid.base.words import counted
 from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
 from algid.report.document import Kind, Table
 from algid.report.tables import log_tables, provenance_table
 from algid.results.verdict import LEAST_R2, WORST_R2, share_text
-from algid.text import ABSENT, file_name, joined, significant
 from algid.tracks.payload import Stretch
 from algid.tracks.result import StretchStatus, TrackResult
-from algid.verdict import Verdict, graded
-from algid.words import counted
 
 
 def stretch_table(result: TrackResult) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from algid.files import whole_file
+from algid.base.files import whole_file
 from algid.log import Companion, Log, Truth
 from algid.writers.blocks import as_blocks, columns, exact_in_seconds, summed
 

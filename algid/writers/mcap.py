@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.files import whole_file
+from algid.base.files import whole_file
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 from algid.log import KEY, Companion, Log, Truth
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 from algid.writers.blocks import as_blocks
 
 TOPIC = "/joint_states"

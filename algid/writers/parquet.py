@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from algid.arrow import table_of_columns
-from algid.errors import OutputError
-from algid.files import whole_file
+from algid.base.arrow import table_of_columns
+from algid.base.errors import OutputError
+from algid.base.files import whole_file
 from algid.log import KEY, Companion, Log, Truth
 from algid.writers.blocks import as_blocks, columns, summed
 

@@ -13,8 +13,8 @@ from io import BytesIO
 import zstandard
 from mcap.writer import CompressionType, IndexType, Writer
 
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers.mcap import messages
 from pipelines.hostile import Hostile
 from pipelines.mutations import clean_log

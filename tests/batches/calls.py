@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from algid.base.staging import staged
 from algid.guard import reading
-from algid.staging import staged
 
 
 def add(a: int, b: int) -> int:

@@ -14,8 +14,8 @@ import polars as pl
 import zstandard
 
 import algid
+from algid.base.ros2 import JOINT_STATE
 from algid.log import Log
-from algid.ros2 import JOINT_STATE
 from algid.synth.sensors import Sensors
 from algid.writers import write_log
 from tests.readers.mcaps import joint_state, write_mcap

@@ -14,14 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from algid.base.errors import SettingError
+from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.job import redacted
 from algid.batches.jobs import Job, checked_name, name_fault
 from algid.batches.manifest import is_manifest, label_of
 from algid.batches.run import sweep
-from algid.errors import SettingError
 from algid.readers.formats import SUFFIXES
-from algid.stores import open_store
 from tests.processes import Outcome
 
 JOB = "[[job]]\nname = 'x'\nlogs = 'a.csv'\n"

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import algid
+from algid.base.errors import LogError
+from algid.base.stores import open_store
 from algid.batches.fetch import staged
-from algid.errors import LogError
 from algid.identification.identify import identify
 from algid.settings import Settings
-from algid.stores import open_store
 from tests.objects import Served, s3
 
 WEAK = Settings(estimator="weak", model="plain")

@@ -17,13 +17,13 @@ import pytest
 
 import algid
 from algid.api.batch import watched
+from algid.base.errors import AlgidError, LogError, OutputError, without_credentials
+from algid.base.stores import connect, list_urls, open_store, put_folder
 from algid.batches.discover import jobs_of
 from algid.batches.fetch import staged
 from algid.batches.records import JobStatus
 from algid.batches.run import Batch, BatchConfig, BatchOutcome
-from algid.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.settings import Settings
-from algid.stores import connect, list_urls, open_store, put_folder
 from algid.synth.sensors import Sensors
 from tests.batches.test_run import Here
 from tests.objects import Served, s3
@@ -347,7 +347,7 @@ def test_a_log_that_fails_once_changed_keeps_no_result(
 
 
 def _settings_fail(_file: str | None) -> None:
-    raise algid.errors.SettingError("no such profile")
+    raise algid.base.errors.SettingError("no such profile")
 
 
 def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(

@@ -14,6 +14,8 @@ from typing import Any
 import polars as pl
 import pytest
 
+from algid.base.errors import OutputError
+from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.jobs import Job
 from algid.batches.manifest import read_manifest
@@ -30,9 +32,7 @@ from algid.batches.records import (
 )
 from algid.batches.run import Batch, BatchConfig, BatchOutcome, sweep
 from algid.batches.table import jobs_frame, write_jobs
-from algid.errors import OutputError
 from algid.settings import Settings
-from algid.stores import open_store
 
 
 class Failing(Executor):

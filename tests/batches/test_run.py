@@ -18,19 +18,19 @@ import polars as pl
 import pytest
 
 import algid
+from algid.base.errors import OutputError
+from algid.base.stores import open_store
+from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
 from algid.batches.lock import locked
 from algid.batches.records import JobStatus
 from algid.batches.run import Batch, BatchConfig, BatchOutcome, StableFiles, sweep
 from algid.batches.workers import WorkerDiedError
-from algid.errors import OutputError
 from algid.identification.identify import identify
 from algid.notices import Notice
 from algid.results import Result
 from algid.settings import Settings
-from algid.stores import open_store
 from algid.synth.sensors import Sensors
-from algid.verdict import Verdict
 
 
 class Here(Executor):
@@ -285,7 +285,7 @@ def test_parts_share_an_output_and_its_table_is_of_all(
     assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["bad", "r1/a", "r1/b"]
     assert algid.batch(logs, out, **quick).ran == 0
     for wrong in ("0/2", "3/2", "2", "a/b", "", "-1/2", "1/2/3"):
-        with pytest.raises(algid.errors.SettingError, match="--part: expected 1/N to N/N"):
+        with pytest.raises(algid.base.errors.SettingError, match="--part: expected 1/N to N/N"):
             algid.batch(logs, out, part=wrong, **quick)
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import pytest
 
+from algid.base.errors import SettingError
 from algid.batches.cluster import cluster
 from algid.batches.workers import CallFailedError, WorkerDiedError, Workers
-from algid.errors import SettingError
 from tests.batches import calls
 from tests.test_guard import lives
 

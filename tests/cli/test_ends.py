@@ -16,13 +16,13 @@ import pytest
 from algid.api.batch import Batched, answer, watched
 from algid.api.compare import labels_of as labels
 from algid.api.design import campaign_of, noise_of
+from algid.base.errors import SettingError
 from algid.batches.jobs import Job
 from algid.batches.records import JobRecord, JobStatus
 from algid.batches.run import BatchOutcome
 from algid.cli.output import shown
 from algid.designs.prior import KnownBefore, prior_of
 from algid.designs.request import request
-from algid.errors import SettingError
 from algid.estimators.whitening import NoiseLevels
 from algid.synth.cases import load_case
 from tests.cli.commands import call

@@ -6,7 +6,7 @@ import pytest
 
 import algid
 from algid.api.guide import text_of
-from algid.errors import AlgidError
+from algid.base.errors import AlgidError
 from algid.moved import MOVED
 from algid.options import BY_SET
 from tests.cli.commands import call

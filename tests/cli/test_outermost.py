@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 
 import algid.cli
+from algid.base.faults import EXIT_INTERNAL
+from algid.base.text import printable
 from algid.cli.output import console
-from algid.faults import EXIT_INTERNAL
-from algid.text import printable
 from tests.cli.commands import call
 from tests.processes import begin
 

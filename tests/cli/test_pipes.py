@@ -16,9 +16,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from algid.errors import AlgidError
-from algid.files import read_whole
-from algid.limits import LIMITS
+from algid.base.errors import AlgidError
+from algid.base.files import read_whole
+from algid.base.limits import LIMITS
 from tests.cli.commands import app
 
 WRITTEN = {"out", "scratch", "write_profile"}

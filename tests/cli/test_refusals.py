@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from algid.api.batch import bytes_of
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from tests.cli.commands import call
 
 

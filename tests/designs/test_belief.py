@@ -7,11 +7,11 @@ import pytest
 from scipy.stats import norm
 
 from algid.arm import FloatArray
+from algid.base.errors import SettingError
+from algid.base.significance import SURE
 from algid.designs.belief import UNKNOWN, Asked, Belief, asked_for
-from algid.errors import SettingError
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
-from algid.significance import SURE
 
 SIZES = np.array([0.1, 1.0, 20.0])
 ALL = np.ones(3, bool)

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm
+from algid.base.errors import AlgidError
+from algid.base.significance import SURE
 from algid.designs.belief import asked_for
 from algid.designs.prior import BelievedArm, KnownBefore, of_case, prior_of
-from algid.errors import AlgidError
 from algid.model import Model
 from algid.results import Result, result_json
-from algid.significance import SURE
 from algid.synth.cases import Case
 from tests.exports.arms import ODD, result_of, values_of
 

@@ -13,6 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.arm import FloatArray, inverse_dynamics
+from algid.base.errors import AlgidError, SettingError
+from algid.base.progress import Progress
 from algid.designs.belief import asked_for
 from algid.designs.campaign import Campaign, Design, plan
 from algid.designs.information import Experiment, Information
@@ -21,9 +23,7 @@ from algid.designs.optimise import kept
 from algid.designs.position import PositionProblem
 from algid.designs.prior import KnownBefore, prior_of
 from algid.designs.request import limits_of, request
-from algid.errors import AlgidError, SettingError
 from algid.estimators.whitening import NoiseLevels
-from algid.progress import Progress
 from algid.readers import read_log
 from tests.cli.commands import app
 

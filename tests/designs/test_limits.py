@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
+from algid.base.errors import SettingError
+from algid.base.significance import SURE
 from algid.designs.belief import Load
 from algid.designs.information import Slopes
 from algid.designs.limits import HANGING, Limits, Row, resting, usage
-from algid.errors import SettingError
 from algid.model import Model, Motion
-from algid.significance import SURE
 
 FREE = Limits(
     low=np.full(2, -np.inf),

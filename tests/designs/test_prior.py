@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import algid
+from algid.base.errors import ResultError, SettingError
+from algid.base.significance import SURE
 from algid.designs.belief import Belief, asked_for
 from algid.designs.prior import KnownBefore, prior_of
-from algid.errors import ResultError, SettingError
 from algid.results import Result, Status, write_result
 from algid.settings import Settings
-from algid.significance import SURE
 from algid.synth.sensors import Sensors
 
 

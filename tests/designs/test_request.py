@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from algid.base.errors import SettingError
 from algid.designs.request import limits_of, request
-from algid.errors import SettingError
 from algid.options import flag
 
 LENGTHS = np.array([0.4, 0.3])

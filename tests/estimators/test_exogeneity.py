@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
+from algid.base.significance import LEVEL
 from algid.estimators import exogeneity, instruments, shrunk
 from algid.estimators.exogeneity import ANSWERS, _crossed
 from algid.estimators.fit import Fit
 from algid.estimators.weak import Source, WeakSettings
 from algid.signals.segments import Segment
-from algid.significance import LEVEL
 from pipelines.disturbed import DT, NAMES, Scene, scene
 
 SETTINGS = WeakSettings(bandwidth=60.0)

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from algid.criteria import AT_REST
+from algid.base.criteria import AT_REST
 from algid.estimators import shrunk, weak
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.parametrisation import Shared

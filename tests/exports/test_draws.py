@@ -14,8 +14,8 @@ import pytest
 
 import algid
 from algid.arm import FloatArray, regressor
-from algid.compiled import student_quantile
-from algid.errors import ResultError, SettingError
+from algid.base.compiled import student_quantile
+from algid.base.errors import ResultError, SettingError
 from algid.exports.draws import draws_of, freedom_of
 from algid.exports.links import Knowns
 from algid.model import Model

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from algid.arm import Arm
-from algid.errors import AlgidError, ResultError, SettingError
+from algid.base.errors import AlgidError, ResultError, SettingError
+from algid.base.significance import NORMAL
 from algid.exports.description import coefficients_of, describe
 from algid.exports.formats import FORMATS, exported
 from algid.exports.links import Knowns, Link, links_of
 from algid.model import Model
 from algid.results import Result, result_json
-from algid.significance import NORMAL
 from tests.cli.commands import app
 from tests.exports.arms import ODD, UNIFORM, result_of, values_of
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import algid
 from algid.arm import inverse_dynamics
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.exports.read_urdf import read_urdf

@@ -12,12 +12,12 @@ from ruamel.yaml import YAML
 
 import algid
 from algid.arm import Arm, regressor
-from algid.errors import AlgidError
+from algid.base.errors import AlgidError
+from algid.base.significance import NORMAL
 from algid.exports.formats import FORMATS, exported
 from algid.exports.links import Knowns
 from algid.model import Model
 from algid.results import Status
-from algid.significance import NORMAL
 from tests.exports.arms import ODD, UNIFORM, result_of, states, values_of
 
 XML = ("urdf", "sdf", "mjcf")

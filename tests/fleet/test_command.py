@@ -15,16 +15,16 @@ import pytest
 from scipy.stats import norm, t
 from typer.testing import CliRunner
 
+from algid.base.errors import ResultError
+from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.records import JobRecord, JobStatus, stat_of
 from algid.batches.run import Batch, BatchConfig
-from algid.errors import ResultError
 from algid.fleet.figures import overview
 from algid.fleet.history import history_of
 from algid.fleet.page import fleet_document, verdict
 from algid.fleet.tables import change_table, finding_table, robot_table
 from algid.settings import Settings
-from algid.stores import open_store
 from tests.cli.commands import app
 from tests.report.pages import Page, named, typed
 from tests.terminals import shown

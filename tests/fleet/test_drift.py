@@ -16,7 +16,7 @@ import polars as pl
 import pytest
 from scipy import stats
 
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.fleet.history import history_of, read_jobs, write_history
 
 START = datetime(2026, 1, 1, tzinfo=UTC)

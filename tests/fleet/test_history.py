@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import binom, linregress
 from scipy.stats import t as student
 
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.fleet.figures import overview
 from algid.fleet.history import History, history_of, write_history
 from algid.fleet.page import verdict

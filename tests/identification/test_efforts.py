@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from algid.api.identify import identify
 from algid.arm import FloatArray, inverse_dynamics, passive_torque
-from algid.errors import LogError, SettingError
+from algid.base.errors import LogError, SettingError
 from algid.identification.known import prior_of
 from algid.identification.validate import predictor_of
 from algid.log import Log, Origin

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.estimators.convention_search import judge
 from algid.identification.identify import identify
 from algid.log import Log, Origin

@@ -14,7 +14,7 @@ import pytest
 import algid
 from algid import results
 from algid.arm import CONSTANT_NAMES
-from algid.errors import LogError, OutputError, ResultError, SettingError
+from algid.base.errors import LogError, OutputError, ResultError, SettingError
 from algid.estimators import refined
 from algid.identification.identify import identify
 from algid.identification.source import open_source

@@ -9,7 +9,7 @@ import pytest
 
 import algid
 from algid.arm import with_payload
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.known import (
     contradictions,

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.arm import CONSTANT_NAMES
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.estimators import instruments, motorless, refined, weak
 from algid.estimators.weak import Source, WeakSettings
 from algid.identification.identify import identify

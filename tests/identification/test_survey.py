@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.errors import LogError
-from algid.files import sha256_of
+from algid.base.errors import LogError
+from algid.base.files import sha256_of
 from algid.identification import source
 from algid.identification.source import (
     LogSource,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray, with_payload
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.estimators import refined
 from algid.identification.identify import identify
 from algid.log import Log, Origin

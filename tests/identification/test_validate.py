@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from algid.arm import FloatArray, forward_dynamics, regressor, with_payload
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.source import Role, open_source
 from algid.identification.survey import Survey

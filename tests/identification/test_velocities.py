@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.identification.source import open_source
 from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.inspection import channels
 from algid.inspection.checks import examine, noticed
 from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.inspection.checks import examine, noticed
 from algid.inspection.dynamics import dynamic_figures
 from algid.inspection.figures import signal_figures

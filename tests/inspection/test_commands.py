@@ -13,7 +13,7 @@ import pytest
 from pydantic import BaseModel
 from typer.testing import CliRunner
 
-from algid.errors import OutputError, SettingError
+from algid.base.errors import OutputError, SettingError
 from algid.inspection.report import inspect_log
 from algid.profile import Angle, Profile, Torque, Velocity, load_profile
 from algid.readers import read_log

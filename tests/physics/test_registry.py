@@ -93,7 +93,7 @@ from typer.testing import CliRunner
 import algid
 from algid.api.words import terms
 from algid.api.guide import text_of
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.identification.identify import identify
@@ -261,7 +261,7 @@ def inserted(path: Path, before: str, text: str) -> None:
 def add_toys(package: Path) -> None:
     """An entry in each registry but that of terms: a module, and a line or an entry."""
     inserted(
-        package / "units.py",
+        package / "base" / "units.py",
         '    Unit("N cm"',
         '    Unit("N mm", ("torque",), 1e-3, "nmm n-mm"),\n',
     )
@@ -274,7 +274,9 @@ def add_toys(package: Path) -> None:
     inserted(checks, "    every += rests(log, whole)\n", "    every += toys(log)\n")
     inserted(checks, "from algid.log import", "from algid.inspection.toy import toys\n")
     inserted(
-        package / "notices.py", "    # of tracks\n", '    "TOY_SEEN": "{count:# toy|toys} seen",\n'
+        package / "messages.toml",
+        "[DATA_LOST]\n",
+        '[TOY_SEEN]\ncause = "A toy."\ntext = "{count:# toy|toys} seen"\n\n',
     )
     (package / "estimators" / "toy.py").write_text(ESTIMATOR)
     methods = package / "methods.py"

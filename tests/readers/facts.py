@@ -33,8 +33,8 @@ from numpy.typing import NDArray
 
 import algid
 from algid.arm import FloatArray
-from algid.ros2 import JOINT_STATE_DEFINITION
-from algid.units import TORQUE
+from algid.base.ros2 import JOINT_STATE_DEFINITION
+from algid.base.units import TORQUE
 from tests.readers.ways import (
     EPOCH,
     FLAT,

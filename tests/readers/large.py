@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from tests.readers.mcaps import TOPIC, joint_state
 
 CHUNK = 5000

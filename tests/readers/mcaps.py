@@ -12,8 +12,8 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 
 TOPIC = "/joint_states"
 

@@ -27,10 +27,10 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
 
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import FORMATS, mcap, write_log
 from tests.readers.logs import EPOCH_NS, TRUTH
 from tests.readers.mcaps import (

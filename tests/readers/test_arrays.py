@@ -16,7 +16,7 @@ from pyarrow import feather, parquet
 from scipy.io import savemat
 from typer.testing import CliRunner
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log, Origin, join
 from algid.notices import Notice
 from algid.profile import Profile

@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log

@@ -1,4 +1,4 @@
-"""Every loop over what a file claims has a bound, `algid.limits.LIMITS`.
+"""Every loop over what a file claims has a bound, `algid.base.limits.LIMITS`.
 
 And patterns take time with a text's length.
 
@@ -15,9 +15,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
 from algid.identification.identify import identify
-from algid.limits import LIMITS
 from algid.readers import read_log
 from algid.readers.names import Name, take_apart
 from algid.readers.stated import units_in

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import IntArray
 from algid.notices import Notice
 from algid.readers.clock import Series, aligned, in_order, whole_topic

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.notices import Notice
 from algid.profile import Profile, with_settings
 from algid.readers.columns import assign

@@ -12,14 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import constants
 
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.units import CURRENT, TORQUE, VELOCITY
 from algid.log import ChannelReading, Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.readers.assemble import Unwrapper
 from algid.readers.convert import Conversion, GrowingBuffer, SampleBuffer
 from algid.readers.table import CHANNELS, SampleTable
-from algid.units import CURRENT, TORQUE, VELOCITY
 from tests.readers.headers import opened
 
 TURN = 2 * np.pi

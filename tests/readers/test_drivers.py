@@ -151,7 +151,7 @@ def write_both(path: Path, messages: list[tuple[str, int, bytes]]) -> None:
     """An MCAP file of joint states in CDR, and the others in JSON."""
     from mcap.writer import Writer
 
-    from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
+    from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 
     with path.open("wb") as stream:
         writer = Writer(stream)

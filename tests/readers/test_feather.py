@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
 from pipelines.mutations import damage

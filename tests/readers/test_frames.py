@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log

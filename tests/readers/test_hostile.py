@@ -25,9 +25,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyarrow.parquet import encryption
 
+from algid.base.errors import LogError
+from algid.base.files import read_whole, sha256_of
 from algid.batches.manifest import is_manifest
-from algid.errors import LogError
-from algid.files import read_whole, sha256_of
 from algid.readers import read_log
 from algid.writers import write_log
 from pipelines.mutations import clean_files, clean_log, damage

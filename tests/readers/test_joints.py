@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log

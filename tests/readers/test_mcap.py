@@ -12,13 +12,13 @@ import pytest
 import zstandard
 from mcap.writer import CompressionType, IndexType
 
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.ros2 import HEADER
 from algid.profile import Profile
 from algid.readers import mcap, open_log, read_log
 from algid.readers.messages.batch import Messages
 from algid.readers.messages.columnar import Decoder
 from algid.readers.messages.json import _Paths
-from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import (

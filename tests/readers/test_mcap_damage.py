@@ -20,10 +20,10 @@ from mcap.records import Channel, ChunkIndex, McapRecord, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
 from algid.readers import read_log
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
 from tests.readers.mcaps import (

@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.notices import Notice
 from algid.readers import read_log
 from algid.readers.clock import in_order

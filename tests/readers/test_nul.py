@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.readers import read_log
 from tests.readers.logs import noise_log
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from algid.errors import LogError, SettingError
+from algid.base.errors import LogError, SettingError
+from algid.base.ros2 import HEADER
 from algid.log import Log
 from algid.profile import Profile, load_profile
 from algid.readers import read_log
-from algid.ros2 import HEADER
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log
 from tests.readers.mcaps import Cdr, joint_state, write_mcap

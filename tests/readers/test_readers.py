@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log, Origin
 from algid.readers import open_log, read_log
 from algid.writers import FORMATS, write_log

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
+from algid.base.ros2 import HEADER
 from algid.log import Log, Origin
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from algid.ros2 import HEADER
 from algid.writers import FORMATS, write_log
 from tests.readers.mcaps import Cdr, joint_state, write_mcap
 

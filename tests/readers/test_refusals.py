@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 import algid
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.inspection.checks import noticed
 from algid.log import Log
 from algid.profile import Profile, with_settings

@@ -11,7 +11,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg

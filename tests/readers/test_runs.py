@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from algid import inspect
 from algid.arm import FloatArray
-from algid.errors import LogError, SettingError
+from algid.base.errors import LogError, SettingError
 from algid.log import IntArray
 from algid.notices import Notice
 from algid.profile import Profile

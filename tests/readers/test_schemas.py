@@ -14,7 +14,8 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.writer import Writer
 
-from algid.errors import LogError
+from algid.base.errors import LogError
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
@@ -22,7 +23,6 @@ from algid.readers.messages import cdr, protobuf
 from algid.readers.messages.batch import Messages
 from algid.readers.messages.columnar import ColumnDecoder, MisfitError
 from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import TOPIC, joint_state, messages_of, protobuf_schema, write_mcap
 

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
 

@@ -11,7 +11,7 @@ import pytest
 import zstandard
 
 from algid.api.guide import text_of
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.readers import read_log
 from algid.readers.dialect import Dialect, detect, split
 from algid.readers.formats import FORMATS, SUFFIXES, sniff

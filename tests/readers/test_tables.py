@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.readers import read_log
 
 ROWS = [(0.0, 10, 20, 30, 40), (0.001, 11, 21, 31, 41), (0.002, 12, 22, 32, 42)]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.inspection.report import contents, inspect_log
 from algid.profile import Profile
 from algid.readers import read_log

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 import algid
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.writers import write_log
 
 

@@ -23,8 +23,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from tests.readers.mcaps import joint_state, protobuf_schema
 
 EPOCH = 1_700_000_000_000_000_000

@@ -21,6 +21,7 @@ from algid.arm import (
     regressor,
     with_payload,
 )
+from algid.base.significance import NORMAL
 from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import STAGE2_NAMES, stage1, stage2
 from algid.identification.series import innovation_rows, write_columns
@@ -37,7 +38,6 @@ from algid.results import (
     WhitenessTest,
     write_result,
 )
-from algid.significance import NORMAL
 from algid.synth.cases import Case, load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate

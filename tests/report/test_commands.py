@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from algid.api.compare import labels_of as labels
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.results import read_result, result_json
 from tests.cli.commands import app
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.errors import OutputError
+from algid.base.errors import OutputError
+from algid.base.significance import NORMAL
 from algid.log import ChannelReading, Reading
 from algid.report.comparison import Comparison, compare, verdict, write_comparison
 from algid.results import Estimate, Result
-from algid.significance import NORMAL
 from tests.report.folders import estimate
 from tests.report.pages import Page, typed
 from tests.report.test_terminal import printed

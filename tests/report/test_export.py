@@ -13,7 +13,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from algid.errors import OutputError, ResultError
+from algid.base.errors import OutputError, ResultError
 from algid.report.export import START_KEY, export_mcap
 from tests.report.folders import START_NS
 

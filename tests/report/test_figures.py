@@ -12,6 +12,8 @@ import pytest
 from scipy.stats import norm
 
 from algid.arm import mass_matrix
+from algid.base.significance import NORMAL
+from algid.base.text import significant
 from algid.report.figures import (
     closeup,
     convergence,
@@ -29,8 +31,6 @@ from algid.report.figures import (
 from algid.report.plot import Panels, Plot, label, packed
 from algid.report.series import Drawn, drawn
 from algid.results import Estimate, Result, TorquePrediction
-from algid.significance import NORMAL
-from algid.text import significant
 from tests.report.folders import estimate
 from tests.report.pages import named, typed
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from algid.text import (
+from algid.base.text import (
     file_name,
     interval,
     joined,

@@ -16,14 +16,14 @@ import plotly.graph_objects as go
 import polars as pl
 import pytest
 
-from algid.errors import ResultError
+from algid.base.errors import ResultError
+from algid.base.verdict import Verdict
 from algid.notices import Notice
 from algid.report.document import Document, Section, Table
 from algid.report.page import result_document, write_pages
 from algid.report.render import library, markdown, page, strict_json
 from algid.results import Estimate, Result, Status, TermCriterion, write_result
 from algid.results.rows import rows_of
-from algid.verdict import Verdict
 from tests.report.folders import HOSTILE, estimate, hostile
 from tests.report.pages import Page
 

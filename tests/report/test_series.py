@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.report import series
 from algid.report.series import between, blocks, by_log, drawn
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from algid.criteria import CUT
+from algid.base.criteria import CUT
 from algid.log import Log, Origin
 from algid.signals.segments import Segment, pieces, segments
 

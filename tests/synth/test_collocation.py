@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 from algid.arm import FloatArray
-from algid.limits import PHYSICAL
+from algid.base.limits import PHYSICAL
 from algid.synth.collocation import Acceleration, integrate
 
 Timed = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]

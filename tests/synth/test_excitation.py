@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.synth.cases import Case, case_names, load_case
 from algid.synth.excitation import Hold, MultiSine, SampledTorque, no_torque, wide_multi_sine
 from algid.synth.run import excitation, held

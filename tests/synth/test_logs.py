@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from algid.errors import AlgidError
+from algid.base.errors import AlgidError
 from algid.readers import read_log
 from tests.cli.commands import app
 

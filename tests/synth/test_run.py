@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics, mass_matrix, with_payload
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.identification.identify import identify
 from algid.log import Log
 from algid.synth.cases import Case

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from algid.arm import energy, forward_dynamics
-from algid.errors import SettingError
+from algid.base.errors import SettingError
 from algid.signals.differences import integral
 from algid.synth.cases import load_case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import algid
-from algid.errors import ResultError
+from algid.base.errors import ResultError
 from algid.estimators.noise import first_guess
 from algid.identification.identify import identify
 from algid.profile import Angle, Profile

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray, with_payload
-from algid.criteria import HOLE
-from algid.errors import LogError
+from algid.base.criteria import HOLE
+from algid.base.errors import LogError
+from algid.base.significance import NORMAL
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log, Origin
@@ -20,7 +21,6 @@ from algid.notices import Notice
 from algid.results import LogSummary
 from algid.settings import Settings
 from algid.signals.segments import segments
-from algid.significance import NORMAL
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from algid.tracks.bins import CELL, SUMS, Cells, IdentifiedArm, cells_of, joined

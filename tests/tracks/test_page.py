@@ -21,7 +21,8 @@ from mcap_ros2.decoder import DecoderFactory
 from typer.testing import CliRunner
 
 import algid
-from algid.errors import ResultError
+from algid.base.errors import ResultError
+from algid.base.verdict import Verdict
 from algid.identification.identify import identify
 from algid.notices import Notice
 from algid.report.render import markdown, page
@@ -32,7 +33,6 @@ from algid.tracks.read import COLUMNS, CURVE, read_track
 from algid.tracks.result import StretchStatus, TrackResult, track_json
 from algid.tracks.run import track_log
 from algid.tracks.tables import change_table, fixed, stretch_table, verdict
-from algid.verdict import Verdict
 from algid.writers import write_log
 from tests.cli.commands import app
 from tests.report.browser import DRIVER, Browser

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import algid
 from algid.arm import FloatArray
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log

@@ -18,9 +18,9 @@ from mcap.records import Chunk, MessageIndex
 from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
-from algid.errors import OutputError
+from algid.base.errors import OutputError
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin
-from algid.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.writers import mcap, write_log
 
 ROWS = 1000

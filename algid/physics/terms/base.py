@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from algid.names import names_in
+from algid.base.names import names_in
 from algid.physics.expressions import NOTHING, Expression
 from algid.physics.parameters import Parameter
 

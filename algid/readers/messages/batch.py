@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.limits import LIMITS
+from algid.base.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice
 

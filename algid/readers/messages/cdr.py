@@ -9,10 +9,10 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from algid.base.words import counted
 from algid.readers.messages.columnar import MisfitError, Numbers, Shape
 from algid.readers.messages.definitions import PRIMITIVES, TEXTS, Field, Types
 from algid.readers.stated import GROUPS
-from algid.words import counted
 
 _ENDINGS = {0: ">", 1: "<"}
 _HEAD = 4

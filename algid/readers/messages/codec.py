@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.readers.messages import cdr, protobuf
 from algid.readers.messages import json as jsontext
 from algid.readers.messages.columnar import ColumnDecoder, Decoder, Walk

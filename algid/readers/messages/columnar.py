@@ -16,11 +16,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.blocks import concatenated, rows_of
-from algid.limits import LIMITS
+from algid.base.blocks import concatenated, rows_of
+from algid.base.limits import LIMITS
+from algid.base.words import counted
 from algid.log import IntArray
 from algid.readers.messages.batch import Messages, gather, padding
-from algid.words import counted
 
 _NAMED = re.compile(r"[^\[\]]*\[([^\]]*)\]")
 

@@ -9,8 +9,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from algid.limits import LIMITS
-from algid.words import counted
+from algid.base.limits import LIMITS
+from algid.base.words import counted
 
 PRIMITIVES = {
     "bool": "u1", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1",

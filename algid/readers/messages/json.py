@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.limits import LIMITS
+from algid.base.limits import LIMITS
+from algid.base.words import counted, repeated
 from algid.readers.messages.batch import Messages
 from algid.readers.messages.columnar import Decoder, Fields, MisfitError, Numbers, Shape
 from algid.readers.stated import BAD, GOOD, GROUPS
-from algid.words import counted, repeated
 
 _BEYOND = 2**1024 - 2**970
 """From here on an integer rounds to more than the largest float64."""

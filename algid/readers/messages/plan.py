@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.units import unit_of
+from algid.base.words import counted
 from algid.log import Reading
 from algid.notices import Notice, Remedy
 from algid.readers.joints import along_the_arm, order_notice
@@ -33,8 +35,6 @@ from algid.readers.messages.topic import (
 from algid.readers.names import CURRENTS, choose, take_apart
 from algid.readers.stated import in_json_schema, lines_of, units_in
 from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES
-from algid.units import unit_of
-from algid.words import counted
 
 if TYPE_CHECKING:
     from algid.profile import Profile

@@ -16,10 +16,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from algid.limits import LIMITS
+from algid.base.limits import LIMITS
+from algid.base.words import counted
 from algid.readers.messages.columnar import MisfitError, Numbers, Shape
 from algid.readers.messages.definitions import DefinitionError
-from algid.words import counted
 
 _FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
 _VARINTS = {3, 4, 5, 8, 13, 14, 17, 18}

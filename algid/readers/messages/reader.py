@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from algid.errors import LogError
+from algid.base.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice
 from algid.readers.assemble import TableReader, make_reader

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.errors import LogError
-from algid.limits import LIMITS
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
 from algid.readers.messages.batch import Losses

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import Arm, with_payload
-from algid.files import refuse_existing, whole_file
+from algid.base.files import refuse_existing, whole_file
 from algid.log import Log, Truth
 from algid.options import flag
 from algid.synth.excitation import wide_multi_sine

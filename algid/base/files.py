@@ -20,10 +20,10 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from algid.errors import OutputError, SettingError
-from algid.limits import LIMITS
+from algid.base.errors import OutputError, SettingError
+from algid.base.limits import LIMITS
+from algid.base.staging import delete_leftovers, put, staged, temporary_name
 from algid.options import flag
-from algid.staging import delete_leftovers, put, staged, temporary_name
 
 if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError

@@ -1,6 +1,6 @@
 """Places of files: a local folder, or a prefix of an object store at s3://, gs:// or az://.
 
-Files appear whole or not at all: on this machine through `algid.files.whole_file`, in object
+Files appear whole or not at all: on this machine through `algid.base.files.whole_file`, in object
 stores by their nature.
 
 A URL names an object by its key, percent-encoded: ``%3F`` for ``?``, ``%23`` for ``#``, ``%25``
@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from algid.errors import AlgidError, LogError, OutputError, without_credentials
-from algid.files import read_whole, refuse_links, refuse_url, remove_whole, whole_file
+from algid.base.errors import AlgidError, LogError, OutputError, without_credentials
+from algid.base.files import read_whole, refuse_links, refuse_url, remove_whole, whole_file
 
 if TYPE_CHECKING:
     from pyarrow.fs import FileInfo, FileSystem

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.errors import OutputError
+from algid.base.errors import OutputError
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 

@@ -1,6 +1,6 @@
 """What counts as a gap, as at rest, as settled and as undetermined: each once.
 
-What counts as beyond chance stands in `algid.significance`.
+What counts as beyond chance stands in `algid.base.significance`.
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""What every room may use: errors, words, files, numbers. It imports no other room."""
