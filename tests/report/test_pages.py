@@ -265,7 +265,7 @@ def test_three_reasons_are_shown_and_the_rest_and_the_notes_are_folded() -> None
     first, _, rest = page(document()).partition("<details>")
     assert [place for place in range(5) if f"reason {place}" in first] == [0, 1, 2]
     assert "2 more reasons" in rest
-    assert "1 data notes" in rest
+    assert "1 data note" in rest
     assert "a.csv: reason 4" in rest
 
 
