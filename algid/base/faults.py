@@ -20,7 +20,7 @@ EXIT_USAGE = 2
 EXIT_INTERNAL = 70
 """The number that sysexits.h gives to an internal error."""
 
-_OWN = str(Path(__file__).parent) + os.sep
+_OWN = str(Path(__file__).parents[1]) + os.sep
 _MEANT = (AlgidError, SystemExit, KeyboardInterrupt, GeneratorExit)
 """Exceptions that are no faults."""
 _LONGEST_REASON = 200
