@@ -104,7 +104,7 @@ class Settings(BaseModel):
         bounds=PHYSICAL.window,
     )
     bandwidth: float = field(
-        60.0, "Of the zero-phase differentiator, Hz.", bounds=PHYSICAL.bandwidth
+        60.0, "Bandwidth of the zero-phase differentiator, Hz.", bounds=PHYSICAL.bandwidth
     )
     gravity: float = field(
         9.81, "m/s²; 0 for an arm in a horizontal plane [9.81].", bounds=PHYSICAL.gravity

@@ -225,7 +225,7 @@ def row(job: tuple[str, str, str]) -> Line:
         words = ["algid", "identify", *(str(folder / f"log{n}.csv") for n in range(_count(kind)))]
         words += ["--no-report", "-o", str(folder), "--accept", "DEGREES"]
         if kind in ("acrobot", "pendubot"):
-            words += ["--set", "passive=1" if kind == "acrobot" else "2"]
+            words += ["--set", f"passive={1 if kind == 'acrobot' else 2}"]
         if kind == "real friction":
             written(folder, kind, arm, title, SPOILS["nothing"])
             limit = max(WITHIN, ALIKE * furthest(run(words, folder).result, k, names))

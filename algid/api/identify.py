@@ -66,7 +66,7 @@ def identify(
     out : Path
         Folder for the result folder LOG.algid. None writes nothing.
     name : str
-        Of the result folder, NAME.algid.
+        Name of the result folder, NAME.algid.
     force : bool
         Replace what is there.
     report : bool
