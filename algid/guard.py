@@ -30,7 +30,8 @@ TRACEBACK = "ALGID_TRACEBACK"
 """A variable of the environment: set to 1, it shows where an error came from."""
 
 _ENDING = tuple(
-    getattr(signal, f"SIG{name}") for name in ["HUP", "INT", "QUIT", "TERM", "USR1", "USR2"]
+    getattr(signal, f"SIG{name}")
+    for name in ["HUP", "INT", "QUIT", "TERM", "USR1", "USR2", "ALRM", "XCPU"]
 )
 BREAKING = tuple(
     getattr(signal, f"SIG{name}") for name in ["SEGV", "BUS", "FPE", "ILL", "ABRT", "TRAP"]

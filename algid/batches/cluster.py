@@ -52,6 +52,8 @@ class Cluster(Executor):
         def settle(done: Future[Any]) -> None:
             from distributed.scheduler import KilledWorker
 
+            if not future.set_running_or_notify_cancel():  # the batch has ended meanwhile
+                return None
             try:
                 answer = done.result()
                 if not isinstance(answer, Exception):
