@@ -160,6 +160,8 @@ def _spoilt(rows: list[str], separator: str, draw: random.Random) -> bool:
     """Spoil a row; whether the log is the same, or its loss can be seen."""
     place = draw.randrange(1, len(rows))
     cells = rows[place].split(separator)
+    if len(cells) < 5:  # cut before
+        return False
     cell = draw.randrange(1, 5)
     kind = draw.randrange(8)
     if kind == 0:

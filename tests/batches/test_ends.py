@@ -16,6 +16,7 @@ import polars as pl
 import pytest
 
 import algid
+from algid.batches.lock import locked
 from algid.readers import read_log
 from algid.synth.sensors import Sensors
 from pipelines.hostile import corpus
@@ -75,15 +76,15 @@ def test_a_folder_of_hostile_logs_of_every_format_ends_with_a_row_a_log(tmp_path
     assert left(tmp_path) == []
 
 
-def test_two_batches_at_once_on_one_output_do_each_job_once(tmp_path: Path) -> None:
+def test_a_batch_beside_another_on_one_output_is_refused(tmp_path: Path) -> None:
     logs, out = write_logs(tmp_path / "logs", 3), tmp_path / "out"
-    first, second = (started("batch", logs, "-o", out, *QUICK) for _ in range(2))
-    ends = sorted([ended(first), ended(second)])
-    assert [code for code, _ in ends] == [0, 2], ends
-    assert "another batch is at work" in ends[1][1]
+    with locked(str(out)):
+        code, told = ended(started("batch", logs, "-o", out, *QUICK))
+    assert code == 2
+    assert "another batch is at work" in told
+    assert ended(started("batch", logs, "-o", out, *QUICK))[0] == 0
     assert pl.read_parquet(out / "jobs.parquet")["status"].to_list() == ["ok"] * 3
     assert left(out) == []
-    assert ended(started("batch", logs, "-o", out, *QUICK))[0] == 0
 
 
 def test_an_interrupt_ends_a_batch_clean_and_the_next_one_finishes_it(tmp_path: Path) -> None:
