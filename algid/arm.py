@@ -159,15 +159,14 @@ def with_payload(k: FloatArray, z: FloatArray) -> FloatArray:
     return np.array([k1 + z3, k2 + z5, k3 + z2, k4 + z4, k5 + z1, k6, k7])
 
 
-Moment = tuple[FloatArray, FloatArray]
-"""A phasor as its cosine and sine part: numbers, or arrays of many arms."""
+Moment = tuple[FloatArray, FloatArray | None]
+"""A phasor as its cosine and sine part, None where the arm is straight: of one arm or of many."""
 
 
 def _moments(k: FloatArray) -> tuple[Moment, Moment, Moment]:
     """The moments k1, k2 and k4 of constants (7, ...), or with their sine parts (10, ...)."""
     if len(k) == 7:
-        none = np.zeros(())
-        return (k[0], none), (k[1], none), (k[3], none)
+        return (k[0], None), (k[1], None), (k[3], None)
     return (k[0], k[7]), (k[1], k[8]), (k[3], k[9])
 
 
@@ -179,7 +178,7 @@ def _turned(moment: Moment, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     cosine, sine = np.cos(angle), np.sin(angle)
     along, across = moment
-    if not np.any(across):
+    if across is None:
         return along * cosine, along * sine
     return along * cosine - across * sine, along * sine + across * cosine
 

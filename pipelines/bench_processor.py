@@ -87,6 +87,11 @@ def commands(folder: Path, data: Path) -> dict[str, Timed]:
         "weak second": Timed(identify(second, out, *weak)),
         "weak million": Timed(identify(million, out, *weak)),
         "hour": Timed(identify(hour, out, *bare), 2),
+        "synth": Timed(
+            python("-m", "algid", "synth", "case1", "--torque-hold", "zoh", "--duration", "500")
+            + ["-o", str(out), "--force"],
+            1,
+        ),
         "many weak": Timed(identify(Path(many[0]), out, *weak, *together), 2),
         "many refined": Timed(identify(Path(many[0]), out, *bare, *together), 2),
     }
@@ -121,6 +126,7 @@ def table(costs: Mapping[str, Cost]) -> str:
     line("refined, one hour at 1 kHz, times real time", "≥ 320", "hour", hour)
     line(f"weak, {MANY} logs of 5 s", "≤ 6", "many weak")
     line(f"refined, {MANY} logs of 5 s", "≤ 15", "many refined")
+    line("synth, 1,000,000 samples of a held torque", "≤ 30", "synth")
     share = f"{costs['help'].cpu / costs['empty typer help'].cpu:.2f}"
     line("`--help` to an empty typer app", "≤ 1.15", "help", share)
     return "\n".join(lines) + "\n"

@@ -2,12 +2,16 @@
 
         ω(t) = ω₀ + ∫ α(s, θ, ω) ds,   θ(t) = θ₀ + ∫ ω ds,   α interpolated at Gauss-Legendre nodes
 
-With Q, which integrates from the window's start to each node, the velocities W at the nodes solve
+A window is P pieces, each with s nodes. The unknowns are the accelerations a at the nodes: a
+piece's velocities and angles are ω = ω₀ + Q a and θ = θ₀ + Q ω, Q the integrals from its start, and
+where it ends the next one starts, x = (θ₀, ω₀). The simplified Newton method of implicit Runge-Kutta methods
+(Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8) changes a by δ, with A = ∂α/∂θ
+and B = ∂α/∂ω in the window's middle, r = α(θ, ω) − a and q = Q 1:
 
-    W = ω₀ + Q α(θ₀ + Q W, W)      by      (I − Q ∂α/∂ω − Q² ∂α/∂θ) δ = ω₀ + Q α − W,   W ← W + δ
+    (I − A ⊗ Q² − B ⊗ Q) δ = r + (A ⊗ 1) δθ₀ + (A ⊗ q + B ⊗ 1) δω₀ = r + C δx
 
-the simplified Newton method of implicit Runge-Kutta methods (Hairer and Wanner, Solving Ordinary
-Differential Equations II, IV.8). The method has order 2s, and between the nodes its polynomial, so
+so that a piece's δ is N (r + C δx), and the starts follow each other as δx' = E δx + L N r: no
+system is larger than a piece. The method has order 2s, and between the nodes its polynomial, so
 that a sample costs no step.
 
 ======  =======================================================  ==========
@@ -16,7 +20,7 @@ symbol  name                                                     shape
 θ, ω    angles and velocities, x both                            (n, ...)
 α       accelerations                                            (n, P, s)
 P, s    pieces of a window, nodes of a piece                     -
-Q       integrals from the window's start to every node          (Ps, Ps)
+Q       integrals from a piece's start to each of its nodes      (s, s)
 t       times at which states are asked for                      (N,)
 ======  =======================================================  ==========
 """
@@ -43,8 +47,8 @@ LONGEST = 0.05  # s: nothing of interest changes unseen within it
 SHORTEST = 1e-9  # s
 TURNS = 10
 """What the iteration of a window may take: more, and it is too long."""
-MOST_PIECES = 4
-"""Pieces in a window: more cost more to solve for than they save in calls."""
+MOST_PIECES = 50
+"""Pieces in a window: more cost more to carry on than they save in calls."""
 _SLOPE = 1e-6  # rad and rad/s, for the derivatives of α: they only steer the iteration
 
 
@@ -172,37 +176,91 @@ def _solved(
     None where it is too long.
     """
     n = state.size // 2
-    half = 0.5 * np.diff(edges)
-    times = (edges[:-1] + half)[:, None] + half[:, None] * _X
+    half = 0.5 * np.diff(edges)[:, None]
+    times = edges[:-1, None] + half * (1 + _X)
     accelerate = accelerate_at(times.ravel())
-    earlier = np.tri(half.size, k=-1)[:, None, :, None] * _WEIGHTS
-    own = np.eye(half.size)[:, None, :, None] * _TO_NODES[None, :, None, :]
-    Q = ((earlier + own) * half[:, None]).reshape(2 * (times.size,))
-    by_theta, by_omega = _slopes(accelerate_at, float(edges[0]), state)
-    newton = np.linalg.inv(np.eye(n * times.size) - np.kron(by_omega, Q) - np.kron(by_theta, Q @ Q))
-    omega = np.broadcast_to(state[n:, None], (n, times.size))
+    own, carry = _newton(accelerate_at, edges, state)
+
+    def integral(start: FloatArray, rate: FloatArray) -> FloatArray:
+        """`start` (n,) and ∫ `rate` from the window's start, (n, P, s)."""
+        scaled = half * rate
+        ends = start[:, None] + np.cumsum(scaled @ _WEIGHTS, axis=1)
+        starts = np.concatenate([start[:, None], ends[:, :-1]], axis=1)
+        integrals: FloatArray = scaled @ _TO_NODES.T + starts[:, :, None]
+        return integrals
+
+    alpha = np.zeros((n, *times.shape))
     before = inf
     for turn in range(TURNS):
-        alpha = accelerate(state[:n, None] + omega @ Q.T, omega)
-        change = (newton @ (state[n:, None] + alpha @ Q.T - omega).ravel()).reshape(n, -1)
-        omega = omega + change
-        size = float(np.abs(change).max())
+        omega = integral(state[n:], alpha)
+        theta = integral(state[:n], omega)
+        now = accelerate(theta.reshape(n, -1), omega.reshape(n, -1)).reshape(alpha.shape)
+        rest = (now - alpha).transpose(1, 0, 2).reshape(half.size, -1)
+        starts = (carry @ (rest @ own.ends.T).ravel()).reshape(half.size, 2 * n)
+        change = rest @ own.inverse.T + starts @ own.by_start.T
+        alpha = alpha + change.reshape(half.size, n, -1).transpose(1, 0, 2)
+        size = float(np.abs(change).max()) * float(edges[-1] - edges[0])
         if not size < before:  # also where it is no number
             break
-        if size <= TOLERANCE * max(1.0, float(np.abs(omega).max())):
-            rates = np.concatenate([omega, accelerate(state[:n, None] + omega @ Q.T, omega)])
-            window = Window(edges, state, rates.reshape(2 * n, *times.shape))
+        # what is left where each turn shrinks the change as this one did
+        left = size * size / (before - size) if before < inf else size
+        if left <= TOLERANCE * max(1.0, float(np.abs(omega).max())):
+            rates = np.concatenate([integral(state[n:], alpha), alpha])
+            window = Window(edges, state, rates)
             return (window, turn) if window.resolved() else (None, turn)
         before = size
     return None, TURNS
 
 
-def _slopes(
-    accelerate_at: Callable[[FloatArray], Acceleration], now: float, state: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """∂α/∂θ and ∂α/∂ω, (n, n) each, at a time and state (2n,)."""
-    n = state.size // 2
-    moved = state[:, None] + _SLOPE * np.concatenate([np.zeros((2 * n, 1)), np.eye(2 * n)], axis=1)
-    alpha = accelerate_at(np.full(2 * n + 1, now))(moved[:n], moved[n:])
+@dataclass(frozen=True)
+class _Newton:
+    """What a piece makes of its defects r (ns,) and of a change of its start δx (2n,).
+
+    ==========  ===========================================  ========
+    attribute   what                                         shape
+    ==========  ===========================================  ========
+    inverse     N: δ from r                                  (ns, ns)
+    by_start    N C: δ from δx                               (ns, 2n)
+    ends        L N: the change of the next start from r     (2n, ns)
+    ==========  ===========================================  ========
+    """
+
+    inverse: FloatArray
+    by_start: FloatArray
+    ends: FloatArray
+
+
+def _kron(a: FloatArray, b: FloatArray) -> FloatArray:
+    """A ⊗ B of (i, j) and (k, l): (ik, jl). NumPy's own takes longer than what it is for."""
+    outer: FloatArray = a[:, None, :, None] * b[None, :, None, :]
+    return outer.reshape(a.shape[0] * b.shape[0], -1)
+
+
+def _newton(
+    accelerate_at: Callable[[FloatArray], Acceleration], edges: FloatArray, state: FloatArray
+) -> tuple[_Newton, FloatArray]:
+    """The matrices of each piece, and (P 2n, P 2n) which carries changes of starts on.
+
+    They steer the iteration alone, so that all pieces may pass for equally long.
+    """
+    n, pieces = state.size // 2, edges.size - 1
+    half = 0.5 * (edges[-1] - edges[0]) / pieces
+    # in the middle of the window, as far as its start tells where that is
+    middle = np.concatenate([state[:n] + pieces * half * state[n:], state[n:]])[:, None]
+    moved = middle + _SLOPE * np.concatenate([np.zeros((2 * n, 1)), np.eye(2 * n)], axis=1)
+    alpha = accelerate_at(np.full(2 * n + 1, edges[0] + pieces * half))(moved[:n], moved[n:])
     slopes = (alpha[:, 1:] - alpha[:, :1]) / _SLOPE
-    return slopes[:, :n], slopes[:, n:]
+    A, B = slopes[:, :n], slopes[:, n:]
+    Q, weights, one = half * _TO_NODES, half * _WEIGHTS[None], np.ones((NODES, 1))
+    inverse = np.linalg.inv(np.eye(n * NODES) - _kron(A, Q @ Q) - _kron(B, Q))
+    by_start = inverse @ np.hstack([_kron(A, one), _kron(A, Q @ one) + _kron(B, one)])
+    ends = np.vstack([_kron(np.eye(n), weights @ Q), _kron(np.eye(n), weights)])
+    still = np.eye(2 * n)
+    still[:n, n:] = 2 * half * np.eye(n)
+    step = still + ends @ by_start
+    powers = [np.zeros_like(step), np.eye(2 * n)]
+    while len(powers) < pieces + 1:
+        powers.append(step @ powers[-1])
+    apart = np.subtract.outer(np.arange(pieces), np.arange(pieces)).clip(0)
+    carry = np.array(powers)[apart].transpose(0, 2, 1, 3).reshape((2 * n * pieces,) * 2)
+    return _Newton(inverse, by_start, ends @ inverse), carry
