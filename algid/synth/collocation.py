@@ -3,10 +3,10 @@
         ω(t) = ω₀ + ∫ α(s, θ, ω) ds,   θ(t) = θ₀ + ∫ ω ds,   α interpolated at Gauss-Legendre nodes
 
 A window is P pieces, each with s nodes. The unknowns are the accelerations a at the nodes: a
-piece's velocities and angles are ω = ω₀ + Q a and θ = θ₀ + Q ω, Q the integrals from its start, and
-where it ends the next one starts, x = (θ₀, ω₀). The simplified Newton method of implicit Runge-Kutta methods
-(Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8) changes a by δ, with A = ∂α/∂θ
-and B = ∂α/∂ω in the window's middle, r = α(θ, ω) − a and q = Q 1:
+piece's velocities and angles are ω = ω₀ + Q a and θ = θ₀ + Q ω, Q the integrals from its start,
+and where it ends the next one starts, x = (θ₀, ω₀). The simplified Newton method of implicit
+Runge-Kutta methods (Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8) changes
+a by δ, with A = ∂α/∂θ and B = ∂α/∂ω in the window's middle, r = α(θ, ω) − a and q = Q 1:
 
     (I − A ⊗ Q² − B ⊗ Q) δ = r + (A ⊗ 1) δθ₀ + (A ⊗ q + B ⊗ 1) δω₀ = r + C δx
 
