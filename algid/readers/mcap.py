@@ -377,7 +377,8 @@ def _records(stream: IO[bytes], part: _Part) -> _Records:
         size, checked = chunk.uncompressed_size, chunk.uncompressed_crc != 0
         content = _unpacked(chunk)
         if len(content) != size and not part.torn:
-            raise ValueError(f"a chunk of {counted(size, 'byte')} unpacks to {len(content):,}")
+            unpacked = "more" if len(content) > size else f"{len(content):,}"
+            raise ValueError(f"a chunk of {counted(size, 'byte')} unpacks to {unpacked}")
         if len(content) == size and checked and zlib.crc32(content) != chunk.uncompressed_crc:
             raise ValueError("a chunk's checksum is wrong")
         index = _read(stream, part.start + part.length, part.index_length)
@@ -397,7 +398,13 @@ def _records(stream: IO[bytes], part: _Part) -> _Records:
 
 
 def _unpacked(chunk: Chunk) -> bytes:
-    """What a chunk holds, as far as its bytes go; memory is bounded by what it claims."""
+    """A chunk unpacked as far as its bytes go, with one byte too many where it holds more.
+
+    Raises
+    ------
+    ValueError
+        If it claims more than memory is for, or its packing is not known.
+    """
     size = chunk.uncompressed_size
     if size > LIMITS.chunk_bytes:
         raise ValueError(
@@ -405,12 +412,12 @@ def _unpacked(chunk: Chunk) -> bytes:
         )
     if chunk.compression == "zstd":
         with zstandard.ZstdDecompressor().stream_reader(chunk.data) as unpacker:
-            return unpacker.read(size)
+            return unpacker.read(size + 1)
     if chunk.compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size))
+        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1))
     if chunk.compression:
         raise ValueError(f"a chunk is packed with {chunk.compression!r}; expected zstd or lz4")
-    return chunk.data[:size]
+    return chunk.data[: size + 1]
 
 
 def _one_by_one(content: bytes) -> tuple[list[int], list[tuple[int, bytes]], int]:

@@ -473,3 +473,19 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
         LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"
     ):
         read_log(path)
+
+
+@pytest.mark.parametrize("packed", CompressionType)
+@pytest.mark.parametrize("claimed", [0, 100])
+def test_a_chunk_that_holds_more_than_it_claims_is_lost_and_told(
+    packed: CompressionType, claimed: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(LOG), chunk_size=4096, compression=packed)
+    first = chunks_of(path)[0]
+    size_at = first.chunk_start_offset + 9 + 16
+    path.write_bytes(poked(path.read_bytes(), size_at, "<QI", claimed, 0))  # and no checksum
+    found = read_log(path)
+    assert 0 < len(found) < len(LOG)
+    (notice,) = [one for one in found.notices if one.lossy]
+    assert f"a chunk of {claimed} bytes unpacks to more" in notice.text
