@@ -43,7 +43,7 @@ IDEAS = {
     r"|exogeneity\._(influences|variance)|instruments\._apart|diagnostics\.by_themselves"
     r"|saturation\._solved|evidence\.\w*(sandwich|dispersion)\w*)$",
     "tests of the model": r"^(refined\.\w*refuted\w*|log_likelihood\.refuted|identifiability\.judge"
-    r"|misfit\.misfit|agreement\.agree|by_likelihood\._refuted_alone|\w+\.score_test)$",
+    r"|misfit\.misfit|by_likelihood\._refuted_alone|\w+\.score_test)$",
     "choosers of terms": r"^(selection\._?select\w*|by_likelihood\.completed|coarse\._starts"
     r"|model_choice\.without_nothing|shrunk\.shrunk|terms\.(choose|drop)\w*)$",
 }

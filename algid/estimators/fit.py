@@ -13,7 +13,6 @@ from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.compiled import student_quantile
 from algid.base.names import outside, places_outside
 from algid.base.significance import LEVEL, NORMAL
-from algid.estimators.agreement import agree
 from algid.estimators.combine import (
     LogInformation,
     Prior,
@@ -282,8 +281,7 @@ def conclude(
 
     Notes
     -----
-    Repeats count as one log for a sandwich and a jackknife. Where what they leave agrees, error
-    bars rest on those though residuals are white.
+    Repeats count as one log for a sandwich and a jackknife.
 
     Where both a sandwich and a jackknife have a part in the variance, Student's quantile is that
     of the degrees of freedom of Satterthwaite 1946, with the parts' mean share over the
@@ -300,7 +298,7 @@ def conclude(
     each: Sequence[LogInformation] = logs
     if 0 < len(repeats) < len(logs):
         each = merged(logs, repeats)
-    if coloured or agree(shared, logs, beta, S, repeats):
+    if coloured:
         meat, freedom = sandwich(shared, each, beta, prior)
         covariance = known.covariance @ meat @ known.covariance
         if estimator == "refined":

@@ -264,10 +264,7 @@ class Windows:
     def _dissipated(
         self, model: Model, c: FloatArray, theta: FloatArray, omega: FloatArray
     ) -> Iterator[tuple[str, int, FloatArray]]:
-        """Name, joint and |L| tanh(ω / ω_s) (N,) of each parameter by load; `c` gives load L.
-
-        Where friction is by the torque, L is all torque but that friction.
-        """
+        """Name, joint and |L| tanh(ω / ω_s) (N,) of each parameter by load; `c` gives load L."""
         shared = attributes(model, "by_load")
         if not shared:
             return

@@ -11,7 +11,7 @@ import numpy as np
 from algid.base.names import within
 from algid.base.runtime import Worker
 from algid.base.significance import LEVEL
-from algid.estimators import exogeneity, load_scatter, motorless, shrunk, weak
+from algid.estimators import exogeneity, motorless, shrunk, weak
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, without
 from algid.estimators.diagnostics import constrained
@@ -93,8 +93,6 @@ def run_fit(
         if fit.refuted and settings.chooses:
             fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
-        else:
-            fit = _unsure_of_load(fit, unloaded, loaded, ours, settings, known)
         if not chosen.shrunk and fit.shared.model != chosen.model:
             # the fit has estimated the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
@@ -158,25 +156,6 @@ def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
     return min(seen)[1]
 
 
-def _unsure_of_load(
-    fit: Fit,
-    unloaded: Sequence[Pass],
-    loaded: Sequence[Pass],
-    ours: weak.WeakSettings,
-    settings: Settings,
-    known: Prior | None,
-) -> Fit:
-    """The fit, where its model does not hold, with what friction by load leaves open."""
-    holds = fit.whiteness is None or fit.whiteness.white
-    if holds and fit.misfit is None:
-        return fit
-
-    def refit(model: Model) -> Fit:
-        return weak.fit(unloaded, loaded, replace(ours, model=model), settings.lengths, known)
-
-    return load_scatter.widened(fit, refit)
-
-
 _BY_NOTHING = "left out: it was judged beside constants near nothing"
 
 
@@ -234,12 +213,6 @@ def _shrunk(
     least = shrunk.fit(unloaded, loaded, shaped, settings.lengths, known)
     fit = exogeneity.settled(least, unloaded, loaded, shaped)
     fit = scattered(fit, least, unloaded, loaded, shaped, settings.lengths, known)
-
-    def refit(model: Model) -> Fit:
-        # every term is offered anew: of a model its shapes and its friction by load count
-        return shrunk.fit(unloaded, loaded, replace(shaped, model=model), settings.lengths, known)
-
-    fit = load_scatter.widened(fit, refit, least)
     notes = refuted.notes + fit.notes
     fit = replace(fit, notes=notes)
     terms = fit.shared.model.terms

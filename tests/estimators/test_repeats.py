@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators import refined, shrunk
-from algid.estimators.fit import Fit
+from algid.estimators import shrunk
 from algid.estimators.repeats import grouped
 from algid.estimators.weak import Source, WeakSettings
 from algid.signals.segments import Segment
@@ -62,27 +61,3 @@ def test_six_repeats_tell_what_one_run_tells() -> None:
     together, six = fitted([repeat() for _ in range(6)])
     assert together == pytest.approx(alone, rel=0.05)
     assert np.all(six > 0.7 * once)
-
-
-def test_what_six_repeats_share_is_in_the_intervals_of_the_likelihood() -> None:
-    """An error of two fifths of the noise: the same in each run, and no function of the motion."""
-    arm, _ = random_arm(81)
-    t = np.arange(3000) * 2e-3
-    motion = simulate(arm.constants(), wide_multi_sine(arm, 81), t)
-    rng = np.random.default_rng(6)
-    common = rng.standard_normal(motion.tau.shape)
-
-    def six(error: float) -> Fit:
-        sources = []
-        for _ in range(6):
-            theta = motion.theta + 3e-4 * rng.standard_normal(motion.theta.shape)
-            tau = motion.tau + error * common + 1e-2 * rng.standard_normal(motion.tau.shape)
-            sources.append(source(Segment(0.0, 2e-3, theta, tau)))
-        return refined.fit(sources)
-
-    sound, wrong = six(0.0), six(4e-3)
-    assert sound.repeats == wrong.repeats == (tuple(range(6)),)
-    assert not wrong.refuted
-    assert (sound.intervals, wrong.intervals) == ("likelihood", "sandwich")
-    assert np.mean(wrong.std / sound.std) > 1.2
-    assert np.all(np.abs(wrong.values - arm.constants()) < 3 * wrong.std)
