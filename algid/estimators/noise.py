@@ -39,6 +39,7 @@ _MOST_SAMPLES = 8192
 _FEWEST_SAMPLES = 10 * 2 * _LAGS
 _RIDGE = 1e-9  # of the angles' sums of squares
 _PROBES = 8
+_GROWING = 1.0  # standard deviations of the score
 _LARGEST_STEP = 2.0  # in log σ²
 _SMALLEST = 1e-12  # relative to the signal: below it floating point is the noise
 # of the other joint's torque: what bearings and cables exert on a joint without a motor, at least
@@ -303,7 +304,7 @@ def _only(signal: FloatArray, joint: int) -> FloatArray:
 def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> NoiseLevels:
     """Better noise levels by one average-information step (Gilmour, Thompson & Cullis 1995).
 
-    The step changes σ² by a factor of at most e².
+    The step changes σ² by a factor of at most e², but for a component that is not seen yet.
 
     Parameters
     ----------
@@ -316,8 +317,13 @@ def newton_step(noise: NoiseLevels, score: VarianceScore, S: FloatArray) -> Nois
     inverse = scaled_pinv(S)
     freedom = score.trace - np.einsum("xy,ixy->i", inverse, score.absorbed)
     gradient = 0.5 * (score.power - freedom)
-    curvature = score.average + np.diag(0.05 * np.maximum(np.diag(score.average), 1.0))
+    size = np.diag(score.average)
+    curvature = score.average + np.diag(0.05 * np.maximum(size, 1.0))
     step = np.clip(np.linalg.solve(curvature, gradient), -_LARGEST_STEP, _LARGEST_STEP)
+    # In log σ² the slope vanishes with σ²: a component that the residual does not see yet, and
+    # whose score grows, goes to where it is seen, at an information of 1 (which goes as σ⁴).
+    unseen = (size < 1.0) & (gradient > _GROWING * np.sqrt(size))
+    step = np.where(unseen, np.maximum(step, -0.5 * np.log(np.maximum(size, 1e-300))), step)
     factor = np.exp(0.5 * step)
     return NoiseLevels(noise.theta * factor[:2], noise.tau * factor[2:])
 
