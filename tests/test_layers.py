@@ -55,7 +55,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "moved": room("errors options"),
     "results": room(
-        "errors files limits log model names notices options profile settings significance text "
+        "errors files log model names notices options settings significance text "
         "verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model results synth"),

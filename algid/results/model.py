@@ -1,36 +1,34 @@
 """What an identification found: the one source of every table, file and page that shows it.
 
-A `Result` is written as `result.json` (schema version 3; 1 and 2 are still read) and read back;
-JSON Schema comes from the models. Its verdict is made of the rest whenever it is asked for, and
-written for whoever reads the file. Numbers that do not exist (NaN) are null; an unbounded interval
-is ``[null, null]``. Nothing in a result depends on when it was made, so that the same log and
-settings give the same bytes.
+A `Result` is written as `result.json` (schema version 4; 3 is still read) and read back; JSON
+Schema comes from the models. Its verdict is made of the rest whenever it is asked for, and written
+for whoever reads the file. Numbers that do not exist (NaN) are null; an unbounded interval is
+``[null, null]``. Nothing in a result depends on when it was made, so that the same log and settings
+give the same bytes.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError, computed_field, model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, computed_field
 
-from algid.base.errors import ResultError, SettingError
+from algid.base.errors import ResultError
 from algid.base.files import first_misfit, read_text, whole_file
-from algid.base.limits import LIMITS
 from algid.base.significance import NORMAL
 from algid.base.text import visible
 from algid.base.verdict import Verdict
-from algid.base.words import counted
 from algid.log import Reading
 from algid.model import DELAYS
 from algid.notices import Notice, code_of_now, notes_of, warnings_of
+from algid.results.rows import row_of
 
 SCHEMA_VERSION: Literal[4] = 4
-READABLE = (3, 4)
-"""Versions that are read; what the first one did not hold has its default."""
 
 
 class Status(StrEnum):
@@ -51,7 +49,7 @@ class Status(StrEnum):
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Estimate(_Model):
@@ -288,15 +286,6 @@ class FitSummary(_Model):
     repeatability: Repeatability | None = None
     torque_gain: Estimate | None = None
 
-    @model_validator(mode="after")
-    def _covariance_is_square(self) -> FitSummary:
-        size = len(self.covariance_names)
-        if list(map(len, self.covariance)) != [size] * size:
-            raise ValueError(
-                f"covariance should have {counted(size, 'row')} of {counted(size, 'number')}"
-            )
-        return self
-
     @property
     def prediction(self) -> TorquePrediction | None:
         """How well torque is predicted: of other logs where that was tried, else of those used."""
@@ -363,14 +352,6 @@ class Result(_Model):
     more_logs: list[LogSummary] = []
     data_lost: bool = False
     notices: list[Notice] = []
-
-    @model_validator(mode="before")
-    @classmethod
-    def _verdict_is_made_anew(cls, content: Any) -> Any:
-        if isinstance(content, dict):
-            content = dict(content)
-            content.pop("verdict", None)
-        return content
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -451,43 +432,23 @@ class Result(_Model):
         for name, one in self.estimates.items():
             low, high = one.ci95 or (None, None)
             rows.append((name, one.estimate, one.std, low, high, one.unit, one.status.value))
-        number = pl.Float64
-        columns = {
-            "parameter": pl.String,
-            "estimate": number,
-            "std": number,
-            "low": number,
-            "high": number,
-            "unit": pl.String,
-            "status": pl.String,
-        }
-        return pl.DataFrame(rows, schema=columns, orient="row")
-
-    def __dir__(self) -> list[str]:
-        """What is algid's, and not what is pydantic's."""
-        own = set(type(self).model_fields)
-        for kind in type(self).__mro__:
-            if issubclass(kind, Result):
-                own |= vars(kind).keys()
-        return sorted(name for name in own if not name.startswith(("_", "model_")))
+        columns = dict.fromkeys(("parameter", "estimate", "std", "low", "high"), pl.Float64)
+        text = dict.fromkeys(("parameter", "unit", "status"), pl.String)
+        return pl.DataFrame(rows, schema={**columns, **text}, orient="row")
 
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same, whatever else either can do."""
         return isinstance(other, Result) and dict(self) == dict(other)
 
     def __str__(self) -> str:
-        rows = list(self._rows())
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         judged = self.verdict
         lines = [self.subject, visible(judged.sentence, 1000)]
         mends = " or ".join(repr(one) for why in judged.reasons[:1] for one in why.remedies)
         if mends:
             lines.append(f"mend: {visible(mends, 1000)}")
-        for row in rows:
-            line = ""
-            for cell, width, align in zip(row, widths, "<>><<", strict=True):
-                line += f"{cell:{align}{width}}  "
-            lines.append(line.rstrip())
+        for name, one in self.estimates.items():
+            row = row_of(name, one)
+            lines.append(f"{row.name:<8} {row.with_half:>22} {row.unit:<10} {row.status}")
         return "\n".join(lines)
 
     __repr__ = __str__
@@ -497,17 +458,6 @@ class Result(_Model):
         """Whose estimate it is, and of which logs."""
         others = f" and {len(self.more_logs)} more" if self.more_logs else ""
         return f"{self.estimator} estimate from {ascii(self.log.path)[1:-1]}{others}"
-
-    def _rows(self) -> Iterator[tuple[str, str, str, str, str]]:
-        """The head of a table of the estimates, and its rows."""
-        yield "parameter", "estimate", "± 95 %", "unit", "status"
-        for name, one in self.estimates.items():
-            value = half = "-"
-            if one.estimate is not None:
-                value = f"{one.estimate:.6g}"
-            if one.half is not None:
-                half = f"{one.half:.2g}"
-            yield name, value, half, one.unit, one.status.value
 
 
 def _line(notice: Notice) -> str:
@@ -557,151 +507,23 @@ def read_result(path: str | Path) -> Result:
     """
     path = Path(path)
     file = path / "result.json" if path.is_dir() else path
+    wanted, again = "expected a result of algid identify", "identify again with this version"
     try:
         content = json.loads(read_text(file))
+        version = content.get("schema_version") if isinstance(content, dict) else None
+        if version not in (3, SCHEMA_VERSION):
+            raise ResultError(
+                f"{file}: schema_version: expected 3 or {SCHEMA_VERSION}, found {version!r:.60}; "
+                f"{again}"
+            )
+        content.pop("verdict", None)  # it is made anew
+        result = Result.model_validate(content | {"schema_version": SCHEMA_VERSION})
     except OSError as error:
-        raise ResultError(
-            f"{file}: cannot read it ({error.strerror}); expected a result of algid identify"
-        ) from error
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise ResultError(
-            f"{file}: not JSON ({error}); expected a result of algid identify"
-        ) from error
-    version = content.get("schema_version") if isinstance(content, dict) else None
-    if version not in READABLE:
-        known = " or ".join(map(str, READABLE))
-        raise ResultError(
-            f"{file}: schema_version: expected {known}, found {version!r}; identify again with "
-            "this version"
-        )
-    wrong = misfit_of_numbers(content)
-    if wrong is not None:
-        raise ResultError(f"{file}: {wrong}; identify again with this version")
-    try:
-        result = Result.model_validate(_current(content))
-        _check(result)
+        raise ResultError(f"{file}: cannot read it ({error.strerror}); {wanted}") from error
     except ValidationError as error:
-        raise ResultError(
-            f"{file}: {first_misfit(error)}; identify again with this version"
-        ) from error
-    except SettingError as error:
-        raise ResultError(f"{file}: {error}; identify again with this version") from error
-    return result
-
-
-def misfit_of_numbers(content: Any) -> str | None:
-    """Where a document of JSON's types holds a number that is none, or beyond all bounds.
-
-    None nowhere.
-    """
-    largest = LIMITS.largest_value**2  # of a covariance
-    left: list[tuple[str, Any]] = [("", content)]
-    while left:
-        place, value = left.pop()
-        if isinstance(value, dict):
-            for key, inner in value.items():
-                left.append((f"{place}.{key}"[-200:], inner))
-        elif isinstance(value, list):
-            for number, inner in enumerate(value):
-                left.append((f"{place}.{number}"[-200:], inner))
-        elif (
-            isinstance(value, int | float) and not -largest <= value <= largest
-        ):  # also where it is no number
-            return f"{place.lstrip('.')}: expected a number below {largest:g} in size"
-    return None
-
-
-_ROUNDING = 1e-3
-"""Of correlations, far beyond what rounding makes of them."""
-
-
-def _check(result: Result) -> None:
-    """What no field tells by itself.
-
-    Raises
-    ------
-    SettingError
-        If settings, terms, error bars, the covariance or a log's figures are such as no
-        identification gives.
-    """
-    from algid.model import TERMS
-    from algid.settings import Settings
-
-    Settings.of(result.settings)
-    for log in result.logs:
-        if min(log.rows, log.duration, log.rate) < 0 or abs(log.start_ns) >= 1 << 63:
-            raise SettingError(
-                f"{log.path!r:.60}: rows, duration and rate may not be negative, nor the start "
-                "2^63 ns"
-            )
-    fit = result.fit
-    _check_estimates(result.estimates)
-    _check_estimates(result.paper_payload)
-    if fit is None:
-        return
-    for estimates in fit.by_log:
-        _check_estimates(estimates)
-    for name, level in fit.noise.items():
-        _check_size(f"fit.noise.{name:.60}", level, positive=True)
-    if fit.model is not None:
-        for term in fit.model.terms:
-            if term not in TERMS:
-                raise SettingError(
-                    f"fit.model.terms: expected some of {', '.join(TERMS)}, found {term!r:.60}"
-                )
-    if len(set(fit.covariance_names)) < len(fit.covariance_names):
-        raise SettingError("fit.covariance_names: expected each once")
-    for place, row in enumerate(fit.covariance):
-        _check_size(f"fit.covariance.{place}.{place}", row[place], positive=True)
-    _check_covariance(fit)
-
-
-def _check_estimates(estimates: Mapping[str, Estimate]) -> None:
-    """Raises `SettingError` where one is of a size that no identification gives."""
-    for name, one in estimates.items():
-        _check_size(f"{name!r:.60}: estimate", one.estimate)
-        if max(abs(one.estimate or 0.0), one.std or 0.0) > LIMITS.largest_value:
-            raise SettingError(
-                f"{name!r:.60}: expected a number below {LIMITS.largest_value:g} in size"
-            )
-        _check_size(f"{name!r:.60}: std", one.std, positive=True)
-
-
-def _check_covariance(fit: FitSummary) -> None:
-    """Raises `SettingError` where no errors have such a covariance."""
-    import numpy as np
-
-    covariance = np.array(fit.covariance, dtype=np.float64).reshape(
-        (len(fit.covariance_names),) * 2
-    )
-    deviations = np.sqrt(np.diag(covariance))
-    known = deviations > 0  # what is not known has None
-    correlation = covariance[np.ix_(known, known)] / np.outer(deviations[known], deviations[known])
-    correlation = np.where(np.isnan(correlation), 0.0, correlation)
-    if not known.any():
-        return
-    one_sided = float(np.abs(correlation - correlation.T).max())
-    if one_sided > _ROUNDING or np.linalg.eigvalsh(correlation)[0] < -_ROUNDING:
-        raise SettingError(
-            "fit.covariance: expected a symmetric matrix without negative eigenvalues, as errors "
-            "have"
-        )
-
-
-def _check_size(place: str, value: float | None, *, positive: bool = False) -> None:
-    """Raise `SettingError` for a number so small that it cannot be divided by, or negative."""
-    if value is None:
-        return
-    expected = f"0, or {1 / LIMITS.largest_value:g} or more"
-    if not positive:
-        expected += " in size"
-    if 0 < abs(value) < 1 / LIMITS.largest_value or (positive and value < 0):
-        raise SettingError(f"{place}: expected {expected}, found {value:g}")
-
-
-def _current(content: dict[str, Any]) -> dict[str, Any]:
-    """A result of schema 3 in this one: its notices have the codes of now, and their own texts."""
-    if content["schema_version"] == SCHEMA_VERSION:
-        return content
-    notices = [one | {"code": code_of_now(one["code"])} for one in content["notices"]]
-    return content | {"schema_version": SCHEMA_VERSION, "notices": notices}
+        raise ResultError(f"{file}: {first_misfit(error)}; {again}") from error
+    except (ValueError, RecursionError) as error:
+        raise ResultError(f"{file}: not JSON ({error}); {wanted}") from error
+    # notices of schema 3 have codes of then, and texts of their own
+    notices = [replace(one, code=code_of_now(one.code)) for one in result.notices]
+    return result.model_copy(update={"notices": notices})

@@ -14,7 +14,7 @@ from algid.base.files import first_misfit, read_text
 from algid.base.significance import NORMAL
 from algid.notices import Notice
 from algid.report.series import Block, blocks
-from algid.results import LogSummary, misfit_of_numbers
+from algid.results import LogSummary
 from algid.tracks.payload import Stretch, Track
 from algid.tracks.result import TrackResult
 
@@ -40,9 +40,6 @@ def read_track(folder: Path) -> TrackResult:
     again = "run algid track again with this version"
     try:
         content = json.loads(read_text(path))
-        wrong = misfit_of_numbers(content)
-        if wrong is not None:
-            raise ResultError(f"{path}: {wrong}; {again}")
         file = _File.model_validate(content)
     except OSError as error:
         raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
