@@ -6,7 +6,6 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,15 +18,20 @@ from algid.base.words import counted
 from algid.log import ZEROS, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order
-from algid.readers.convert import ROWS, Conversion, GrowingBuffer, channel_readings, laws_of
+from algid.readers.convert import (
+    QUANTITIES,
+    ROWS,
+    Conversion,
+    SampleBuffer,
+    channel_readings,
+    laws_of,
+)
 from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
-from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, stack
+from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, remark
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-_Noted = tuple[SampleTable, tuple[Notice, ...]]
-"""A table, and what is to be said of it."""
 PASSIVE_TORQUE = 0.01
 """Of the other joint's: more than what a torque's noise makes of a joint without a motor."""
 
@@ -83,154 +87,97 @@ class TableReader:
     def _gathered(self, most: int) -> Iterator[Log]:
         """Logs of at most `most` samples, each converted from small tables into its arrays."""
         unwrapper = Unwrapper(self.origin.reading.unwrap)
-        buffer: GrowingBuffer | None = None
-        notices, samples = self._of_passive(self._samples(min(ROWS, most)))
-        for table, said in samples:
-            if buffer is not None and len(buffer) + len(table) > most:
+        buffer: SampleBuffer | None = None
+        notices, total = self.notices, 0
+        ordered = in_order(
+            self.origin.path, self.tables(ROWS), self.origin.reading.segment, runs=True
+        )
+        for table in cut(self._usable(ordered), min(ROWS, most)):
+            if not len(table):
+                notices += table.notices
+                continue
+            if buffer is not None and buffer.used + len(table) > most:
                 yield self._log(buffer, notices)
                 buffer, notices = None, ()
-            if buffer is None:
-                buffer = GrowingBuffer(
-                    min(most, self.rows or len(table)),
-                    velocity=table.has_velocities,
-                    reference=table.has_references,
-                )
-            room = buffer.more(len(table))
-            room.stamp_ns[:] = table.stamp_ns
-            self.conversion.apply(table, room)
-            unwrapper.run(room.theta)
-            if room.reference is not None:
-                unwrapper.follow(room.reference, room.theta)
-            notices += said
-        if buffer is not None:
-            yield self._log(buffer, notices)
-
-    def _log(self, buffer: GrowingBuffer, notices: tuple[Notice, ...]) -> Log:
-        room = buffer.filled()
-        return Log(
-            room.stamp_ns,
-            room.theta,
-            room.tau,
-            self.origin,
-            room.omega,
-            notices,
-            room.reference,
-        )
-
-    def _samples(self, rows: int) -> Iterator[_Noted]:
-        """Checked and sorted tables that are not empty, with what is to be said of each."""
-        notices, total = self.notices, 0
-        held: _Noted | None = None
-        path, segment = self.origin.path, self.origin.reading.segment
-        ordered = in_order(path, self.tables(rows), segment, runs=True)
-        for table in cut(self._finite(self._within(ordered)), rows):
             if total < 2 <= len(table):
                 notices += other_rate(self.stated_rate, table.stamp_ns)
+            if not total:
+                notices += self._of_passive(table)
+            if buffer is None:
+                recorded = [name for name in QUANTITIES if f"{name}1" in table.columns]
+                buffer = SampleBuffer(min(most, self.rows or len(table)), recorded)
+            stamps, signals = buffer.more(len(table))
+            stamps[:] = table.stamp_ns
+            self.conversion.apply(table, signals)
+            unwrapper.run(signals["theta"], signals.get("q_des"))
             notices += table.notices
-            if len(table):
-                if held is not None:
-                    yield held
-                total += len(table)
-                held, notices = (table, notices), ()
+            total += len(table)
         if total < 2:
-            said = held[1] + notices if held else notices
-            worst = min(said, key=lambda notice: not notice.lossy, default=None)
+            worst = min(notices, key=lambda notice: not notice.lossy, default=None)
             why = "" if worst is None else f" ({worst.text})"
             raise LogError(
                 f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
             )
-        if held is not None:  # what the last tables tell, also where they are empty
-            yield held[0], held[1] + notices
+        if buffer is not None:
+            yield self._log(buffer, notices)
 
-    def _within(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
-        """The rows between the `start` and the `end` that the reading says.
+    def _log(self, buffer: SampleBuffer, notices: tuple[Notice, ...]) -> Log:
+        stamps, signals = buffer.filled()
+        theta, tau = signals["theta"], signals["tau"]
+        omega, reference = signals.get("omega"), signals.get("q_des")
+        return Log(stamps, theta, tau, self.origin, omega, notices, reference)
 
-        The last table tells of the cut.
-        """
-        start, end = self.origin.reading.start, self.origin.reading.end
-        if start is None and end is None:
-            yield from tables
-            return
-        first_ns, left_out = None, 0
-        held: SampleTable | None = None
-        for table in tables:
-            if held is not None:
-                yield held
-            if first_ns is None and len(table):
-                first_ns = int(table.stamp_ns[0])
-            since = table.stamp_ns - (first_ns or 0)
-            inside = (since >= 1e9 * (start or 0.0)) & (
-                since <= 1e9 * (math.inf if end is None else end)
-            )
-            left_out += len(table) - int(np.count_nonzero(inside))
-            held = table.take(inside)
-        if held is not None:
-            last = "the end" if end is None else f"{end:g} s"
-            numbers = {"count": left_out, "start": start or 0.0, "end": last}
-            yield held.noting(Notice("CUT", numbers=numbers))
-
-    def _finite(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
-        """Tables of finite numbers.
+    def _usable(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
+        """The rows from `start` to `end` of the reading, whose numbers are finite.
 
         Where a user accepts others, their rows are left out and counted.
         """
-        first, dropped = 0, 0
-        held: SampleTable | None = None
+        reading = self.origin.reading
+        start, end = reading.start or 0.0, math.inf if reading.end is None else reading.end
+        whole, accepted = (start, end) == (0.0, math.inf), "NOT_FINITE" in reading.accepted
+        begin_ns: int | None = None
+        outside = dropped = done = 0
         for table in tables:
-            if held is not None:
-                yield held
-            held = table
-            if "NOT_FINITE" in self.origin.reading.accepted:
-                good = np.ones(len(table), np.bool_)
-                for values in self._measured(table).values():
+            if not len(table):
+                yield table
+                continue
+            begin_ns = int(table.stamp_ns[0]) if begin_ns is None else begin_ns
+            if not whole:
+                since = table.stamp_ns - begin_ns
+                inside = (since >= 1e9 * start) & (since <= 1e9 * end)
+                outside += len(table) - int(np.count_nonzero(inside))
+                table = table.take(inside)
+            good = np.ones(len(table), np.bool_)
+            for name, values in table.columns.items():
+                # a joint without a motor has no torque, and nobody need follow a reference always
+                if name in (f"tau{reading.passive}", *REFERENCES):
+                    continue
+                if accepted:
                     good &= np.abs(values) < LIMITS.largest_value
-                dropped += len(table) - int(np.count_nonzero(good))
-                held = table.take(good)
-            else:
-                for name, values in self._measured(table).items():
-                    self._check(name, values, first)
-            first += len(table)
-        if held is not None and dropped:
-            held = held.noting(Notice("NOT_FINITE", numbers={"case": "number", "count": dropped}))
-        if held is not None:
-            yield held
+                else:
+                    self._check(name, values, done)
+            done += len(table)
+            dropped += len(table) - int(np.count_nonzero(good))
+            yield table if good.all() else table.take(good)
+        if not (reading.start is None and reading.end is None):
+            last = "the end" if reading.end is None else f"{end:g} s"
+            yield remark(Notice("CUT", numbers={"count": outside, "start": start, "end": last}))
+        if dropped:
+            yield remark(Notice("NOT_FINITE", numbers={"case": "number", "count": dropped}))
 
-    def _measured(self, table: SampleTable) -> Mapping[str, FloatArray]:
-        """The columns of a table without the torque of a joint that has no motor, and references.
-
-        Nobody need follow a reference all the time.
-        """
-        without = (f"tau{self.origin.reading.passive}", *REFERENCES)
-        return {name: values for name, values in table.columns.items() if name not in without}
-
-    def _of_passive(self, samples: Iterator[_Noted]) -> tuple[tuple[Notice, ...], Iterator[_Noted]]:
-        """Notice of a torque in the column of a joint that is called passive, and all samples.
-
-        The first `ROWS` samples show it.
-        """
+    def _of_passive(self, begin: SampleTable) -> tuple[Notice, ...]:
+        """What to say of a torque in the column of a joint that is called passive."""
         passive, mapping = self.origin.reading.passive, self.origin.mapping
         names = f"tau{passive}", f"tau{3 - (passive or 1)}"
-        if passive is None or not set(names) <= set(mapping):
-            return (), samples
-        looked_at: list[_Noted] = []
-        for noted in samples:
-            looked_at.append(noted)
-            if sum(len(table) for table, _ in looked_at) >= ROWS:
-                break
-        samples = chain(looked_at, samples)
-        begin = stack([table for table, _ in looked_at])
-        own, other = begin.columns.get(names[0]), begin.columns.get(names[1])
-        if own is None or other is None or mapping[names[0]] == mapping[names[1]]:
-            return (), samples
-        size, driving = _rms(own), _rms(other)
-        if not (np.isfinite(size) and size > PASSIVE_TORQUE * driving > 0):
-            return (), samples
-        numbers = {
-            "column": mapping[names[0]],
-            "joint": passive,
-            "percent": 100 * size / driving,
-        }
-        return (Notice("PASSIVE_TORQUE", numbers=numbers),), samples
+        if not set(names) <= begin.columns.keys() or mapping[names[0]] == mapping[names[1]]:
+            return ()
+        with np.errstate(over="ignore"):  # without a motor a torque may be anything
+            own, other = (np.sqrt(np.mean(np.square(begin.columns[name]))) for name in names)
+        if not (np.isfinite(own) and own > PASSIVE_TORQUE * other > 0):
+            return ()
+        share = 100 * float(own / other)
+        numbers = {"column": mapping[names[0]], "joint": passive, "percent": share}
+        return (Notice("PASSIVE_TORQUE", numbers=numbers),)
 
     def _check(self, name: str, values: FloatArray, first: int) -> None:
         # one pass without an array of its own: a small sum of squares has no large term, and no NaN
@@ -248,11 +195,6 @@ class TableReader:
                 f"{values[row]}; "
                 f"{cut}; {accept}"
             )
-
-
-def _rms(values: FloatArray) -> float:
-    with np.errstate(over="ignore"):  # without a motor a torque may be anything
-        return float(np.sqrt(np.mean(np.square(values))))
 
 
 def make_reader(
@@ -330,18 +272,14 @@ class Unwrapper:
         self._last = [math.nan, math.nan]  # each joint's last angle as recorded
         self._turns = [0.0, 0.0]
 
-    def run(self, theta: FloatArray) -> None:
-        """Unwrap the next angles (2, N), rad, in place."""
-        for joint in (0, 1):
-            if self._joints[joint] and theta.shape[1]:
+    def run(self, theta: FloatArray, reference: FloatArray | None = None) -> None:
+        """Unwrap the next angles (2, N), rad, in place; references follow within half a turn."""
+        for joint in np.flatnonzero(self._joints):
+            if theta.shape[1]:
                 start = theta[joint, 0] if math.isnan(self._last[joint]) else self._last[joint]
                 raw = np.concatenate([[start], theta[joint]])
                 turns = self._turns[joint] - np.cumsum(np.rint(np.diff(raw) / _TURN))
                 self._last[joint], self._turns[joint] = raw[-1], turns[-1]
                 theta[joint] += _TURN * turns
-
-    def follow(self, reference: FloatArray, theta: FloatArray) -> None:
-        """Bring references (2, N) within half a turn of the unwrapped angles, in place."""
-        for joint in (0, 1):
-            if self._joints[joint]:
+            if reference is not None:
                 reference[joint] += _TURN * np.rint((theta[joint] - reference[joint]) / _TURN)

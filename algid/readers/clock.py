@@ -22,7 +22,7 @@ from algid.base.quantiles import median
 from algid.base.words import counted
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
-from algid.readers.table import SampleTable, stack
+from algid.readers.table import SampleTable, remark, stack
 
 HORIZON = 1024
 """Rows a sample may come late: a network reorders neighbours, it does not mix two recordings."""
@@ -34,6 +34,8 @@ _RUN = 8
 """Samples in a row that come late: fewer are jitter."""
 _SHORTEST = 64
 """Late samples at a table's end that wait for the next table, and least of a run before all."""
+_NO_HOLE = 0.75
+"""Of the usual rows in a time, between the half that one of two threads writes and all of them."""
 _MOST_RUNS = 1000
 """More are a broken clock's."""
 PAUSE = 20
@@ -63,41 +65,79 @@ def in_order(
         rows by more than a few; if it stands still in half of them; if there are too many runs, or
         fewer than `segment`.
     """
-    clock = _Clock(path, runs)
-    pending: SampleTable | None = None
-    counts = np.zeros(3, dtype=np.int64)
-    left_out: tuple[Notice, ...] = ()
-    for run, table in clock.parts(tables):
+    run, shift_ns = 1, 0
+    held: SampleTable | None = (
+        None  # this run's last rows in order: late ones may belong among them
+    )
+    waiting: SampleTable | None = None  # late rows at a table's end: perhaps the next run's first
+    counts = np.zeros(3, np.int64)
+
+    def moved(table: SampleTable) -> SampleTable:
+        """A part of this run behind the run before; nothing of it where another is read alone."""
         if segment not in (None, run):
-            left_out += table.notices
-            continue
-        if len(table) == 0 and pending is not None:
-            pending = pending.noting(*table.notices)
-            continue
-        ordered, added = _sorted(path, table)
+            return remark(*table.notices)
+        if not shift_ns:
+            return table
+        if int(table.stamp_ns[-1]) + shift_ns > LIMITS.largest_time_ns:
+            raise LogError(f"{path}: time starts again, and its runs span over 292 years")
+        return SampleTable(table.stamp_ns + shift_ns, table.columns, table.notices)
+
+    def settled(part: SampleTable) -> Iterator[SampleTable]:
+        """The rows before which none of this run comes any more; the others are held."""
+        nonlocal held, counts
+        before, own, held = held, part, None
+        if before is not None and len(part) < HORIZON:
+            part, before = stack([before, part]), None
+        ordered, added = _sorted(path, part)
         counts += added
-        if pending is None:
-            pending = ordered
-        elif len(pending) == 0:
-            pending = ordered.noting(*pending.notices)
-        elif ordered.stamp_ns[0] > pending.stamp_ns[-1]:
-            yield pending
-            pending = ordered
-        else:
-            merged, added = _sorted(path, stack([pending, ordered]))
+        if before is not None and ordered.stamp_ns[0] > before.stamp_ns[-1]:
+            yield moved(before)
+        elif before is not None:
+            ordered, added = _sorted(path, stack([before, ordered]))
             counts += added
-            keep = max(0, len(merged) - max(HORIZON, len(ordered) // 2))
-            if keep:
-                yield merged.part(0, keep)
-                merged = merged.part(keep, len(merged))
-            pending = merged
-    if segment is not None and segment > clock.run:
-        last = Remedy({"segment": clock.run}, "the last one")
-        known = counted(clock.run, "run")
-        raise LogError(f"{path}: there is no segment {segment}: its time makes {known}; {last}")
-    if pending is not None:
-        restarts = _restarts(clock.run, segment) if clock.run > 1 else ()
-        yield pending.noting(*left_out, *restarts, *_mended(*counts.tolist()))
+        last = 0 if ordered is own else max(0, len(ordered) - HORIZON)
+        if last:
+            yield moved(ordered.part(0, last))
+        held = ordered.part(last, len(ordered))
+
+    for table in tables:
+        if not len(table):
+            yield table
+            continue
+        rows = table if waiting is None else stack([waiting, table])
+        while (start := _restart(held, rows)) is not None:
+            if start:
+                yield from settled(rows.part(0, start))
+            first_ns, rows = int(rows.stamp_ns[start]), rows.part(start, len(rows))
+            assert held is not None
+            if not runs:
+                raise LogError(_backwards(path, int(held.stamp_ns[-1]), first_ns))
+            if run == _MOST_RUNS:
+                other = Remedy({"time": None}, "name another time")
+                raise LogError(
+                    f"{path}: time starts again {_MOST_RUNS} times; expected one clock; {other}"
+                )
+            yield moved(held)
+            period = _period(held.stamp_ns[-HORIZON:])
+            shift_ns += int(held.stamp_ns[-1]) + max(1, round(PAUSE * period)) - first_ns
+            held, run = None, run + 1
+        on_time = np.flatnonzero(~_late(held, rows.stamp_ns))
+        certain = int(on_time[-1]) + 1 if on_time.size else 0
+        if len(rows) - certain >= _SHORTEST:  # so many would have shown a restart
+            certain = len(rows)
+        waiting = rows.part(certain, len(rows)) if certain < len(rows) else None
+        if certain:
+            yield from settled(rows.part(0, certain))
+    if waiting is not None:
+        yield from settled(waiting)
+    if segment is not None and segment > run:
+        last_one, known = Remedy({"segment": run}, "the last one"), counted(run, "run")
+        raise LogError(f"{path}: there is no segment {segment}: its time makes {known}; {last_one}")
+    if held is not None:
+        yield moved(held)
+    notices = (*_restarts(run, segment), *_mended(*counts.tolist()))
+    if notices:
+        yield remark(*notices)
 
 
 def _mended(late: int, repeated: int, lost: int) -> Iterator[Notice]:
@@ -112,134 +152,62 @@ def _mended(late: int, repeated: int, lost: int) -> Iterator[Notice]:
         yield Notice("UNEVEN_STAMPS", numbers={"case": "repeated"} | numbers, lossy=lost > 0)
 
 
-def _restarts(runs: int, only: int | None) -> tuple[Notice]:
+def _restarts(runs: int, only: int | None) -> Iterator[Notice]:
     """What to say of several runs."""
+    if runs == 1:
+        return
     said = "one is read behind another, and no window spans two"
-    mends: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)
+    remedies: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)
     if only is not None:
-        said, mends = f"number {only} is read alone", ()
+        said, remedies = f"number {only} is read alone", ()
     joined = runs - 1 if only is None else 0
     numbers = {"count": runs - 1, "runs": runs, "said": said, "joined": joined}
-    return (Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=mends),)
+    yield Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=remedies)
 
 
-class _Clock:
-    """Numbers the runs of a log, and moves the stamps of each behind the run before it.
+def _period(stamps: IntArray) -> float:
+    """Median step between increasing stamps (N,) in ns; 0 for one stamp."""
+    return median(np.diff(stamps)) if stamps.size > 1 else 0.0
 
-    Attributes
-    ----------
-    run : int
-        The run that is being read, from 1.
+
+def _late(held: SampleTable | None, stamps: IntArray) -> NDArray[np.bool_]:
+    """Which stamps (N,) are not above all before them, those of `held` among these."""
+    late = np.zeros(stamps.size, np.bool_)
+    late[1:] = stamps[1:] <= np.maximum.accumulate(stamps)[:-1]
+    if held is not None:
+        late |= stamps <= held.stamp_ns[-1]
+    return late
+
+
+def _restart(held: SampleTable | None, table: SampleTable) -> int | None:
+    """The row of the table with which the clock starts again; None where it does not.
+
+    Rows that merely come late fill a hole, or repeat what stands there. Those of another run lie
+    in time of which rows are known without a hole, or before all that is known.
     """
-
-    def __init__(self, path: str, restarts: bool) -> None:
-        self.run = 1
-        self._path, self._restarts = path, restarts
-        self._before: SampleTable | None = None  # the run's last rows, as they stand in the file
-        self._moved_ns = 0
-        self._latest_ns = -(1 << 63)
-
-    def parts(self, tables: Iterator[SampleTable]) -> Iterator[tuple[int, SampleTable]]:
-        """Parts of the tables, each with its run; late rows at a table's end wait for the next."""
-        waiting: SampleTable | None = None
-        for each in tables:
-            if not len(each):
-                yield self.run, each
-                continue
-            table = each if waiting is None else stack([waiting, each])
-            waiting = None
-            while (place := self._restart(table)) is not None:
-                if place:
-                    yield self._moved(table.part(0, place))
-                table = table.part(place, len(table))
-                self._begin(int(table.stamp_ns[0]))
-            settled = self._settled(table.stamp_ns)
-            if settled < len(table):
-                waiting = table.part(settled, len(table))
-            if settled:
-                yield self._moved(table.part(0, settled))
-        if waiting is not None:
-            yield self._moved(waiting)
-
-    def _rises(self, stamps: IntArray) -> bool:
-        before = self._before
-        follows = before is None or stamps[0] > before.stamp_ns[-1]
-        return bool(follows and np.all(stamps[1:] > stamps[:-1]))
-
-    def _restart(self, table: SampleTable) -> int | None:
-        """The row of the table with which a new run begins."""
-        if self._rises(table.stamp_ns):
-            return None
-        known = [] if self._before is None else [self._before]
-        first = _restart(stack([*known, table]))
-        return None if first is None else max(0, first - sum(map(len, known)))
-
-    def _settled(self, stamps: IntArray) -> int:
-        """How many rows are of this run for certain: all but a few late ones at the end."""
-        if self._rises(stamps):
-            return stamps.size
-        before = stamps[0] if self._before is None else self._before.stamp_ns.max()
-        on_time = np.flatnonzero(stamps >= np.maximum(np.maximum.accumulate(stamps), before))
-        certain = int(on_time[-1]) + 1 if on_time.size else 0
-        return certain if stamps.size - certain < _SHORTEST else stamps.size
-
-    def _begin(self, first_ns: int) -> None:
-        """A new run begins, whose first stamp is given."""
-        if not self._restarts:
-            last = self._latest_ns
-            raise LogError(_backwards(self._path, last, first_ns))
-        if self.run == _MOST_RUNS:
-            other = Remedy({"time": None}, "name another time")
-            raise LogError(
-                f"{self._path}: time starts again {_MOST_RUNS} times; expected one clock; {other}"
-            )
-        self.run += 1
-        if self._before is not None:
-            steps = np.diff(self._before.stamp_ns)
-            period = median(steps[steps > 0]) if np.any(steps > 0) else 0.0
-            self._moved_ns = self._latest_ns + max(1, round(PAUSE * period)) - first_ns
-        self._before = None
-
-    def _moved(self, part: SampleTable) -> tuple[int, SampleTable]:
-        """The part behind what stands before it, and its run."""
-        known = [self._before] if self._before is not None and len(part) < HORIZON else []
-        last = stack([*known, SampleTable(part.stamp_ns, part.columns)])
-        self._before = last.part(max(0, len(last) - HORIZON), len(last))
-        latest = int(part.stamp_ns.max()) + self._moved_ns
-        if self._moved_ns and latest > LIMITS.largest_time_ns:
-            raise LogError(f"{self._path}: time starts again, and its runs span over 292 years")
-        self._latest_ns = max(self._latest_ns, latest)
-        stamps = part.stamp_ns + self._moved_ns if self._moved_ns else part.stamp_ns
-        return self.run, SampleTable(stamps, part.columns, part.notices)
-
-
-def _restart(table: SampleTable) -> int | None:
-    """The row with which the clock starts again, None where it does not."""
-    stamps = table.stamp_ns
-    highest = np.maximum.accumulate(stamps)
-    late = np.flatnonzero(stamps[1:] <= highest[:-1]) + 1
-    for run in np.split(late, np.flatnonzero(np.diff(late) > 1) + 1):
-        goes_back = np.any(np.diff(stamps[run[0] - 1 : run[-1] + 1]) < 0)  # or stands still
-        if run.size < _RUN or not goes_back:
+    late = np.flatnonzero(_late(held, table.stamp_ns))
+    for rows in np.split(late, np.flatnonzero(np.diff(late) > 1) + 1):
+        if rows.size < _RUN:
             continue
-        # in time order but for late ones among them
-        before = np.arange(max(0, run[0] - HORIZON - run.size), run[0])
-        before = before[np.argsort(stamps[before], kind="stable")]
-        step = np.diff(stamps[before])
-        period = median(step[step > 0]) if np.any(step > 0) else 0.0
-        after = np.clip(np.searchsorted(stamps[before], stamps[run]), 0, before.size - 1)
-        nearest = before[after]
-        left = before[np.maximum(after - 1, 0)]
-        nearer = np.abs(stamps[left] - stamps[run]) < np.abs(stamps[nearest] - stamps[run])
-        nearest = np.where(nearer, left, nearest)
-        crowded = np.abs(stamps[nearest] - stamps[run]) <= period / 2
-        if np.count_nonzero(crowded & ~_alike(table, nearest, run)) > run.size / 2:
-            return int(run[0])
-        # from before all that is known of the run time rises again
-        known = stamps[max(0, run[0] - HORIZON) : run[0]]
-        rising = np.count_nonzero(np.diff(stamps[run]) > 0) > 0.75 * run.size
-        if run.size >= _SHORTEST and rising and stamps[run[0]] < known.min():
-            return int(run[0])
+        before = table.part(max(0, rows[0] - HORIZON - rows.size), rows[0])
+        if held is not None:
+            before = stack([held, before])
+        order = np.argsort(before.stamp_ns, kind="stable")
+        known, own = before.stamp_ns[order], table.stamp_ns[rows]
+        first, last = own.min(), own.max()
+        if first >= known[-1]:  # it stands still
+            continue
+        there = np.unique(known[(known >= first) & (known <= last)])
+        if there.size >= _RUN and there.size * _period(np.unique(known)) > _NO_HOLE * (
+            last - first
+        ):
+            after = np.minimum(np.searchsorted(known, own), known.size - 1)
+            same = (known[after] == own) & _alike(before, order[after], table, rows)
+            if np.count_nonzero(~same) > rows.size / 2:
+                return int(rows[0])
+        rising = np.count_nonzero(np.diff(own) > 0) > 0.75 * rows.size
+        if rows.size >= _SHORTEST and rising and own[0] < before.stamp_ns[-HORIZON:].min():
+            return int(rows[0])
     return None
 
 
@@ -274,9 +242,8 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
         )
     kept = order[fresh]
     gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
-    same = _alike(table, gone, instead)
-    late, lost = np.count_nonzero(moved > 0), gone.size - np.count_nonzero(same)
-    return table.take(kept), (int(late), repeated, int(lost))
+    lost = gone.size - np.count_nonzero(_alike(table, gone, table, instead))
+    return table.take(kept), (int(np.count_nonzero(moved > 0)), repeated, int(lost))
 
 
 def _backwards(path: str, last: int, first: int) -> str:
@@ -286,12 +253,14 @@ def _backwards(path: str, last: int, first: int) -> str:
     )
 
 
-def _alike(table: SampleTable, rows: IntArray, others: IntArray) -> NDArray[np.bool_]:
-    """Which rows (R,) hold what the others (R,) hold; what is missing in both is the same."""
+def _alike(
+    table: SampleTable, rows: IntArray, other: SampleTable, others: IntArray
+) -> NDArray[np.bool_]:
+    """Which rows (R,) hold what those of the other table hold; missing in both is the same."""
     same = np.ones(rows.size, np.bool_)
-    for values in table.columns.values():
-        one, other = values[rows], values[others]
-        same &= (one == other) | (np.isnan(one) & np.isnan(other))
+    for name, values in table.columns.items():
+        one, two = values[rows], other.columns[name][others]
+        same &= (one == two) | (np.isnan(one) & np.isnan(two))
     return same
 
 
@@ -323,7 +292,7 @@ class Series:
     @property
     def period(self) -> float:
         """Median time between samples in ns."""
-        return median(np.diff(self.table.stamp_ns)) if len(self.table) > 1 else 0.0
+        return _period(self.table.stamp_ns)
 
     def covers(self, stamps: IntArray) -> NDArray[np.bool_]:
         """True where a stamp (N,) equals a sample's, or lies between two samples without a gap."""
@@ -334,12 +303,6 @@ class Series:
         bridged = own[after] - own[after - 1] <= BRIDGED * self.period
         at_sample = (own[after] == stamps) | (own[after - 1] == stamps)
         return (bridged | at_sample) & (stamps >= own[0]) & (stamps <= own[-1])
-
-    def holds(self, stamps: IntArray) -> bool:
-        """Whether each of the stamps (N,) is a sample's."""
-        own = self.table.stamp_ns
-        places = np.minimum(np.searchsorted(own, stamps), own.size - 1)
-        return bool(np.array_equal(own[places], stamps))
 
     def at(self, stamps: IntArray) -> dict[str, FloatArray]:
         """The channels at the stamps (N,), linear between samples."""
@@ -369,12 +332,12 @@ def whole_topic(
     LogError
         As `in_order`, and if there is no sample.
     """
-    filled = [table for table in in_order(path, tables) if len(table)]
-    if not filled:
+    whole = stack(list(in_order(path, tables)) or [remark()])
+    if not len(whole):
         channel = next(iter(channels))
         other = Remedy({f"{channel}.topic": None, f"{channel}.source": None}, "name another")
         raise LogError(f"{path}: topic {topic!r} holds no sample of {channel}; {other}")
-    return Series(topic, stack(filled))
+    return Series(topic, whole)
 
 
 def aligned(
@@ -390,11 +353,11 @@ def aligned(
     The last table tells how many were dropped and what the interpolation costs, in the log's own
     units, and has the `notices`.
     """
-    lost, held = 0, None
-    between: set[str] = set()
+    lost, between = 0, set[str]()
     for table in main:
-        if held is not None:
-            yield held
+        if not len(table):
+            yield table
+            continue
         covered = np.ones(len(table), np.bool_)
         for other in others:
             covered &= other.covers(table.stamp_ns)
@@ -403,14 +366,15 @@ def aligned(
         columns = dict(kept.columns)
         for other in others:
             columns |= other.at(kept.stamp_ns)
-            if not other.holds(kept.stamp_ns):
+            own = other.table.stamp_ns
+            places = np.minimum(np.searchsorted(own, kept.stamp_ns), own.size - 1)
+            if not np.array_equal(own[places], kept.stamp_ns):
                 between.add(other.topic)
         for other in beside:
             known = other.covers(kept.stamp_ns)
-            at_stamps = other.at(kept.stamp_ns)
-            for name, values in at_stamps.items():
+            for name, values in other.at(kept.stamp_ns).items():
                 columns[name] = np.where(known, values, np.nan)
-        held = SampleTable(kept.stamp_ns, columns, kept.notices)
+        yield SampleTable(kept.stamp_ns, columns, kept.notices)
     said = list(notices)
     for other in others:
         if other.topic in between:
@@ -421,5 +385,4 @@ def aligned(
         said.append(Notice("ALIGNED", numbers={"case": "not covered", "count": lost}))
     for other in others:
         said += other.table.notices
-    if held is not None:
-        yield held.noting(*said)
+    yield remark(*said)

@@ -19,7 +19,7 @@ from algid.base.units import CURRENT, TORQUE, VELOCITY
 from algid.log import ChannelReading, IntArray
 from algid.notices import Remedy
 from algid.options import flag
-from algid.readers.table import CHANNELS, JOINT_CHANNELS, REFERENCES, VELOCITIES, SampleTable
+from algid.readers.table import CHANNELS, REFERENCES, SampleTable
 
 if TYPE_CHECKING:
     from algid.profile import Angle, Profile, Torque, Velocity
@@ -30,82 +30,50 @@ ROWS = 1 << 16
 """Rows a table: few enough to stay in a core's cache between decoding and copying."""
 
 
-@dataclass(frozen=True, eq=False)
+QUANTITIES = ("theta", "tau", "omega", "q_des")
+
+
 class SampleBuffer:
-    """Samples to be filled in: stamps (N,) in ns.
+    """Stamps (N,) in ns and signals (2, N) by quantity in one piece of memory, which grows.
 
-    Angles, torques and, where recorded, velocities and references (2, N).
-    """
-
-    stamp_ns: IntArray
-    theta: FloatArray
-    tau: FloatArray
-    omega: FloatArray | None
-    reference: FloatArray | None = None
-
-    @classmethod
-    def empty(cls, rows: int, *, velocity: bool, reference: bool = False) -> SampleBuffer:
-        """Room for `rows` samples in one piece of memory, which the system maps in large pages."""
-        signals = np.empty((5 + 2 * velocity + 2 * reference, rows))
-        stamps = signals[-1].view(np.int64)
-        omega = signals[4:6] if velocity else None
-        return cls(stamps, signals[0:2], signals[2:4], omega, signals[-3:-1] if reference else None)
-
-    def __len__(self) -> int:
-        return int(self.stamp_ns.size)
-
-    def part(self, first: int, last: int) -> SampleBuffer:
-        """Samples `first` to `last` - 1 as views."""
-        omega = None if self.omega is None else self.omega[:, first:last]
-        reference = None if self.reference is None else self.reference[:, first:last]
-        return SampleBuffer(
-            self.stamp_ns[first:last],
-            self.theta[:, first:last],
-            self.tau[:, first:last],
-            omega,
-            reference,
-        )
-
-
-class GrowingBuffer:
-    """Room that grows by samples. Reserved memory costs nothing until it is written.
+    Reserved memory costs nothing until it is written.
 
     Parameters
     ----------
     rows : int
         How many samples to expect; 0 where nobody knows. A wrong number costs time, nothing else.
-    velocity, reference : bool
-        What is recorded beside angles and torques.
+    recorded : sequence of str
+        The quantities, of `QUANTITIES`.
+
+    Attributes
+    ----------
+    used : int
+        Samples so far.
     """
 
-    def __init__(self, rows: int, *, velocity: bool, reference: bool = False) -> None:
-        reserved = min(rows, LIMITS.reserved_rows)
-        self._room = SampleBuffer.empty(reserved, velocity=velocity, reference=reference)
-        self._used = 0
+    def __init__(self, rows: int, recorded: Sequence[str]) -> None:
+        self._recorded, self.used = recorded, 0
+        self._room = np.empty((1 + 2 * len(recorded), min(rows, LIMITS.reserved_rows)), np.int64)
 
-    def __len__(self) -> int:
-        return self._used
-
-    def more(self, rows: int) -> SampleBuffer:
+    def more(self, rows: int) -> tuple[IntArray, dict[str, FloatArray]]:
         """Room for the next `rows` samples."""
-        first, self._used = self._used, self._used + rows
-        if self._used > len(self._room):
-            old = self._room.part(0, first)
-            self._room = SampleBuffer.empty(
-                max(self._used, 2 * len(self._room)),
-                velocity=old.omega is not None,
-                reference=old.reference is not None,
-            )
-            new = self._room.part(0, first)
-            new.stamp_ns[:], new.theta[:], new.tau[:] = old.stamp_ns, old.theta, old.tau
-            for there, here in ((old.omega, new.omega), (old.reference, new.reference)):
-                if there is not None and here is not None:
-                    here[:] = there
-        return self._room.part(first, self._used)
+        first, self.used = self.used, self.used + rows
+        if self.used > self._room.shape[1]:
+            larger = max(self.used, 2 * self._room.shape[1])
+            old, self._room = self._room, np.empty((len(self._room), larger), np.int64)
+            self._room[:, :first] = old[:, :first]
+        return self._part(first)
 
-    def filled(self) -> SampleBuffer:
+    def filled(self) -> tuple[IntArray, dict[str, FloatArray]]:
         """All samples so far."""
-        return self._room.part(0, self._used)
+        return self._part(0)
+
+    def _part(self, first: int) -> tuple[IntArray, dict[str, FloatArray]]:
+        part = self._room[:, first : self.used]
+        signals = part[1:].view(np.float64)
+        return part[0], {
+            name: signals[2 * place : 2 * place + 2] for place, name in enumerate(self._recorded)
+        }
 
 
 @dataclass(frozen=True)
@@ -159,16 +127,19 @@ class Conversion:
     passive: int | None = None
     laws: tuple[PdLaw | None, PdLaw | None] = (None, None)
 
-    def apply(self, table: SampleTable, room: SampleBuffer) -> None:
-        """Fill in a table's angles, torques and, where recorded, velocities and references.
-
-        In rad, N m, rad/s.
-        """
-        theta, omega, reference = room.theta, room.omega, room.reference
-        self._joint_pair(table, JOINT_CHANNELS[:2], theta)
-        self._joint_pair(table, JOINT_CHANNELS[2:], room.tau)
-        if omega is not None:
-            self._joint_pair(table, VELOCITIES, omega)
+    def apply(self, table: SampleTable, signals: Mapping[str, FloatArray]) -> None:
+        """Fill in a table's signals (2, N) by quantity, in rad, N m, rad/s."""
+        for quantity, both in signals.items():
+            for joint, row in enumerate(both, start=1):
+                name = f"{quantity}{joint}"
+                channel = self.channels[name]
+                if channel.factor == 1:
+                    row[:] = table.columns[name]
+                elif channel.factor:  # without a motor a torque may be anything
+                    np.multiply(table.columns[name], channel.factor, out=row)
+                if channel.offset:
+                    row += channel.offset
+        theta, tau, omega = signals["theta"], signals["tau"], signals.get("omega")
         for joint, law in enumerate(self.laws):
             if law is not None:
                 speed = np.zeros(len(table))
@@ -176,32 +147,16 @@ class Conversion:
                     speed = omega[joint]
                 elif law.kd and len(table) > 1:
                     speed = np.gradient(theta[joint], 1e-9 * (table.stamp_ns - table.stamp_ns[0]))
-                room.tau[joint] = law.kp * (room.tau[joint] - theta[joint]) - law.kd * speed
-        if self.absolute:
-            theta[1] -= theta[0]
-            if omega is not None:
-                omega[1] -= omega[0]
-        if self.zero:
-            theta[0] += self.zero
-        if reference is not None:
-            self._joint_pair(table, REFERENCES, reference)
-            if self.absolute:
-                reference[1] -= reference[0]
-            reference[0] += self.zero
+                tau[joint] = law.kp * (tau[joint] - theta[joint]) - law.kd * speed
+        for quantity, both in signals.items():
+            if self.absolute and quantity != "tau":
+                both[1] -= both[0]
+            if self.zero and quantity in ("theta", "q_des"):
+                both[0] += self.zero
         if self.passive is not None:
-            room.tau[self.passive - 1] = 0.0
+            tau[self.passive - 1] = 0.0
         if self.base:
-            room.tau[0] += room.tau[1]
-
-    def _joint_pair(self, table: SampleTable, names: Sequence[str], both: FloatArray) -> None:
-        for row, name in zip(both, names, strict=True):
-            channel = self.channels[name]
-            if channel.factor == 1:
-                row[:] = table.columns[name]
-            elif channel.factor:  # without a motor a torque may be anything
-                np.multiply(table.columns[name], channel.factor, out=row)
-            if channel.offset:
-                row += channel.offset
+            tau[0] += tau[1]
 
 
 def channel_readings(

@@ -11,24 +11,18 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING
 
 from algid.base.limits import LIMITS
-from algid.base.units import ANGLE, CURRENT, NANOSECONDS, TORQUE, VELOCITY, is_foreign, unit_of
+from algid.base.units import CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
 from algid.log import KEY, IntArray, Reading, usual_period
 from algid.notices import Notice, Remedy
 from algid.readers.names import CURRENTS, STEMS, TIMES, take_apart, words
+from algid.readers.table import REFERENCES, VELOCITIES
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-_WORDS: dict[str, frozenset[str]] = {
-    "theta": frozenset((*STEMS["theta"], "joint_angles", "joint_positions")),
-    "omega": frozenset((*STEMS["omega"], "speeds")),
-    "tau": frozenset((*STEMS["tau"], "motor_torques", "joint_torques")),
-    "t": frozenset((*TIMES, "times", "timestamps", "stamps")),
-}
-"""What a key of metadata may call the columns of a quantity."""
 _UNIT_KEY = re.compile(r"units?[.:_ /](.+)|(.+)[.:_ /]units?", re.IGNORECASE)
 _KEY = re.compile(r"[\W\d]*(\w+) ?[:=] ?\"?([\w.-]+)(?: ?hz)?\"?$", re.IGNORECASE)
 _CONVENTIONS = {
@@ -36,7 +30,7 @@ _CONVENTIONS = {
     "second_angle": ("relative", "absolute"),
     "drive": ("joint", "base"),
     "effort": (
-        "raw", "gravity-compensated", "friction-compensated", "external", "command", "current",
+        "gravity-compensated", "friction-compensated", "external", "command", "current",
     ),
 }  # fmt: skip
 """Settings of a profile whose words a file may state."""
@@ -56,6 +50,7 @@ _COMMON = frozenset(
 )
 """Units that are also words: units only in brackets, or behind these words."""
 _BEFORE_UNIT = ("in", "unit", "units", "is", "are")
+_TIME_WORDS = frozenset((*TIMES, "times", "timestamps", "stamps"))
 GROUPS = frozenset(
     words(
         """
@@ -83,7 +78,7 @@ def units_in(metadata: Mapping[str, str], columns: Sequence[str]) -> dict[str, s
         elif match := _UNIT_KEY.fullmatch(key):
             named = {match[1] or match[2]: value}
         for name, unit in islice(named.items(), LIMITS.metadata_keys):
-            if _is_unit(unit):
+            if isinstance(unit, str) and (unit_of(unit) is not None or is_foreign(unit)):
                 units |= dict.fromkeys(_called(name, columns), unit.strip())
     return units
 
@@ -97,27 +92,28 @@ def _object(text: str) -> dict[str, object]:
     return content if isinstance(content, dict) else {}
 
 
-def _is_unit(text: object) -> TypeGuard[str]:
-    return isinstance(text, str) and (unit_of(text) is not None or is_foreign(text))
-
-
 def _called(name: str, columns: Sequence[str]) -> list[str]:
     """The columns that a name stands for."""
     plain = name.strip().lower()
-    if plain in (lower := [one.lower() for one in columns]):
-        return [columns[lower.index(plain)]]
+    named = [column for column in columns if column.lower() == plain]
+    if named:
+        return named[:1]
     part = take_apart(plain)
-    found = []
+    singular = {part.stem, part.stem.removesuffix("s"), part.stem.removeprefix("joint_")}
+    singular.add(part.stem.removeprefix("joint_").removesuffix("s"))
+    quantity = [stems for stems in (*STEMS.values(), TIMES) if not singular.isdisjoint(stems)]
     for column in columns:
         own = take_apart(column)
         if own.stem == part.stem:
             if part.joint in (None, own.joint):
-                found.append(column)
-        elif part.joint is None and (own.stem in CURRENTS) == (part.stem in CURRENTS):
-            called = (part.stem, f"{part.stem}s")
-            if any(own.stem in one and not one.isdisjoint(called) for one in _WORDS.values()):
-                found.append(column)
-    return found
+                named.append(column)
+        elif (
+            part.joint is None
+            and (own.stem in CURRENTS) == (part.stem in CURRENTS)
+            and any(own.stem in stems for stems in quantity)
+        ):
+            named.append(column)
+    return named
 
 
 def in_json_schema(text: str) -> tuple[dict[str, str], list[str]]:
@@ -148,7 +144,10 @@ def unused(said: Iterable[str], reading: Reading, profile: Profile) -> Iterator[
     found: dict[str, Remedy] = {}
     for line in islice(said, LIMITS.stated_lines):
         text = " ".join(line[: LIMITS.stated_letters].split())
-        settings = _convention(text, profile) or _other_units(text, reading)
+        key, value = _stated(text)
+        settings = dict(_other_units(text, reading))
+        if value in _CONVENTIONS.get(key, ()) and key not in profile.model_fields_set:
+            settings = {key: value}
         if settings or _MISSING.search(text):
             found[text[:60]] = Remedy(settings, "if that is right")
     if found:
@@ -159,27 +158,17 @@ def unused(said: Iterable[str], reading: Reading, profile: Profile) -> Iterator[
         )
 
 
-def _convention(text: str, profile: Profile) -> dict[str, object]:
-    """The setting of a profile that a line states, and nobody set."""
-    match = _KEY.search(text)
-    if match is None:
-        return {}
-    key, value = match[1].lower(), match[2].lower()
-    known = value in _CONVENTIONS.get(key, ()) and value != getattr(profile, key)
-    if known and key not in profile.model_fields_set and value != "raw":
-        return {key: value}
-    return {}
+def _stated(line: str) -> tuple[str, str]:
+    """Key and value of a line, ``zero = hanging``, in lower case; empty where there is none."""
+    match = _KEY.search(line)
+    return (match[1].lower(), match[2].lower()) if match else ("", "")
 
 
 def stated_rate(said: Iterable[str]) -> float | None:
     """Samples a second that a line states."""
-    for line in said:
-        match = _KEY.search(line)
-        if match and match[1].lower() in _RATES:
-            try:
-                return float(match[2])
-            except ValueError:
-                continue
+    for key, value in map(_stated, said):
+        if key in _RATES and re.fullmatch(r"\d+\.?\d*", value):
+            return float(value)
     return None
 
 
@@ -188,57 +177,46 @@ def other_rate(stated: float | None, stamp_ns: IntArray) -> tuple[Notice, ...]:
     period = usual_period(stamp_ns) if stamp_ns.size > 1 else 0.0
     if not stated or period <= 0 or abs(stated * period - 1) < _SAME_RATE:
         return ()
-    said = f"{stated:g} Hz"
-    numbers = {"case": "rate", "said": said, "rate": 1 / period}
+    numbers = {"case": "rate", "said": f"{stated:g} Hz", "rate": 1 / period}
     return (Notice("STATED_UNUSED", numbers=numbers),)
 
 
-def _other_units(text: str, reading: Reading) -> dict[str, object]:
-    """Settings for the units in a line in which the signals are not read.
+def _other_units(text: str, reading: Reading) -> Iterator[tuple[str, object]]:
+    """Settings for the units that a line names, and in which no signal is read.
 
-    A unit behind a number is that of a quantity, ``30 deg``.
+    A unit behind a number is that of a quantity, ``30 deg``. One that is a word of English too
+    counts in brackets, or behind a word such as ``in``.
     """
     letters = text.replace(",", " ").split()
-    settings: dict[str, object] = {}
-    for place, word in enumerate(letters):
-        before = letters[place - 1].lower() if place else ""
+    for before, word, behind in zip(["", *letters], letters, [*letters[1:], ""], strict=False):
         bare = word.strip("[](){};.\"'*")
-        if re.fullmatch(r"[-+~±]?\d.*", before) or bare in ("", "a"):
+        sure = before.lower() in _BEFORE_UNIT or before[-1:] in tuple(":=") or word[:1] in "[("
+        if re.match(r"[-+~±]?\d", before) or bare in ("", "a"):
             continue
-        sure = before in _BEFORE_UNIT or before[-1:] in ":=" or word[:1] in "[("
-        pair = f"{bare} {letters[place + 1].strip('])}.')}" if place + 1 < len(letters) else bare
-        unit = unit_of(pair) if " " in pair else None
+        unit = unit_of(f"{bare} {behind.strip('])}.')}") if behind else None
         if unit is None and (sure or bare.lower() not in _COMMON):
             unit = unit_of(bare)
-        if unit is not None:
-            settings |= _for_unit(unit, bare, text, reading)
-        elif sure and is_foreign(bare) and bare not in _COMMON:
-            of_word = set(re.findall(r"\w+", text.lower()))
-            for name in reading.channels:
-                if name[:-1] in _WORDS and not of_word.isdisjoint(_WORDS[name[:-1]]):
-                    settings[f"{name}.unit"] = None
-    return settings
+        quantity = "omega" if "/" in bare or unit == "rpm" else "theta"
+        if unit in TORQUE or unit in CURRENT:
+            quantity = "tau"
+        elif unit in NANOSECONDS:
+            timed = not _TIME_WORDS.isdisjoint(re.findall(r"\w+", text.lower()))
+            if timed and reading.clock == "column" and unit != (reading.time_unit or "s"):
+                yield "time_unit", unit
+            continue
+        elif unit is None:
+            if not (sure and is_foreign(bare) and bare not in _COMMON):
+                continue
+            quantity = next((one for one in ("theta", "tau") if _names(one, text)), "")
+        for name, channel in reading.channels.items():
+            own = channel.factor and channel.told not in ("flag", "profile")
+            if quantity and name.startswith(quantity) and own and channel.unit != unit:
+                yield f"{name}.unit", unit
 
 
-def _for_unit(unit: str, written: str, text: str, reading: Reading) -> dict[str, object]:
-    """Settings that read every signal that can have a unit in it."""
-    if unit in NANOSECONDS:
-        timed = not _WORDS["t"].isdisjoint(re.findall(r"\w+", text.lower()))
-        of_column = reading.clock == "column" and timed and unit != (reading.time_unit or "s")
-        return {"time_unit": unit} if of_column else {}
-    quantities = ("tau",)
-    if unit in VELOCITY or unit == "counts":
-        quantities = ("omega",) if "/" in written or unit not in ANGLE else ("theta",)
-    elif unit not in TORQUE and unit not in CURRENT:
-        return {}
-    return {
-        f"{name}.unit": unit
-        for name, channel in reading.channels.items()
-        if name.startswith(quantities)
-        and channel.unit != unit
-        and channel.factor
-        and channel.told not in ("flag", "profile")
-    }
+def _names(quantity: str, text: str) -> bool:
+    """Whether a text has a word for a quantity."""
+    return not set(STEMS[quantity]).isdisjoint(re.findall(r"\w+", text.lower()))
 
 
 def several(name: str, values: Iterable[object]) -> Notice:
@@ -251,7 +229,6 @@ def settings_unused(
     profile: Profile, reading: Reading, mapping: Mapping[str, str]
 ) -> Iterator[Notice]:
     """One notice of the settings that a profile has and no step of reading consumed."""
-    given = {name for name in profile.model_fields_set if getattr(profile, name) is not None}
     if reading.clock == "column":
         useless = {"topic", "clock"}
         useless |= {f"{name}.topic" for name in profile.channels if profile.channel(name).topic}
@@ -263,10 +240,10 @@ def settings_unused(
             useless.add("columns")
     else:
         useless = {"time", "time_unit", "rate", "columns"}
-    if "omega1" in profile.channels and "omega1" not in mapping:
-        useless |= {"omega1", "omega2"} | ({"velocity"} if profile.velocity else set())
-    if "q_des1" in profile.channels and "q_des1" not in mapping:
-        useless |= {"q_des1", "q_des2"}
+    for pair in (VELOCITIES, REFERENCES):
+        if pair[0] in profile.channels and pair[0] not in mapping:
+            useless |= {*pair, *(["velocity"] if pair is VELOCITIES and profile.velocity else [])}
+    given = {name for name in profile.model_fields_set if getattr(profile, name) is not None}
     names = [name for name in useless if name.partition(".")[0] in given]
     if names:
         yield Notice(

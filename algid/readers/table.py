@@ -29,16 +29,6 @@ class SampleTable:
     def __len__(self) -> int:
         return int(self.stamp_ns.size)
 
-    @property
-    def has_velocities(self) -> bool:
-        """Whether velocities were recorded."""
-        return VELOCITIES[0] in self.columns
-
-    @property
-    def has_references(self) -> bool:
-        """Whether the angles that a controller was to follow were recorded."""
-        return REFERENCES[0] in self.columns
-
     def part(self, first: int, last: int) -> SampleTable:
         """Rows `first` to `last` - 1 as views; the notices stay with the first part."""
         columns = rows_of(self.columns, slice(first, last))
@@ -55,27 +45,26 @@ class SampleTable:
         )
 
 
+def remark(*notices: Notice) -> SampleTable:
+    """A table of no samples, that only tells something: a pass ends with what it has counted."""
+    return SampleTable(np.empty(0, np.int64), {}, notices)
+
+
 def stack(tables: Sequence[SampleTable]) -> SampleTable:
     """One table out of several with the same channels, in their order."""
-    if len(tables) == 1:
-        return tables[0]
-    stamps, columns = [], []
-    notices: tuple[Notice, ...] = ()
-    for table in tables:
-        stamps.append(table.stamp_ns)
-        columns.append(table.columns)
-        notices += table.notices
-    return SampleTable(np.concatenate(stamps), concatenated(columns), notices)
+    notices = tuple(notice for table in tables for notice in table.notices)
+    filled = [table for table in tables if len(table)] or list(tables[:1])
+    if len(filled) == 1:
+        return SampleTable(filled[0].stamp_ns, filled[0].columns, notices)
+    stamps = np.concatenate([table.stamp_ns for table in filled])
+    return SampleTable(stamps, concatenated([table.columns for table in filled]), notices)
 
 
 def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:
     """The same samples in tables of at most `rows` rows."""
     for table in tables:
-        if len(table) <= rows:
-            yield table
-        else:
-            for first in range(0, len(table), rows):
-                yield table.part(first, min(first + rows, len(table)))
+        for first in range(0, max(1, len(table)), rows):
+            yield table.part(first, min(first + rows, len(table)))
 
 
 BLOCK_ROWS = 1 << 18

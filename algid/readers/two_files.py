@@ -18,7 +18,7 @@ from algid.notices import Notice, Remedy
 from algid.readers.assemble import TableReader
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.formats import entries_at
-from algid.readers.table import BLOCK_ROWS, SampleTable
+from algid.readers.table import BLOCK_ROWS, SampleTable, remark
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -119,29 +119,25 @@ def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> O
 def _overlap(path: str, main: Iterator[SampleTable], other: Series) -> Iterator[SampleTable]:
     """The rows of `main` within the other file's time; the last table counts those outside."""
     first, last = int(other.table.stamp_ns[0]), int(other.table.stamp_ns[-1])
-    rows, inside, held = 0, 0, None
-    begin, end = None, 0
+    own: list[int] = []
+    outside = inside = 0
     for table in main:
-        if held is not None:
-            yield held
         if len(table):
-            if begin is None:
-                begin = int(table.stamp_ns[0])
-            end = int(table.stamp_ns[-1])
+            own = [*own[:1], int(table.stamp_ns[0]), int(table.stamp_ns[-1])]
         within = (table.stamp_ns >= first) & (table.stamp_ns <= last)
-        rows, inside = rows + len(table), inside + int(np.count_nonzero(within))
-        held = table if within.all() else table.take(within)
-    if rows and inside < 2:
+        inside += int(np.count_nonzero(within))
+        outside += int(np.count_nonzero(~within))
+        yield table if within.all() else table.take(within)
+    if own and inside < 2:
         raise LogError(
-            f"{path}: its angles run from {_span(begin or 0, end)} and the torques of "
+            f"{path}: its angles run from {_span(own[0], own[-1])} and the torques of "
             f"{other.topic} from {_span(first, last)}: expected files that overlap in time, "
             "stamped by one clock; shift the times of one of them"
         )
-    if held is not None:
-        if rows > inside:
-            numbers = {"file": other.topic, "count": rows - inside}
-            held = held.noting(Notice("ALIGNED", numbers={"case": "file"} | numbers))
-        yield held
+    if outside:
+        yield remark(
+            Notice("ALIGNED", numbers={"case": "file", "file": other.topic, "count": outside})
+        )
 
 
 def _span(first_ns: int, last_ns: int) -> str:

@@ -18,7 +18,7 @@ from algid.log import ChannelReading, Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.readers.assemble import Unwrapper
-from algid.readers.convert import Conversion, GrowingBuffer, SampleBuffer
+from algid.readers.convert import QUANTITIES, Conversion, SampleBuffer
 from algid.readers.table import CHANNELS, SampleTable
 from tests.readers.headers import opened
 
@@ -170,58 +170,37 @@ def test_zero_and_reference_of_the_angles() -> None:
 
 def test_factor_and_offset_of_a_channel() -> None:
     samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
-    room = SampleBuffer.empty(50, velocity=False)
     channels = {
         name: ChannelReading(name, "", factor=place - 1.5, offset=1.0 - place)
         for place, name in enumerate(CHANNELS)
     }
-    Conversion(channels).apply(samples, room)
+    signals = dict(zip(QUANTITIES[:2], np.empty((2, 2, 50)), strict=True))
+    Conversion(channels).apply(samples, signals)
     wanted = [(place - 1.5) * SIGNALS[place] + 1.0 - place for place in range(4)]
-    assert np.allclose([*room.theta, *room.tau], wanted, rtol=1e-15, atol=1e-15)
-
-
-def test_a_file_is_not_believed_how_many_samples_it_holds() -> None:
-    """Of 2^45, which take a petabyte, none is reserved beyond what may be at once."""
-    gatherer = GrowingBuffer(1 << 45, velocity=False)
-    gatherer.more(3).tau[:] = 7
-    assert gatherer.filled().tau.tolist() == [[7] * 3] * 2
+    assert np.allclose([*signals["theta"], *signals["tau"]], wanted, rtol=1e-15, atol=1e-15)
 
 
 @settings(max_examples=40, deadline=None)
 @given(
     sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8),
-    expected=st.integers(0, 60),
-    velocity=st.booleans(),
-    reference=st.booleans(),
+    expected=st.integers(0, 60) | st.just(1 << 45),
+    count=st.integers(2, 4),
 )
-def test_a_gatherer_keeps_what_was_put_in(
-    sizes: list[int], expected: int, velocity: bool, reference: bool
-) -> None:
-    """Whatever number of samples was expected, also none."""
-    gatherer = GrowingBuffer(expected, velocity=velocity, reference=reference)
+def test_a_buffer_keeps_what_was_put_in(sizes: list[int], expected: int, count: int) -> None:
+    """Whatever number of samples was expected, also none, or what takes a petabyte."""
+    buffer = SampleBuffer(expected, QUANTITIES[:count])
     total = sum(sizes)
-    signals = np.random.default_rng(total).normal(size=(4, 2, total))
-    done = 0
+    wanted = np.random.default_rng(total).normal(size=(count, 2, total))
     for size in sizes:
-        room, rows = gatherer.more(size), slice(done, done + size)
-        room.stamp_ns[:], room.theta[:], room.tau[:] = (
-            np.arange(done, done + size),
-            *signals[:2, :, rows],
-        )
-        if room.omega is not None:
-            room.omega[:] = signals[2, :, rows]
-        if room.reference is not None:
-            room.reference[:] = signals[3, :, rows]
-        done += size
-        assert len(gatherer) == done
-    found = gatherer.filled()
-    assert found.stamp_ns.tolist() == list(range(total))
-    assert np.array_equal(found.theta, signals[0])
-    assert np.array_equal(found.tau, signals[1])
-    assert (found.omega is not None) == velocity
-    assert found.omega is None or np.array_equal(found.omega, signals[2])
-    assert (found.reference is not None) == reference
-    assert found.reference is None or np.array_equal(found.reference, signals[3])
+        rows = slice(buffer.used, buffer.used + size)
+        stamps, signals = buffer.more(size)
+        stamps[:] = np.arange(rows.start, rows.stop)
+        for own, values in zip(signals.values(), wanted, strict=True):
+            own[:] = values[:, rows]
+    stamps, signals = buffer.filled()
+    assert stamps.tolist() == list(range(total))
+    assert list(signals) == list(QUANTITIES[:count])
+    assert all(map(np.array_equal, signals.values(), wanted))
 
 
 @settings(max_examples=40, deadline=None)
