@@ -1,8 +1,8 @@
 """What a command line calls a setting: the one place that writes flags.
 
 A setting is a field of `algid.settings.Settings` or `algid.profile.Profile`, or a keyword of a
-verb. There its type, default, bounds and help stand; the command line reads them. What is seldom
-set has no flag of its own: ``--set NAME=VALUE`` sets it, as it sets every line of a profile.
+verb: its type, default, bounds and help are stated there, and the command line reads them. What is
+seldom set has no flag of its own: ``--set NAME=VALUE`` sets it, like every line of a profile.
 """
 
 from __future__ import annotations
@@ -50,20 +50,20 @@ class Option:
         The least and the largest value of a number.
     panel : str
         Where help shows it.
-    flags : tuple of str
+    flag : str
         How it is typed, where that is not the flag of its name.
     default : object
         What a command takes where Python's default is None.
-    complete : callable
-        What completes the text that is begun.
+    words : callable
+        Gives what completes it, where no type states that.
     """
 
     kind: Any = None
     range: Range | None = None
     panel: str = EVERYDAY
-    flags: tuple[str, ...] = ()
+    flag: str | None = None
     default: Any = None
-    complete: Callable[[str], list[str]] | None = None
+    words: Callable[[], list[str]] | None = None
 
 
 def flag(name: str, *, off: bool = False) -> str:
@@ -79,7 +79,7 @@ def flag(name: str, *, off: bool = False) -> str:
         return "-o"
     if name in BY_SET:
         return f"--set {name}"
-    return f"--{'no-' if off else ''}{name.replace('_', '-')}"
+    return f"--{'no-' if off else ''}{name.rstrip('_').replace('_', '-')}"
 
 
 class _Flags(dict[str, str]):

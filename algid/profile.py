@@ -291,21 +291,15 @@ KEYWORDS = (*Profile.model_fields, *CHANNELS_OF)
 """What verbs take that read logs."""
 
 
-class ProfileSettingError(SettingError):
-    """A profile's setting or value is invalid: `place` is its name, `why` the reason."""
-
-    def __init__(self, text: str, place: str = "", why: str = "") -> None:
-        super().__init__(text)
-        self.place, self.why = place, why
-
-
-def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
+def with_settings(
+    profile: Profile, settings: Mapping[str, Any], typed: str | None = None
+) -> Profile:
     """The profile with settings over it, channel by channel.
 
     Raises
     ------
-    ProfileSettingError
-        If a setting or its value is not known.
+    SettingError
+        If a setting or its value is not known; it names what was `typed`.
     """
     merged = profile.model_dump(exclude_unset=True)
     flags = set(profile._flags)
@@ -320,7 +314,8 @@ def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
         changed = Profile.model_validate(merged)
     except ValidationError as error:
         place, why = misfit(error)
-        raise ProfileSettingError(f"setting {place}: {why}", place, why) from error
+        where = f"setting {place}" if typed is None else f"{typed} (profile: {place})"
+        raise SettingError(f"{where}: {why}") from error
     changed._flags = frozenset(flags)
     return changed
 

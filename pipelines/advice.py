@@ -173,7 +173,7 @@ def run(words: list[str], folder: Path) -> Outcome:
         contextlib.redirect_stderr(printed),
     ):
         try:
-            called(words[1])(words[1:])
+            code = called(words[1:])
         except AlgidError as error:
             print(error)
             code = Exit.USAGE

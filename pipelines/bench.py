@@ -27,7 +27,7 @@ from pipelines.bench_table import Row, day_rows, markdown, rows
 HOUR, MILLION, DAY = 3_600_000, 1_000_000, 86_400_000
 _QUICK = 3  # runs a round of what takes a second: a start-up is taken from it, and both scatter
 EMPTY_APP = (
-    "import typer\napp = typer.Typer()\nfor n in ('a', 'b'): app.command(n)(lambda: None)\napp()"
+    "import click\napp = click.Group()\nfor n in ('a', 'b'): app.command(n)(lambda: None)\napp()"
 )
 
 
@@ -73,7 +73,7 @@ def contenders(folder: Path) -> list[Contender]:
     found = [
         Contender("polars", peer("polars", million), times=_QUICK),
         Contender("help", python("-m", "algid", "--help"), times=_QUICK),
-        Contender("empty typer help", python("-c", EMPTY_APP, "--help"), times=_QUICK),
+        Contender("empty click help", python("-c", EMPTY_APP, "--help"), times=_QUICK),
         Contender("ten seconds, report", identify(ten, out)),
         Contender("second, report", identify(second, out)),
     ]

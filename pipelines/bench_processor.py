@@ -79,7 +79,7 @@ def commands(folder: Path, data: Path) -> dict[str, Timed]:
         "python": Timed(python("-c", "pass")),
         "numpy": Timed(python("-c", "import numpy")),
         "help": Timed(python("-m", "algid", "--help")),
-        "empty typer help": Timed(python("-c", EMPTY_APP, "--help")),
+        "empty click help": Timed(python("-c", EMPTY_APP, "--help")),
         "second": Timed(identify(second, out, *bare)),
         "pair": Timed(identify(ten, out, *pair, *bare)),
         "pair, page": Timed(identify(ten, out, *pair)),
@@ -127,8 +127,8 @@ def table(costs: Mapping[str, Cost]) -> str:
     line(f"weak, {MANY} logs of 5 s", "≤ 6", "many weak")
     line(f"refined, {MANY} logs of 5 s", "≤ 15", "many refined")
     line("synth, 1,000,000 samples of a held torque", "≤ 30", "synth")
-    share = f"{costs['help'].cpu / costs['empty typer help'].cpu:.2f}"
-    line("`--help` to an empty typer app", "≤ 1.15", "help", share)
+    share = f"{costs['help'].cpu / costs['empty click help'].cpu:.2f}"
+    line("`--help` to an empty click app", "≤ 1.15", "help", share)
     return "\n".join(lines) + "\n"
 
 

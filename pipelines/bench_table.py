@@ -112,7 +112,7 @@ def _others(costs: Mapping[str, Cost]) -> list[Row]:
     )
     second, shown = costs["refined second"], costs["second, report"]
     times, each = _HOUR / refined.wall, 1e6 * _net(costs, "paper") / 1e6
-    ours, theirs = costs["help"].wall, costs["empty typer help"].wall
+    ours, theirs = costs["help"].wall, costs["empty click help"].wall
     wall = f"{refined.wall:.1f} s, start-up included; processor {refined.cpu:.1f} s"
     return [
         Row(
@@ -151,7 +151,7 @@ def _others(costs: Mapping[str, Cost]) -> list[Row]:
             None,
         ),
         Row(
-            "--help to an empty typer app's",
+            "--help to an empty click app's",
             "≤ 1.3",
             f"{ours / theirs:.2f}",
             f"{ours:.3f} s",

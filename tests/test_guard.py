@@ -21,7 +21,7 @@ from algid.guard import Notes
 
 ROOT = Path(__file__).parents[1]
 SCRIPT = """
-import contextlib, os, pathlib, signal, sys, time, types
+import contextlib, os, pathlib, signal, sys, time
 import algid.cli, algid.cli.app, algid.guard
 from algid.base.staging import staged
 from algid.base.faults import during
@@ -83,13 +83,12 @@ def work(kind):
     if kind == "three":
         raise SystemExit(3)
 
-def command(_arguments):
-    def run(words, **_):
-        for _ in range(3 if words[0] == "samples" else 1):
-            with during("reading", words[1]) if len(words) > 1 else contextlib.nullcontext():
-                spin(0.3) if words[0] == "samples" else work(words[0])
-        spin(1.0) if words[0] == "samples" else None
-    return types.SimpleNamespace(main=run)
+def command(words):
+    for _ in range(3 if words[0] == "samples" else 1):
+        with during("reading", words[1]) if len(words) > 1 else contextlib.nullcontext():
+            spin(0.3) if words[0] == "samples" else work(words[0])
+    spin(1.0) if words[0] == "samples" else None
+    return 0
 
 algid.guard.SILENCE = float(os.environ.get("SILENCE", "10"))
 algid.cli.app.called = command

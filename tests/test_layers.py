@@ -104,13 +104,14 @@ TABLE: dict[str, Room] = {  # lower rooms first
                   "significance text verdict words", "numpy polars scipy"),
     "api": room(
         "arm batches check designs errors estimators exits exports files fleet identification "
-        "inspection limits log methods model moved notices options physics profile progress "
+        "inspection limits log methods moved notices options physics profile progress "
         "readers report results runtime settings stores synth text tracks units words writers",
         "numpy plotly polars",
     ),
     "cli": room(
-        "api errors exits faults guard moved options profile report runtime settings text units",
-        "rich typer",
+        "api errors exits faults guard model moved options profile report runtime settings text "
+        "units",
+        "click rich",
     ),
 }  # fmt: skip
 
@@ -162,7 +163,7 @@ FLOORS = {
     "arm": room(packages="numpy", library=PURE),
     "estimators": room("arm", "numpy scipy", PURE),
     "synth": room("arm", "numpy"),
-    "cli": room("arm estimators synth", "typer"),
+    "cli": room("arm estimators synth", "click"),
 }
 
 

@@ -89,7 +89,7 @@ class Batched:
 
 def batch(
     sources: Annotated[str | Path | Sequence[str | Path], Option(kind=list[str])],
-    out: Annotated[str | Path, Option(kind=str, flags=OUT)],
+    out: Annotated[str | Path, Option(kind=str, flag=OUT)],
     settings: Settings | None = None,
     *,
     parameters: AnyResult | None = None,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def convert(
     source: str | Path,
-    out: Annotated[str | Path, Option(kind=Path, flags=OUT)],
+    out: Annotated[str | Path, Option(kind=Path, flag=OUT)],
     *,
     profile: ProfileLike | None = None,
     force: Force = False,

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
 from algid.api.given import called, folder_or_none, parts_of
-from algid.api.options import AnyLog, Folder, Force, Length, two_names
+from algid.api.options import AnyLog, Folder, Force, Length, cases, two_names
 from algid.api.signature import check
-from algid.api.words import cases
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
 from algid.base.files import refuse_existing
@@ -84,7 +83,7 @@ class Planned:
 
 
 def design(
-    prior: Annotated[Result | str | Path, Option(kind=str, complete=cases)],
+    prior: Annotated[Result | str | Path, Option(kind=str, words=cases)],
     *,
     limits: str | Path | None = None,
     range: Annotated[Span, Option(kind=str)] | None = None,  # noqa: A002  # as the flag
@@ -95,7 +94,7 @@ def design(
     duration: Annotated[float, Option(range=PLANNED["duration"])] | None = None,
     rate: Annotated[float, Option(range=PLANNED["rate"])] | None = None,
     runs: Annotated[tuple[int, int] | str, Option(kind=str)] | None = None,
-    wanted: Annotated[Sequence[str] | str, Option(kind=str, flags=("--for",))] | None = None,
+    wanted: Annotated[Sequence[str] | str, Option(kind=str, flag="--for")] | None = None,
     position_noise: Annotated[float, Option(range=NOISE)] | None = None,
     torque_noise: Annotated[float, Option(range=NOISE)] | None = None,
     noise_from: AnyLog | None = None,

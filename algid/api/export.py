@@ -46,7 +46,7 @@ def export(
     result: AnyResult,
     to: Annotated[
         Literal["urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet"],
-        Option(flags=("--to",)),
+        Option(flag="--to"),
     ],
     *,
     l1: Length | None = None,

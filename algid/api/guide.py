@@ -30,11 +30,7 @@ def topics() -> dict[str, str]:
     return found
 
 
-def _begun(incomplete: str) -> list[str]:
-    return [name for name in topics() if name.startswith(incomplete)]
-
-
-def guide(topic: Annotated[str, Option(complete=_begun)] | None = None) -> str:
+def guide(topic: Annotated[str, Option(words=lambda: [*topics()])] | None = None) -> str:
     """Read the guide in the terminal.
 
     Parameters

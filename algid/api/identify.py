@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
@@ -13,11 +12,13 @@ from algid.api.options import (
     Export,
     Folder,
     Force,
+    Loaded,
     Logs,
     Options,
     ProfileLike,
     with_options,
 )
+from algid.api.signature import check
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
 from algid.base.text import visible
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 def identify(
     unloaded: Logs | None,
-    loaded: Annotated[Logs | None, Option(kind=list[Path])] = None,
+    loaded: Loaded | None = None,
     settings: Settings | None = None,
     *,
     parameters: AnyResult | None = None,
@@ -109,6 +110,7 @@ def identify(
     from algid.api.result import Result
     from algid.identification.identify import identify as run
 
+    check(identify, locals())
     asked, meaning = with_options(settings, profile, options)
     unloaded, loaded = meant(unloaded, meaning), meant(loaded, meaning)
     if export and not report:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
+from algid.api.signature import refuse_unknown
 from algid.base.errors import SettingError
 from algid.base.files import parsed_toml
 from algid.base.limits import KNOWN_LENGTH, LIMITS
@@ -16,7 +16,6 @@ from algid.profile import (
     KEYWORDS,
     Effort,
     Profile,
-    ProfileSettingError,
     load_profile,
     over,
     with_settings,
@@ -32,16 +31,22 @@ ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=
 AnyLog = Annotated["LogLike", Option(kind=Path)]
 """A path, a `Log`, a pandas or polars frame, or a dict of arrays."""
 Logs = Annotated["LogLike | Iterable[LogLike]", Option(kind=list[Path])]
+Loaded = Annotated["LogLike | Iterable[LogLike]", Option(kind=list[Path], flag="--loaded")]
 AnyResult = Annotated["Result | str | Path", Option(kind=Path)]
 """A result, or the path of one."""
-OUT = ("-o", "--out")
-Folder = Annotated[str | Path, Option(kind=Path, flags=OUT, default=Path())]
+OUT = "-o"
+Folder = Annotated[str | Path, Option(kind=Path, default=Path())]
 """Where a command writes: the working folder by default."""
-Place = Annotated[str | Path, Option(kind=Path, flags=OUT)]
+Place = Annotated[str | Path, Option(kind=Path, flag=OUT)]
 Length = Annotated[float, Option(range=KNOWN_LENGTH)]
 Force = Annotated[bool, Option(panel=ADVANCED)]
-Export = Annotated[bool | Literal["mcap"], Option(kind=Literal["mcap"], panel=ADVANCED)]
+Export = Annotated[bool | Literal["mcap"], Option(kind=str, panel=ADVANCED)]
 """Whether what is shown over time is also written as MCAP."""
+
+
+def cases() -> list[str]:
+    """The cases that algid knows, for completion."""
+    return ["case1", "case2"]
 
 
 class _OfLogs(TypedDict, total=False):
@@ -121,25 +126,22 @@ def with_options(
     SettingError
         If an option is not known, or a value is wrong.
     """
-    given, known = settings or Settings(), profile_of(profile)
-    if not options:
-        return given, known
-    own = Settings.model_fields
-    refuse_unknown(options, (*own, *KEYWORDS))
+    refuse_unknown(options, (*Settings.model_fields, *KEYWORDS))
     refuse_contradictions(options)
     of_settings, of_profile = {}, {}
     for name, value in options.items():
         # a profile's velocity is true or false
-        if name in own and not (name == "velocity" and isinstance(value, bool)):
+        if name in Settings.model_fields and not (name == "velocity" and isinstance(value, bool)):
             of_settings[name] = value
         else:
             of_profile[name] = value
-    known = _over(known, of_profile)
+    asked = (settings or Settings()).but(**of_settings)
+    known = profile_of(profile)
     of_both = {name: of_settings[name] for name in OF_BOTH if name in of_settings}
     # a driver's effort says how its torques are read, gravity alone says nothing of a log
-    if of_both and (known is not None or "effort" in of_both):
-        known = with_settings(known or Profile(), of_both)
-    return given.but(**of_settings), known
+    if known is not None or of_profile or "effort" in of_both:
+        of_profile |= of_both
+    return asked, _over(known, of_profile)
 
 
 def meaning(profile: ProfileLike | None, options: Mapping[str, Any]) -> Profile | None:
@@ -185,17 +187,6 @@ def two_names(name: str, given: object) -> tuple[str, str]:
     raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {given!r:.60}")
 
 
-def refuse_unknown(options: Mapping[str, Any], known: Iterable[str]) -> None:
-    """Raise `SettingError` at a name that is none of the known ones."""
-    names = list(dict.fromkeys(known))
-    for name in options:
-        if name not in names:
-            mend = f"known are {', '.join(names)}"
-            for near in get_close_matches(name, names, n=1):
-                mend = f"did you mean {near}?"
-            raise SettingError(f"{name}: no setting has this name; {mend}")
-
-
 def setting_of(line: str) -> dict[str, Any]:
     """A setting out of ``NAME=VALUE``, as a line of TOML; a bare word is text.
 
@@ -227,12 +218,6 @@ def _over(profile: Profile | None, options: Mapping[str, Any]) -> Profile | None
             settings = {channel: {"unit": value} for channel in CHANNELS_OF[name]}
         elif name == "joints" and value is not None:
             settings = {name: two_names(name, value)}
-        try:
-            profile = with_settings(profile or Profile(), settings)
-        except ProfileSettingError as error:
-            typed = flag(name).partition(" ")[0]
-            if isinstance(value, Mapping) or name == "velocity":
-                typed = flag("set")
-            where = f"{typed} (profile: {error.place})"
-            raise ProfileSettingError(f"{where}: {error.why}", error.place, error.why) from error
+        typed = "set" if isinstance(value, Mapping) or name == "velocity" else name
+        profile = with_settings(profile or Profile(), settings, flag(typed).partition(" ")[0])
     return profile

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
 from algid.api.options import Export, Place
+from algid.api.signature import check
 from algid.base.errors import SettingError
 from algid.options import Option, flag
 
@@ -60,6 +61,7 @@ def report(
     --------
     $ algid report case1-unloaded.algid --export mcap
     """
+    check(report, locals())
     from algid.tracks.read import is_track
 
     made = []

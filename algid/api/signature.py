@@ -1,6 +1,6 @@
 """What a verb's signature and docstring say of each keyword: its type, its bounds, its help.
 
-The command line and the guide are made from it, and the verb checks its numbers by it.
+The command line and the guide are made from it, and the verb checks its values by it.
 """
 
 from __future__ import annotations
@@ -11,42 +11,69 @@ import math
 import re
 import sys
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from algid.base.errors import SettingError
-from algid.options import Option, flag
+from algid.options import ADVANCED, Option, flag
 
-CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels", "cwd")
+CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
+EMPTY = inspect.Parameter.empty
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """A parameter of a verb.
+    """A parameter of a verb, or a field of `Settings` or `Profile`.
 
     Parameters
     ----------
     name : str
-    kind : type
-        What a command line takes: text where Python takes several forms.
+    hint : its annotation
     default : object
-        `inspect.Parameter.empty` where it must be given.
-    option : Option
+        `EMPTY` where it must be given.
     help : str
-        The first sentence of its entry in the docstring.
+        The first sentence of its entry in the docstring, or the field's description.
+    option : Option
     place : an `inspect` kind of parameter
     """
 
     name: str
-    kind: Any
+    hint: Any
     default: Any
-    option: Option
     help: str
-    place: Any
+    option: Option
+    place: Any = inspect.Parameter.KEYWORD_ONLY
+
+    @property
+    def kind(self) -> Any:
+        """What a command line takes: text where Python takes several forms."""
+        if self.option.kind is not None:
+            return self.option.kind
+        parts = [part for part in _parts(self.hint) if not isinstance(part, Option)]
+        if Path in parts:
+            return Path
+        return parts[0] if len(parts) == 1 and get_origin(parts[0]) is None else str
+
+    @property
+    def words(self) -> list[str]:
+        """The words that it may be; none where that is the user's own."""
+        if self.option.words is not None:
+            return self.option.words()
+        return words_of(self.hint)
+
+    @property
+    def or_file(self) -> bool:
+        """Whether it may be the path of a file too."""
+        return Path in _parts(self.hint)
+
+    @property
+    def flag(self) -> str:
+        """How it is typed."""
+        return self.option.flag or flag(self.name, off=self.default is True)
 
 
 class _Names(dict[str, Any]):
@@ -59,26 +86,37 @@ class _Names(dict[str, Any]):
 @cache
 def keywords(verb: Callable[..., Any]) -> Mapping[str, Keyword]:
     """The parameters of a verb that a command line has, by name, without ``**options``."""
-    names = _Names(vars(sys.modules[verb.__module__]))
+    module = vars(sys.modules[verb.__module__])
+    names = _Names(module)
     helps = _described(verb)
     found = {}
     for one in inspect.signature(verb).parameters.values():
         if one.name in CALLERS or one.kind is one.VAR_KEYWORD:
             continue
-        hint = eval(one.annotation, {}, names)  # our own source
-        options = [part for part in _flattened(hint) if isinstance(part, Option)]
-        option = options[0] if options else Option()
-        kind = option.kind or kind_of(hint)
+        hint = eval(one.annotation, module, names)  # our own source
+        option = next((part for part in _parts(hint) if isinstance(part, Option)), Option())
         default = one.default
-        if one.default is None and option.default is not None:
+        if default is None and option.default is not None:
             default = option.default
-        help_text = helps.get(one.name, "")
-        found[one.name] = Keyword(one.name, kind, default, option, help_text, one.kind)
+        found[one.name] = Keyword(
+            one.name, hint, default, helps.get(one.name, ""), option, one.kind
+        )
+    return found
+
+
+def fields(model: Any, kind: Any = None) -> dict[str, Keyword]:
+    """The fields of `Settings` or `Profile` by name; `kind` is what is typed for each."""
+    found = {}
+    for name, one in model.model_fields.items():
+        panel = (one.json_schema_extra or {}).get("panel") or ADVANCED
+        option = Option(kind=Path if name == "torque_file" else kind, panel=panel)
+        default = False if one.annotation is bool and kind is None else None
+        found[name] = Keyword(name, one.annotation, default, one.description or "", option)
     return found
 
 
 def check(verb: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Refuse numbers that a verb cannot take; None stands for what is not given.
+    """Refuse numbers and words that a verb cannot take; None stands for what is not given.
 
     Parameters
     ----------
@@ -92,20 +130,40 @@ def check(verb: Callable[..., Any], given: Mapping[str, Any]) -> None:
         If a number is out of its bounds, or a word none of those that are known.
     """
     for name, one in keywords(verb).items():
-        value = given[name]
-        if value is None:
-            continue
-        if get_origin(one.kind) is Literal and value not in (*get_args(one.kind), True, False):
-            words = ", ".join(get_args(one.kind))
-            typed = one.option.flags[-1] if one.option.flags else flag(name)
-            raise SettingError(f"{typed}: expected one of {words}, found {value!r:.60}")
-        if one.option.range is not None:
-            low, high = one.option.range
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not (number and math.isfinite(value) and low <= value <= high):
-                raise SettingError(
-                    f"{flag(name)}: expected a number from {low:g} to {high:g}, found {value!r:.60}"
-                )
+        refuse(one, given[name])
+
+
+def refuse(one: Keyword, value: Any) -> None:
+    """Raise `SettingError` at a number or a word that a keyword does not take."""
+    if value is None or isinstance(value, bool):
+        return
+    words = words_of(one.hint)
+    if words and value not in words:
+        expected = f"expected one of {', '.join(words)}"
+        raise SettingError(f"{one.flag}: {expected}, found {value!r:.60}")
+    if one.option.range is not None:
+        low, high = one.option.range
+        finite = isinstance(value, int | float) and math.isfinite(value)
+        if not (finite and low <= value <= high):
+            expected = f"expected a number from {low:g} to {high:g}"
+            raise SettingError(f"{one.flag}: {expected}, found {value!r:.60}")
+
+
+def refuse_unknown(options: Iterable[str], known: Iterable[str]) -> None:
+    """Raise `SettingError` at a name that is none of the known ones."""
+    from difflib import get_close_matches
+
+    from algid.moved import MOVED
+
+    names = list(dict.fromkeys(known))
+    for name in options:
+        if f"{name}=" in MOVED:
+            raise SettingError(f"{name}= is not in this version; instead: {MOVED[f'{name}=']}")
+        if name not in names:
+            mend = f"known are {', '.join(names)}"
+            for near in get_close_matches(name, names, n=1):
+                mend = f"did you mean {near}?"
+            raise SettingError(f"{name}: no setting has this name; {mend}")
 
 
 def summary(text: str, name: str) -> str:
@@ -138,23 +196,22 @@ def _described(verb: Callable[..., Any]) -> dict[str, str]:
     return helps
 
 
-def _flattened(hint: Any) -> Iterator[Any]:
+def _parts(hint: Any) -> list[Any]:
     """The alternatives of a union, and what is said beside them."""
+    if hint is type(None):
+        return []
     if get_origin(hint) is Annotated:
         base, *beside = get_args(hint)
-        yield from (one for one in beside if isinstance(one, Option))
-        yield from _flattened(base)
-    elif get_origin(hint) in (Union, types.UnionType):
-        for part in get_args(hint):
-            yield from _flattened(part)
-    elif hint is not type(None):
-        yield hint
+        return [*(one for one in beside if isinstance(one, Option)), *_parts(base)]
+    if get_origin(hint) in (Union, types.UnionType):
+        return [part for inner in get_args(hint) for part in _parts(inner)]
+    return [hint]
 
 
-def kind_of(hint: Any) -> Any:
-    """What a command line takes of several types."""
-    parts = [part for part in _flattened(hint) if not isinstance(part, Option)]
-    for part in parts:
-        if get_origin(part) is Literal or part is Path:
-            return part
-    return parts[0] if len(parts) == 1 else str
+def words_of(hint: Any) -> list[str]:
+    """The words that a type states, anywhere in it."""
+    if get_origin(hint) is Literal:
+        return [str(word) for word in get_args(hint)]
+    if hint is bool:
+        return []
+    return list(dict.fromkeys(word for part in get_args(hint) for word in words_of(part)))

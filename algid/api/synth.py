@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 from algid.api.answer import Answer
 from algid.api.given import parts_of
-from algid.api.options import Folder, Force
+from algid.api.options import Folder, Force, cases
 from algid.api.signature import check, keywords
-from algid.api.words import cases, excitations
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing
 from algid.base.limits import PHYSICAL
@@ -63,12 +62,12 @@ def synthesise(
 @overload
 def synthesise(case: str, *, payload_schedule: Schedule | str, **options: Any) -> tuple[Log]: ...
 def synthesise(  # type: ignore[misc]  # its options are the keywords of the other
-    case: Annotated[str, Option(complete=cases)],
+    case: Annotated[str | Path, Option(kind=str, words=cases)],
     *,
     duration: Annotated[float, Option(range=PHYSICAL.duration)] | None = None,
     rate: Annotated[float, Option(range=PHYSICAL.rate)] = 1000.0,
     excitation: Annotated[
-        str | Path | Log, Option(kind=str, flags=("--torque",), complete=excitations)
+        str | Path | Log, Option(kind=str, flag="--torque", words=lambda: [*run.EXCITATIONS])
     ]
     | None = None,
     motion: str | Path | None = None,
@@ -84,7 +83,7 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
     start_time: Annotated[datetime | date | str, Option(kind=str)] | None = None,
     payload_schedule: Annotated[Schedule | str, Option(kind=str)] | None = None,
     out: Folder | None = None,
-    kind: Annotated[Literal["mcap", "parquet", "csv"], Option(flags=("--format",))] = "mcap",
+    kind: Annotated[Literal["mcap", "parquet", "csv"], Option(flag="--format")] = "mcap",
     force: Force = False,
     progress: Progress | None = None,
 ) -> tuple[Log, ...]:
@@ -166,7 +165,7 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
         return _example(own)
     sensed = ("position_noise", "torque_noise", "encoder_bits", "jitter", "drop", "seed")
     given = {name: own[name] for name in sensed}
-    described = load_case(case)
+    described = load_case(str(case))
     wished = {name: value for name, value in given.items() if value is not None}
     measured = replace(sensors or Sensors(), **wished)
     if start_time is not None:
@@ -198,8 +197,7 @@ def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
     for name, one in keywords(synthesise).items():
         default = inspect.signature(synthesise).parameters[name].default
         if name not in ("case", "out", "force") and given[name] not in (None, default):
-            typed = one.option.flags[-1] if one.option.flags else flag(name)
-            raise SettingError(f"{typed}: the example is always the same; leave it out")
+            raise SettingError(f"{one.flag}: the example is always the same; leave it out")
     logs = example_logs()
     if given["out"] is not None:
         write_example(given["out"], logs, given["force"])

@@ -35,7 +35,7 @@ UNIT = "passes"
 
 def track(
     log: AnyLog,
-    parameters: Annotated[Result | str | Path, Option(kind=Path, flags=("--parameters",))],
+    parameters: Annotated[Result | str | Path, Option(kind=Path, flag="--parameters")],
     *,
     l1: Length | None = None,
     l2: Length | None = None,

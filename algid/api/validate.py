@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.given import called, meant, opened
-from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, meaning
+from algid.api.options import AnyResult, Loaded, LogOptions, Logs, ProfileLike, meaning
 from algid.api.signature import check
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def validate(
     result: AnyResult,
     logs: Logs | None = None,
-    loaded: Annotated[Logs | None, Option(kind=list[Path])] = None,
+    loaded: Loaded | None = None,
     *,
     max_nrmse: Annotated[float, Option(range=(0, 1e9))] | None = None,
     max_error: Annotated[float | str | Path, Option(kind=str)] | None = None,

@@ -49,25 +49,23 @@ def _command() -> int:
 
 
 def _called(arguments: Sequence[str]) -> int:
-    """Call the command; what typer refuses is one line too."""
+    """Call the command; what click refuses is one line too."""
+    from click import UsageError
+
     from algid.base.errors import SettingError
-    from algid.cli.app import called
+    from algid.cli import app
     from algid.moved import refuse_moved
 
     if not arguments:
-        _called(["--help"])
+        app.called(["--help"])
         return Exit.USAGE
     refuse_moved(arguments)
-    command = called(arguments[0])
     try:
-        return int(command.main(list(arguments), prog_name="algid", standalone_mode=False) or 0)
-    except Exception as error:
-        told = getattr(error, "format_message", None)
-        if told is None:
-            raise
-        context = getattr(error, "ctx", None)
-        more = f"; {context.command_path} --help lists all" if context is not None else ""
-        raise SettingError(f"{told().rstrip('.')}{more}") from error
+        return app.called(arguments)
+    except UsageError as error:
+        text = error.format_message().rstrip(".?")
+        more = "" if error.ctx is None else f"; {error.ctx.command_path} --help lists all"
+        raise SettingError(f"{text}{more}") from error
 
 
 def run(arguments: Sequence[str]) -> int:

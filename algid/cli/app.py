@@ -1,68 +1,94 @@
-"""The commands of `algid`, gathered: all of them, or the one that is called."""
+"""The application: its commands are made when they are called, or listed."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
-from functools import cache
-from typing import Annotated, Any
+from collections.abc import Sequence
+from pathlib import Path
 
-import typer
-from typer.main import get_command
+import click
+from click.shell_completion import get_completion_class
 
 from algid import __version__
-from algid.cli.derive import COMMANDS, Command, add, listed
+from algid.base.errors import SettingError
+from algid.cli.derive import COMMANDS, command, listed
 from algid.cli.output import say
 
+COMPLETE = "_ALGID_COMPLETE"
+STARTS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ".config/fish/config.fish"}
+"""By shell the file that it reads as it starts, below the home folder."""
 
-def _print_version(wanted: bool) -> None:
+
+def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if wanted:
         say(f"algid {__version__}")
-        raise typer.Exit
+        ctx.exit()
 
 
-def _root(
-    _version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
-    ] = False,
-) -> None:
-    pass
+def _completion(ctx: click.Context, option: click.Parameter, wanted: bool) -> None:
+    if not wanted:
+        return
+    shell = Path(os.environ.get("SHELL", "")).name
+    kind = get_completion_class(shell)
+    if kind is None:
+        raise SettingError(f"{option.opts[0]}: expected bash, zsh or fish, found {shell!r:.60}")
+    if option.name == "show_completion":
+        say(kind(app, {}, "algid", COMPLETE).source())
+        ctx.exit()
+    start = Path.home() / STARTS[shell]
+    line = f'eval "$({COMPLETE}={shell}_source algid)"'
+    if shell == "fish":
+        line = f"{COMPLETE}=fish_source algid | source"
+    start.parent.mkdir(parents=True, exist_ok=True)
+    with start.open("a", encoding="utf-8") as file:
+        file.write(f"{line}\n")
+    say(f"added to {start}: {line}")
+    ctx.exit()
 
 
-def gathered(names: Iterable[str], *, only_listed: bool = False) -> typer.Typer:
-    """The application with the commands `names`.
+class Algid(click.Group):
+    """The commands by name."""
 
-    Commands that are only listed have the first sentence of their help and none of their options.
-    """
-    made = typer.Typer(
-        help="Parameters and payload of a two-link arm, with honest error bars, from its torque "
-        "and angle logs.",
-        pretty_exceptions_enable=False,
-        rich_markup_mode=None,
-        context_settings={"help_option_names": ["-h", "--help"]},
+    def list_commands(self, _ctx: click.Context) -> list[str]:
+        """Their names, in the order of help."""
+        return list(COMMANDS)
+
+    def get_command(self, _ctx: click.Context, name: str) -> click.Command | None:
+        """The command of that name, with all its options."""
+        return command(name) if name in COMMANDS else None
+
+    def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write what each does, without loading what it needs."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, listed(name)) for name in COMMANDS])
+
+
+def _option(name: str, text: str, callback: object) -> click.Option:
+    return click.Option(
+        [name], is_flag=True, is_eager=True, expose_value=False, help=text, callback=callback
     )
-    made.callback()(_root)
-    for name in names:
-        if only_listed:
-            text = listed(name)
-            made.command(name, cls=Command, short_help=text)(_nothing)
-        else:
-            add(made, name)
-    return made
 
 
-def _nothing() -> None:
-    """What stands for a command that is only listed."""
+app = Algid(
+    "algid",
+    help="Parameters and payload of a two-link arm, with honest error bars, from its torque and "
+    "angle logs.",
+    params=[
+        _option("--version", "Print the version.", _version),
+        _option("--install-completion", "Install completion for the current shell.", _completion),
+        _option("--show-completion", "Print the script of that.", _completion),
+    ],
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 
 
-@cache
-def called(first: str) -> Any:
-    """What reads a call that begins with `first`: typer takes 0.2 s to read all options."""
-    if any(name.startswith("_ALGID_COMPLETE") for name in os.environ):
-        return get_command(gathered(COMMANDS))
-    if first in COMMANDS:
-        return get_command(gathered([first]))
-    return get_command(gathered(COMMANDS, only_listed=True))
+def called(arguments: Sequence[str]) -> int:
+    """Run a command and return its exit code."""
+    if COMPLETE in os.environ:
+        app.main(prog_name="algid")
+    try:
+        with app.make_context("algid", list(arguments)) as context:
+            app.invoke(context)
+    except click.exceptions.Exit as ended:
+        return ended.exit_code
+    return 0

@@ -8,24 +8,33 @@ module says by `answer` what is printed, and how the command ends.
 from __future__ import annotations
 
 import inspect
-import math
 import shlex
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_origin
+from typing import Any, Literal, get_args, get_origin
 
-import typer
-from typer.core import TyperCommand
+import click
+from click.shell_completion import CompletionItem
 
-from algid.api.signature import Keyword, head, keywords, kind_of, summary
-from algid.base.errors import SettingError
+from algid.api.signature import (
+    EMPTY,
+    Keyword,
+    fields,
+    head,
+    keywords,
+    refuse,
+    refuse_unknown,
+    summary,
+    words_of,
+)
 from algid.base.exits import epilog
 from algid.base.text import lines_of
 from algid.cli.output import complain, shown
-from algid.options import ADVANCED, BY_SET, EVERYDAY, VALUES, Option, flag
+from algid.options import ADVANCED, BY_SET, EVERYDAY, VALUES, Option
 
 COMMANDS: Mapping[str, str] = {
     "inspect": "inspect",
@@ -44,45 +53,31 @@ COMMANDS: Mapping[str, str] = {
 """The function of each command, whose module has the command's name, in the order of help."""
 PRINTED = ("inspect", "design", "identify", "validate", "track", "report", "compare")
 """Commands that print tables, or JSON."""
-LETTERS = {"quiet": "-q", "verbose": "-v", "help": "-h"}
+LETTERS = {"out": "-o", "quiet": "-q", "verbose": "-v"}
+ARGUMENTS = "Arguments"
 
 
-class Command(TyperCommand):
-    """A command whose help has a line an option, and whose numbers are finite."""
+class Command(click.Command):
+    """A command whose help has a line an option, by panel."""
 
-    def format_options(self, ctx: Any, formatter: Any) -> None:
-        """Show arguments and options by panel."""
-        panels: dict[str, list[tuple[str, str]]] = {"Arguments": [], EVERYDAY: [], ADVANCED: []}
+    def __init__(self, name: str, taken: list[Keyword], **options: Any) -> None:
+        super().__init__(name, params=[_parameter(one) for one in taken], **options)
+        self.taken = {one.name: one for one in taken}
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write arguments and options."""
+        rows: dict[str, list[tuple[str, str]]] = {ARGUMENTS: [], EVERYDAY: [], ADVANCED: []}
         for one in self.get_params(ctx):
-            panel = getattr(one, "rich_help_panel", None) or EVERYDAY
-            if one.param_type_name == "argument":
-                dots = "..." if one.nargs == -1 else ""
-                panels["Arguments"].append((f"{one.metavar}{dots}", getattr(one, "help", "")))
-                continue
-            names = sorted((*one.opts, *one.secondary_opts), key=len)
-            metavar = getattr(one, "metavar", None)
-            words = ", ".join(names) + (f" {metavar}" if metavar else "")
-            if one.name == "help":
-                panel = ADVANCED
-            panels[panel].append((words, getattr(one, "help", "") or ""))
-        for panel, rows in panels.items():
-            if rows:
+            known = self.taken.get(one.name or "")
+            if isinstance(one, click.Argument) and known is not None:
+                rows[ARGUMENTS].append((str(one.metavar), known.help))
+            else:
+                panel = ADVANCED if known is None else known.option.panel  # help is none of ours
+                rows[panel].append(one.get_help_record(ctx) or ("", ""))
+        for panel, entries in rows.items():
+            if entries:
                 with formatter.section(panel):
-                    formatter.write_dl(rows)
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run it.
-
-        Raises
-        ------
-        SettingError
-            If a number is not finite.
-        """
-        for option in self.params:
-            value = ctx.params.get(option.name or "")
-            if isinstance(value, float) and not math.isfinite(value):
-                raise SettingError(f"{option.opts[0]}: expected a finite number, found {value:g}")
-        return super().invoke(ctx)
+                    formatter.write_dl(entries)
 
 
 def listed(name: str) -> str:
@@ -92,197 +87,180 @@ def listed(name: str) -> str:
     return summary(text, COMMANDS[name])
 
 
-def add(app: typer.Typer, name: str) -> None:
-    """Give the application a command."""
+def command(name: str) -> Command:
+    """The command that calls a verb."""
     module = import_module(f"algid.api.{name}")
     verb = getattr(module, COMMANDS[name])
-    *told, example = head(verb)
-    lines = lines_of(example, 76, rest="  ")
-    text = "\n\n".join((*told, "\b\n" + "\n".join(lines)))
-    app.command(name, cls=Command, help=text, epilog=epilog(name))(_command(name, module, verb))
-
-
-def _command(name: str, module: Any, verb: Callable[..., Any]) -> Callable[..., None]:
-    own = dict(keywords(verb))
-    takes = inspect.signature(verb).parameters
-    rest = [one for one in takes.values() if one.kind is one.VAR_KEYWORD]
-    declared = [_declared(one) for one in own.values() if one.name not in BY_SET]
-    if rest:
-        declared += _of_models("Unpack[Options]" in str(rest[0].annotation))
-    if rest or any(name in BY_SET for name in own):
-        declared.append(_set(own, bool(rest)))
+    own, of_logs = keywords(verb), _of_logs(verb)
+    by_set = [one for one in own.values() if one.name in BY_SET]
+    taken = [one for one in [*own.values(), *of_logs.values()] if one.name not in BY_SET]
+    if by_set or of_logs:
+        text = "Any other setting, as tau1.sign=-1; may be repeated."
+        if not of_logs:
+            text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
+        words = Option(list[str], panel=ADVANCED, words=lambda: _lines(by_set, bool(of_logs)))
+        taken.append(Keyword("set", str, None, text, words))
     if name in PRINTED:
-        kind = Literal["table", "json"]
-        declared.append(_option("format", kind, "table", "What to print.", ADVANCED))
+        taken.append(_of_command("format", Literal["table", "json"], "table", "What to print."))
     if name == "identify":
-        declared.append(_option("verbose", bool, False, "All tables, logs, settings.", ADVANCED))
-    declared.append(_option("quiet", bool, False, "Print nothing but errors.", ADVANCED))
+        taken.append(_of_command("verbose", bool, False, "All tables, logs, settings."))
+    taken.append(_of_command("quiet", bool, False, "Print nothing but errors."))
 
     def run(**typed: Any) -> None:
-        from algid.base.runtime import keep_freed
-        from algid.report.progress import progress
+        for one in taken:
+            if one.name == "format" and name in PRINTED:
+                refuse(one, typed["format"])
+        known = None if of_logs else [one.name for one in by_set]
+        click.get_current_context().exit(_run(module, verb, typed, known))
 
-        keep_freed()
-        form, quiet = typed.pop("format", "table"), typed.pop("quiet")
-        verbose = typed.pop("verbose", False)
-        for one in own.values():
-            if one.kind is bool and one.default is True:
-                typed[one.name] = not typed[one.name]
-        given = {key: value for key, value in typed.items() if value not in (None, [])}
-        for line in given.pop("set", []):
-            take(given, line, own, bool(rest))
-        given = getattr(module, "typed", dict)(given)
-        callers: dict[str, Any] = {"command": shlex.join(["algid", *sys.argv[1:]])}
-        callers["complain"] = complain
-        several = [one.name for one in takes.values() if one.kind is one.VAR_POSITIONAL]
-        by_name = {key: value for key, value in given.items() if key not in several}
-        inline = [value for name in several for value in given[name]]
-        with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
-            callers["progress"] = bar
-            called = {key: value for key, value in callers.items() if key in takes}
-            value = verb(*inline, **by_name, **called)
-        made = module.answer(value, given)
-        answers = made if isinstance(made, list) else [made]
-        for one in answers:
-            shown(one, form == "json", quiet, verbose)
-        ended = max(one.exit for one in answers)
-        if ended:
-            raise typer.Exit(ended)
-
-    run.__signature__ = inspect.Signature(declared)  # type: ignore[attr-defined]
-    run.__annotations__ = {one.name: one.annotation for one in declared}
-    return run
+    *above, example = head(verb)
+    text = "\n\n".join((*above, "\b\n" + "\n".join(lines_of(example, 76, rest="  "))))
+    return Command(name, taken, help=text, epilog=epilog(name), callback=run)
 
 
-def _declared(one: Keyword) -> inspect.Parameter:
-    """A verb's parameter as typer takes it."""
-    if (one.default is inspect.Parameter.empty and not one.option.flags) or (
-        one.place is inspect.Parameter.VAR_POSITIONAL
-    ):
-        return _argument(one, ...)
-    if one.place is inspect.Parameter.POSITIONAL_OR_KEYWORD and one.name in ("logs", "topic"):
-        return _argument(one, None)
-    default = ... if one.default is inspect.Parameter.empty else one.default
-    if default is False and one.kind is not bool:  # a choice stands for True
-        default = None
-    return _option(one.name, one.kind, default, one.help, one.option.panel, one.option)
+def _run(module: Any, verb: Callable[..., Any], typed: dict[str, Any], known: Any) -> int:
+    """Call a verb with what is typed, print its answer, and return the exit code.
+
+    `known` are the names that ``--set`` takes; None where it takes every setting of a log.
+    """
+    from algid.base.runtime import keep_freed
+    from algid.report.progress import progress
+
+    keep_freed()
+    quiet, verbose = typed.pop("quiet"), typed.pop("verbose", False)
+    given = {key: value for key, value in typed.items() if value not in (None, ())}
+    for line in given.pop("set", ()):
+        take(given, line, known)
+    as_json = module.__name__.rpartition(".")[2] in PRINTED and given.pop("format") == "json"
+    given = getattr(module, "typed", dict)(given)
+    parameters = inspect.signature(verb).parameters
+    several = [one.name for one in parameters.values() if one.kind is one.VAR_POSITIONAL]
+    callers = {"command": shlex.join(["algid", *sys.argv[1:]]), "complain": complain}
+    with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
+        callers["progress"] = bar
+        called = {key: value for key, value in given.items() if key not in several}
+        called |= {key: value for key, value in callers.items() if key in parameters}
+        value = verb(*(one for key in several for one in given[key]), **called)
+    made = module.answer(value, given)
+    answers = made if isinstance(made, list) else [made]
+    for one in answers:
+        shown(one, as_json, quiet, verbose)
+    return max(one.exit for one in answers)
 
 
-def _argument(one: Keyword, default: Any) -> inspect.Parameter:
-    many = get_origin(one.kind) is list
-    declared = typer.Argument(
-        help=one.help,
-        autocompletion=one.option.complete,
-        metavar=one.name.upper().removesuffix("S") if many else one.name.upper(),
-        show_default=False,
-    )
-    kind = one.kind if default is ... else one.kind | None
-    return _parameter(one.name, Annotated[kind, declared], default)
-
-
-def _option(
-    name: str, kind: Any, default: Any, text: str, panel: str, option: Option | None = None
-) -> inspect.Parameter:
-    option = option or Option()
-    names = option.flags or (flag(name),)
-    if name in LETTERS:
-        names = (LETTERS[name], *names)
-    if kind is bool and default is True:  # what is given switches it off
-        names, default = (flag(name, off=True),), False
-    low, high = option.range or (None, None)
-    declared = typer.Option(
-        *names,
-        help=text,
-        min=low,
-        max=high,
-        rich_help_panel=panel,
-        autocompletion=option.complete,
-        metavar=None if kind is bool else _metavar(name, kind),
-        show_default=False,
-    )
-    wanted = kind | None if default is None else kind
-    return _parameter(name, Annotated[wanted, declared], default)
-
-
-def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    default = inspect.Parameter.empty if default is ... else default
-    return inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
-    )
-
-
-def _metavar(name: str, kind: Any) -> str:
-    """What stands for a value in help."""
-    if name in VALUES:
-        value = VALUES[name]
-        return value if isinstance(value, str) else ",".join(value)
-    if get_origin(kind) is Literal:
-        return "WORD"
-    known = {Path: "PATH", list[Path]: "PATH", float: "X", int: "N"}
-    return known.get(kind, "TEXT")
-
-
-def _of_models(with_settings: bool) -> list[inspect.Parameter]:
-    """An option for each field of `Profile`, and of `Settings`, that has a flag."""
-    from algid.api.words import COMPLETED, of_profile
-    from algid.base.units import names_of
-    from algid.profile import ALL_CHANNELS, Profile
-    from algid.settings import OF_BOTH, Settings
-
-    units = {
-        "angle_unit": ", ".join(names_of("angle")),
-        "torque_unit": "N m, mN m, A, mA, lbf in, …",
-    }
-    declared = []
-    for name, text in units.items():
-        option = Option(complete=of_profile(name))
-        declared.append(_option(name, str, None, f"{text}.", EVERYDAY, option))
-    for name, one in Profile.model_fields.items():
-        if name in BY_SET or name in ALL_CHANNELS or name == "velocity":
-            continue
-        if with_settings and name in OF_BOTH:
-            continue
-        kind = Path if name == "torque_file" else str
-        option = Option(complete=COMPLETED.get(name) or of_profile(name))
-        panel = _panel(one)
-        declared.append(_option(name, kind, None, one.description or "", panel, option))
-    for name, one in Settings.model_fields.items() if with_settings else ():
-        if name not in BY_SET:
-            kind, panel = kind_of(one.annotation), _panel(one)
-            default = False if kind is bool else None
-            option = Option(complete=COMPLETED.get(name))
-            declared.append(_option(name, kind, default, one.description or "", panel, option))
-    return declared
-
-
-def _panel(field: Any) -> str:
-    return (field.json_schema_extra or {}).get("panel") or ADVANCED
-
-
-def _set(own: Mapping[str, Keyword], of_logs: bool) -> inspect.Parameter:
-    """The option that sets whatever has no flag."""
-    from algid.api.words import COMPLETED
-
-    names = [name for name in own if name in BY_SET]
-
-    def complete(incomplete: str) -> list[str]:
-        mine = [f"{name}=" for name in names if name.startswith(incomplete)]
-        return mine + (COMPLETED["set"](incomplete) if of_logs else [])
-
-    text = "Any other setting, as tau1.sign=-1; may be repeated."
-    if not of_logs:
-        text = f"NAME=VALUE of {', '.join(names)}."
-    return _option("set", list[str], None, text, ADVANCED, Option(complete=complete))
-
-
-def take(given: dict[str, Any], line: str, own: Mapping[str, Keyword], of_logs: bool) -> None:
+def take(given: dict[str, Any], line: str, known: list[str] | None) -> None:
     """Put one ``NAME=VALUE`` among what is given."""
-    from algid.api.options import refuse_unknown, setting_of
+    from algid.api.options import setting_of
 
     setting = setting_of(line)
-    if not of_logs:
-        refuse_unknown(setting, [name for name in own if name in BY_SET])
+    if known is not None:
+        refuse_unknown(setting, known)
     for name, value in setting.items():
         if isinstance(value, Mapping) and isinstance(given.get(name), Mapping):
             value = {**given[name], **value}
         given[name] = value
+
+
+def _parameter(one: Keyword) -> click.Parameter:
+    """A keyword as click takes it."""
+    many = get_origin(one.kind) is list
+    kind = get_args(one.kind)[0] if many else one.kind
+    text: dict[str, Any] = {
+        "type": click.Path(path_type=Path) if kind is Path else kind,
+        "required": one.default is EMPTY,
+        "shell_complete": _completion(one) if one.option.words or words_of(one.hint) else None,
+    }
+    if not many and one.default not in (EMPTY, None, False):
+        text["default"] = one.default
+    if one.place is not inspect.Parameter.KEYWORD_ONLY and one.option.flag is None:
+        name = one.name.upper()
+        metavar = f"{name.removesuffix('S')}..." if many else name
+        return click.Argument([one.name], metavar=metavar, nargs=-1 if many else 1, **text)
+    names = [LETTERS[one.name]] if one.name in LETTERS else []
+    names += [one.flag if one.flag.startswith("--") else f"--{one.name}", one.name]
+    if kind is bool:
+        off = one.default is True  # what is given switches it off
+        return click.Option(names, help=one.help, flag_value=not off, default=off, is_flag=True)
+    metavar = _metavar(one, kind)
+    return click.Option(names, help=one.help, metavar=metavar, multiple=many, **text)
+
+
+def _completion(one: Keyword) -> Callable[..., list[CompletionItem]]:
+    """Completes the last of several words, separated by commas and each used once."""
+
+    def complete(_ctx: object, _parameter: object, incomplete: str) -> list[CompletionItem]:
+        before, comma, last = incomplete.rpartition(",")
+        used = before.split(",")
+        found = [word for word in one.words if word.startswith(last) and word not in used]
+        files = [CompletionItem(incomplete, type="file")] if one.or_file else []
+        return files + [CompletionItem(before + comma + word) for word in found]
+
+    return complete
+
+
+def _metavar(one: Keyword, kind: Any) -> str:
+    """What stands for a value in help."""
+    if one.name in VALUES:
+        value = VALUES[one.name]
+        return value if isinstance(value, str) else ",".join(value)
+    if words_of(one.hint):
+        return "WORD"
+    return {Path: "PATH", float: "X", int: "N"}.get(kind, "TEXT")
+
+
+def _of_command(name: str, hint: Any, default: Any, text: str) -> Keyword:
+    return Keyword(name, hint, default, text, Option(panel=ADVANCED))
+
+
+def _of_logs(verb: Callable[..., Any]) -> dict[str, Keyword]:
+    """The fields of `Profile`, and of `Settings`, of a verb that takes them as ``**options``."""
+    *_, last = inspect.signature(verb).parameters.values()
+    if "Options" not in str(last.annotation):
+        return {}
+    from algid.base.units import names_of
+    from algid.profile import ALL_CHANNELS, CHANNELS_OF, Profile
+    from algid.settings import Settings
+
+    found = {}
+    for name, text in (
+        ("angle_unit", ", ".join(names_of("angle"))),
+        ("torque_unit", "N m, mN m, A, mA, lbf in, …"),
+    ):
+        channel = Profile.model_fields[CHANNELS_OF[name][0]].annotation
+        hint = channel.model_fields["unit"].annotation  # type: ignore[union-attr]
+        found[name] = Keyword(name, hint, None, f"{text}.", Option(str))
+    of_profile = fields(Profile, str)
+    for name in (*ALL_CHANNELS, "velocity"):
+        del of_profile[name]
+    found |= of_profile
+    if "Unpack[Options]" in str(last.annotation):
+        found |= fields(Settings)
+        option = replace(found["model"].option, words=_terms)
+        found["model"] = replace(found["model"], option=option)
+    return found
+
+
+def _terms() -> list[str]:
+    from algid.model import CHOICES
+
+    return ["auto", "plain", *CHOICES]
+
+
+def _lines(by_set: list[Keyword], of_logs: bool) -> list[str]:
+    """What ``--set`` takes: a line a word, or ``NAME=``."""
+    hints = {one.name: one.hint for one in by_set}
+    if of_logs:
+        from algid.profile import Profile
+        from algid.settings import Settings
+
+        hints = {name: one.annotation for name, one in Settings.model_fields.items()}
+        hints = {name: hint for name, hint in hints.items() if name in BY_SET}
+        for name, one in Profile.model_fields.items():
+            channel = getattr(one.annotation, "model_fields", None) or {"": one}
+            for key, part in channel.items():
+                hints[f"{name}.{key}".rstrip(".")] = part.annotation
+    lines = []
+    for name, hint in hints.items():
+        words = ["true", "false"] if hint is bool else words_of(hint)
+        lines += [f"{name}={word}" for word in words] or [f"{name}="]
+    return lines

@@ -10,17 +10,13 @@ import random
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import datetime
-from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin
+from typing import Any
 
 import polars as pl
-import typer
 
-from algid.cli.app import gathered
-from algid.cli.derive import COMMANDS
+from algid.cli.derive import COMMANDS, command
 from pipelines.hostile import places, values
 from pipelines.mutations import damage
 
@@ -105,10 +101,9 @@ def draw_call(seed: int, place: Path) -> Call:
 
 
 @cache
-def options(command: str) -> tuple[Any, ...]:
-    """A command's options, as typer reads them."""
-    group = typer.main.get_command(gathered([command, "guide" if command != "guide" else "report"]))
-    every = group.commands[command].params  # type: ignore[attr-defined]
+def options(name: str) -> tuple[Any, ...]:
+    """A command's options."""
+    every = command(name).params
     return tuple(
         one for one in every if one.param_type_name == "option" and one.opts[-1] not in NEVER
     )
@@ -116,37 +111,35 @@ def options(command: str) -> tuple[Any, ...]:
 
 def flags(draw: random.Random, _place: Path) -> Call:
     """A sound call with one to three flags of any value."""
-    command = draw.choice([name for name in COMMANDS if name in CALLS])
-    given = [*CALLS[command]]  # no argument of a process holds a NUL, nor half a character
+    name = draw.choice([one for one in COMMANDS if one in CALLS])
+    given = [*CALLS[name]]  # no argument of a process holds a NUL, nor half a character
     chosen = (
-        [draw.choice(options(command)) for _ in range(draw.choice((1, 1, 2, 3)))]
-        if options(command)
+        [draw.choice(options(name)) for _ in range(draw.choice((1, 1, 2, 3)))]
+        if options(name)
         else []
     )
     for option in chosen:
-        if (command, option.opts[-1]) in SLOW and draw.random() < 0.8:
+        if (name, option.opts[-1]) in SLOW and draw.random() < 0.8:
             continue
         given += _given(option, draw)
-    if draw.random() < 0.1 and CALLS[command]:
-        given[draw.randrange(len(CALLS[command]))] = values.text(draw)
+    if draw.random() < 0.1 and CALLS[name]:
+        given[draw.randrange(len(CALLS[name]))] = values.text(draw)
     words = [word.replace("\0", "").replace("\ud800", "\udcff") for word in given]
-    return Call("flags", (command, *words))
+    return Call("flags", (name, *words))
 
 
 def _given(option: Any, draw: random.Random) -> list[str]:
     """An option and its value."""
-    flag, kind = option.opts[0], option.type_descriptor.annotation
-    if kind is bool:
-        return [draw.choice((*option.opts, *option.secondary_opts))]
-    if get_origin(kind) is Literal:
-        known = [str(one) for one in get_args(kind)]
-    elif isinstance(kind, type) and issubclass(kind, Enum):
-        known = [one.value for one in kind]
-    elif kind is float:
+    flag, kind = option.opts[0], option.type.name
+    if option.is_flag:
+        return [flag]
+    if option.metavar == "WORD":
+        known = [one.value for one in option.shell_complete(None, "")]
+    elif kind == "float":
         known = [repr(values.number(draw)) for _ in range(4)]
-    elif kind is int:
+    elif kind == "integer":
         known = [str(draw.choice(values.WHOLE[:-1])) for _ in range(4)]
-    elif kind in (Path, list[Path]):
+    elif kind == "path":
         known = [
             *RESULTS,
             UNLOADED,
@@ -157,10 +150,6 @@ def _given(option: Any, draw: random.Random) -> list[str]:
             "/dev/zero",
             "/dev/full",
             ".",
-        ]
-    elif kind is datetime:
-        known = [
-            f"{draw.choice((1, 1600, 1677, 1969, 1970, 2026, 2262, 2300, 9999)):04d}-01-01T00:00:00"
         ]
     else:
         known = _words(draw)

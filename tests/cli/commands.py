@@ -13,12 +13,11 @@ from unittest.mock import patch
 
 from algid.api.options import meaning
 from algid.cli import run
-from algid.cli.app import gathered
-from algid.cli.derive import COMMANDS, take
+from algid.cli.app import app
+from algid.cli.derive import take
 from algid.profile import Profile
 
-app = gathered(COMMANDS)
-NAMES = list(COMMANDS)
+__all__ = ["app", "call", "profile_from"]
 
 
 @dataclass(frozen=True)
@@ -43,5 +42,5 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
     """The profile that flags mean, as a command hands them to its verb."""
     options = {name: value for name, value in flags.items() if name != "set"}
     for line in flags.get("set", []):
-        take(options, line, {}, True)
+        take(options, line, None)
     return meaning(None, options)

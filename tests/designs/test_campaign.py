@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from algid.arm import FloatArray, inverse_dynamics
 from algid.base.errors import AlgidError, SettingError

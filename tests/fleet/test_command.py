@@ -12,8 +12,8 @@ from typing import Any
 
 import polars as pl
 import pytest
+from click.testing import CliRunner
 from scipy.stats import norm, t
-from typer.testing import CliRunner
 
 from algid.base.errors import ResultError
 from algid.base.stores import open_store

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from algid.api.identify import identify
 from algid.arm import FloatArray, inverse_dynamics, passive_torque

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from click.testing import CliRunner
 from pydantic import BaseModel
-from typer.testing import CliRunner
 
 from algid.base.errors import OutputError, SettingError
 from algid.inspection.report import inspect_log

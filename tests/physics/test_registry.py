@@ -89,9 +89,9 @@ ENTRY = """    Estimator(
 """
 TRIAL = """
 import numpy as np
-from typer.testing import CliRunner
+from click.testing import CliRunner
 import algid
-from algid.api.words import terms
+from algid.model import CHOICES
 from algid.api.guide import text_of
 from algid.base.errors import SettingError
 from algid.exports.formats import exported
@@ -102,7 +102,7 @@ from algid.profile import Profile
 from algid.settings import Settings
 
 here = algid.__file__
-listed = terms()
+listed = CHOICES
 assert "toy" in listed and not {"stribeck", "gain", "delay"} & set(listed), listed
 guide = text_of("estimators")
 assert "| `toy` |" in guide and "cogging" in guide, guide
@@ -142,10 +142,9 @@ np.testing.assert_allclose(written, ours, rtol=1e-12)
 
 # the command line
 from pathlib import Path
-from algid.cli.app import gathered
-from algid.cli.derive import COMMANDS
+from algid.cli.app import app
 def called(*words):
-    return CliRunner().invoke(gathered(COMMANDS), [*map(str, words)])
+    return CliRunner().invoke(app, [*map(str, words)])
 shown = " ".join(called("identify", "--help").stdout.replace("│", " ").split())
 assert "toy" in shown.split("--estimator")[1][:60], shown
 for page, row in (
@@ -163,8 +162,9 @@ rows = [",".join(map(repr, map(float, row))) for row in table]
 toy.write_text("\\n".join(["TOYLOG", head, *rows, ""]))
 from algid.batches.discover import jobs_of
 assert [job.name for job in jobs_of([str(toy.parent.absolute())], "results")] == ["arm"]
-from algid.api.words import of_profile
-assert of_profile("torque_unit")("N m") == ["N m", "N mm"]
+from algid.cli.derive import command
+unit = next(one for one in command("inspect").params if one.name == "torque_unit")
+assert [one.value for one in unit.shell_complete(None, "N m")] == ["N m", "N mm"]
 assert called("convert", toy, "-o", "arm.csv").exit_code == 0
 assert abs(np.loadtxt("arm.csv", delimiter=",", skiprows=1)[0, 3] - log.tau[0, 0]) < 1e-12
 seen = called("inspect", toy, "--set", 'tau1.unit="N mm"').stdout
@@ -181,20 +181,18 @@ print("all follow", here)
 OPTION_TRIAL = """
 import json
 from pathlib import Path
-from typer.testing import CliRunner
+from click.testing import CliRunner
 import algid
 from algid.api.guide import text_of
-from algid.cli.app import gathered
-from algid.cli.derive import COMMANDS
+from algid.cli.app import app
+from algid.cli.derive import command as derived
 from algid.notices import Remedy
-from typer.main import get_command
 
-app = gathered(COMMANDS)
 def called(*words):
     done = CliRunner().invoke(app, [*map(str, words)])
     return done.exit_code, " ".join(done.stdout.replace("│", " ").split()), done.exception
 def option(command, name):
-    return next(one for one in get_command(app).commands[command].params if one.name == name)
+    return next(one for one in derived(command).params if one.name == name)
 
 # help, and completion, of every verb that takes it
 for command in ("identify", "batch"):
@@ -206,8 +204,9 @@ for command in ("identify", "batch", "inspect", "convert", "validate", "track"):
     side = option(command, "toy_side")
     assert [word.value for word in side.shell_complete(None, "r")] == ["right"]
     line = option(command, "set")
-    assert [word.value for word in line.shell_complete(None, "toy_s")] == ["toy_side="]
-others = {one.name for one in get_command(app).commands["compare"].params}
+    found = [word.value for word in line.shell_complete(None, "toy_s")]
+    assert found == ["toy_side=left", "toy_side=right"], found
+others = {one.name for one in derived("compare").params}
 assert others and not {"toy_level", "toy_side"} & others
 # guide
 assert "| `--toy-level` | How much the toy plays. |" in text_of("python")

@@ -12,9 +12,9 @@ import numpy as np
 import polars as pl
 import pyarrow as pa
 import pytest
+from click.testing import CliRunner
 from pyarrow import feather, parquet
 from scipy.io import savemat
-from typer.testing import CliRunner
 
 from algid.base.errors import LogError
 from algid.log import Log

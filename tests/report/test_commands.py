@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from algid.api.compare import labels_of as labels
 from algid.base.errors import SettingError

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
+from click.testing import CliRunner
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from typer.testing import CliRunner
 
 import algid
 from algid.base.errors import ResultError

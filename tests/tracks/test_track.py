@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from click.testing import CliRunner
 from scipy.stats import chi2
-from typer.testing import CliRunner
 
 import algid
 from algid.arm import FloatArray
