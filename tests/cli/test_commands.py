@@ -425,7 +425,6 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
     quick = ("--no-report", "--estimator", "weak", "--model", "plain")
     Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, *quick)
     content = json.loads((tmp_path / "case1-unloaded.algid" / "result.json").read_text())
-    crooked = {**content, "fit": {**content["fit"], "covariance": [[1.0]]}}
     empty = {**content, "parameters": {}}
     lost = {
         **content,
@@ -434,10 +433,8 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
             "k3": {**content["parameters"]["k3"], "estimate": None},
         },
     }
-    texts = [json.dumps(crooked), json.dumps(empty), "[" * 100_000]
-    for text, said in zip(
-        texts, ("covariance should have", "the result has no k1", "not JSON"), strict=True
-    ):
+    texts = [json.dumps(empty), "[" * 100_000]
+    for text, said in zip(texts, ("the result has no k1", "not JSON"), strict=True):
         path = tmp_path / "result.json"
         path.write_text(text)
         found = Outcome(
