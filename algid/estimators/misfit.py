@@ -38,7 +38,6 @@ from algid.base.names import vector
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.fit import Fit, Misfit, Overlooked
 from algid.estimators.imprint import Imprint, summed
-from algid.estimators.whitening import low_passed
 from algid.model import (
     DELAYS,
     EVERY_TERM,
@@ -111,10 +110,7 @@ def columns(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArra
     rows += _shapes(model, modelled, motion)
     for width in _widths(model):
         rows.append(_change(model, c, motion, width))
-    made = np.stack(rows)
-    if model.lag_name is not None:
-        made = low_passed(made, dt, model.lag(c))
-    return made
+    return np.stack(rows)
 
 
 def _slow(tau: FloatArray, dt: float) -> FloatArray:

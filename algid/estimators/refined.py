@@ -238,7 +238,7 @@ def _opened(
         shift = settings.shift
         if shared.delay:
             shift = replace(shift, delay=float(c[-1]))
-        return Stencil(dt, shift.at(dt) - shared.model.lag(c), held=shift.held)
+        return Stencil(dt, shift.at(dt), held=shift.held, lag=shared.model.lag(c))
 
     every = [LogEvidence(source, loaded, shared, stencil, noise) for source in sources]
     kept = [log for log in every if log.kept]

@@ -5,8 +5,9 @@ at a trajectory near the truth, the torque residual
 
     e = τ_m − f(θ0; c) − G (θ_m − θ0) = η − G ε + Y δc
 
-has the covariance Σ_τ + G Σ_θ Gᵀ. The noise η is white, or went through `held_torque`. The stencil
-makes G, hence that matrix, banded: one Cholesky factor L Lᵀ = V whitens everything. Minimising
+has the covariance Σ_τ + G Σ_θ Gᵀ. τ_m is `Stencil.moving` of the
+logged torque, whose noise is white: η is F times white noise. The stencil makes G, hence that
+matrix, banded: one Cholesky factor L Lᵀ = V whitens everything. Minimising
 over the trajectory as well as over c, the Schur complement of the normal equations, is the same as
 weighting e by V⁻¹ (Woodbury), so S = (L⁻¹Y)ᵀ(L⁻¹Y) is the information on c and the innovations w =
 L⁻¹e are white with unit variance wherever the model holds.
@@ -15,7 +16,7 @@ L⁻¹e are white with unit variance wherever the model holds.
 symbol  name                                                  shape                    unit
 ======  ====================================================  =======================  ======
 H       dτ/dθ along the stencil, times σ_θ / σ_τ              (2, 2, POINTS, n)        1
-F       I, or `held_torque` where torques are held            (n, n) of each joint     1
+F       `Stencil.taps`: I, a held torque, a low-pass undone   (n, n) of each joint     1
 V       F Fᵀ + H Hᵀ, covariance of e / σ_τ, upper band        (2 POINTS, 2 n)          1
 Z       L⁻¹ of the columns of [Y, e] / σ_τ                    (q + 1, 2 n)             mixed
 ======  ====================================================  =======================  ======
@@ -25,14 +26,14 @@ Rows run (sample, joint): joint 1 and joint 2 of a sample are neighbours.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import lapack
 from algid.model import Model, Motion, partials, regressor, sensitivity, torque
-from algid.signals.differences import HELD, POINTS, Stencil, held_torque
+from algid.signals.differences import POINTS, Stencil, weighted
 from algid.signals.filters import recursion
 from algid.signals.segments import Segment
 
@@ -56,8 +57,8 @@ class Linearised:
     """One piece of log, linearised and whitened: see the module's table.
 
     `factor` holds Lᵀ as LAPACK's upper band; `first` is the angle sample of the first stencil's
-    first point; `motion` is where the columns but the residual stand; `held` says whether F is
-    `held_torque`.
+    first point; `motion` is where the columns but the residual stand; `taps` are
+    F's.
     """
 
     columns: FloatArray
@@ -66,7 +67,7 @@ class Linearised:
     first: int
     residual: FloatArray
     motion: Motion
-    held: bool = False
+    taps: FloatArray = field(default_factory=lambda: np.ones(1))
 
     @property
     def torques(self) -> int:
@@ -87,15 +88,17 @@ class Linearised:
 
     def smeared(self, torques: FloatArray) -> FloatArray:
         """F of torque noise (..., n)."""
-        if not self.held:
-            return torques
-        padded = np.zeros((*torques.shape[:-1], torques.shape[-1] + 2))
-        padded[..., 1:-1] = torques
-        return held_torque(padded)[..., 1:-1]
+        return _padded(torques, self.taps)
 
     def smeared_back(self, rows: FloatArray) -> FloatArray:
-        """Fᵀ of rows (..., n); F is symmetric."""
-        return self.smeared(rows)
+        """Fᵀ of rows (..., n)."""
+        return _padded(rows, self.taps[::-1])
+
+
+def _padded(rows: FloatArray, taps: FloatArray) -> FloatArray:
+    """Weighted sums (..., n) of rows (..., n) that are zero beyond their ends."""
+    reach = taps.size // 2
+    return weighted(np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(reach, reach)]), taps)
 
 
 def triangular(
@@ -143,9 +146,7 @@ def linearise(
         The trajectory, near the truth.
     piece : Segment of N samples
     stencil : Stencil
-        Its shift is when a logged torque acts. A lag of the torque is taken from that shift by the
-        caller; what the low-pass does beyond that is done here, to the torque and its derivatives
-        by c, while H counts the shift alone.
+        Its shift is when a logged torque acts; it holds what undoes a hold or a low-pass.
     noise : NoiseLevels
     delay : bool
         Whether the last column but the residual is the derivative of the torque by the stencil's
@@ -170,12 +171,11 @@ def linearise(
     if smooth is not None:
         motion = Motion(*stencil.differences(smooth))
         J, rising = _modelled(model, c, motion, stencil.dt)
-    measured = piece.tau
-    if stencil.held:
-        measured = held_torque(measured)
-    error = measured[:, torques] - modelled - forward(G, piece.theta - theta0, first)
+    error = (
+        stencil.moving(piece.tau)[:, torques] - modelled - forward(G, piece.theta - theta0, first)
+    )
     H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
-    factor = covariance_factor(H, held=stencil.held)
+    factor = covariance_factor(H, stencil.taps)
     parts = []
     if not residual_only:
         parts.append(J.swapaxes(0, 1))
@@ -185,7 +185,7 @@ def linearise(
     rows = np.concatenate(parts)
     rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
     columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N", in_place=True)
-    return Linearised(columns, factor, H, first, error, motion, stencil.held)
+    return Linearised(columns, factor, H, first, error, motion, stencil.taps)
 
 
 def _modelled(
@@ -199,9 +199,7 @@ def _modelled(
         J = sensitivity(model, c, motion)
         modelled = torque(model, c, motion)
     if model.lag_name is not None:
-        lag = model.lag(c)
-        J, modelled = low_passed(J, dt, lag), low_passed(modelled, dt, lag)
-        J[:, model.names.index(model.lag_name)] = -np.gradient(modelled, dt, axis=1)
+        J[:, model.names.index(model.lag_name)] = -_low_passed_slope(modelled, dt, model.lag(c))
     return J, modelled
 
 
@@ -259,6 +257,21 @@ def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
     return later
 
 
+def _low_passed_slope(tau: FloatArray, dt: float, lag: float) -> FloatArray:
+    """dτ_log/dt (2, n) in N m/s of a torque whose low-pass of `lag` s is logged."""
+    if lag < 0:
+        return -_low_passed_slope(tau[:, ::-1], dt, -lag)[:, ::-1]
+    if lag < 1e-6 * dt:
+        return np.gradient(tau, dt, axis=1)
+    # exact for a torque that is straight between its samples
+    decay = np.exp(-dt / lag)
+    mean = (1 - decay) * lag / dt
+    numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
+    start = tau[:, :1]
+    logged = [recursion(numerator, denominator, row, np.zeros(1))[0] for row in tau - start]
+    return (tau - start - np.stack(logged)) / lag
+
+
 def along_stencil(P: FloatArray, weights: FloatArray) -> FloatArray:
     """G, the derivative of each torque by each angle that its stencil touches.
 
@@ -297,14 +310,14 @@ def adjoint(G: FloatArray, y: FloatArray, first: int, length: int) -> FloatArray
     return result
 
 
-def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
+def covariance_factor(H: FloatArray, taps: FloatArray | None = None) -> FloatArray:
     """Cholesky factor Lᵀ of V = F Fᵀ + H Hᵀ.
 
     Parameters
     ----------
     H : (2, 2, POINTS, n)
-    held : bool
-        Whether F is `held_torque`, and not I.
+    taps : (p,), optional
+        Of F; without them F is I.
 
     Returns
     -------
@@ -316,10 +329,8 @@ def covariance_factor(H: FloatArray, *, held: bool = False) -> FloatArray:
         If V is not positive definite in floating point.
     """
     band = products(H)
-    correlation = np.ones(1)
-    if held:
-        correlation = np.convolve(HELD, HELD)[2:]
-    for lag, value in enumerate(correlation):
+    F = np.ones(1) if taps is None else taps
+    for lag, value in enumerate(np.correlate(F, F, "full")[F.size - 1 :]):
         band[:, :, -1 - 2 * lag] += value
     return factored(band)
 

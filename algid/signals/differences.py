@@ -42,11 +42,14 @@ class Stencil:
         How long after its stamp a torque acts: hold and delay together.
     held : bool
         Whether each torque was held until the next: see `held_torque`.
+    lag : float, s
+        Time constant of a first-order low-pass that the logged torque went through.
     """
 
     dt: float
     shift: float = 0.0
     held: bool = False
+    lag: float = 0.0
 
     @cached_property
     def whole(self) -> int:
@@ -67,6 +70,28 @@ class Stencil:
             wanted[order, order] = factorial(order) / self.dt**order
         return np.linalg.solve(moments, wanted).T
 
+    @cached_property
+    def taps(self) -> FloatArray:
+        """What a logged torque and its neighbours, as many on either side, count for.
+
+        A held one is that of `held_torque`; a low-pass is undone by 1 + lag d/dt.
+        """
+        taps = HELD if self.held else np.ones(1)
+        if self.lag:
+            taps = np.convolve(
+                taps, np.eye(_SLOPE.size)[_SLOPE.size // 2] + self.lag / self.dt * _SLOPE
+            )
+        return taps
+
+    def moving(self, tau: FloatArray) -> FloatArray:
+        """Torque (..., N) that moves the arm, of the logged one; the ends go on by reflection."""
+        reach = self.taps.size // 2
+        if not reach:
+            return tau
+        before = 2 * tau[..., :1] - tau[..., reach:0:-1]
+        after = 2 * tau[..., -1:] - tau[..., -2 : -reach - 2 : -1]
+        return weighted(np.concatenate([before, tau, after], axis=-1), self.taps)
+
     def torques(self, length: int) -> slice:
         """Torque samples among `length` whose stencil lies within the `length` angles."""
         return slice(max(0, _HALF - self.whole), max(0, min(length, length - _HALF - self.whole)))
@@ -86,6 +111,20 @@ class Stencil:
                 if weight != 0.0:
                     result[order] += weight * x[:, first + point : first + point + n]
         return result
+
+
+_SLOPE = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
+"""First derivative by the samples around one, times dt: sixth order."""
+
+
+def weighted(signal: FloatArray, taps: FloatArray) -> FloatArray:
+    """Sums (..., N - p + 1) of each sample of a signal (..., N) and the next by `taps` (p,)."""
+    n = signal.shape[-1] - taps.size + 1
+    result = taps[0] * signal[..., :n]
+    for place, tap in enumerate(taps[1:], start=1):
+        if tap != 0.0:
+            result += tap * signal[..., place : place + n]
+    return result
 
 
 HELD = np.array([1.0, 22.0, 1.0]) / 24

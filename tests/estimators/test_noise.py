@@ -24,7 +24,7 @@ from algid.estimators.noise import (
 )
 from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, linearise
 from algid.model import Model
-from algid.signals.differences import HELD, POINTS, Stencil
+from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment
 
 from .conftest import DT, Bench
@@ -88,10 +88,10 @@ def _parts(linear: Linearised) -> tuple[list[FloatArray], FloatArray]:
     for row in range(n):
         for point in range(POINTS):
             H[row, :, linear.first + row + point] += linear.H[:, :, point, row]
-    weights = np.zeros((n, n + 2))
+    size = linear.taps.size
+    weights = np.zeros((n, n + size - 1))
     for row in range(n):
-        weights[row, row : row + 3] = HELD if linear.held else [0, 1, 0]
-    weights = weights if linear.held else np.eye(n)
+        weights[row, row : row + size] = linear.taps
     columns = [H[:, :, :, joint].reshape(2 * n, ANGLES) for joint in range(2)]
     parts: list[FloatArray] = [column @ column.T for column in columns]
     parts += [np.kron(weights @ weights.T, np.diag(np.eye(2)[joint])) for joint in range(2)]

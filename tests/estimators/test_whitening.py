@@ -54,7 +54,7 @@ def test_a_held_torques_noise_is_that_of_neighbouring_samples() -> None:
     for row in range(20):
         weights[row, row : row + 3] = HELD
     F = np.kron(weights @ weights.T, np.eye(2))
-    L = _lower(covariance_factor(H, held=True))
+    L = _lower(covariance_factor(H, HELD))
     np.testing.assert_allclose(L @ L.T, F + dense @ dense.T, atol=1e-12 * 40 * POINTS)
 
 
