@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from algid.designs.request import Request
     from algid.designs.write import Provenance
     from algid.estimators.whitening import NoiseLevels
-    from algid.identification.source import LogLike
+    from algid.identification.open_logs import LogLike
     from algid.report.document import Document
 
 RATE, DURATION = 1000.0, 10.0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from algid.base.files import whole_folder
 
 if TYPE_CHECKING:
-    from algid.identification.source import LogLike
+    from algid.identification.open_logs import LogLike
     from algid.profile import Profile
     from algid.results import Result
 

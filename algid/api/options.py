@@ -23,7 +23,7 @@ from algid.profile import (
 from algid.settings import OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
-    from algid.identification.source import LogLike
+    from algid.identification.open_logs import LogLike
     from algid.results import Result
 
 ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=Path)]

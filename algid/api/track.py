@@ -24,7 +24,7 @@ from algid.options import Option
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
-    from algid.identification.source import LogLike
+    from algid.identification.open_logs import LogLike
     from algid.results import Result
     from algid.tracks.result import TrackResult
 

@@ -89,8 +89,8 @@ def validate(
     """
     check(validate, locals())
     from algid.identification.identify import reused
-    from algid.identification.source import open_sources, read_otherwise
-    from algid.identification.survey import Survey
+    from algid.identification.open_logs import open_sources, read_otherwise
+    from algid.identification.recordings import Recordings
     from algid.identification.validate import predictor_of
     from algid.identification.validate import simulate as roll
     from algid.identification.validate import validate as predicted
@@ -118,7 +118,7 @@ def validate(
     gravity = model.model.gravity
     sources = open_sources(logs, "unloaded", own, gravity)
     sources += open_sources(loaded, "loaded", own, gravity)
-    survey = Survey(sources, progress)
+    survey = Recordings(sources, progress)
     survey.begin("prediction")
     validation = predicted(model, survey)
     rolled, warnings = None, []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from algid.base.errors import AlgidError, LogError
 from algid.base.stores import public, reading
-from algid.identification.source import Staged
+from algid.identification.open_logs import Staged
 
 if TYPE_CHECKING:
     from pyarrow import NativeFile

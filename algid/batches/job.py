@@ -24,7 +24,7 @@ from algid.batches.fetch import errors_name_url, staged
 from algid.batches.jobs import Job, redacted_path
 from algid.batches.records import Input, JobRecord, JobStatus, estimates_of, hash_of, stat_of
 from algid.identification.identify import identify
-from algid.identification.source import Staged
+from algid.identification.open_logs import Staged
 from algid.options import flag
 from algid.results import Result
 from algid.settings import Settings

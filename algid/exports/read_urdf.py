@@ -17,7 +17,7 @@ from algid.arm import Arm, FloatArray
 from algid.base.errors import ResultError
 from algid.base.files import read_text
 from algid.base.words import counted
-from algid.identification.source import Role
+from algid.identification.recordings import Role
 from algid.identification.validate import Predictor
 from algid.model import SINES, TERMS, Model
 

@@ -23,20 +23,19 @@ from algid.estimators.selection import FIRST_TERMS, Selection, TermTrial, has_ne
 from algid.estimators.shrinkage import joined
 from algid.estimators.window_scatter import scattered
 from algid.identification.passes import Pass, long_enough, passes, weak_settings
-from algid.identification.source import LogSource
-from algid.identification.survey import Survey
+from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
 from algid.model import DELAYS, TERMS, Model
 from algid.physics.effort import absent
 from algid.settings import Settings
 from algid.signals.segments import Segment
 
-Predictions = Mapping[LogSource, PredictionSums]
+Predictions = Mapping[Recording, PredictionSums]
 """What scores a prediction of a log by any coefficients."""
 
 
 def run_fit(
-    survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None
+    survey: Recordings, settings: Settings, chosen: Selection, prior: Prior | None
 ) -> tuple[Fit, Predictions, Selection]:
     """Fit the settings' estimator to logs.
 
@@ -44,7 +43,7 @@ def run_fit(
 
     Parameters
     ----------
-    survey : Survey
+    survey : Recordings
         Of the logs; its `progress` is called with the refined estimator's steps too.
     settings : Settings
     chosen : Selection
@@ -68,7 +67,7 @@ def run_fit(
     if estimator.fit is None:
         raise ValueError(f"{estimator.name} gives time series, not a fit")
     estimate = estimator.fit
-    sums: dict[LogSource, PredictionSums] = {}
+    sums: dict[Recording, PredictionSums] = {}
     ours = weak_settings(settings, chosen)
     watched = None
     if chosen.model.linear and not chosen.delay and chosen.model.lag_name is None:
@@ -160,7 +159,7 @@ _BY_NOTHING = "left out: it was judged beside constants near nothing"
 
 
 def _of_motorless(
-    fit: Fit, survey: Survey, settings: Settings, chosen: Selection, prior: Prior | None
+    fit: Fit, survey: Recordings, settings: Settings, chosen: Selection, prior: Prior | None
 ) -> tuple[Fit, Selection] | None:
     """The fit by instruments, where least squares leaves open what a joint without a motor does.
 
@@ -234,8 +233,8 @@ def _shrunk(
 def _scored(
     model: Model,
     settings: Settings,
-    sums: dict[LogSource, PredictionSums],
-    log: LogSource,
+    sums: dict[Recording, PredictionSums],
+    log: Recording,
     moving: Pass,
 ) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""

@@ -23,9 +23,8 @@ from algid.estimators.paper import (
     wanders,
 )
 from algid.identification.outcome import Identified, distrusted
+from algid.identification.recordings import Recording, Recordings
 from algid.identification.series import series_blocks, write_columns
-from algid.identification.source import LogSource
-from algid.identification.survey import Survey
 from algid.identification.velocities import with_velocities
 from algid.methods import settles
 from algid.model import UNITS as PARAMETER_UNITS
@@ -40,9 +39,9 @@ STAGE2_FILE = "loaded.parquet"
 
 
 def run_paper(
-    survey: Survey,
-    unloaded: LogSource | None,
-    loaded: LogSource | None,
+    survey: Recordings,
+    unloaded: Recording | None,
+    loaded: Recording | None,
     settings: Settings,
     known: FloatArray | None = None,
     folder: Path | None = None,
@@ -91,7 +90,11 @@ def run_paper(
 
 
 def _estimate(
-    survey: Survey, log: LogSource, settings: Settings, k: FloatArray | None, folder: Path | None
+    survey: Recordings,
+    log: Recording,
+    settings: Settings,
+    k: FloatArray | None,
+    folder: Path | None,
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Estimates from one log's series, how far they wander, and which can be used.
 
@@ -131,7 +134,7 @@ def _estimate(
         for _ in watched():
             pass
     else:
-        write_columns(folder / file, columns(), [survey.seen(log).first_ns])
+        write_columns(folder / file, columns(), [survey.whole(log).first_ns])
     duration = survey.summary(log).duration
     if duration < SHORTEST - 1e-9:
         raise LogError(

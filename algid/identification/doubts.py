@@ -13,9 +13,9 @@ from algid.estimators.prediction import PredictionScore, score
 from algid.estimators.selection import FIRST_TERMS, Selection
 from algid.identification.passes import passes, weak_settings
 from algid.identification.predicted import prediction
+from algid.identification.recordings import Recordings
 from algid.identification.remarks import exchanged
 from algid.identification.series import torque_coefficients, torque_shift
-from algid.identification.survey import Survey
 from algid.model import RIGID
 from algid.notices import Notice
 from algid.settings import Settings
@@ -25,7 +25,7 @@ MOST = 0.5
 
 
 def residual_of(
-    survey: Survey, settings: Settings, chosen: Selection, fit: Fit
+    survey: Recordings, settings: Settings, chosen: Selection, fit: Fit
 ) -> ResidualSums | None:
     """Residual sums of the estimator behind the fit: of its innovations, or of its windows.
 
@@ -47,7 +47,7 @@ def residual_of(
     return pooled(sums)
 
 
-def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) -> Fit:
+def with_doubt(fit: Fit, survey: Recordings, settings: Settings, chosen: Selection) -> Fit:
     """The fit; where its likelihood is refuted, with what makes k1 … k5 doubtful: see `doubted`.
 
     Of an arm with a joint that has no motor, whether its equation determines them: see
@@ -76,7 +76,7 @@ def with_doubt(fit: Fit, survey: Survey, settings: Settings, chosen: Selection) 
     return doubted(fit, unloaded, loaded, weak_settings(settings, common))
 
 
-def _explains_little(fit: Fit, survey: Survey, settings: Settings) -> bool:
+def _explains_little(fit: Fit, survey: Recordings, settings: Settings) -> bool:
     """Whether most of a joint's torque is not what the fit makes it."""
     total = PredictionScore()
     for log in survey.logs:

@@ -17,17 +17,16 @@ from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
 from algid.identification.by_paper import run_paper
 from algid.identification.known import contradictions
-from algid.identification.outcome import Identified
-from algid.identification.series import write_fit_series
-from algid.identification.source import (
+from algid.identification.open_logs import (
     LogLike,
-    LogSource,
     open_sources,
     read_otherwise,
     with_twins_marked,
 )
+from algid.identification.outcome import Identified
+from algid.identification.recordings import Recording, Recordings
+from algid.identification.series import write_fit_series
 from algid.identification.summary import result_of
-from algid.identification.survey import Survey
 from algid.methods import estimator_of, settles
 from algid.options import flag
 from algid.physics.effort import absent
@@ -134,7 +133,7 @@ def identify(
         open_sources(unloaded, "unloaded", meaning, settings.gravity, settings.effort),
         open_sources(loaded, "loaded", meaning, settings.gravity, settings.effort),
     )
-    survey = Survey(sources, progress)
+    survey = Recordings(sources, progress)
     stated: dict[str, Any] = {}
     if meaning is not None:
         stated = meaning.model_dump(mode="json", exclude_unset=True)
@@ -197,7 +196,7 @@ def reused(profile: Profile | None, earlier: Result) -> Profile | None:
 
 
 def _identified(
-    survey: Survey,
+    survey: Recordings,
     settings: Settings,
     earlier: Earlier | None,
     stated: dict[str, Any],
@@ -230,7 +229,7 @@ def _identified(
 
 
 def _by_the_paper(
-    survey: Survey, settings: Settings, earlier: Earlier | None, folder: Path | None
+    survey: Recordings, settings: Settings, earlier: Earlier | None, folder: Path | None
 ) -> Identified:
     for logs in (survey.unloaded, survey.loaded):
         if len(logs) > 1:
@@ -254,7 +253,7 @@ def _by_the_paper(
 
 
 def _by_likelihood(
-    survey: Survey,
+    survey: Recordings,
     settings: Settings,
     earlier: Earlier | None,
     stated: dict[str, Any],
@@ -298,7 +297,7 @@ def _by_likelihood(
     return outcome, settings
 
 
-def _zero_is_stated(log: LogSource, stated: dict[str, Any]) -> bool:
+def _zero_is_stated(log: Recording, stated: dict[str, Any]) -> bool:
     """Whether the caller, or the log itself, says what θ1 is measured from."""
     reading = log.origin.reading
     of_channel = stated.get("theta1") or {}
@@ -311,7 +310,7 @@ def _zero_is_stated(log: LogSource, stated: dict[str, Any]) -> bool:
 
 
 def _fitted(
-    survey: Survey, settings: Settings, earlier: Earlier | None
+    survey: Recordings, settings: Settings, earlier: Earlier | None
 ) -> tuple[Fit, Predictions, Selection]:
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
     from algid.identification.by_likelihood import run_fit
@@ -337,7 +336,7 @@ def _fitted(
 
 
 def _with_the_papers(
-    outcome: Identified, survey: Survey, settings: Settings, folder: Path
+    outcome: Identified, survey: Recordings, settings: Settings, folder: Path
 ) -> Identified:
     """The outcome with the paper's series of the first log of each kind, and its payload route."""
     first, second = _firsts(survey)
@@ -357,5 +356,5 @@ def _with_the_papers(
     )
 
 
-def _firsts(survey: Survey) -> tuple[LogSource | None, LogSource | None]:
+def _firsts(survey: Recordings) -> tuple[Recording | None, Recording | None]:
     return next(iter(survey.unloaded), None), next(iter(survey.loaded), None)

@@ -14,7 +14,7 @@ from algid.base.significance import CERTAIN, sigmas
 from algid.estimators.combine import Prior
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import NoiseLevels
-from algid.identification.source import Role
+from algid.identification.recordings import Role
 from algid.model import (
     K1,
     K2,

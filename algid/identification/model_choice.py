@@ -14,7 +14,7 @@ from algid.estimators.hold import Hold
 from algid.estimators.selection import CHOICE, Selection, TermTrial, lateness, needs_shape, select
 from algid.identification.known import model_of
 from algid.identification.passes import long_enough, passes, weak_settings
-from algid.identification.survey import Survey
+from algid.identification.recordings import Recordings
 from algid.model import CHOICES, COLUMN_NAMES, DELAYS, EVERY_TERM, Model, without_delay
 from algid.physics.effort import absent, without_terms
 from algid.results import Result
@@ -24,7 +24,9 @@ NOTHING = 2.0
 """Standard deviations: a coefficient nearer to zero is not distinguished from it."""
 
 
-def choose_model(survey: Survey, settings: Settings, earlier: Result | None = None) -> Selection:
+def choose_model(
+    survey: Recordings, settings: Settings, earlier: Result | None = None
+) -> Selection:
     """The torque's model: set by the user, taken from an earlier result, or chosen by the logs.
 
     The same with whether the torque is held between samples. Where logs are to tell that and do
@@ -41,7 +43,7 @@ def choose_model(survey: Survey, settings: Settings, earlier: Result | None = No
         return _with_hold(survey, settings)
 
 
-def _with_model(survey: Survey, settings: Settings, earlier: Result | None) -> Selection:
+def _with_model(survey: Recordings, settings: Settings, earlier: Result | None) -> Selection:
     """The model where the hold is given, by the settings or by the earlier result."""
     asked = settings.torque_hold
     hold_by: Literal["settings", "parameters"] = "settings"
@@ -62,7 +64,7 @@ _OF_HOLD = "kept: the logs leave open whether the torque is held, half a sample 
 _OF_CONTROLLER = "kept: the logs leave open how late a controller that is faster than they are acts"
 
 
-def _with_hold(survey: Survey, settings: Settings) -> Selection:
+def _with_hold(survey: Recordings, settings: Settings) -> Selection:
     """The model and the hold that the logs show: not held where a delay is set or asked for."""
     chosen = _modelled(survey, settings, "foh")
     lagged = chosen.model.lag_name is not None
@@ -82,7 +84,7 @@ def _with_hold(survey: Survey, settings: Settings) -> Selection:
     return replace(chosen, hold=late.hold, hold_by="logs", late=late)
 
 
-def _modelled(survey: Survey, settings: Settings, hold: Hold) -> Selection:
+def _modelled(survey: Recordings, settings: Settings, hold: Hold) -> Selection:
     """The model that the settings ask for, or that the logs choose, of a torque with that hold."""
     plain = Model(gravity=settings.gravity)
     if not settings.chooses and not needs_shape(settings.terms):

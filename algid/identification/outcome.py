@@ -20,9 +20,9 @@ from algid.estimators.prediction import PredictionScore, cross_validate, score
 from algid.estimators.selection import Selection
 from algid.identification.by_likelihood import Predictions
 from algid.identification.predicted import prediction
+from algid.identification.recordings import Recordings
 from algid.identification.remarks import fit_notes, fit_warnings, torque_unit
 from algid.identification.series import torque_coefficients, torque_shift
-from algid.identification.survey import Survey
 from algid.model import DELAYS, UNITS
 from algid.notices import Notice
 from algid.physics.effort import absent
@@ -58,7 +58,7 @@ class Identified:
 
 
 def outcome_of(
-    fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection
+    fit: Fit, predictions: Predictions, survey: Recordings, settings: Settings, chosen: Selection
 ) -> Identified:
     """The fit as a result holds it."""
     # a constant that the model has no column for is not identifiable
@@ -235,7 +235,7 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
 
 
 def fit_summary(
-    fit: Fit, predictions: Predictions, survey: Survey, settings: Settings, chosen: Selection
+    fit: Fit, predictions: Predictions, survey: Recordings, settings: Settings, chosen: Selection
 ) -> results.FitSummary:
     """The statistical part of a result."""
     residual, crossed = _predicted(fit, predictions, survey, settings)
@@ -348,7 +348,7 @@ def _repeatability(fit: Fit) -> results.Repeatability | None:
 
 
 def _predicted(
-    fit: Fit, predictions: Predictions, survey: Survey, settings: Settings
+    fit: Fit, predictions: Predictions, survey: Recordings, settings: Settings
 ) -> tuple[PredictionScore, PredictionScore | None]:
     """How well the fit predicts its own logs and, if asked and possible, each from the others."""
     own = PredictionScore()

@@ -11,8 +11,7 @@ from algid.base.errors import LogError
 from algid.estimators import weak
 from algid.estimators.selection import Selection
 from algid.estimators.too_short import TooShortError
-from algid.identification.source import LogSource
-from algid.identification.survey import Survey
+from algid.identification.recordings import Recording, Recordings
 from algid.identification.velocities import with_velocities
 from algid.settings import Settings
 from algid.signals.segments import Segment
@@ -22,7 +21,7 @@ Pass = Callable[[], Iterable[Segment]]
 
 
 @contextmanager
-def long_enough(survey: Survey) -> Iterator[None]:
+def long_enough(survey: Recordings) -> Iterator[None]:
     """Name the logs where an estimator finds none of them long enough.
 
     Raises
@@ -53,9 +52,9 @@ def weak_settings(settings: Settings, chosen: Selection) -> weak.WeakSettings:
 
 
 def passes(
-    survey: Survey,
+    survey: Recordings,
     settings: Settings,
-    watched: Callable[[LogSource, Pass], Iterator[Segment]] | None = None,
+    watched: Callable[[Recording, Pass], Iterator[Segment]] | None = None,
 ) -> tuple[list[Pass], list[Pass]]:
     """Callables, one per log, that give a fresh pass; unloaded and loaded logs apart.
 
@@ -65,7 +64,7 @@ def passes(
     """
     own = settings.velocity == "measured" or settings.luenberger
 
-    def passed(log: LogSource) -> Pass:
+    def passed(log: Recording) -> Pass:
         moving: Pass = partial(survey.segments, log)
         if own:
             moving = partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)

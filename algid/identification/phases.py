@@ -20,7 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.diagnostics import bent
 from algid.estimators.fit import Fit
-from algid.identification.source import LogSource
+from algid.identification.recordings import Recording
 from algid.model import K1, K2, K4, SINE_OF, SINES, phasor
 from algid.notices import Notice, Remedy
 
@@ -52,7 +52,7 @@ LEAST_TURN = np.radians(20.0)
 LEAST_SURE = 5.0  # standard deviations of k1 and of k2 that an angle between them needs
 
 
-def turn_note(fit: Fit, log: LogSource) -> Notice | None:
+def turn_note(fit: Fit, log: Recording) -> Notice | None:
     """That gravity is turned against θ1 as `log` was read, with the zero that turns it back.
 
     Where its named zeros lie within the interval of ε1, the nearest is named. None where gravity is

@@ -8,9 +8,9 @@ import polars as pl
 
 from algid.arm import FloatArray
 from algid.identification.identify import reused
+from algid.identification.open_logs import LogLike, open_source
+from algid.identification.recordings import Recordings, Role
 from algid.identification.series import torque_blocks
-from algid.identification.source import LogLike, Role, open_source
-from algid.identification.survey import Survey
 from algid.identification.validate import predictor_of
 from algid.results import Result
 
@@ -23,7 +23,7 @@ def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None)
     known = predictor_of(result, result.log.path)
     source = open_source(log, role, reused(profile, result), known.model.gravity)
     coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
-    blocks = list(torque_blocks(Survey([source]), known.model, coefficients, known.shift))
+    blocks = list(torque_blocks(Recordings([source]), known.model, coefficients, known.shift))
     if not blocks:
         return pl.DataFrame()
     return pl.concat(map(pl.DataFrame, blocks), rechunk=True).drop("log")

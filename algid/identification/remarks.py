@@ -13,7 +13,7 @@ from algid.estimators.diagnostics import broken_bounds, length_by_constants, pay
 from algid.estimators.fit import Fit
 from algid.estimators.shrunk_fit import unshrunk
 from algid.identification.phases import phase_note
-from algid.identification.source import LogSource
+from algid.identification.recordings import Recording
 from algid.model import K4
 from algid.notices import Notice, Remedy, has_code
 
@@ -30,7 +30,7 @@ def exchanged(fit: Fit) -> bool:
     return False
 
 
-def torque_unit(logs: Sequence[LogSource]) -> float | None:
+def torque_unit(logs: Sequence[Recording]) -> float | None:
     """N m of the one unit that all torques were read in.
 
     None where they differ, or an offset in N m or a PD law's gains do not follow the unit.

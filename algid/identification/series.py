@@ -19,7 +19,7 @@ from algid.estimators.noise import first_guess
 from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import PredictionFilter, scored_torque
 from algid.estimators.running import has_running, running
-from algid.identification.survey import Survey
+from algid.identification.recordings import Recordings
 from algid.model import Model, Motion, inertia, torque
 from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
@@ -32,7 +32,7 @@ LOWEST, HIGHEST = 4.0, 40.0  # Hz
 
 
 def torque_blocks(
-    survey: Survey,
+    survey: Recordings,
     model: Model,
     coefficients: Mapping[str, FloatArray],
     shift: TorqueShift,
@@ -108,7 +108,7 @@ SCORED_RATE = 10.0
 
 
 def scored_blocks(
-    survey: Survey,
+    survey: Recordings,
     model: Model,
     coefficients: Mapping[str, FloatArray],
     shift: TorqueShift,
@@ -250,7 +250,7 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
 
 
 def write_fit_series(
-    folder: Path, fit: Fit, survey: Survey, settings: Settings, residual: ResidualSums | None
+    folder: Path, fit: Fit, survey: Recordings, settings: Settings, residual: ResidualSums | None
 ) -> None:
     """Write the time series of a fit, and what its `residual` looks like.
 

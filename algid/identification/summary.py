@@ -7,8 +7,8 @@ from pathlib import PurePath
 
 from algid import __version__
 from algid.identification.outcome import Identified
+from algid.identification.recordings import Recordings
 from algid.identification.remarks import FAR_APART
-from algid.identification.survey import Survey
 from algid.log import Truth
 from algid.model import K4
 from algid.notices import Notice, has_code, merged
@@ -67,7 +67,7 @@ def _pulled_down(outcome: Identified, count: int) -> list[bool]:
     return down
 
 
-def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result:
+def result_of(outcome: Identified, settings: Settings, survey: Recordings) -> Result:
     """The result of `outcome` on a survey's logs, the first log first."""
     truth = survey.logs[0].origin.truth
     payload = None
@@ -110,7 +110,7 @@ def result_of(outcome: Identified, settings: Settings, survey: Survey) -> Result
     )
 
 
-def _other_arms(survey: Survey, truth: Truth | None) -> list[Notice]:
+def _other_arms(survey: Recordings, truth: Truth | None) -> list[Notice]:
     """A notice of each synthetic log that another arm than the first log's made."""
     notices = []
     for log in survey.logs:

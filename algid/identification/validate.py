@@ -10,8 +10,7 @@ from algid.estimators.prediction import PredictionScore, score
 from algid.estimators.rollout import RolloutScore, rollouts
 from algid.identification.known import model_of, shift_of, torque_constants
 from algid.identification.predicted import prediction
-from algid.identification.source import Role
-from algid.identification.survey import Survey
+from algid.identification.recordings import Recordings, Role
 from algid.model import Model
 from algid.results import Result, TorquePrediction
 from algid.signals.shift import AT_ONCE, TorqueShift
@@ -53,7 +52,7 @@ def predictor_of(result: Result, name: str) -> Predictor:
     )
 
 
-def validate(known: Predictor, survey: Survey) -> Validation:
+def validate(known: Predictor, survey: Recordings) -> Validation:
     """Predict the torque of a survey's logs.
 
     Raises
@@ -70,7 +69,7 @@ def validate(known: Predictor, survey: Survey) -> Validation:
     return Validation(predictions, prediction(total))
 
 
-def simulate(known: Predictor, survey: Survey) -> Simulation:
+def simulate(known: Predictor, survey: Recordings) -> Simulation:
     """Simulate the arm forward from states of a survey's logs; raises as `validate`."""
     scores: dict[str, RolloutScore] = {}
     total = RolloutScore()

@@ -75,12 +75,12 @@ def examine(
     notices = [yielding(notice, log.origin.reading.accepted) for notice in every]
     if external or any(notice.refuse for notice in notices):
         return tuple(notices)
-    mended, right = None, False
-    if alone:
-        mended, right = mend(log, tried()), is_right(tried())
+    if not alone:
+        return tuple(notices)
+    mended = mend(log, tried())
     if mended is not None:
         notices.append(mended.notice)
-    elif gravity > 0 and not right:
+    elif gravity > 0 and not is_right(tried()):
         notices += _of_gravity(log)
     return tuple(notices)
 

@@ -10,29 +10,33 @@ import numpy as np
 from algid.estimators.saturation import UNSEEN, Limit, Saturation, saturation_of
 from algid.log import Log, Origin
 from algid.notices import Notice, Remedy
-from algid.signals.segments import segments
+from algid.signals.segments import Segment, segments
 
 CODE = "CLIPPED_TORQUE"
 LOOKED_AT = 1 << 18
-"""Samples at the beginning of a log in which its limits are looked for."""
+"""Samples at the beginning of logs in which limits are looked for."""
 
 
-def saturation(log: Log, *, gravity: float = 9.81, effort: str | None = None) -> Saturation:
-    """The limits that cut off torques of a log, and the joints whose limits are sound.
+def saturation(*logs: Log, gravity: float = 9.81, effort: str | None = None) -> Saturation:
+    """The limits that cut off torques of an arm's logs, and the joints whose limits are sound.
 
-    They are looked for in the beginning of a log, at most `LOOKED_AT` samples.
+    They are looked for in the beginning of the logs, at most `LOOKED_AT` samples in all.
 
     Parameters
     ----------
-    log : Log, or the beginning of one
+    logs : of one arm, with or without one payload, or their beginnings
     gravity : float, m/s^2
         0 for an arm in a horizontal plane.
     effort : str, as in a profile
         An external torque is not what moves the arm, and shows no limit.
     """
-    if effort == "external" or len(log) < 2 or CODE in log.origin.reading.accepted:
+    if effort == "external":
         return UNSEEN
-    return saturation_of(list(segments([log.part(0, LOOKED_AT)])), gravity)
+    pieces: list[Segment] = []
+    for log in logs:
+        if len(log) > 1 and CODE not in log.origin.reading.accepted:
+            pieces += segments([log.part(0, LOOKED_AT // len(logs))])
+    return saturation_of(pieces, gravity) if pieces else UNSEEN
 
 
 @dataclass

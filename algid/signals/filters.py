@@ -100,7 +100,7 @@ def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
     kernel = smoother(dt, bandwidth)
     reach = min(kernel.size // 2, x.shape[1] - 1)
     kernel = kernel[kernel.size // 2 - reach : kernel.size // 2 + reach + 1]
-    return correlate(_reflected(x, reach), kernel / kernel.sum())
+    return correlate(reflected(x, reach), kernel / kernel.sum())
 
 
 def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArray:
@@ -115,7 +115,7 @@ def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArr
     1.
     """
     reach = min(math.ceil(_SETTLED * order / (cutoff * dt)), x.shape[1] - 1)
-    y = _reflected(x, reach)
+    y = reflected(x, reach)
     for _ in range(2):  # there, and back again
         start = y[:, :1].copy()
         y -= start
@@ -163,7 +163,7 @@ def _passed(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> Fl
     return np.asarray(y.T)
 
 
-def _reflected(x: FloatArray, reach: int) -> FloatArray:
+def reflected(x: FloatArray, reach: int) -> FloatArray:
     """Signals (m, N + 2 reach), continued by point reflection about first and last samples."""
     before = 2 * x[:, :1] - x[:, reach:0:-1]
     after = 2 * x[:, -1:] - x[:, -2 : -reach - 2 : -1]

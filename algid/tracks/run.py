@@ -15,8 +15,8 @@ from algid.base.runtime import one_blas_thread
 from algid.estimators.too_short import TooShortError
 from algid.identification.identify import reused
 from algid.identification.known import contradictions
-from algid.identification.source import LogLike, open_source, read_otherwise
-from algid.identification.survey import Survey
+from algid.identification.open_logs import LogLike, open_source, read_otherwise
+from algid.identification.recordings import Recordings
 from algid.notices import Notice, lossy, merged
 from algid.results import Result, read_result, result_json
 from algid.tracks.bins import arm_of
@@ -62,7 +62,7 @@ def track_log(
     source = open_source(
         log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
     )
-    survey = Survey([source])
+    survey = Recordings([source])
     first = next(survey.segments(source), None)
     if first is None:
         raise LogError(f"{source.name}: it holds no samples; record longer")
@@ -72,7 +72,7 @@ def track_log(
             weighed = track(partial(survey.segments, source), arm, covariance)
     except TooShortError as error:
         raise LogError(f"{source.name}: {error}; record longer") from error
-    truth, of_log = source.origin.truth, survey.seen(source).notices
+    truth, of_log = source.origin.truth, survey.whole(source).notices
     judged = result.verdict
     notices = []
     if judged.grade != "good":

@@ -18,7 +18,7 @@ from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError, OutputError, ResultError, SettingError
 from algid.estimators import refined
 from algid.identification.identify import identify
-from algid.identification.source import open_source
+from algid.identification.open_logs import open_source
 from algid.inspection.checks import noticed
 from algid.log import Log
 from algid.notices import Notice, has_code

@@ -18,6 +18,7 @@ from algid.estimators.identifiability import Whiteness
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.selection import Selection
 from algid.estimators.whitening import NoiseLevels
+from algid.identification.open_logs import open_source
 from algid.identification.outcome import (
     distrusted,
     estimate,
@@ -26,9 +27,8 @@ from algid.identification.outcome import (
     unknown,
 )
 from algid.identification.predicted import prediction
+from algid.identification.recordings import Recordings
 from algid.identification.remarks import fit_notes, fit_warnings
-from algid.identification.source import open_source
-from algid.identification.survey import Survey
 from algid.log import Log, Origin
 from algid.model import Model
 from algid.notices import Notice
@@ -42,7 +42,7 @@ ACCUSED = float(norm.isf(0.5e-6))  # standard deviations, by chance once in a mi
 K1, K2, K3, K4, K5, K6, K7 = K.tolist()
 
 
-def survey(*, loaded: bool = True) -> Survey:
+def survey(*, loaded: bool = True) -> Recordings:
     """A short log of each kind, or of the unloaded arm alone, too short to judge a
     prediction by.
     """
@@ -52,7 +52,7 @@ def survey(*, loaded: bool = True) -> Survey:
         Log((t * 1e9).astype(np.int64), theta, 3 * np.cos(theta), Origin(name, "csv", {}))
         for name in "ab"
     ]
-    return Survey(
+    return Recordings(
         [open_source(logs[0], "unloaded"), *([open_source(logs[1], "loaded")] if loaded else [])]
     )
 

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from algid.identification.identify import identify
-from algid.identification.source import open_sources
+from algid.identification.open_logs import open_sources
 from algid.profile import Profile
 from algid.results import read_result
 from algid.settings import Settings

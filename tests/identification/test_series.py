@@ -20,6 +20,8 @@ from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import score
 from algid.identification import series
+from algid.identification.open_logs import open_source
+from algid.identification.recordings import Recordings
 from algid.identification.series import (
     START_KEY,
     information_blocks,
@@ -32,8 +34,6 @@ from algid.identification.series import (
     write_columns,
     write_fit_series,
 )
-from algid.identification.source import open_source
-from algid.identification.survey import Survey
 from algid.log import Log, Origin
 from algid.model import Model
 from algid.settings import Settings
@@ -125,7 +125,7 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
     """Of noiseless logs the prediction is the torque itself wherever the smoother does not reach
     over an end.
     """
-    survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
+    survey = Recordings([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     blocks = list(torque_blocks(survey, Model(), {"unloaded": K, "loaded": LOADED_K}, AT_ONCE))
     for number, (log, omega) in enumerate(both):
         own = [block for block in blocks if block["log"][0] == number]
@@ -158,7 +158,7 @@ def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
     both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]],
 ) -> None:
     early, _ = moved(K, 3, lead=5)
-    survey = Survey([open_source(early, "unloaded")])
+    survey = Recordings([open_source(early, "unloaded")])
     known, wrong = (
         np.concatenate(
             [
@@ -177,7 +177,7 @@ def test_a_stretch_of_a_few_samples_has_no_prediction(
     both: tuple[tuple[Log, FloatArray], object],
 ) -> None:
     (block,) = torque_blocks(
-        Survey([open_source(both[0][0].part(0, 15), "unloaded")]),
+        Recordings([open_source(both[0][0].part(0, 15), "unloaded")]),
         Model(),
         {"unloaded": K},
         AT_ONCE,
@@ -197,7 +197,7 @@ def test_noise_narrows_what_is_shown_of_the_torque(
     log = both[0][0]
     sigma = 3e-3
     noise = np.random.default_rng(0).normal(0, sigma, log.theta.shape)
-    survey = Survey([open_source(replace(log, theta=log.theta + noise), "unloaded")])
+    survey = Recordings([open_source(replace(log, theta=log.theta + noise), "unloaded")])
     (block,) = torque_blocks(survey, Model(), {"unloaded": K}, AT_ONCE)
     band = []
     for inertia, tau in zip((K[4] + K[2] + 2 * K[0], K[2]), log.tau, strict=True):
@@ -250,7 +250,7 @@ def test_coefficients_of_a_loaded_log_hold_the_payload_and_no_delay() -> None:
 def test_a_fits_series_stand_in_its_folder(
     both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]], tmp_path: Path
 ) -> None:
-    survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
+    survey = Recordings([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
     # torques beside it
     residual = residual_sums(np.random.default_rng(0).standard_normal((4, 4000)), DT)
@@ -291,7 +291,7 @@ def test_the_torque_in_the_file_is_the_one_that_is_scored(
 
     a wrong arm leaves one.
     """
-    survey = Survey([open_source(both[0][0], "unloaded")])
+    survey = Recordings([open_source(both[0][0], "unloaded")])
     wrong = K * np.array([1, 1, 1.1, 0.9, 1, 1, 1.05])
     (block,) = scored_blocks(survey, Model(), {"unloaded": wrong}, AT_ONCE)
     found = score(Model(), wrong, survey.segments(survey.logs[0]))
@@ -311,7 +311,7 @@ def test_the_torque_in_the_file_is_the_one_that_is_scored(
 def test_a_fit_held_within_bounds_or_of_fewer_logs_lacks_what_it_cannot_tell(
     both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]], tmp_path: Path
 ) -> None:
-    survey = Survey([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
+    survey = Recordings([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
     write_fit_series(tmp_path, replace(fit, logs=fit.logs[:1]), survey, Settings(), None)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scored.parquet", "torque.parquet"]

@@ -10,14 +10,14 @@ import pytest
 
 import algid
 from algid.arm import FloatArray
-from algid.identification import survey as surveys
+from algid.identification import recordings as surveys
 from algid.identification.by_likelihood import run_fit
 from algid.identification.by_paper import run_paper
 from algid.identification.model_choice import choose_model
+from algid.identification.open_logs import open_source
 from algid.identification.outcome import outcome_of
-from algid.identification.source import LogSource, open_source
+from algid.identification.recordings import Recording, Recordings
 from algid.identification.summary import result_of
-from algid.identification.survey import Survey
 from algid.log import Log
 from algid.results import Result
 from algid.settings import Settings
@@ -32,7 +32,7 @@ SETTINGS = {
 }
 
 
-def chopped(log: Log, rows: int) -> LogSource:
+def chopped(log: Log, rows: int) -> Recording:
     """A log that comes in blocks of `rows` samples."""
     starts = range(0, len(log), rows)
 
@@ -56,9 +56,9 @@ def uneven() -> Log:
     return Log(stamps, np.tile(first.theta, 12), np.tile(first.tau, 12), first.origin)
 
 
-def estimates(log: LogSource, settings: Settings) -> tuple[FloatArray, FloatArray, Result]:
+def estimates(log: Recording, settings: Settings) -> tuple[FloatArray, FloatArray, Result]:
     """Estimates, by how much sums of another order may move them, and the whole result."""
-    survey = Survey([log])
+    survey = Recordings([log])
     if settings.estimator == "paper":
         result = result_of(run_paper(survey, log, None, settings), settings, survey)
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
@@ -104,7 +104,7 @@ def test_logs_that_fit_in_memory_are_read_once(
         return log.blocks()
 
     counting = replace(log, blocks=blocks)
-    survey = Survey([counting])
+    survey = Recordings([counting])
     passes = [list(survey.segments(counting)) for _ in range(3)]
     assert len(begun) == readings
     for again in passes[1:]:
@@ -117,6 +117,6 @@ def test_logs_that_fit_in_memory_are_read_once(
 
 def test_a_pass_that_ends_early_is_not_taken_for_the_whole_log(uneven: Log) -> None:
     log = chopped(uneven, 5000)
-    survey = Survey([log])
+    survey = Recordings([log])
     next(survey.segments(log))
-    assert sum(map(len, survey.segments(log))) == sum(map(len, Survey([log]).segments(log)))
+    assert sum(map(len, survey.segments(log))) == sum(map(len, Recordings([log]).segments(log)))

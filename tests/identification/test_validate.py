@@ -14,8 +14,8 @@ from scipy.signal import butter, sosfiltfilt
 from algid.arm import FloatArray, forward_dynamics, regressor, with_payload
 from algid.base.errors import ResultError
 from algid.identification.identify import identify
-from algid.identification.source import Role, open_source
-from algid.identification.survey import Survey
+from algid.identification.open_logs import open_source
+from algid.identification.recordings import Recordings, Role
 from algid.identification.validate import Predictor, predictor_of, simulate, validate
 from algid.log import Log, Origin
 from algid.model import Model
@@ -69,8 +69,8 @@ def known(k: FloatArray, shift: float = 0.0) -> Predictor:
     return Predictor(Model(), lambda _: k, TorqueShift(delay=shift))
 
 
-def survey(*logs: tuple[Log, Role]) -> Survey:
-    return Survey([open_source(log, role) for log, role in logs])
+def survey(*logs: tuple[Log, Role]) -> Recordings:
+    return Recordings([open_source(log, role) for log, role in logs])
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import LogError
-from algid.identification.source import open_source
-from algid.identification.survey import Survey
+from algid.identification.open_logs import open_source
+from algid.identification.recordings import Recordings
 from algid.identification.velocities import with_velocities
 from algid.log import Log, Origin
 from algid.settings import Settings
@@ -38,7 +38,7 @@ def observed(log: Log, rows: int, *, luenberger: bool = False, **settings: objec
     source = replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=0)
     whole: list[Segment] = []
     wanted = Settings(bandwidth=BANDWIDTH).but(**settings)
-    for part in with_velocities(Survey([source]), source, wanted, luenberger=luenberger):
+    for part in with_velocities(Recordings([source]), source, wanted, luenberger=luenberger):
         if part.continues:
             whole[-1] = append(whole[-1], part)
         else:

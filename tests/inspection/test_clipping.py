@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.identification.source import open_sources
-from algid.identification.survey import Survey
+from algid.identification.open_logs import open_sources
+from algid.identification.recordings import Recordings
 from algid.inspection.clipping import clipped, saturation
 from algid.inspection.report import inspect_log
 from algid.log import Log
@@ -23,11 +23,11 @@ def cut_off() -> Log:
     return replace(log, tau=np.clip(log.tau, -LIMIT, LIMIT))
 
 
-def surveyed(log: Log) -> Survey:
-    return Survey(open_sources(log, "unloaded", None, 9.81))
+def surveyed(log: Log) -> Recordings:
+    return Recordings(open_sources(log, "unloaded", None, 9.81))
 
 
-def told(survey: Survey) -> list[str]:
+def told(survey: Recordings) -> list[str]:
     return [one.text for one in survey.notices(survey.logs[0]) if one.code == "CLIPPED_TORQUE"]
 
 
@@ -42,7 +42,7 @@ def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
     (text,) = told(survey)
     assert text.startswith(f"tau{limit.joint + 1} is cut off at 17.9")
     assert f"{np.count_nonzero(beyond):,} samples" in text
-    assert survey.seen(survey.logs[0]).rows == len(log)
+    assert survey.whole(survey.logs[0]).rows == len(log)
 
 
 def test_a_second_pass_leaves_the_same_out() -> None:

@@ -1,19 +1,20 @@
-"""Logs to identify from, opened once and never changed."""
+"""Logs opened from files and from memory, and which of them may go together."""
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from algid.base.errors import LogError
 from algid.base.files import sha256_of
 from algid.base.runtime import ahead
-from algid.log import Log, Origin
+from algid.identification.recordings import SHORT, Recording, Role
+from algid.log import Log
 from algid.notices import Notice
 from algid.readers.clock import check_step
 from algid.readers.memory import Columns, is_columns, refuse_others
@@ -21,8 +22,6 @@ from algid.results import LogSummary, Result
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-
-Role = Literal["unloaded", "loaded"]
 
 
 @dataclass(frozen=True)
@@ -41,39 +40,6 @@ class Staged:
 LogLike = str | Path | Log | Staged | Columns
 
 
-@dataclass(frozen=True, eq=False)
-class LogSource:
-    """One log, opened; `algid.identification.survey.Survey` goes over it.
-
-    Parameters
-    ----------
-    name : its path, its URL, or what a log in memory calls itself
-    role : 'unloaded' or 'loaded'
-    origin : Origin
-    blocks : callable
-        Gives a fresh pass over the samples.
-    promised : samples that the file says it has, 0 where it does not
-    gravity : float, m/s^2, for the named checks
-    effort : as in `Settings`, for the named checks
-    digest : callable or None
-        Gives the SHA-256 of the log; None where only parts of it are here.
-    """
-
-    name: str
-    role: Role
-    origin: Origin
-    blocks: Callable[[], Iterator[Log]]
-    promised: int
-    gravity: float
-    effort: str | None
-    digest: Callable[[], str] | None
-    notices: tuple[Notice, ...] = ()
-
-    def noted(self, notice: Notice) -> LogSource:
-        """The same with one more notice."""
-        return replace(self, notices=self.notices + (notice,))
-
-
 def open_source(
     log: LogLike,
     role: Role,
@@ -82,7 +48,7 @@ def open_source(
     effort: str | None = None,
     *,
     changing: bool = False,
-) -> LogSource:
+) -> Recording:
     """Open a log from a file or from memory.
 
     Parameters
@@ -135,11 +101,11 @@ def open_source(
     return source
 
 
-def _in_memory(log: Log, role: Role, gravity: float, effort: str | None) -> LogSource:
+def _in_memory(log: Log, role: Role, gravity: float, effort: str | None) -> Recording:
     """The source of a log from arrays."""
     log = _in_radians(log)
     check_step(log.origin.path, log.stamp_ns)
-    return LogSource(
+    return Recording(
         name=log.origin.path,
         role=role,
         origin=log.origin,
@@ -153,16 +119,23 @@ def _in_memory(log: Log, role: Role, gravity: float, effort: str | None) -> LogS
 
 def _of_file(
     path: Path, role: Role, profile: Profile | None, gravity: float, effort: str | None
-) -> LogSource:
+) -> Recording:
     """The source of a log in a file, read ahead of whoever goes over it."""
     from algid.readers import open_log
 
     reader = open_log(path, profile)
-    return LogSource(
+
+    def blocks() -> Iterator[Log]:
+        read = _of_an_arm(reader.blocks())
+        if 0 < reader.rows <= SHORT:
+            return read  # a thread would cost more than it reads ahead
+        return ahead(read)
+
+    return Recording(
         name=str(path),
         role=role,
         origin=reader.origin,
-        blocks=lambda: ahead(_of_an_arm(reader.blocks())),
+        blocks=blocks,
         promised=reader.rows,
         gravity=gravity,
         effort=effort,
@@ -184,7 +157,7 @@ def open_sources(
     profile: Profile | None,
     gravity: float,
     effort: str | None = None,
-) -> list[LogSource]:
+) -> list[Recording]:
     """Sources of one log, several, or none: see `open_source`.
 
     A log that is given twice, byte for byte, counts once, and the first of the two has a notice of
@@ -198,20 +171,20 @@ def open_sources(
         refuse_others(logs)
     sources = [open_source(log, role, profile, gravity, effort) for log in logs]
     lengths = Counter(source.promised for source in sources if source.digest)
-    kept: list[LogSource] = []
+    kept: list[Recording] = []
     places: dict[str, int] = {}
     for source in sources:
         if source.digest is not None and lengths[source.promised] > 1:
             place = places.setdefault(source.digest(), len(kept))
             if place < len(kept):
                 twin = Notice("SAME_LOG", numbers={"case": "twice", "name": source.name})
-                kept[place] = kept[place].noted(twin)
+                kept[place].notices += (twin,)
                 continue
         kept.append(source)
     return kept
 
 
-def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> list[LogSource]:
+def with_twins_marked(unloaded: list[Recording], loaded: list[Recording]) -> list[Recording]:
     """All logs, unloaded ones first.
 
     A loaded one that is also given as unloaded has a notice of it: its payload is zero.
@@ -222,39 +195,16 @@ def with_twins_marked(unloaded: list[LogSource], loaded: list[LogSource]) -> lis
     for source in unloaded:
         if source.digest:
             names[source.digest()] = source.name
-    sources = list(unloaded)
     for source in loaded:
         if source.digest is not None and source.digest() in names:
             numbers = {"name": source.name, "twin": names[source.digest()]}
-            source = source.noted(Notice("SAME_LOG", numbers={"case": "loaded"} | numbers))
-        sources.append(source)
-    return sources
+            source.notices += (Notice("SAME_LOG", numbers={"case": "loaded"} | numbers),)
+    return unloaded + loaded
 
 
-def _hashed_lengths(sources: Iterable[LogSource]) -> set[int]:
+def _hashed_lengths(sources: Iterable[Recording]) -> set[int]:
     """How many samples those sources promise that can be hashed."""
     return {source.promised for source in sources if source.digest}
-
-
-def refuse_shared_torques(sources: Sequence[LogSource]) -> None:
-    """Refuse logs whose torques would come from one file: they were not recorded at once.
-
-    Raises
-    ------
-    LogError
-        If two of them do.
-    """
-    owners: dict[str, str] = {}
-    for source in sources:
-        file = source.origin.reading.torque_file
-        if file is None:
-            continue
-        owner = owners.setdefault(file, source.name)
-        if owner != source.name:
-            raise LogError(
-                f"{source.name}: its torques would come from {file}, as those of {owner} do; put "
-                "each log and its torques into a folder of their own, under the same names"
-            )
 
 
 def _in_radians(log: Log) -> Log:

@@ -5,7 +5,6 @@ on the way.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,15 +14,14 @@ import pytest
 
 from algid.base.errors import LogError
 from algid.base.files import sha256_of
-from algid.identification import source
-from algid.identification.source import (
-    LogSource,
+from algid.identification import open_logs
+from algid.identification.open_logs import (
     Staged,
     open_source,
     open_sources,
     with_twins_marked,
 )
-from algid.identification.survey import Survey
+from algid.identification.recordings import Recording, Recordings
 from algid.log import Log, Origin, Truth
 from algid.notices import Notice
 from algid.synth.cases import load_case
@@ -44,7 +42,7 @@ def moving(
     return Log(stamps, theta, 3 * np.cos(theta), came)
 
 
-def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> LogSource:
+def in_blocks(log: Log, cuts: list[int], promised: int = 0) -> Recording:
     ends = [0, *cuts, len(log)]
     blocks = [log.part(first, last) for first, last in pairwise(ends)]
     return replace(open_source(log, "unloaded"), blocks=lambda: iter(blocks), promised=promised)
@@ -93,7 +91,7 @@ def test_a_log_whose_payload_changes_is_only_for_tracking() -> None:
 
 def test_a_summary_holds_what_the_whole_log_showed() -> None:
     log = in_blocks(moving(samples=601), [100, 100, 350])
-    survey = Survey([log])
+    survey = Recordings([log])
     summary = survey.summary(log)
     assert (summary.path, summary.role, summary.format, summary.rows) == (
         "log.csv",
@@ -104,13 +102,13 @@ def test_a_summary_holds_what_the_whole_log_showed() -> None:
     assert summary.start_ns == 5_000_000_000
     assert summary.duration == pytest.approx(0.6, rel=1e-12)
     assert summary.rate == pytest.approx(1000, rel=1e-12)
-    seen = survey.seen(log)
+    seen = survey.whole(log)
     assert (seen.rows, seen.first_ns, seen.last_ns) == (601, 5_000_000_000, 5_600_000_000)
 
 
 def test_a_log_of_one_sample_has_no_rate() -> None:
     source = open_source(moving(samples=1), "unloaded")
-    summary = Survey([source]).summary(source)
+    summary = Recordings([source]).summary(source)
     assert (summary.rows, summary.duration, summary.rate) == (1, 0.0, 0.0)
 
 
@@ -119,15 +117,15 @@ def test_hashes_are_those_of_the_bytes(tmp_path: Path) -> None:
     write_log(tmp_path / "log.csv", log)
     expected = hashlib.sha256((tmp_path / "log.csv").read_bytes()).hexdigest()
     source = open_source(tmp_path / "log.csv", "unloaded")
-    assert Survey([source]).summary(source).sha256 == expected
+    assert Recordings([source]).summary(source).sha256 == expected
     part = open_source(Staged(tmp_path / "log.csv", "s3://bucket/log.csv", whole=False), "unloaded")
-    summary = Survey([part]).summary(part)
+    summary = Recordings([part]).summary(part)
     assert (summary.path, summary.sha256) == ("s3://bucket/log.csv", None)
     whole = open_source(Staged(tmp_path / "log.csv", "s3://bucket/log.csv"), "unloaded")
-    assert Survey([whole]).summary(whole).sha256 == expected
+    assert Recordings([whole]).summary(whole).sha256 == expected
     arrays = b"".join(array.tobytes() for array in (log.stamp_ns, *log.theta, *log.tau))
     memory = open_source(log, "unloaded")
-    assert Survey([memory]).summary(memory).sha256 == hashlib.sha256(arrays).hexdigest()
+    assert Recordings([memory]).summary(memory).sha256 == hashlib.sha256(arrays).hexdigest()
 
 
 def test_a_folders_hash_is_that_of_its_files_by_name(tmp_path: Path) -> None:
@@ -177,7 +175,7 @@ def test_files_of_lengths_of_their_own_are_opened_without_hashing(
         hashed.append(path)
         return str(path)
 
-    monkeypatch.setattr(source, "sha256_of", sha256_of)
+    monkeypatch.setattr(open_logs, "sha256_of", sha256_of)
     files = [tmp_path / f"{name}.parquet" for name in "abc"]
     for file, samples in zip(files, (300, 301, 300), strict=True):
         write_log(file, moving(samples=samples))
@@ -204,32 +202,13 @@ def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(
     cuts: list[int], alone: bool
 ) -> None:
     dead = replace(moving(), tau=np.zeros((2, 600)))
-    survey = Survey([in_blocks(dead, cuts)])
+    survey = Recordings([in_blocks(dead, cuts)])
     if alone:
         with pytest.raises(LogError, match="EFFORT_ZERO"):
             list(survey.segments(survey.logs[0]))
     else:
         assert sum(map(len, survey.segments(survey.logs[0]))) == 600
-        assert any(notice.code == "EFFORT_ZERO" for notice in survey.seen(survey.logs[0]).notices)
-
-
-@pytest.mark.parametrize("promised", [0, 600, 601])
-def test_a_first_block_need_not_wait_where_the_file_promises_more_than_twice_of_it(
-    promised: int,
-) -> None:
-    """Of 600 promised samples one block of 300 may be all; of 601 it is not."""
-    log, begun = moving(), list[int]()
-
-    def blocks() -> Iterator[Log]:
-        for first in (0, 300):
-            begun.append(first)
-            yield log.part(first, first + 300)
-
-    source = replace(open_source(log, "unloaded"), blocks=blocks, promised=promised)
-    survey = Survey([source])
-    first = next(survey._counted(source))
-    assert len(first) == 300
-    assert begun == ([0] if promised == 601 else [0, 300])
+        assert any(notice.code == "EFFORT_ZERO" for notice in survey.whole(survey.logs[0]).notices)
 
 
 def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it_is_gone_over() -> (
@@ -238,13 +217,13 @@ def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it
     log, told = moving(), Notice("CUT", "CUT: some", lossy=True)
     source = in_blocks(replace(log, notices=(told,)), [300])
     source = replace(source, notices=(Notice("SAME_LOG", "SAME_LOG: twin"),))
-    survey = Survey([source])
+    survey = Recordings([source])
     for _ in range(3):
         assert sum(map(len, survey.segments(source))) == 600
-    codes = [notice.code for notice in survey.seen(source).notices]
+    codes = [notice.code for notice in survey.whole(source).notices]
     assert codes[0] == "SAME_LOG"
     assert codes.count("CUT") == 2  # `part` keeps a log's notices in both blocks
-    assert len(codes) == len([notice.code for notice in Survey([source]).seen(source).notices])
+    assert len(codes) == len([notice.code for notice in Recordings([source]).whole(source).notices])
 
 
 def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None:
@@ -253,7 +232,7 @@ def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None
         in_blocks(moving(samples=600), [200], 600),
         in_blocks(moving("b.csv", samples=300), [], 300),
     )
-    survey = Survey([one, other], lambda *what: told.append(what))
+    survey = Recordings([one, other], lambda *what: told.append(what))
     survey.begin("choosing terms")
     for log in survey.logs:
         list(survey.segments(log))
@@ -274,7 +253,7 @@ def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None
 def test_a_log_of_unknown_length_has_no_total_before_its_end() -> None:
     told: list[tuple[str, int, int]] = []
     source = in_blocks(moving(), [200], 0)
-    survey = Survey([source], lambda *what: told.append(what))
+    survey = Recordings([source], lambda *what: told.append(what))
     list(survey.segments(source))
     assert told == [("reading", 0, 0), ("reading", 200, 0), ("reading", 600, 0)]
     told.clear()

@@ -1,0 +1,340 @@
+"""Recordings: logs as estimators go over them, judged once an arm and read as rarely as can be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Literal
+
+from algid.base.errors import LogError
+from algid.base.names import evenly_spread
+from algid.base.progress import Progress
+from algid.base.runtime import Beside
+from algid.log import Log, Origin
+from algid.notices import Notice
+from algid.results import LogSummary
+from algid.signals.segments import Segment, segments
+
+if TYPE_CHECKING:
+    from algid.estimators.convention_search import Recorded
+    from algid.estimators.saturation import Limit, Saturation
+
+EXAMINED = 1 << 15
+"""Samples at the start of a long log that the named checks look at."""
+SHORT = 1 << 16
+"""Samples of a log that is read and hashed sooner than a thread starts."""
+MOST_KEPT = 1 << 20
+"""Samples of all logs together that stay in memory, 48 bytes each, so that they are read once."""
+
+Role = Literal["unloaded", "loaded"]
+
+
+@dataclass(eq=False)
+class Recording:
+    """One log, opened, and what the first pass over it shows; see `Recordings`.
+
+    Parameters
+    ----------
+    name : its path, its URL, or what a log in memory calls itself
+    role : 'unloaded' or 'loaded'
+    origin : Origin
+    blocks : callable
+        Gives a fresh pass over the samples.
+    promised : samples that the file says it has, 0 where it does not
+    gravity : float, m/s^2, for the named checks
+    effort : as in `Settings`, for the named checks
+    digest : callable or None
+        Gives the SHA-256 of the log; None where only parts of it are here.
+    notices : of opening it, then of the first pass too
+    """
+
+    name: str
+    role: Role
+    origin: Origin
+    blocks: Callable[[], Iterator[Log]]
+    promised: int
+    gravity: float
+    effort: str | None
+    digest: Callable[[], str] | None
+    notices: tuple[Notice, ...] = ()
+    rows: int | None = field(default=None, init=False)
+    """Samples; None before a pass has come to the end."""
+    first_ns: int = field(default=0, init=False)
+    last_ns: int = field(default=0, init=False)
+    _begin: Log | None = field(default=None, init=False)
+    """All of a log that was looked at before its first pass."""
+    _findings: tuple[Notice, ...] | None = field(default=None, init=False)
+    _kept: tuple[Segment, ...] | None = field(default=None, init=False)
+    _hash: Beside[str] | None = field(default=None, init=False)
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last stamp, in s."""
+        return (self.last_ns - self.first_ns) * 1e-9
+
+    @property
+    def weight(self) -> float:
+        """Gravity in m/s² in the torque; no driver compensates for that of a payload."""
+        if self.effort in ("gravity-compensated", "external") and self.role == "unloaded":
+            return 0.0
+        return self.gravity
+
+
+class Recordings:
+    """Logs that are gone over as often as an estimator asks.
+
+    What is the arm's and its driver's (limits of torques, conventions) is judged of all logs of a
+    role together, in the first samples of at most `MOST_LOGS` of them; sampling and channels are
+    judged log by log, in the first pass. Hashing runs beside it. Logs of `MOST_KEPT` samples in all
+    are read once and kept; longer ones are read again for each pass, block by block.
+
+    Parameters
+    ----------
+    logs : the logs, unloaded ones first
+    progress : callable
+        Called with the stage and how many samples of how many it has gone over.
+
+    Raises
+    ------
+    LogError
+        If torques of two logs come from one file: they were not recorded at once.
+    """
+
+    def __init__(self, logs: Sequence[Recording], progress: Progress | None = None) -> None:
+        owners: dict[str, str] = {}
+        for log in logs:
+            file = log.origin.reading.torque_file
+            owner = log.name if file is None else owners.setdefault(file, log.name)
+            if owner != log.name:
+                raise LogError(
+                    f"{log.name}: its torques would come from {file}, as those of {owner} do; put "
+                    "each log and its torques into a folder of their own, under the same names"
+                )
+        self.logs = tuple(logs)
+        self.progress = progress
+        self._limits: dict[Role, tuple[Limit, ...]] = {}
+        self._known: dict[Role, Saturation] = {}
+        self._recorded: dict[Recording, list[Recorded]] = {}
+        self._conventions: dict[Recording, Notice] | None = None
+        self._room = MOST_KEPT
+        self._stage, self._over = "fitting", self.logs
+        self._words = ""
+        self._done: dict[Recording, int] = {}
+
+    @property
+    def unloaded(self) -> list[Recording]:
+        """The logs of the arm without payload."""
+        return [log for log in self.logs if log.role == "unloaded"]
+
+    @property
+    def loaded(self) -> list[Recording]:
+        """The logs of the arm with its payload."""
+        return [log for log in self.logs if log.role == "loaded"]
+
+    def begin(self, stage: str, logs: Sequence[Recording] | None = None) -> None:
+        """The passes from here on are over `logs`, by default all, and of that stage."""
+        self._stage, self._words = stage, ""
+        self._over = self.logs if logs is None else tuple(logs)
+
+    def segments(self, log: Recording) -> Iterator[Segment]:
+        """A fresh pass over a log: its uniform segments, from its start.
+
+        Without samples whose torque a limit cuts off.
+
+        Raises `LogError` where it is refused.
+        """
+        from algid.estimators.saturation import sound
+
+        rows = 0
+        if log._kept is not None:
+            self._report(log, 0)
+            for piece in log._kept:
+                yield piece
+                rows += len(piece)
+                self._report(log, rows)
+            return
+        uniform = segments(self._blocks(log))
+        first = list(islice(uniform, 1))  # which the limits are known after
+        held: list[Segment] = []
+        for piece in sound(chain(first, uniform), self._limits.get(log.role, ())):
+            rows += len(piece)
+            if rows <= self._room:
+                held.append(piece)
+            else:
+                held.clear()
+            yield piece
+        if rows <= self._room and log._kept is None:
+            log._kept = tuple(held)
+            self._room -= rows
+
+    def whole(self, log: Recording) -> Recording:
+        """The log, gone over to its end."""
+        if log.rows is None:
+            for _ in self._blocks(log):
+                pass
+        return log
+
+    def notices(self, log: Recording, *, doubtful: bool = True) -> tuple[Notice, ...]:
+        """What was noticed in a log.
+
+        Of several logs of a role the conventions are judged together, and only where what they
+        come to is `doubtful`: a fit that holds and obeys physics has no other convention.
+        """
+        seen = self.whole(log).notices
+        if self._conventions is None:
+            self._conventions = {}
+            if doubtful:
+                for role in (self.unloaded, self.loaded):
+                    self._conventions |= self._judged(role)
+        convention = self._conventions.get(log)
+        if convention is None:
+            return seen
+        # what is less precise than the convention
+        of_gravity = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
+        return tuple(one for one in seen if one.code not in of_gravity) + (convention,)
+
+    def summary(self, log: Recording) -> LogSummary:
+        """The log as a result names it."""
+        rows = self.whole(log).rows or 0
+        rate, digest = 0.0, None
+        if log.duration > 0:
+            rate = (rows - 1) / log.duration
+        if log._hash is not None:
+            digest = log._hash.result()
+        elif log.digest is not None:
+            digest = log.digest()
+        return LogSummary(
+            path=log.name,
+            sha256=digest,
+            role=log.role,
+            format=log.origin.format,
+            rows=rows,
+            start_ns=log.first_ns,
+            duration=log.duration,
+            rate=rate,
+            mapping=dict(log.origin.mapping),
+            reading=log.origin.reading,
+        )
+
+    def _judged(self, logs: Sequence[Recording]) -> dict[Recording, Notice]:
+        """What is wrong with the conventions of each of several logs."""
+        from algid.inspection.conventions import mends
+
+        known = [(log, self._recorded.pop(log)) for log in logs if log in self._recorded]
+        if not known:
+            return {}
+        mended = mends(known, gravity=known[0][0].weight > 0)
+        pairs = zip(known, mended, strict=True)
+        return {log: mend.notice for (log, _), mend in pairs if mend is not None}
+
+    def _blocks(self, log: Recording) -> Iterator[Log]:
+        """The log's blocks, each counted.
+
+        The first is examined, and refuses a log only where that is all of it.
+        """
+        from algid.inspection.clipping import Counted
+
+        if log.digest is not None and log._hash is None and not 0 < log.promised <= SHORT:
+            log._hash = Beside(log.digest)
+        first_pass = log.rows is None
+        rows, first_ns, last_ns = 0, 0, 0
+        notices = list(log.notices)
+        counted: Counted | None = None
+        self._report(log, 0)
+        blocks = _with_end(log)
+        if log._begin is not None:
+            blocks, log._begin = iter([(log._begin, True)]), None
+        for block, alone in blocks:
+            if len(block) and not rows:
+                first_ns = int(block.stamp_ns[0])
+                if log._findings is None:
+                    log._findings = self._examined(log, block, whole=alone)
+                notices += log._findings
+                counted = Counted(self._limits.get(log.role, ()))
+            if counted is not None:
+                counted.add(block)
+            if len(block):
+                last_ns = int(block.stamp_ns[-1])
+            rows += len(block)
+            notices += block.notices
+            yield block
+            self._report(log, rows)
+        if first_pass:
+            if counted is not None:
+                notices += counted.notices(log.origin)
+            log.notices = tuple(notices)
+            log.rows, log.first_ns, log.last_ns = rows, first_ns, last_ns
+
+    def _examined(self, log: Recording, block: Log, *, whole: bool) -> tuple[Notice, ...]:
+        """What the named checks find in the first block of a log."""
+        from algid.inspection.checks import noticed
+        from algid.inspection.findings import CONTRADICTIONS
+
+        begin = block if whole else block.part(0, EXAMINED)
+        if log.role not in self._limits:
+            self._judge_arm(log, begin)
+        alike = [one for one in self.logs if one.role == log.role]
+        notices = noticed(
+            begin,
+            gravity=log.weight,
+            effort=log.effort,
+            whole=whole,
+            alone=len(alike) == 1,
+            known=self._known[log.role],
+        )
+        if len(alike) == 1 and any(one.code in CONTRADICTIONS for one in notices):
+            self._limits[log.role] = ()  # of an arm that is not this one
+        return notices
+
+    def _judge_arm(self, log: Recording, begin: Log) -> None:
+        """Find the limits of torques of the role of `log`, and keep what conventions ask for."""
+        from algid.estimators.convention_search import MOST_LOGS, seconds_of_each
+        from algid.inspection.clipping import saturation
+        from algid.inspection.conventions import recorded
+
+        alike = [one for one in self.logs if one.role == log.role]
+        begins = {log: begin}
+        for other in evenly_spread(alike, MOST_LOGS):
+            if other is not log:
+                for block, alone in islice(_with_end(other), 1):
+                    other._begin = block if alone else None  # so that it is not read again
+                    begins[other] = block if alone else block.part(0, EXAMINED)
+        known = saturation(*begins.values(), gravity=log.weight, effort=log.effort)
+        self._known[log.role], self._limits[log.role] = known, known.limits
+        if len(alike) > 1 and log.effort != "external":
+            for one, samples in begins.items():
+                self._recorded[one] = recorded(samples, seconds_of_each(len(alike)))
+
+    def _report(self, log: Recording, rows: int) -> None:
+        """A pass over `log` has come as far as `rows` samples; 0 starts one.
+
+        The first over a log reads it.
+        """
+        if self.progress is None:
+            return
+        words = "reading" if log.rows is None else self._stage
+        if words != self._words or (rows == 0 and log in self._done):
+            self._words, self._done = words, {}
+        self._done[log] = rows
+        counts = [one.promised if one.rows is None else one.rows for one in self._over]
+        # 0 where a log does not say how many samples it has
+        self.progress(words, sum(self._done.values()), sum(counts) if all(counts) else 0)
+
+
+def _with_end(log: Recording) -> Iterator[tuple[Log, bool]]:
+    """Each block of a log, and whether it is the only one.
+
+    Where more than twice its samples are promised it is not, and need not wait for the second one:
+    a reader refuses a log of which it would have to drop half.
+    """
+    blocks = log.blocks()
+    for first in islice(blocks, 1):
+        if log.promised > 2 * len(first):
+            yield first, False
+        else:
+            waited = list(islice(blocks, 1))
+            yield first, not waited
+            blocks = chain(waited, blocks)
+        for block in blocks:
+            yield block, False
