@@ -248,7 +248,7 @@ class _Asked:
             return "unloaded", "loaded"
         return ("unloaded",)
 
-    def recording(self, duration: float) -> run.Recording:
+    def recording(self, duration: float) -> run.Acquisition:
         """How it is recorded; raises `SettingError` for fewer than two samples, or too many."""
         most = PHYSICAL.samples[1]
         if self.rate * duration > most:
@@ -262,7 +262,7 @@ class _Asked:
                 f"{flag('duration')}: expected at least {1 / self.rate:g} s, two samples at "
                 f"{flag('rate')} {self.rate:g}, found {duration:g}"
             )
-        return run.Recording(self.rate, duration, sensors=self.sensors)
+        return run.Acquisition(self.rate, duration, sensors=self.sensors)
 
 
 def _refuse_beside_motion(initial: object, schedule: object, excitation: object) -> None:

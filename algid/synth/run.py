@@ -19,7 +19,7 @@ EXCITATIONS = ("case", "wide", "none")
 
 
 @dataclass(frozen=True)
-class Recording:
+class Acquisition:
     """How long, how often and how a case is recorded, and the state it starts from."""
 
     rate: float = 1000.0
@@ -54,7 +54,7 @@ def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTor
 
 
 def synthesise(
-    case: Case, torque: Torque, recording: Recording, progress: Progress | None = None
+    case: Case, torque: Torque, recording: Acquisition, progress: Progress | None = None
 ) -> tuple[Log, Log]:
     """The unloaded and the loaded log of a case, each with noise of its own.
 
@@ -77,7 +77,7 @@ def synthesise(
 
 
 def rehearse(
-    case: Case, plan: Reference, recording: Recording, progress: Progress | None = None
+    case: Case, plan: Reference, recording: Acquisition, progress: Progress | None = None
 ) -> list[Log]:
     """Logs of a case whose controller follows a plan: unloaded and, with a payload, loaded."""
     logs: list[Log] = []
@@ -104,7 +104,7 @@ def _role(payload: float) -> str:
 def with_schedule(
     case: Case,
     torque: Torque,
-    recording: Recording,
+    recording: Acquisition,
     schedule: Sequence[tuple[float, float]],
     progress: Progress | None = None,
 ) -> Log:
@@ -156,7 +156,7 @@ def with_schedule(
 
 
 def _counted(
-    progress: Progress | None, stage: str, recording: Recording
+    progress: Progress | None, stage: str, recording: Acquisition
 ) -> Callable[[float], None] | None:
     """Reports in samples the time to which the simulation has come."""
     if progress is None:

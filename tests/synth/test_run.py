@@ -18,14 +18,14 @@ from algid.log import Log
 from algid.synth.cases import Case
 from algid.synth.excitation import MultiSine, no_torque, wide_multi_sine
 from algid.synth.follow import STIFFNESS, Reference, follow, read_plan
-from algid.synth.run import Recording, rehearse, synthesise, with_schedule
+from algid.synth.run import Acquisition, rehearse, synthesise, with_schedule
 from algid.synth.sensors import Sensors
 from algid.synth.simulator import Driven, simulate, steered
 
 ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
 CASE = Case("mine", ARM, 0.5, None, {})
 WAVE = MultiSine(((4.0,), (1.5,)), ((0.7,), (1.1,)), ((0.0,), (0.4,)))
-SHORT = Recording(rate=100.0, duration=0.6, initial=(-1.0, 0.3, 0.5, -0.2))
+SHORT = Acquisition(rate=100.0, duration=0.6, initial=(-1.0, 0.3, 0.5, -0.2))
 
 
 def loaded_constants(mass: float) -> FloatArray:
@@ -123,19 +123,19 @@ def plan_of(k: FloatArray, loaded: FloatArray, amplitude: float = 0.4) -> Refere
 
 def test_an_arm_that_is_as_believed_follows_its_plan() -> None:
     plan = plan_of(ARM.constants(), loaded_constants(0.5))
-    logs = rehearse(CASE, plan, Recording(rate=400.0, duration=1.0))
+    logs = rehearse(CASE, plan, Acquisition(rate=400.0, duration=1.0))
     assert [log.origin.path for log in logs] == ["mine-unloaded", "mine-loaded"]
     for log, torque in zip(logs, (plan.tau, plan.loaded_tau), strict=True):
         # the plan is a spline through knots at 200 Hz, of sixth order in their distance
         np.testing.assert_allclose(log.theta, plan.theta, atol=1e-7)
         np.testing.assert_allclose(log.tau, torque, atol=1e-3)
-    (alone,) = rehearse(replace(CASE, payload=0.0), plan, Recording(rate=50.0, duration=0.1))
+    (alone,) = rehearse(replace(CASE, payload=0.0), plan, Acquisition(rate=50.0, duration=0.1))
     assert alone.origin.path == "mine-unloaded"
 
 
 def test_beyond_its_end_a_plan_holds_its_last_posture() -> None:
     plan = plan_of(ARM.constants(), loaded_constants(0.5))
-    log: Log = rehearse(replace(CASE, payload=0.0), plan, Recording(rate=50.0, duration=1.6))[0]
+    log: Log = rehearse(replace(CASE, payload=0.0), plan, Acquisition(rate=50.0, duration=1.6))[0]
     late = log.t > 1.3
     assert late.sum() > 10
     # at rest where gravity is what the plan's last torque holds, which is that of its last
@@ -227,7 +227,7 @@ def test_bent_links_and_a_body_at_the_tip_are_found_without_a_flag() -> None:
     case = Case("bent", arm, 0.5, None, {}, (None, 0.0), 0.5 * 0.05**2)
     sensors = Sensors(position_noise=1e-4, torque_noise=2e-2, seed=1)
     logs = synthesise(
-        case, wide_multi_sine(arm, 3), Recording(rate=500.0, duration=10.0, sensors=sensors)
+        case, wide_multi_sine(arm, 3), Acquisition(rate=500.0, duration=10.0, sensors=sensors)
     )
     unloaded, loaded = (replace(log, origin=replace(log.origin, truth=None)) for log in logs)
     result = identify(unloaded, loaded)

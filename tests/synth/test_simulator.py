@@ -11,7 +11,7 @@ from algid.base.errors import SettingError
 from algid.signals.differences import integral
 from algid.synth.cases import load_case
 from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_multi_sine
-from algid.synth.run import Recording, held, synthesise
+from algid.synth.run import Acquisition, held, synthesise
 from algid.synth.simulator import simulate
 
 CASE = load_case("case1")
@@ -94,7 +94,7 @@ def test_times_must_increase() -> None:
 
 @pytest.mark.parametrize("hold", [None, "zoh"])
 def test_the_simulation_tells_how_far_it_is_and_changes_nothing_by_it(hold: Hold | None) -> None:
-    recording = Recording(rate=200.0, duration=0.5)
+    recording = Acquisition(rate=200.0, duration=0.5)
     torque: Torque = wide_multi_sine(CASE.arm)
     torque = torque if hold is None else held(torque, recording.rate, recording.duration, hold)
     calls: list[tuple[str, int, int]] = []
