@@ -27,7 +27,7 @@ from algid.results import Status, read_result, result_schema
 from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
-from algid.synth.run import Recording, synthesise
+from algid.synth.run import Acquisition, synthesise
 from algid.synth.sensors import Sensors
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
@@ -460,7 +460,7 @@ def test_a_payload_without_gravity_raises_no_warning_of_numpy() -> None:
     """Its weight tells no length then: the weak estimate starts from a usual one."""
     flat = replace(load_case("case1").arm, g=0.0)
     case = replace(load_case("case1"), arm=flat)
-    recording = Recording(
+    recording = Acquisition(
         rate=500.0, duration=4.0, sensors=Sensors(position_noise=1e-4, torque_noise=1e-3)
     )
     logs = synthesise(case, wide_multi_sine(flat, 3), recording)

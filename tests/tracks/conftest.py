@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from algid.log import Log
-from algid.synth.run import Recording, excitation, with_schedule
+from algid.synth.run import Acquisition, excitation, with_schedule
 from tests.tracks.folders import CASE
 
 
@@ -11,5 +11,5 @@ from tests.tracks.folders import CASE
 def picking() -> Log:
     """50 g picked and placed, without noise."""
     return with_schedule(
-        CASE, excitation(CASE, "wide"), Recording(duration=4.5), [(1.5, 0.05), (3.0, 0.0)]
+        CASE, excitation(CASE, "wide"), Acquisition(duration=4.5), [(1.5, 0.05), (3.0, 0.0)]
     )

@@ -20,7 +20,7 @@ from algid.identification.identify import identify
 from algid.log import Log
 from algid.model import Model
 from algid.signals.segments import segments
-from algid.synth.run import Recording, excitation, with_schedule
+from algid.synth.run import Acquisition, excitation, with_schedule
 from algid.synth.sensors import Sensors
 from algid.tracks import drift
 from algid.tracks.bins import CELL, IdentifiedArm
@@ -63,7 +63,7 @@ def test_masses_lie_within_their_intervals() -> None:
     log = with_schedule(
         CASE,
         excitation(CASE, "wide"),
-        Recording(rate=250.0, duration=4.5),
+        Acquisition(rate=250.0, duration=4.5),
         [(1.5, 0.05), (3.0, 0.0)],
     )
     rng = np.random.default_rng(0)
@@ -218,4 +218,4 @@ def test_a_log_carries_its_schedule(picking: Log, tmp_path: Path, suffix: str) -
 
 def test_a_schedule_that_runs_backwards_is_refused() -> None:
     with pytest.raises(ValueError, match="increasing times"):
-        with_schedule(CASE, excitation(CASE, "wide"), Recording(), [(2.0, 0.1), (1.0, 0.0)])
+        with_schedule(CASE, excitation(CASE, "wide"), Acquisition(), [(2.0, 0.1), (1.0, 0.0)])
