@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES
-from algid.estimators import refined, shrunk
+from algid.estimators import refined, robust
 from algid.estimators.selection import Selection, select
 from algid.estimators.weak import WeakSettings
 from algid.model import Model
@@ -55,7 +55,7 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
     fit = refined.fit(*logs, weak)
     if fit.refuted and mode == MODES[0]:
-        fit = shrunk.fit(
+        fit = robust.fit(
             *logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False)
         )
     truth = _scenes[row, arm, False].truth

@@ -39,8 +39,8 @@ IDEAS = {
     "reweighting loops": r"for _ in range\(\w*(?i:reweight)",
     "leave-one-outs": r"(?i)^\w+\.\w*(left_out|without_each|by_themselves)$",
     "Runge-Kuttas": r"/ 6(\.0)? \* \(",
-    "sandwiches": r"^(combine\.sandwich|shrinkage\.(dispersion|spread)|term_grams\._spread"
-    r"|exogeneity\._(influences|variance)|instruments\._apart|diagnostics\.by_themselves"
+    "sandwiches": r"^((combine|evidence)\.sandwich|term_grams\._spread"
+    r"|diagnostics\.by_themselves"
     r"|saturation\._solved|evidence\.\w*(sandwich|dispersion)\w*)$",
     "tests of the model": r"^(refined\.\w*refuted\w*|log_likelihood\.refuted|identifiability\.judge"
     r"|misfit\.misfit|by_likelihood\._refuted_alone|\w+\.score_test)$",

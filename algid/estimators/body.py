@@ -15,9 +15,8 @@ import numpy as np
 from algid.base.names import outside, vector, within
 from algid.base.significance import sigmas
 from algid.estimators.combine import likelihood
-from algid.estimators.fit import Fit, conclude
+from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import BODY_PARAMETERS
-from algid.estimators.shrunk_fit import concluded
 from algid.model import SINES
 from algid.physics.parameters import BODY
 
@@ -136,24 +135,18 @@ def with_body_of(fit: Fit, body: Sequence[str]) -> Fit:
     shared = replace(fit.shared, body=tuple(body))
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     start = vector(shared.names, known, otherwise=0.0)
-    if fit.shrinkage is not None and fit.prior is not None:
-        changed = concluded(
-            shared, fit.logs, start, fit.prior, fit.shrinkage, fit.moved, fit.repeats
-        )
-        changed = replace(changed, estimator=fit.estimator)
-    else:
-        coloured = fit.intervals != "likelihood"
-        changed = conclude(
-            fit.estimator,
-            shared,
-            fit.logs,
-            start,
-            fit.moved,
-            fit.prior,
-            coloured=coloured,
-            samples=fit.freedom,
-            repeats=fit.repeats,
-        )
+    changed = finish(
+        fit.estimator,
+        shared,
+        fit.logs,
+        start,
+        fit.moved,
+        fit.prior,
+        coloured=fit.intervals != "likelihood",
+        samples=fit.freedom,
+        repeats=fit.repeats,
+        shrinkage=fit.shrinkage,
+    )
     status = list(changed.status)
     for name, before in zip(fit.names, fit.status, strict=True):
         if before != "OK" and name in changed.names:

@@ -14,7 +14,7 @@ explain. When the stretches become too many, neighbours are added up.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays, read_only
-from algid.base.names import outside
+from algid.base.names import outside, places_outside
 from algid.estimators.parametrisation import Shared
 
 RANK_TOLERANCE = 1e-13  # relative eigenvalue of the scaled information that counts as nothing
@@ -74,11 +74,23 @@ class Prior:
         """Where its parameters stand among `names`."""
         return list(map(names.index, self.names))
 
-    def silent_on(self, name: str) -> Prior:
-        """The same without a parameter that it does not correlate with others."""
-        kept = [place for place, own in enumerate(self.names) if own != name]
+    def silent_on(self, names: Collection[str]) -> Prior:
+        """The same without parameters that do not correlate with others, or are known better."""
+        kept = places_outside(self.names, names)
         precision = self.precision[np.ix_(kept, kept)]
-        return Prior(outside(self.names, (name,)), self.mean[kept], precision, self.absent)
+        absent = outside(self.absent, names)
+        return Prior(outside(self.names, names), self.mean[kept], precision, absent)
+
+
+def joined(first: Prior | None, second: Prior) -> Prior:
+    """What two priors on different parameters know together."""
+    if first is None:
+        return second
+    size = len(first.names)
+    precision = np.zeros((size + len(second.names),) * 2)
+    precision[:size, :size], precision[size:, size:] = first.precision, second.precision
+    mean = np.concatenate([first.mean, second.mean])
+    return Prior(first.names + second.names, mean, precision, first.absent + second.absent)
 
 
 _NOTHING = 1e-6  # standard deviation of what is absent, in its unit: far below any estimate's
@@ -89,15 +101,7 @@ def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
     if not absent:
         return prior
     none = Prior(absent, np.zeros(len(absent)), np.diag([_NOTHING**-2] * len(absent)), absent)
-    if prior is None:
-        return none
-    kept = np.flatnonzero(~np.isin(prior.names, absent))
-    count = kept.size
-    precision = np.zeros((count + len(absent), count + len(absent)))
-    precision[:count, :count] = prior.precision[np.ix_(kept, kept)]
-    precision[count:, count:] = none.precision
-    names = outside(prior.names, absent) + absent
-    return Prior(names, np.append(prior.mean[kept], none.mean), precision, absent)
+    return joined(None if prior is None else prior.silent_on(absent), none)
 
 
 def scaled_pinvs(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
@@ -261,10 +265,51 @@ def scores_of(
     return shared.jacobian(beta, log.loaded), log.g - log.S @ change
 
 
-def sandwich(
-    shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
-) -> tuple[FloatArray, int]:
-    """Covariance of the score at `beta` (Q,), allowing for coloured residuals.
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """How the scores of the logs of one kind scatter at shared parameters.
+
+    Parameters
+    ----------
+    S : (Q, Q), the information of all of them
+    within : (Q, Q), long-run variance of the sum of the stretches' scores
+    each : (n, Q), each log's score
+    stretches : how many stretches of log are independent
+    """
+
+    S: FloatArray
+    within: FloatArray
+    each: FloatArray
+    stretches: int
+
+    @property
+    def among(self) -> FloatArray:
+        """Variance (Q, Q) of the sum of the logs' scores, by how two logs or more differ."""
+        n = len(self.each)
+        return np.asarray(n / (n - 1) * self.each.T @ self.each)
+
+
+def scatters(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray) -> list[Scatter]:
+    """The scatter at `beta` (Q,) of unloaded and of loaded logs, where there are any."""
+    found = []
+    for kind in (False, True):
+        own = of_kind(logs, kind)
+        S, within = (np.zeros((len(shared.names),) * 2) for _ in range(2))
+        each, stretches = [], 0
+        for log in own:
+            T, scores = scores_of(shared, log, beta)
+            variance, lags = long_run_variance(scores)
+            S += T.T @ log.total[0] @ T
+            within += T.T @ variance @ T
+            each.append(scores.sum(axis=0) @ T)
+            stretches += len(scores) // (lags + 1)
+        if own:
+            found.append(Scatter(S, within, np.array(each), stretches))
+    return found
+
+
+def sandwich(kinds: Sequence[Scatter]) -> tuple[FloatArray, int]:
+    """Covariance of the sum of all logs' scores, allowing for coloured residuals.
 
     Returns
     -------
@@ -278,18 +323,24 @@ def sandwich(
     Between the inverses of the information it makes the sandwich of White 1982 and Newey & West
     1987.
     """
-    meat = np.zeros((len(shared.names), len(shared.names)))
-    stretches = 0
-    for log in logs:
-        T, scores = scores_of(shared, log, beta)
-        variance, lags = long_run_variance(scores)
-        meat += T.T @ variance @ T
-        stretches += scores.shape[0] // (lags + 1)
+    stretches = sum(kind.stretches for kind in kinds)
+    freedom = max(2, stretches - rank(np.sum([kind.S for kind in kinds], axis=0)))
+    within = np.sum([kind.within for kind in kinds], axis=0)
+    return within * (max(stretches, freedom + 1) / freedom), freedom
+
+
+def rank(S: FloatArray) -> int:
+    """How many parameters the information (Q, Q) tells anything of, at least one."""
+    return max(1, int(np.sum(np.diag(S) > 0)))
+
+
+def precision_of(prior: Prior | None, shared: Shared) -> FloatArray:
+    """What a prior knows of all shared parameters (Q, Q)."""
+    precision = np.zeros((len(shared.names),) * 2)
     if prior is not None:
         places = prior.places(shared.names)
-        meat[np.ix_(places, places)] += prior.precision
-    freedom = max(2, stretches - len(shared.names))
-    return meat * (max(stretches, freedom + 1) / freedom), freedom
+        precision[np.ix_(places, places)] = prior.precision
+    return precision
 
 
 def left_out(

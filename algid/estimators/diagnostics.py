@@ -30,6 +30,7 @@ from algid.estimators.combine import (
     of_kind,
     sandwich,
     scaled_pinv,
+    scatters,
 )
 from algid.estimators.fit import Fit, Status
 from algid.estimators.identifiability import sizes
@@ -443,5 +444,5 @@ def by_themselves(
     inverse = scaled_pinv(S)
     c = inverse @ y
     plain = [replace(log, loaded=False) for log in logs]
-    meat, _ = sandwich(Shared(shared.model, shared.delay), plain, c)
+    meat, _ = sandwich(scatters(Shared(shared.model, shared.delay), plain, c))
     return c, inverse @ meat @ inverse, bool(np.linalg.matrix_rank(inverse @ S) == len(c))

@@ -16,10 +16,14 @@ from algid.base.significance import LEVEL, NORMAL
 from algid.estimators.combine import (
     LogInformation,
     Prior,
+    Scatter,
     combine,
     jackknife,
     left_out,
+    precision_of,
     sandwich,
+    scaled_pinv,
+    scatters,
 )
 from algid.estimators.identifiability import (
     Identifiability,
@@ -234,7 +238,8 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
         known = examine(fit.shared.log_names, values, S, fit.moved)
         covariance = known.covariance
         if fit.intervals != "likelihood":
-            meat, _ = sandwich(shared, alone, values, fit.shrinkage)
+            meat, _ = sandwich(scatters(shared, alone, values))
+            meat = meat + precision_of(fit.shrinkage, shared)
             covariance = covariance @ meat @ covariance
         std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
         estimates.append(OwnEstimate(log.loaded, values, std))
@@ -244,7 +249,7 @@ def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
 _STATUS: dict[bool, Status] = {True: "OK", False: "NOT_IDENTIFIABLE"}
 
 
-def conclude(
+def finish(
     estimator: str,
     shared: Shared,
     logs: Sequence[LogInformation],
@@ -254,8 +259,9 @@ def conclude(
     *,
     coloured: bool,
     samples: int = 1,
-    without: FloatArray | None = None,
     repeats: Groups = (),
+    shrinkage: Prior | None = None,
+    without: FloatArray | None = None,
 ) -> Fit:
     """Solve for the shared parameters, and attach error bars and statuses.
 
@@ -269,52 +275,68 @@ def conclude(
     moved : (2,), rad
         How far each joint travelled.
     prior : Prior, optional
+        All that is known beforehand.
     coloured : bool
         Whether the residuals are not white: error bars then rest on a sandwich, and with
-        `FEWEST_LOGS` logs on the larger of that and of a jackknife.
+        `FEWEST_LOGS` logs on a jackknife too.
     samples : int
         Independent samples behind error bars that rest on white noise.
+    repeats : Groups
+        Logs that repeat each other, where that was looked at: one log for sandwich and jackknife.
+    shrinkage : Prior, optional
+        The prior's part on terms that are shrunk, which physics bounds and no log leaves open.
     without : (n, Q), optional
         The estimates without each of the logs, where the estimator has made them itself.
-    repeats : Groups
-        Logs that repeat each other, where that was looked at.
 
     Notes
     -----
-    Repeats count as one log for a sandwich and a jackknife.
-
     Where both a sandwich and a jackknife have a part in the variance, Student's quantile is that
     of the degrees of freedom of Satterthwaite 1946, with the parts' mean share over the
     parameters.
+
+    Beside shrunk terms the covariance is the mean of three, H⁻¹ (M + Λ) H⁻¹ with Λ for what the
+    prior's mean is off, as each errs where logs are few: M is what moves as logs are left out, or
+    how the logs' scores differ, or the sandwich's.
     """
     beta, S, _ = combine(shared, logs, beta, prior)
-    absent: tuple[str, ...] = ()
+    bounded: tuple[str, ...] = ()
     if prior is not None:
-        absent = prior.absent
-    known = examined(shared.names, beta, S, moved, absent)
-    covariance, quantile = known.covariance, NORMAL
+        bounded = prior.absent
+    if shrinkage is not None:
+        bounded += shrinkage.names
+    known = examined(shared.names, beta, S, moved, bounded)
+    covariance, quantile, freedom = known.covariance, NORMAL, samples
     intervals: Intervals = "likelihood"
-    freedom = samples
-    each: Sequence[LogInformation] = logs
-    if 0 < len(repeats) < len(logs):
-        each = merged(logs, repeats)
     if coloured:
-        meat, freedom = sandwich(shared, each, beta, prior)
-        covariance = known.covariance @ meat @ known.covariance
-        if estimator == "refined":
-            # The long-run variance of a short log errs low: white noise is the least there is.
-            covariance = widened(covariance, known.covariance)
-        squares, intervals = float(freedom), "sandwich"
+        each: Sequence[LogInformation] = logs
+        if repeats:
+            each = merged(logs, repeats)
         if without is None:
             without = left_out(shared, logs, beta, prior)
         alone = without
         if len(each) < len(logs):
             alone = left_out(shared, each, beta, prior)
         repeated = jackknife(each, alone)
-        if repeated is not None:
-            within, covariance, intervals = covariance, widened(covariance, repeated), "jackknife"
-            squares = _satterthwaite(within, covariance, freedom, each)
-        quantile = student_quantile(squares)  # squares are two at least
+        intervals = "sandwich" if repeated is None else "jackknife"
+        kinds, known_before = scatters(shared, each, beta), precision_of(prior, shared)
+        meat, freedom = sandwich(kinds)
+        if shrinkage is not None:
+            meats = [_among(kinds), meat]
+            inverse = scaled_pinv(S)
+            ways = [inverse @ (one + known_before) @ inverse for one in meats]
+            if repeated is not None:
+                ways.insert(0, repeated + inverse @ known_before @ inverse)
+            covariance, quantile = np.mean(ways, axis=0), OF_FEW
+        else:
+            covariance = known.covariance @ (meat + known_before) @ known.covariance
+            if estimator == "refined":
+                # The long-run variance of a short log errs low: white noise is the least there is.
+                covariance = widened(covariance, known.covariance)
+            squares = float(freedom)
+            if repeated is not None:
+                within, covariance = covariance, widened(covariance, repeated)
+                squares = _satterthwaite(within, covariance, freedom, each)
+            quantile = student_quantile(squares)  # squares are two at least
     return Fit(
         estimator=estimator,
         shared=shared,
@@ -330,7 +352,30 @@ def conclude(
         without=without,
         moved=moved,
         repeats=repeats,
+        shrinkage=shrinkage,
     )
+
+
+OF_FEW = 2.3
+"""Half width of a 95 % interval in standard deviations beside shrunk terms: `make run-to-run`."""
+_PRIOR_LOGS = 4.0
+"""Logs that the information counts as, beside the scatter of few logs: `make run-to-run`."""
+
+
+def _among(kinds: Sequence[Scatter]) -> FloatArray:
+    """Variance (Q, Q) of the sum of all logs' scores, by how they differ.
+
+    That of n logs of a kind is w n / (n - 1) Σ s sᵀ + (1 - w) S, w = (n - 1) / (n - 1 +
+    `_PRIOR_LOGS`): the scatter of few scores s is drawn to the information.
+    """
+    meat = np.zeros_like(kinds[0].S)
+    for kind in kinds:
+        n = len(kind.each)
+        weight = (n - 1) / (n - 1 + _PRIOR_LOGS)
+        meat += (1 - weight) * kind.S
+        if n > 1:
+            meat += weight * kind.among
+    return meat
 
 
 def examined(
@@ -338,13 +383,14 @@ def examined(
     beta: FloatArray,
     S: FloatArray,
     moved: FloatArray,
-    absent: Collection[str],
+    bounded: Collection[str],
 ) -> Identifiability:
-    """What logs determine where the parameters `absent` are nothing, which is known."""
-    if not absent:
+    """What logs determine beside parameters that are `bounded`: known to be nothing, or shrunk."""
+    if not bounded:
         return examine(names, beta, S, moved)
-    free = places_outside(names, absent)
-    of_free = examine(outside(names, absent), beta[free], S[np.ix_(free, free)], moved)
+    free = places_outside(names, bounded)
+    marginal = scaled_pinv(scaled_pinv(S)[np.ix_(free, free)])
+    of_free = examine(outside(names, bounded), beta[free], marginal, moved)
     covariance = np.zeros_like(S)
     covariance[np.ix_(free, free)] = of_free.covariance
     determined = np.ones(len(names), dtype=bool)

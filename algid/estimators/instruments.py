@@ -41,10 +41,12 @@ from algid.estimators.combine import (
     BlockSums,
     LogInformation,
     Prior,
+    combine,
     scaled_pinv,
 )
-from algid.estimators.fit import Fit, conclude
+from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
+from algid.estimators.parametrisation import Shared
 from algid.estimators.references import Following, followed
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, acceleration, inertia
@@ -112,96 +114,59 @@ def fit(
     shared = start.shared
     if shared.delay:
         settings = settings.delayed(float(start.values[len(settings.model.names)]))
-    following = followed(list(unloaded) + list(loaded), settings)
-    logs: list[LogInformation] = []
-    for kind, sources in ((False, unloaded), (True, loaded)):
-        if not sources:
-            continue
-        c = shared.coefficients(start.values, kind)
-        if shared.delay:
-            c[-1] = 0.0  # the windows are shifted by what is known: the column is a change's
-        informations = _solved(sources, settings, c, kind, following)
-        if informations is None:
-            return replace(start.marked("NOT_CONVERGED"), converged=False)
-        logs += informations
-    if shared.delay:
-        known = settings.shift.delay
-        logs = [replace(log, c0=np.append(log.c0[:-1], log.c0[-1] + known)) for log in logs]
-    return conclude("instruments", shared, logs, start.values, start.moved, prior, coloured=True)
-
-
-def _solved(
-    sources: Sequence[Source],
-    settings: WeakSettings,
-    c: FloatArray,
-    loaded: bool,
-    following: Following | None,
-) -> list[LogInformation] | None:
-    """Each log's projected likelihood, once coefficients and instruments agree.
-
-    None where the windows go astray.
-    """
-    logs: list[LogInformation] = []
+    following = followed([*unloaded, *loaded], settings)
+    beta, logs = start.values, None
     for _ in range(_ROUNDS):
-        sums = []
-        for one in moments(sources, settings, c, following=following):
-            if one is None or gone_astray(one):
-                return None
-            if one.rows:
-                sums.append(one)
-        if not sums:
-            return None
-        better, logs = solve(sums, c, loaded)
-        S, _ = _added(logs)
-        step = better - c
-        c = better
-        if float(step @ S @ step) < SETTLED_SIMULATED**2:
+        logs = evidence(shared, beta, unloaded, loaded, settings, following)
+        if not logs:
+            return replace(start.marked("NOT_CONVERGED"), converged=False)
+        before = beta
+        beta, S, _ = combine(shared, logs, before, prior)
+        if float((beta - before) @ S @ (beta - before)) < SETTLED_SIMULATED**2:
             break
+    assert logs is not None
+    return finish("instruments", shared, logs, beta, start.moved, prior, coloured=True)
+
+
+def evidence(
+    shared: Shared,
+    beta: FloatArray,
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source],
+    settings: WeakSettings,
+    following: Following | None = None,
+) -> list[LogInformation] | None:
+    """Each log's likelihood projected on instruments, simulated at shared parameters `beta` (Q,).
+
+    Its rows weigh by their residual there. None where the windows cannot be simulated.
+    """
+    logs = []
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        if not sources:  # without loaded logs there is no payload among the parameters
+            continue
+        c0 = shared.coefficients(beta, kind)
+        c = c0.copy()
+        if shared.delay:
+            c[-1] -= settings.shift.delay  # the windows are shifted by it: the column is a change's
+        for sums in moments(sources, settings, c, following):
+            if sums is None or sums.astray > _FEWEST * sums.rows:
+                return None
+            if sums.rows:
+                logs.append(replace(_projected(sums, c, kind), c0=c0))
     return logs
 
 
-def solve(
-    sums: Sequence[Moments], c: FloatArray, loaded: bool
-) -> tuple[FloatArray, list[LogInformation]]:
-    """Shared coefficients (q,) from weights at `c`, and each log's projected likelihood at them."""
-    S, g = _added([projected(one, c, loaded) for one in sums])
-    better = c + scaled_pinv(S) @ g
-    return better, [projected(one, better, loaded) for one in sums]
-
-
-def _added(logs: Sequence[LogInformation]) -> tuple[FloatArray, FloatArray]:
-    """Information S (q, q) and score g (q,) of all logs."""
-    S, g = logs[0].total
-    for log in logs[1:]:
-        log_S, log_g = log.total
-        S, g = S + log_S, g + log_g
-    return S, g
-
-
-def _weights(sums: Moments, c: FloatArray) -> FloatArray:
-    """Inverse residual variance (2,) of a row of each joint."""
-    v = np.concatenate([np.zeros_like(c), -c, [1.0]])
-    return row_weights(sums.gram.sum(axis=0), v, sums.rows - sums.astray)
-
-
-def _information(sums: Moments, weights: FloatArray, c: FloatArray, loaded: bool) -> LogInformation:
+def _projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
+    """A log's likelihood projected on the instruments, weighed by its residual at `c` (q,)."""
     q = c.size
+    v = np.concatenate([np.zeros(q), -c, [1.0]])
+    weights = row_weights(sums.gram.sum(axis=0), v, sums.rows - sums.astray)
     # Overlapping rows repeat each other: a window's worth of rows counts as two.
     gram = np.einsum("a,baxy->bxy", weights * (2.0 * _STRIDE / OVERLAP), sums.gram)
     A, V = gram[:, :q, q : 2 * q], gram[:, :q, :q].sum(axis=0)
     projection = A.sum(axis=0).T @ scaled_pinv(V)
     scores = gram[:, :q, -1] - A @ c
     return LogInformation(loaded, c, projection @ A, scores @ projection.T)
-
-
-def gone_astray(sums: Moments) -> bool:
-    """Whether most windows cannot be simulated."""
-    return sums.astray > _FEWEST * sums.rows
-
-
-def projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
-    """A log's likelihood projected on the instruments, weighted by its residual at `c` (q,)."""
-    return _information(sums, _weights(sums, c), c, loaded)
 
 
 def moments(

@@ -323,7 +323,7 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     ----------
     gram : (..., 2, m, m)
         Gram matrices of the columns by joint, the torque last; of several logs at once.
-    v : (m,)
+    v : (m,) or (k, m), then the weights are (k, ..., 2)
         What makes a residual of the columns: the coefficients with their sign turned, and 1 for
         the torque.
     rows : int or (..., 2)
@@ -337,9 +337,14 @@ def row_weights(gram: FloatArray, v: FloatArray, rows: int | FloatArray) -> Floa
     the better it is solved the more it would weigh: its residual counts as `MOTORLESS` of the
     other's at least.
     """
-    size = np.abs(v)
-    rounding = ROUNDINGS * EPS * ((np.abs(gram) @ size) @ size)
-    squares = np.maximum((gram @ v) @ v, rounding)
+    flat = gram.reshape(-1, gram.shape[-1] ** 2)
+
+    def squared(flat: FloatArray, v: FloatArray) -> FloatArray:
+        outer = (v[..., :, None] * v[..., None, :]).reshape(*v.shape[:-1], -1)
+        return np.asarray(outer @ flat.T).reshape(*v.shape[:-1], *gram.shape[:-2])
+
+    rounding = ROUNDINGS * EPS * squared(np.abs(flat), np.abs(v))
+    squares = np.maximum(squared(flat, v), rounding)
     driven = gram[..., -1, -1] > 0
     alone = np.sum(driven, axis=-1, keepdims=True) == 1
     each = np.where(driven, squares / np.maximum(rows, 1), 0.0)

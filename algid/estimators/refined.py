@@ -24,7 +24,7 @@ from algid.base.progress import Progress
 from algid.base.quantiles import quantile
 from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
-from algid.estimators.fit import Fit, conclude
+from algid.estimators.fit import Fit, finish
 from algid.estimators.identifiability import judge, open_directions
 from algid.estimators.imprint import Imprint
 from algid.estimators.integration import deviations, widened_by_integration
@@ -145,7 +145,7 @@ def fit(
     informations = [outcome.information for outcome in outcomes]
     samples = int(_count(outcomes))
     coloured = not whiteness.white
-    fitted = conclude(
+    fitted = finish(
         "refined",
         shared,
         informations,

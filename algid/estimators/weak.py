@@ -16,7 +16,7 @@ beta    parameters that the logs share: the arm's, delay, payload     (Q,)      
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
 from typing import TypeVar
@@ -30,11 +30,12 @@ from algid.estimators.combine import (
     BlockSums,
     LogInformation,
     Prior,
+    by_kind,
     combine,
     scaled_pinv,
     scaled_pinvs,
 )
-from algid.estimators.fit import Fit, conclude
+from algid.estimators.fit import Fit, finish
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
@@ -46,12 +47,14 @@ from algid.signals.shift import AT_ONCE, TorqueShift
 
 Source = Callable[[], Iterable[Segment]]
 Gathered = TypeVar("Gathered")
+_TOGETHER = 256  # logs that are left out at once
+State = TypeVar("State")
+Weighed = TypeVar("Weighed")
 Solved = tuple[FloatArray, list[LogInformation]]
 """Coefficients (q,) that logs share, and their likelihoods there."""
 PIECE_SAMPLES = 16384
 _SHORTEST = 64  # samples: shorter pieces hold no window
-_REWEIGHTINGS = 4
-_TOGETHER = 256  # logs that are left out at once
+REWEIGHTINGS = 4
 _PASSES = 8
 _DELAY_SETTLED = 0.02  # samples
 _SETTLED = 1e-4  # of coefficients in which the torque is not linear: 1 or rad
@@ -120,11 +123,15 @@ def fit(
     model = settings.model
     shared = Shared(model, settings.estimate_delay, bool(loaded), dict(lengths or {}))
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
-    at: list[FloatArray | None] = [None, None]
+    at: dict[bool, FloatArray] = {}
     for _ in range(_PASSES):
-        normals = normals_of(unloaded, settings, at[0])
-        loaded_normals = normals_of(loaded, settings, at[1])
-        beta, logs = first_estimate(shared, normals, loaded_normals, prior)
+        normals = {}
+        for kind, sources in ((False, unloaded), (True, loaded)):
+            own = normals_of(sources, settings, at.get(kind))
+            if own:
+                normals[kind] = own
+        solved = {kind: solve(own, kind) for kind, own in normals.items()}
+        beta, logs = first_estimate(shared, solved, prior)
         base, change = settings.shift.delay, 0.0
         if shared.delay:
             change = float(beta[len(model.names)])
@@ -132,115 +139,19 @@ def fit(
             settings = settings.delayed(base + change)
         settled = True
         if not model.linear:
-            before, at = at, _linearisation(shared, beta, logs)
-            settled = _has_settled(before, at, iterated)
-        every = normals + loaded_normals
+            before, at = at, {log.loaded: log.c0[: len(model.names)] for log in logs}
+            moves = [np.abs(at[kind] - before.get(kind, np.inf))[iterated] for kind in at]
+            settled = bool(np.max(moves) < _SETTLED)
+        every = [normal for own in normals.values() for normal in own]
         if settled and abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every):
             break
     moved = np.max([normal.moved for normal in every], axis=0)
     without = None
     if len(every) >= FEWEST_LOGS:
-        without = _left_out(shared, normals, loaded_normals, prior, base, beta)
+        without = _left_out(shared, normals, solved, prior, base, beta)
     return with_body(
-        conclude("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
+        finish("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
     )
-
-
-def _has_settled(
-    before: Sequence[FloatArray | None], after: Sequence[FloatArray | None], iterated: list[int]
-) -> bool:
-    """Whether the coefficients in which the torque is not linear have hardly moved."""
-    for old, new in zip(before, after, strict=True):
-        if new is None:
-            continue
-        if old is None or not np.all(np.abs(new - old)[iterated] < _SETTLED):
-            return False
-    return True
-
-
-def _left_out(
-    shared: Shared,
-    unloaded: list[Normal],
-    loaded: list[Normal],
-    prior: Prior | None,
-    base: float,
-    beta: FloatArray,
-) -> FloatArray:
-    """Estimates (n, Q) without each log, every other one weighed anew.
-
-    `base` is the delay, in s, from which the passes estimate a change; without the only log of its
-    kind stands `beta`.
-    """
-    every, every_loaded = _solved_together(unloaded, False), _solved_together(loaded, True)
-    pairs = [(rest, every_loaded) for rest in _solved_without_each(unloaded, False)]
-    pairs += [(every, rest) for rest in _solved_without_each(loaded, True)]
-    estimates = []
-    for rest, rest_loaded in pairs:
-        if (unloaded and rest is None) or (loaded and rest_loaded is None):
-            estimates.append(beta)
-            continue
-        start, others = _started(shared, rest, rest_loaded, prior)
-        start, others = _from(shared, start, others, base)
-        estimates.append(combine(shared, others, start, prior)[0])
-    return np.array(estimates)
-
-
-def _solved_together(normals: Sequence[Normal], loaded: bool) -> Solved | None:
-    """What `solve` gives, all logs in one sum; None without any."""
-    if not normals:
-        return None
-    c, logs = solve(normals, loaded)
-    S, g = np.zeros((c.size, c.size)), np.zeros(c.size)
-    for log in logs:
-        log_S, log_g = log.total
-        S += log_S
-        g += log_g
-    return c, [LogInformation(loaded, c, S[None], g[None])]
-
-
-def _solved_without_each(normals: Sequence[Normal], loaded: bool) -> list[Solved | None]:
-    """What `solve` gives without each of several logs, all others in one sum.
-
-    None without the only one.
-
-    The sums without a log are those of all less its own, and many logs' are taken in one product.
-    """
-    if len(normals) < 2:
-        return [None] * len(normals)
-    grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
-    rows = np.stack([normal.rows for normal in normals])
-    least = 1e-24 * grams[:, :, -1, -1].max(axis=1)[:, None] + 1e-300
-    size, flat = grams.shape[-1], grams.reshape(2 * len(normals), -1)
-    solutions: list[Solved | None] = []
-    for first in range(0, len(normals), _TOGETHER):
-        left = np.arange(first, min(first + _TOGETHER, len(normals)))
-        others = np.ones((left.size, len(normals), 1))
-        others[np.arange(left.size), left] = 0.0
-        weights = np.broadcast_to(others, (left.size, len(normals), 2))
-        for _ in range(_REWEIGHTINGS):
-            total = (weights.reshape(left.size, -1) @ flat).reshape(-1, size, size)
-            c = np.einsum("nij,nj->ni", scaled_pinvs(total[:, :-1, :-1]), total[:, :-1, -1])
-            v = np.concatenate([-c, np.ones((left.size, 1))], axis=1)
-            squares = (v[:, :, None] * v[:, None, :]).reshape(left.size, -1) @ flat.T
-            squares = squares.reshape(left.size, len(normals), 2)
-            weights = others * (rows / np.maximum(squares, least))
-        total = 2.0 / OVERLAP * (weights.reshape(left.size, -1) @ flat).reshape(-1, size, size)
-        for own, gram in zip(c, total, strict=True):
-            S = gram[:-1, :-1]
-            g = gram[:-1, -1] - S @ own
-            solutions.append((own, [LogInformation(loaded, own, S[None], g[None])]))
-    return solutions
-
-
-def _linearisation(
-    shared: Shared, beta: FloatArray, logs: Sequence[LogInformation]
-) -> list[FloatArray | None]:
-    """Model coefficients at which the next pass linearises unloaded and loaded logs."""
-    count = len(shared.model.names)
-    at: list[FloatArray | None] = [beta[:count], None]
-    for log in reversed(logs):  # the first log of each kind stands in the end
-        at[log.loaded] = log.c0[:count]
-    return at
 
 
 def normals_of(
@@ -256,37 +167,32 @@ def normals_of(
 
 
 def first_estimate(
-    shared: Shared, unloaded: list[Normal], loaded: list[Normal], prior: Prior | None
+    shared: Shared, solved: Mapping[bool, Solved], prior: Prior | None
 ) -> tuple[FloatArray, list[LogInformation]]:
-    """Shared parameters from which `conclude` starts, and each log's likelihood."""
-    arm, loaded_arm = None, None
-    if unloaded:
-        arm = solve(unloaded)
-    if loaded:
-        loaded_arm = solve(loaded, loaded=True)
-    return _started(shared, arm, loaded_arm, prior)
+    """Shared parameters from which `finish` starts, and each log's likelihood.
 
+    `solved` holds what unloaded (False) and loaded logs give by themselves, where there are any.
 
-def _started(
-    shared: Shared, unloaded: Solved | None, loaded: Solved | None, prior: Prior | None
-) -> tuple[FloatArray, list[LogInformation]]:
-    """The same from what logs without and with payload give by themselves."""
-    if unloaded is None and (prior is None or loaded is None):
+    Raises
+    ------
+    TooShortError
+        If those that are needed are not there.
+    """
+    if False not in solved and (prior is None or True not in solved):
         raise TooShortError(f"no unloaded {OF_A_WINDOW}")
-    logs: list[LogInformation] = []
+    if shared.payload and True not in solved:
+        raise TooShortError(f"no loaded {OF_A_WINDOW}")
     arm: FloatArray = np.zeros(len(shared.log_names))
-    if unloaded is not None:
-        arm, logs = unloaded
+    logs: list[LogInformation] = []
+    if False in solved:
+        arm, logs = solved[False]
     elif prior is not None:
         arm[prior.places(shared.log_names)] = prior.mean
     if not shared.payload:
         return arm, logs
-    if loaded is None:
-        raise TooShortError(f"no loaded {OF_A_WINDOW}")
-    c, under_load = loaded
-    S = np.concatenate([log.S for log in under_load])
-    g = np.concatenate([log.g for log in under_load])
-    return first_payload(shared, arm, LogInformation(True, c, S, g)), logs + under_load
+    _, under_load = solved[True]
+    ((whole,), _) = by_kind(under_load)
+    return first_payload(shared, arm, whole), logs + under_load
 
 
 def _from(
@@ -487,6 +393,37 @@ def grams(X: FloatArray, rows: int) -> FloatArray:
     return parts @ parts.swapaxes(-1, -2)
 
 
+def reweighted(
+    weigh: Callable[[State], Weighed], solve: Callable[[Weighed, State], State], state: State
+) -> tuple[State, Weighed]:
+    """Least squares whose weights follow from its residual: weighed and solved in turn.
+
+    Parameters
+    ----------
+    weigh : callable
+        Gives the weighed logs at a state of the coefficients.
+    solve : callable
+        Gives the state of weighed logs, from the last one.
+    state : where it starts
+
+    Returns
+    -------
+    The state, and the weighed logs that have it.
+    """
+    for _ in range(REWEIGHTINGS):
+        weighed = weigh(state)
+        state = solve(weighed, state)
+    return state, weighed
+
+
+def evidence(normal: Normal, weights: FloatArray, c: FloatArray, loaded: bool) -> LogInformation:
+    """A log's quadratic likelihood at `c` (q,), its joints' rows weighed by `weights` (2,)."""
+    # Overlapping rows repeat each other: a window's worth of rows counts as two.
+    gram = np.einsum("a,baxy->bxy", weights * (2.0 / OVERLAP), normal.gram)
+    S = gram[:, :-1, :-1]
+    return LogInformation(loaded, c, S, gram[:, :-1, -1] - S @ c)
+
+
 def solve(
     normals: Sequence[Normal], loaded: bool = False
 ) -> tuple[FloatArray, list[LogInformation]]:
@@ -494,20 +431,73 @@ def solve(
 
     The rows of a joint weigh by its own residual, log by log.
     """
-    whole = np.stack([normal.gram.sum(axis=0) for normal in normals])
-    rows = np.stack([normal.rows for normal in normals])
-    weights: FloatArray = np.ones((len(normals), 2))
-    for _ in range(_REWEIGHTINGS):
-        total = np.tensordot(weights, whole, 2)
-        c = scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
-        weights = row_weights(whole, np.append(-c, 1.0), rows)
+    c, weights = _of_subsets(normals, np.ones((1, len(normals))))
     logs = []
-    for normal, w in zip(normals, weights, strict=True):
-        # Overlapping rows repeat each other: a window's worth of rows counts as two.
-        gram = np.einsum("a,baxy->bxy", w * (2.0 / OVERLAP), normal.gram)
-        S = gram[:, :-1, :-1]
-        logs.append(LogInformation(loaded, c, S, gram[:, :-1, -1] - S @ c))
-    return c, logs
+    for normal, own in zip(normals, weights[0], strict=True):
+        logs.append(evidence(normal, own, c[0], loaded))
+    return c[0], logs
+
+
+def _of_subsets(normals: Sequence[Normal], kept: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (k, q) of k subsets of n logs, and the weights (k, n, 2) of their rows there.
+
+    `kept` (k, n) is 1 of a log that counts, else 0.
+    """
+    grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
+    rows = np.stack([normal.rows for normal in normals])
+    size, flat = grams.shape[-1], grams.reshape(2 * len(normals), -1)
+
+    def weigh(c: FloatArray) -> FloatArray:
+        each: FloatArray = np.ones((len(kept), len(normals), 2))
+        if c.size:  # after the first time
+            each = row_weights(grams, np.insert(-c, c.shape[1], 1.0, axis=1), rows)
+        return each * kept[:, :, None]
+
+    def solved(weights: FloatArray, _: FloatArray) -> FloatArray:
+        total = (weights.reshape(len(kept), -1) @ flat).reshape(-1, size, size)
+        return np.einsum("kij,kj->ki", scaled_pinvs(total[:, :-1, :-1]), total[:, :-1, -1])
+
+    start: FloatArray = np.empty((len(kept), 0))
+    c, _ = reweighted(weigh, solved, start)
+    return c, weigh(c)
+
+
+def _left_out(
+    shared: Shared,
+    normals: Mapping[bool, list[Normal]],
+    solved: Mapping[bool, Solved],
+    prior: Prior | None,
+    base: float,
+    beta: FloatArray,
+) -> FloatArray:
+    """Estimates (n, Q) without each log, every other one weighed anew.
+
+    A log that is alike to most has weight in proportion: with the weights of all logs no estimate
+    would move. `base` is the delay, in s, from which the passes estimate a change; without the only
+    log of its kind stands `beta`.
+    """
+    every = {kind: (c, list(by_kind(logs)[0])) for kind, (c, logs) in solved.items()}
+    estimates = []
+    for kind, own in normals.items():
+        if len(own) == 1:
+            estimates.append(beta)
+            continue
+        for first in range(0, len(own), _TOGETHER):
+            kept = 1 - np.eye(len(own))[first : first + _TOGETHER]
+            for rest in _summed(own, kept, kind):
+                start, logs = first_estimate(shared, every | {kind: rest}, prior)
+                start, logs = _from(shared, start, logs, base)
+                estimates.append(combine(shared, logs, start, prior)[0])
+    return np.array(estimates)
+
+
+def _summed(normals: Sequence[Normal], kept: FloatArray, loaded: bool) -> Iterator[Solved]:
+    """Coefficients (q,) of each subset of logs, and their likelihood in one sum."""
+    whole = np.stack([normal.gram.sum(axis=0) for normal in normals])
+    for c, weights in zip(*_of_subsets(normals, kept), strict=True):
+        gram = np.tensordot(weights, whole, 2)[None, None]  # as of one joint whose weight is 1
+        total = replace(normals[0], gram=gram)
+        yield c, [evidence(total, np.ones(1), c, loaded)]
 
 
 def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> FloatArray:

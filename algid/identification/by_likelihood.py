@@ -11,17 +11,15 @@ import numpy as np
 from algid.base.names import within
 from algid.base.runtime import Worker
 from algid.base.significance import LEVEL
-from algid.estimators import exogeneity, motorless, shrunk, weak
+from algid.estimators import robust, weak
 from algid.estimators.body import averaged_over_bodies, with_body
-from algid.estimators.combine import Prior, without
+from algid.estimators.combine import Prior, joined, without
 from algid.estimators.diagnostics import constrained
 from algid.estimators.doubt import doubted_without_motor
 from algid.estimators.fit import Fit, Misfit
 from algid.estimators.hold import Hold
 from algid.estimators.prediction import PredictionSums
 from algid.estimators.selection import FIRST_TERMS, Selection, TermTrial, has_need, plausible
-from algid.estimators.shrinkage import joined
-from algid.estimators.window_scatter import scattered
 from algid.identification.passes import Pass, long_enough, passes, weak_settings
 from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
@@ -39,7 +37,7 @@ def run_fit(
 ) -> tuple[Fit, Predictions, Selection]:
     """Fit the settings' estimator to logs.
 
-    Where its likelihood is refuted, every term shrunk: see `shrunk`.
+    Where its likelihood is refuted, every term shrunk: see `robust`.
 
     Parameters
     ----------
@@ -102,7 +100,7 @@ def run_fit(
             ours = weak_settings(settings, chosen)
             sums.clear()
         if fit.estimator == "instruments" and not chosen.shrunk:
-            fit = exogeneity.watched(fit, unloaded, loaded, ours)
+            fit = robust.with_feedback_noted(fit, unloaded, loaded, ours)
     return finished(fit, settings), sums, chosen
 
 
@@ -182,7 +180,7 @@ def _of_motorless(
         plainer = replace(plainer, hold="foh")
     ours = weak_settings(settings, plainer)
     known = without(prior, absent(settings.effort, model.names))
-    better = motorless.by_instruments(unloaded, ours, settings.lengths, known)
+    better = robust.of_passive_joint(unloaded, ours, settings.lengths, known)
     if better is None:
         return None
     return better, plainer
@@ -209,9 +207,7 @@ def _shrunk(
     every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
     nothing = absent(settings.effort, every.names)
     known = without(prior, nothing)
-    least = shrunk.fit(unloaded, loaded, shaped, settings.lengths, known)
-    fit = exogeneity.settled(least, unloaded, loaded, shaped)
-    fit = scattered(fit, least, unloaded, loaded, shaped, settings.lengths, known)
+    fit = robust.fit(unloaded, loaded, shaped, settings.lengths, known)
     notes = refuted.notes + fit.notes
     fit = replace(fit, notes=notes)
     terms = fit.shared.model.terms

@@ -11,7 +11,7 @@ from algid.base.significance import CERTAIN, sigmas
 from algid.base.units import TORQUE
 from algid.estimators.diagnostics import broken_bounds, length_by_constants, payload_distance
 from algid.estimators.fit import Fit
-from algid.estimators.shrunk_fit import unshrunk
+from algid.estimators.robust import unshrunk
 from algid.identification.phases import phase_note
 from algid.identification.recordings import Recording
 from algid.model import K4

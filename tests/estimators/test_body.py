@@ -10,7 +10,7 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.body import FALSE, averaged_over_bodies, with_body, with_body_of
-from algid.estimators.fit import Fit, conclude
+from algid.estimators.fit import Fit, finish
 from algid.model import Model
 from pipelines.planar import Row, _fitted, _segment, motions
 
@@ -44,7 +44,7 @@ def drawn(bench: Fit, sizes: dict[str, float]) -> Iterator[tuple[FloatArray, Fit
             logs.append(replace(log, c0=c0, g=np.zeros_like(log.g)))
         shared = replace(bench.shared, body=())
         start = np.array([true[bench.names.index(name)] for name in shared.names])
-        yield true, conclude("refined", shared, logs, start, bench.moved, coloured=False)
+        yield true, finish("refined", shared, logs, start, bench.moved, coloured=False)
 
 
 def test_a_point_is_called_a_body_once_in_twenty_at_most(bench: Fit) -> None:

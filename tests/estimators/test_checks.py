@@ -24,7 +24,7 @@ from algid.estimators.diagnostics import (
     repeatability,
     term_worths,
 )
-from algid.estimators.fit import conclude, own_estimates
+from algid.estimators.fit import finish, own_estimates
 from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, motion_of, score
@@ -278,7 +278,7 @@ def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
             S = np.repeat(4.0 * np.eye(size)[None], 40, axis=0)
             g = rng.standard_normal((40, size)) * 2.0 + S @ own
             logs.append(LogInformation(False, np.zeros(size), S, g))
-        fit = conclude("weak", shared, logs, np.zeros(size), np.ones(2), coloured=True)
+        fit = finish("weak", shared, logs, np.zeros(size), np.ones(2), coloured=True)
         assert fit.intervals == "jackknife"
         ratios.append(fit.values / (fit.quantile * np.sqrt(np.diag(fit.covariance))))
     holds_95(np.array(ratios))

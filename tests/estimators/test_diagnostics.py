@@ -25,7 +25,7 @@ from algid.estimators.diagnostics import (
     term_worths,
 )
 from algid.estimators.doubt import UNLIKE
-from algid.estimators.fit import Fit, conclude
+from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
@@ -44,7 +44,7 @@ def fit_of(values: FloatArray, model: Model = PLAIN, delay: bool = False) -> Fit
         0.01 * np.maximum(np.abs(values), 1e-3)
     )
     log = LogInformation(False, values, X[:, :, None] * X[:, None, :], np.zeros((50, values.size)))
-    return conclude("refined", shared, [log], values, np.ones(2), coloured=False)
+    return finish("refined", shared, [log], values, np.ones(2), coloured=False)
 
 
 @pytest.mark.parametrize("broken", [5, 6])

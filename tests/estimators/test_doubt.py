@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from algid.arm import with_payload
-from algid.estimators import doubt, shrunk, weak
+from algid.estimators import doubt, robust, weak
 from algid.estimators.diagnostics import joints_apart
 from algid.estimators.doubt import UNLIKE, UNLIKE_IN_MANY, doubted
 from algid.estimators.fit import Fit
-from algid.estimators.shrunk_fit import unshrunk
+from algid.estimators.robust import unshrunk
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import RIGID, Model
 from algid.notices import Notice
@@ -96,7 +96,7 @@ def _runs(bench: Bench, count: int) -> list[Segment]:
 def test_a_gain_far_outside_its_prior_is_found_without_it(bench: Bench, factor: float) -> None:
     scale = np.array([[1.0], [factor]])
     logs = [replace(log, tau=log.tau * scale) for log in _runs(bench, 4)]
-    drawn = shrunk.fit([partial(list, [log]) for log in logs])
+    drawn = robust.fit([partial(list, [log]) for log in logs])
     free = unshrunk(drawn, "gain2")
     place = drawn.names.index("gain2")
     assert free.values[place] > free.quantile * free.std[place]
@@ -170,7 +170,7 @@ def test_an_arm_that_a_payload_outweighs_is_not_thrown_away(bench: Bench) -> Non
     motion = simulate(heavy, wide, np.arange(4001) * DT)
     bare, burdened = bench.log(sigma=1e-4), Segment(0.0, DT, motion.theta, motion.tau)
     assert np.all(np.std(burdened.tau, axis=1) > 5 * np.std(bare.tau, axis=1))
-    fit = shrunk.fit([lambda: [bare]], [lambda: [burdened]])
+    fit = robust.fit([lambda: [bare]], [lambda: [burdened]])
     assert set(fit.status) == {"OK"}
     for name, true in zip(RIGID, bench.truth, strict=False):
         assert fit.values[fit.names.index(name)] == pytest.approx(true, rel=0.02), name

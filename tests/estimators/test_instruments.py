@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from algid.estimators import instruments, refined, selection, weak
+from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.weak import Source, WeakSettings
@@ -67,37 +67,22 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
     """Regress X on Z, then y on what that gives (Theil 1953), rows of each joint over its
     residual's deviation.
     """
-    logs_, stacked = [], []
     start = np.array([1.1, 1.8, 3.3])
-    for seed in (1, 2):
-        Z, X, y = _rows(seed)
-        # nine stretches of ten rows
-        columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(2, 7, 9, 10)
-        logs_.append(instruments.Moments(np.einsum("axbr,aybr->baxy", columns, columns), 100, 10))
-        level = np.sqrt(np.sum((y - np.einsum("q,aqr->ar", start, X)) ** 2, axis=1) / 90)
-        stacked.append([part / level.reshape(2, *([1] * (part.ndim - 1))) for part in (Z, X, y)])
-    found, information = instruments.solve(logs_, start, True)
-    S, g = np.zeros((3, 3)), np.zeros(3)
-    for Z, X, y in stacked:
-        z, x = (np.concatenate(part, axis=1).T for part in (Z, X))
-        first = z @ np.linalg.lstsq(z, x, rcond=None)[0]
-        S, g = S + first.T @ first, g + first.T @ np.concatenate(y)
-    np.testing.assert_allclose(found, np.linalg.solve(S, g), rtol=1e-9)
-    for log, seed in zip(information, (1, 2), strict=True):  # weighed anew at what was found
-        Z, X, y = _rows(seed)
-        residual = y - np.einsum("q,aqr->ar", found, X)
-        level = np.sqrt(np.sum(residual**2, axis=1) / 90)
-        z, x = (np.concatenate(part / level[:, None, None], axis=1).T for part in (Z, X))
-        first = z @ np.linalg.lstsq(z, x, rcond=None)[0]
-        assert (log.loaded, log.S.shape) == (True, (9, 3, 3))
-        # windows overlap eight-fold, every second is taken: a window's worth of rows counts as two
-        np.testing.assert_allclose(log.total[0], 0.5 * first.T @ first, rtol=1e-9)
-        np.testing.assert_allclose(
-            log.total[1],
-            0.5 * first.T @ np.concatenate(residual / level[:, None]),
-            atol=1e-9 * log.total[0].max(),
-        )
-        np.testing.assert_array_equal(log.c0, found)
+    Z, X, y = _rows(1)
+    # nine stretches of ten rows
+    columns = np.concatenate([Z, X, y[:, None]], axis=1).reshape(2, 7, 9, 10)
+    sums = instruments.Moments(np.einsum("axbr,aybr->baxy", columns, columns), 100, 10)
+    found = instruments._projected(sums, start, True)
+    assert (found.loaded, found.S.shape) == (True, (9, 3, 3))
+    residual = y - np.einsum("q,aqr->ar", start, X)
+    level = np.sqrt(np.sum(residual**2, axis=1) / 90)
+    z, x = (np.concatenate(part / level[:, None, None], axis=1).T for part in (Z, X))
+    first = z @ np.linalg.lstsq(z, x, rcond=None)[0]
+    # windows overlap eight-fold, every second is taken: a window's worth of rows counts as two
+    S, g = found.total
+    np.testing.assert_allclose(S, 0.5 * first.T @ first, rtol=1e-9)
+    two_stages = np.linalg.lstsq(first, np.concatenate(y / level[:, None]), rcond=None)[0]
+    np.testing.assert_allclose(start + np.linalg.solve(S, g), two_stages, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("late", "order"), [(0.0, 3.7), (3.0, 3.7), (2.4, 1.7)])
@@ -189,20 +174,6 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4
-
-
-def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Evenly spread, for the choice of terms."""
-    monkeypatch.setattr(selection, "MOST_LOGS", 2)
-    looked_at: list[int] = []
-
-    def source(number: int) -> list[Segment]:
-        looked_at.append(number)
-        return [bench.log(sigma=1e-3, seed=number)]
-
-    sources: list[Source] = [partial(source, number) for number in range(4)]
-    assert not selection.select(sources, [], WeakSettings()).model.terms
-    assert looked_at == [0, 2]
 
 
 def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators import shrunk
+from algid.estimators import robust
 from algid.estimators.repeats import grouped
 from algid.estimators.weak import Source, WeakSettings
 from algid.signals.segments import Segment
@@ -40,7 +40,7 @@ def test_repeats_are_found_by_their_motion() -> None:
 
 
 def fitted(logs: list[Segment]) -> tuple[FloatArray, FloatArray]:
-    found = shrunk.fit([source(log) for log in logs], (), WeakSettings(bandwidth=60.0))
+    found = robust.fit([source(log) for log in logs], (), WeakSettings(bandwidth=60.0))
     return found.values[:7], found.std[:7]
 
 

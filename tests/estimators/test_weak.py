@@ -8,7 +8,7 @@ import pytest
 from algid.arm import Arm, FloatArray, with_payload
 from algid.estimators import weak
 from algid.estimators import weak as normal
-from algid.estimators.combine import LogInformation, Prior, combine
+from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model
@@ -132,16 +132,6 @@ def test_what_is_told_without_a_log_is_what_the_others_tell(
         assert np.all(np.abs(told - alone.values) < (0.02 if delay else 1e-4) * fit.std)
 
 
-def test_the_only_log_of_its_kind_is_left_where_it_is(bench: Bench) -> None:
-    bare: list[Source] = [partial(list, [bench.log(False, 1e-4)])]
-    burdened: list[Source] = [partial(list, [bench.log(True, 1e-4, seed)]) for seed in range(3)]
-    fit = weak.fit(bare, burdened)
-    assert fit.without is not None
-    assert np.all(np.abs(fit.without[0] - fit.values) < fit.std)
-    three = weak.fit(bare, burdened[:2])
-    assert three.intervals == "sandwich"
-
-
 @pytest.mark.parametrize("lengths", [{}, {"l1": None}, {"l1": None, "l2": None}], ids=len)
 def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(
     lengths: dict[str, None],
@@ -166,31 +156,3 @@ def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(
             [bare, [{"m_p": mass, "l1": l1, "l2": l2}[name] for name in shared.names[7:]]]
         )
         np.testing.assert_allclose(weak.first_payload(shared, bare, loaded), truth, rtol=1e-3)
-
-
-@pytest.mark.parametrize("delay", [False, True])
-@pytest.mark.parametrize("loaded", [0, 2])
-def test_estimates_without_each_log_are_those_of_the_others(
-    bench: Bench, loaded: int, delay: bool
-) -> None:
-    """Out of the sums of all logs less one, the same as each time anew."""
-    settings = WeakSettings(estimate_delay=delay)
-    plain, burdened = (
-        [
-            normal.normal_equations(
-                partial(list, [bench.log(loaded=kind, sigma=1e-3, seed=seed)]), settings
-            )
-            for seed in range(count)
-        ]
-        for kind, count in ((False, 3), (True, loaded))
-    )
-    bare, weighed = ([one for one in part if one is not None] for part in (plain, burdened))
-    shared = Shared(Model(), delay, bool(loaded), {})
-    beta, _ = weak.first_estimate(shared, bare, weighed, None)
-    found = weak._left_out(shared, bare, weighed, None, 1e-3, beta)
-    for place, without in enumerate(found):
-        rest = [one for number, one in enumerate(bare) if number != place]
-        burden = [one for number, one in enumerate(weighed, len(bare)) if number != place]
-        start, logs = weak._from(shared, *weak.first_estimate(shared, rest, burden, None), 1e-3)
-        expected = combine(shared, logs, start)[0]
-        np.testing.assert_allclose(without, expected, rtol=1e-9, atol=1e-12)

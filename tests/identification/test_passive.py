@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError
-from algid.estimators import instruments, motorless, refined, weak
+from algid.estimators import instruments, refined, robust, weak
 from algid.estimators.weak import Source, WeakSettings
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
@@ -194,7 +194,7 @@ def test_instruments_tell_what_least_squares_takes_for_nothing(passive: int) -> 
 def test_nothing_is_no_solution_where_instruments_do_not_tell_either(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(motorless, "by_instruments", lambda *_: None)
+    monkeypatch.setattr(robust, "of_passive_joint", lambda *_: None)
     result = identify(log_of("case1", 1, 0), report=False)
     assert not any(result.parameters[name].usable for name in ("k1", "k2", "k3", "k4", "k5"))
     assert "HARDLY_DRIVEN" in [notice.code for notice in result.notices]
@@ -204,8 +204,8 @@ def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:
     """A torque of the other sign turns the whole arm round, which no instrument makes physical."""
     segments_of = pieces_of(log_of("case1", 2, 0))
     turned = [replace(segment, tau=-segment.tau) for segment in segments_of]
-    assert motorless.by_instruments([lambda: segments_of], WeakSettings()) is not None
-    assert motorless.by_instruments([lambda: turned], WeakSettings()) is None
+    assert robust.of_passive_joint([lambda: segments_of], WeakSettings()) is not None
+    assert robust.of_passive_joint([lambda: turned], WeakSettings()) is None
 
 
 def test_cables_of_two_percent_leave_the_constants_told() -> None:

@@ -1,0 +1,710 @@
+"""Parameters where no likelihood of white noise holds: windows' least squares, every term shrunk.
+
+To choose terms is to set some of them to zero, and another half of the logs sets others to zero.
+Here every term stays, with a normal prior whose spread is estimated and never exceeds what a real
+arm may have (empirical Bayes: Efron & Morris 1973). All logs' scores disagree by more than white
+noise explains; the information is divided by that factor first.
+
+    H = S / φ + Λ,   p = H⁻¹ (g / φ + Λ m),   Λ = diag(1 / τ²)
+            τ_t² / s² = min(1, (Σ ((p - m)² + H⁻¹) / s² + u²) / (n + 1))   for n coefficients a term
+
+As one more coefficient stands the usual spread, u = ½ of the largest one: without it a spread
+falls to nothing or stays open by chance, which would be a choice again.
+
+A joint that stands is held by dry friction, which is any torque up to f there: its windows are
+left out. From four logs on, leaving them out shows how far an estimate moves with what the model
+lacks. With fewer, windows of half and of twice the length do: longer ones weigh slow errors more,
+shorter ones fast ones. The scatter of their estimates is added to the covariance.
+
+**Endogenous torque.** Torque that the model lacks drives the motion, and least squares is
+attenuated by it. Instruments (`algid.estimators.instruments`) are not, as long as they do not
+answer that torque: the logged reference of a controller never does, the measured torque does not
+in open loop. Both are compared with the same terms and the same prior, and the residual with the
+torque after it:
+
+    h  = dᵀ V⁻¹ d,   d = β_instruments − β_least squares          χ² of the number of constants
+    r_l = Σ e(t) y(t + l) / (Σ_k N γ_e(k) γ_y(k))^½               normal, where no torque answers
+
+V is the long-run variance of the difference of both estimates' influences, window by window
+(Durbin, Wu & Hausman, in the form that needs no efficient estimate: Wooldridge 2010, §6.3.1); the
+variance of a cross-correlation is Bartlett's 1946.
+
+======  ===============================================================  =========  ===============
+symbol  name                                                             shape      unit
+======  ===============================================================  =========  ===============
+S, g    information and score of all logs                                (Q, Q), Q  1 / (unit unit)
+p       shared parameters where prior and logs meet                      (Q,)       mixed
+m, s    the prior's mean, and the spread that physics allows, of a term  (m,)       its own
+τ       the spread that the logs show, at most s                         (m,)       its own
+φ       overdispersion: variance of the scores over the information      scalar     1
+e, y    residual of the instruments' windows, torque's moment            (2, R)     N m
+γ       autocovariances, lag by lag                                      (K, 2)     (N m)²
+======  ===============================================================  =========  ===============
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray, keep_arrays
+from algid.base.compiled import chi2_tail
+from algid.base.criteria import AT_REST
+from algid.base.significance import LEVEL, chance
+from algid.estimators import instruments, weak
+from algid.estimators.combine import (
+    LogInformation,
+    Prior,
+    by_kind,
+    combine,
+    joined,
+    long_run_variance,
+    rank,
+    scaled_pinv,
+    scatters,
+    scores_of,
+)
+from algid.estimators.diagnostics import broken_bounds
+from algid.estimators.doubt import doubted_without_motor
+from algid.estimators.fit import Fit, finish
+from algid.estimators.modulating_functions import Known, row_weights
+from algid.estimators.parametrisation import Shared
+from algid.estimators.references import Following, followed
+from algid.estimators.repeats import Groups, grouped, merged, shared_out
+from algid.estimators.too_short import OF_A_WINDOW, TooShortError
+from algid.estimators.weak import Normal, Source, WeakSettings
+from algid.model import EVERY_TERM, K3, RIGID, SINES, TERMS
+from algid.notices import Notice, Remedy
+
+_DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
+_ROUNDS = 3  # linearisations: the third moves nothing by a hundredth of a standard deviation
+_MOST_KEPT = 1 << 20  # samples of all logs whose moments stay in memory, some 40 bytes each
+_STEPS, _SETTLED = 200, 1e-3  # of expectation and maximisation, and change of log τ at the last
+_LEAST = 1e-4  # of s: a spread that counts as nothing
+_FEWEST = 3  # logs whose scatter shows an overdispersion
+WINDOWS = (0.5, 2.0)
+"""Of the windows' length: others that few logs are estimated by too."""
+ANSWERS = 0.01
+"""p value of feedback below which instruments do not replace a biased least squares."""
+MOVES = 1.0
+"""Standard deviations of a constant that are worth another estimator.
+
+Below that an interval loses less than 5 points of its coverage.
+"""
+_NEAR = 0.5  # of them: nearer, instruments are not simulated again
+_LAGS = 8  # steps between windows, two windows in all
+_MEMORY = 40  # lags of the autocovariances
+
+
+def fit(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source] = (),
+    settings: WeakSettings | None = None,
+    lengths: Mapping[str, float] | None = None,
+    known: Prior | None = None,
+) -> Fit:
+    """Parameters of the arm, of every term and of its payload where there are loaded logs.
+
+    By least squares, or by instruments where the torque is endogenous and there is one.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called a few
+        times.
+    settings : WeakSettings
+        Window, bandwidth, hold and delay; its model's gravity and shapes of friction. With a delay
+        that is not zero none is estimated.
+    lengths : mapping of "l1", "l2" to m, where known
+    known : Prior
+        What an earlier result knows of the arm and of its terms; unloaded logs are not needed then.
+
+    Raises
+    ------
+    ValueError
+        If no log is long enough for a window, or there is neither an unloaded log nor `known`.
+    """
+    problem = Problem.of(unloaded, loaded, settings or WeakSettings(), lengths, known)
+    least = problem.least_squares()
+    return problem.with_window_scatter(problem.instruments_if_endogenous(least), least)
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """Prior of m coefficients before any log: their term, mean m, largest and usual spread (m,)."""
+
+    names: tuple[str, ...]
+    terms: tuple[str, ...]
+    mean: FloatArray
+    spread: FloatArray
+    usual: FloatArray
+
+    def __post_init__(self) -> None:
+        keep_arrays(self)
+
+    def prior(self, share: FloatArray) -> Prior:
+        """The normal prior with `share` (m,) of the largest spreads."""
+        return Prior(
+            self.names, self.mean, np.diag((np.maximum(share, _LEAST) * self.spread) ** -2)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Logs that are long enough, with what all estimates on them have in common.
+
+    Parameters
+    ----------
+    unloaded, loaded : their sources
+    settings : WeakSettings
+        With every term that the logs can determine, and the speeds below which a joint stands.
+    shared : Shared
+    known : Prior
+    moved : (2,), rad, how far each joint travelled
+    groups : logs that repeat each other
+    keeps : whether the logs are short enough for their moments to stay in memory
+    """
+
+    unloaded: tuple[Source, ...]
+    loaded: tuple[Source, ...]
+    settings: WeakSettings
+    shared: Shared
+    known: Prior | None
+    moved: FloatArray
+    groups: Groups
+    keeps: bool
+
+    @classmethod
+    def of(
+        cls,
+        unloaded: Sequence[Source],
+        loaded: Sequence[Source],
+        settings: WeakSettings,
+        lengths: Mapping[str, float] | None = None,
+        known: Prior | None = None,
+    ) -> Problem:
+        """See `fit`."""
+        bare = replace(settings, model=replace(settings.model, terms=()), estimate_delay=False)
+        long_enough: dict[bool, list[Source]] = {False: [], True: []}
+        normals = []
+        for kind, sources in ((False, unloaded), (True, loaded)):
+            for source in sources:
+                normal = weak.normal_equations(source, bare)
+                if normal is not None:
+                    long_enough[kind].append(source)
+                    normals.append(normal)
+        every = long_enough[False] + long_enough[True]
+        delay = settings.estimate_delay or settings.shift.delay == 0
+        model = replace(settings.model, terms=offered(normals, known.names if known else ()))
+        rest = AT_REST * weak.speeds(every, settings)
+        return cls(
+            tuple(long_enough[False]),
+            tuple(long_enough[True]),
+            replace(
+                settings,
+                model=model,
+                estimate_delay=delay,
+                rest=(float(rest[0]), float(rest[1])),
+            ),
+            Shared(model, delay, bool(loaded), dict(lengths or {})),
+            known,
+            np.max([normal.moved for normal in normals], axis=0, initial=0.0),
+            grouped(long_enough[False], long_enough[True]),
+            sum(normal.samples for normal in normals) <= _MOST_KEPT,
+        )
+
+    def least_squares(self, window: float = 1.0) -> Fit:
+        """Every term shrunk, by windows of `window` times the settings' length."""
+        shared, known = self.shared, self.known
+        settings = replace(self.settings, window=window * self.settings.window)
+        memory: list[dict[Hashable, Known] | None] = [None] * len(self.unloaded + self.loaded)
+        if self.keeps:
+            memory = [{} for _ in memory]
+        normals = self._normals(settings, {}, memory)
+        first = normals[False] + normals[True]
+        solved = {kind: weak.solve(own, kind) for kind, own in normals.items() if own}
+        beta, _ = weak.first_estimate(shared, solved, known)
+        driven = {kind: _driven(own) for kind, own in normals.items()}
+        share: FloatArray = np.ones(0)
+        for number in range(_ROUNDS):
+            base = settings.shift.delay
+            if number:
+                columns = len(settings.model.names)
+                at = {
+                    kind: shared.coefficients(beta, kind)[:columns]
+                    for kind, own in normals.items()
+                    if own
+                }
+                if shared.delay:
+                    base = float(beta[columns])
+                    settings = settings.delayed(base)
+                normals = self._normals(settings, at, memory)
+            expected = expectation(shared, first, settings, beta, known)
+            if number == 0:
+                share = np.ones(len(expected.names))
+            logs = partial(self._weighed, normals, driven, base)
+            shrunk = partial(shrink, shared, expected, known)
+            (beta, share), weighed = weak.reweighted(logs, shrunk, (beta, share))
+        return self._finished("weak", weighed, beta, expected.prior(share))
+
+    def _normals(
+        self,
+        settings: WeakSettings,
+        at: Mapping[bool, FloatArray],
+        memory: Sequence[dict[Hashable, Known] | None],
+    ) -> dict[bool, list[Normal]]:
+        """Normal equations of unloaded and of loaded logs, linearised `at` coefficients (q,)."""
+        normals: dict[bool, list[Normal]] = {False: [], True: []}
+        for place, source in enumerate(self.unloaded + self.loaded):
+            kind = place >= len(self.unloaded)
+            normal = weak.normal_equations(source, settings, at.get(kind), memory[place])
+            if normal is None:
+                raise TooShortError(f"no {OF_A_WINDOW}")
+            normals[kind].append(normal)
+        return normals
+
+    def _weighed(
+        self,
+        normals: Mapping[bool, Sequence[Normal]],
+        driven: Mapping[bool, Sequence[NDArray[np.bool_]]],
+        base: float,
+        state: tuple[FloatArray, FloatArray],
+    ) -> list[LogInformation]:
+        """Each log's likelihood over φ, with the weights of its residual at the parameters (Q,).
+
+        The delay's column is that of a change from `base`, in s.
+        """
+        beta, _ = state
+        logs = []
+        for kind, own in normals.items():
+            if not own:  # without loaded logs there is no payload among the parameters
+                continue
+            c0 = self.shared.coefficients(beta, kind)
+            c = c0.copy()
+            if self.shared.delay:
+                c[-1] -= base
+            for normal, counts in zip(own, driven[kind], strict=True):
+                gram = normal.gram.sum(axis=0)
+                weights = row_weights(gram, np.append(-c, 1.0), normal.rows)
+                log = weak.evidence(normal, np.where(counts, weights, 0.0), c, kind)
+                logs.append(replace(log, c0=c0))
+        return self._divided(logs, beta)
+
+    def _divided(self, logs: Sequence[LogInformation], beta: FloatArray) -> list[LogInformation]:
+        """Each log's likelihood, shared among its repeats and divided by φ at `beta` (Q,)."""
+        logs = shared_out(logs, self.groups)
+        phi = dispersion(self.shared, merged(logs, self.groups), beta)
+        return [replace(log, S=log.S / phi, g=log.g / phi) for log in logs]
+
+    def _finished(
+        self, estimator: str, logs: Sequence[LogInformation], beta: FloatArray, shrinkage: Prior
+    ) -> Fit:
+        """The fit of likelihoods over φ beside the prior that the terms are shrunk by."""
+        return finish(
+            estimator,
+            self.shared,
+            logs,
+            beta,
+            self.moved,
+            joined(self.known, shrinkage),
+            coloured=True,
+            repeats=self.groups,
+            shrinkage=shrinkage,
+        )
+
+    def with_window_scatter(self, fit: Fit, least: Fit) -> Fit:
+        """The fit with the scatter of windows of other lengths; as it is if logs are left out.
+
+        W = V + Σ_w d dᵀ / n,   d = β_w − β,   β by least squares as `least`'s.
+        """
+        if fit.intervals == "jackknife":
+            return fit
+        determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
+        moved = []
+        for window in WINDOWS:
+            try:
+                other = self.least_squares(window)
+            except TooShortError:  # of the longer windows
+                continue
+            moved.append(np.where(determined, other.values - least.values, 0.0))
+        if not moved:
+            return fit
+        scatter = np.transpose(moved) @ np.array(moved) / len(moved)
+        return replace(fit, covariance=fit.covariance + scatter)
+
+    def instruments_if_endogenous(self, least: Fit) -> Fit:
+        """The fit by least squares, or by instruments where those differ and answer nothing.
+
+        A reference that the logs hold and the arm follows is an instrument, else a torque that
+        answers nothing.
+        """
+        following = followed(self.unloaded + self.loaded, self.settings)
+        corrected = self.by_instruments(least, least.values, following)
+        if corrected is None:
+            return least
+        if compared(corrected, least).moved > _NEAR:
+            corrected = self.by_instruments(least, corrected.values, following) or corrected
+        tests = compared(corrected, least)
+        fit = replace(least, endogeneity=tests.distance)
+        if not tests.endogenous:
+            return fit
+        case = "reference"
+        if following is None:
+            case = "torque"
+            silent = no_feedback(corrected, self.unloaded, self.loaded, self.settings)
+            if silent < ANSWERS:
+                return fit.noted(feedback(silent))
+        note = Notice("INSTRUMENTS", numbers={"case": case, "distance": tests.moved})
+        return replace(corrected, endogeneity=tests.distance).noted(note)
+
+    def by_instruments(
+        self, least: Fit, at: FloatArray, following: Following | None = None
+    ) -> Fit | None:
+        """The parameters of `least` by instruments at `at` (Q,), with its terms and its prior.
+
+        Along the motion that a reference explains, where the arm is `following` one, else along a
+        simulated one; None where the windows cannot be simulated.
+        """
+        settings = _of(least, self.settings)
+        logs = instruments.evidence(
+            self.shared, at, self.unloaded, self.loaded, settings, following
+        )
+        if logs is None or len(logs) != len(least.logs) or least.shrinkage is None:
+            return None
+        return self._finished("instruments", self._divided(logs, at), at, least.shrinkage)
+
+
+def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:
+    """Terms that logs can determine: no gain without a motor; a lag is a delay to first order."""
+    driven = all(normal.gram[:, :, -1, -1].any(axis=0).all() for normal in normals)
+    terms = []
+    for name, term in TERMS.items():
+        free = term.spread is not None and (driven or not term.gains)
+        if free or not set(term.names).isdisjoint(held):
+            terms.append(name)
+    return tuple(terms)
+
+
+_HARDLY = 0.2
+"""Share of the most torque that a joint has in any log of a kind: with less it is hardly driven."""
+
+
+def _driven(normals: Sequence[Normal]) -> list[NDArray[np.bool_]]:
+    """Which joints (2,) of each log of one kind are driven, those without a motor among them.
+
+    What moves a joint that is hardly driven is what the model lacks, and its equation is solved by
+    constants near nothing: the better, the more it would weigh. An arm without its payload may need
+    a fifth of the torque and is driven nevertheless.
+    """
+    torques: list[FloatArray] = []
+    for normal in normals:
+        squares = normal.gram[:, :, -1, -1].sum(axis=0)
+        torques.append(np.sqrt(squares / np.maximum(normal.rows, 1)))
+    most = np.max(torques, axis=0, initial=0.0)
+    return [(torque >= _HARDLY * most) for torque in torques]
+
+
+def expectation(
+    shared: Shared,
+    normals: Sequence[Normal],
+    settings: WeakSettings,
+    beta: FloatArray,
+    known: Prior | None = None,
+) -> Expected:
+    """Prior of the terms of logs whose torque has the size of `normals`, but of what is `known`."""
+    held = () if known is None else known.names
+    squares, rows = np.zeros(2), np.zeros(2)
+    for normal in normals:
+        squares += normal.gram[:, :, -1, -1].sum(axis=0)
+        rows += normal.rows
+    torque = np.sqrt(squares / np.maximum(rows, 1.0))
+    # a joint without a motor carries a load like the other's
+    torque = np.where(torque > 0, torque, torque.max())
+    value = dict(zip(shared.names, np.abs(beta).tolist(), strict=True))
+    names, terms, means, spreads, usual = [], [], [], [], []
+    offered_terms = shared.model.terms
+    if shared.delay:
+        offered_terms += _DELAYS
+    for term in offered_terms:
+        spread = EVERY_TERM[term].spread
+        if spread is None:
+            continue
+        mean = 0.0
+        if term in _DELAYS and not settings.shift.held:
+            mean = 0.5 * normals[0].dt  # of a torque that a digital controller holds
+        for name in EVERY_TERM[term].names:
+            if name in held or name not in shared.names:
+                continue
+            unit = 1.0
+            if spread.of == "inertia":
+                unit = value[K3]
+            elif spread.of == "torque":
+                unit = float(torque[int(name.endswith("2"))])
+            elif spread.of == "cosine":
+                unit = value[SINES[name]]
+            names.append(name)
+            terms.append(term)
+            means.append(mean)
+            spreads.append(spread.size * unit)
+            usual.append(spread.usual)
+    return Expected(tuple(names), tuple(terms), np.array(means), np.array(spreads), np.array(usual))
+
+
+def dispersion(shared: Shared, logs: Sequence[LogInformation], beta: FloatArray) -> float:
+    """φ at `beta` (Q,), 1 at least.
+
+    Notes
+    -----
+    The larger of tr(S⁻¹ M) / q, M the long-run variance of the scores within logs, and tr(S⁻¹ Σ s
+    sᵀ) n / (n - 1) / q over the scores s of n logs of a kind, where there are `_FEWEST` or more.
+    """
+    kinds = scatters(shared, logs, beta)
+    many = [kind for kind in kinds if len(kind.each) >= _FEWEST]
+    ratios = [1.0]
+    for some, meats in (
+        (kinds, [kind.within for kind in kinds]),
+        (many, [kind.among for kind in many]),
+    ):
+        if some:
+            S = np.sum([kind.S for kind in some], axis=0)
+            ratios.append(float(np.sum(scaled_pinv(S) * np.sum(meats, axis=0))) / rank(S))
+    return max(ratios)
+
+
+def shrink(
+    shared: Shared,
+    expected: Expected,
+    known: Prior | None,
+    logs: Sequence[LogInformation],
+    start: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Parameters p (Q,) and spread shares τ / s (m,) by expectation and maximisation.
+
+    Parameters
+    ----------
+    shared : Shared
+    expected : Expected
+    known : Prior, optional
+        What an earlier result knows of other parameters.
+    logs : each log's quadratic likelihood, divided by φ
+    start : (Q,) and (m,), in 0 … 1
+        Where the iteration starts.
+    """
+    beta, share = start
+    places = list(map(shared.names.index, expected.names))
+    terms = np.array(expected.terms)
+    logs, _ = by_kind(logs)
+    for _ in range(_STEPS):
+        beta, H, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
+        variance = np.diag(scaled_pinv(H))[places]
+        square = ((beta[places] - expected.mean) ** 2 + variance) / expected.spread**2
+        better = np.empty(len(terms))
+        for place, (term, usual) in enumerate(zip(terms, expected.usual, strict=True)):
+            better[place] = _share(square[terms == term], usual)
+        change = float(np.max(np.abs(np.log(better / np.maximum(share, _LEAST))), initial=0.0))
+        share = better
+        if change < _SETTLED:
+            break
+    beta, _, _ = combine(shared, logs, beta, joined(known, expected.prior(share)))
+    return beta, share
+
+
+def _share(squares: FloatArray, usual: float) -> float:
+    """Share of s from n squares of a term, and one more of the size `usual` that it shrinks to."""
+    return min(1.0, float(np.sqrt((np.sum(squares) + usual**2) / (squares.size + 1))))
+
+
+@dataclass(frozen=True)
+class Exogeneity:
+    """How estimates by instruments differ from those by least squares.
+
+    Parameters
+    ----------
+    distance : how far a constant moves, in standard deviations of the instruments, at most
+    moved : the same in standard deviations of least squares
+    same : chance of such a difference where the torque is exogenous
+    """
+
+    distance: float
+    moved: float
+    same: float
+
+    @property
+    def endogenous(self) -> bool:
+        """Whether least squares is off by more than its error bars take in."""
+        return self.same < LEVEL and self.moved > MOVES
+
+
+def compared(better: Fit, least: Fit) -> Exogeneity:
+    """The test on estimates by instruments and by least squares."""
+    places = np.flatnonzero(np.isin(least.names, RIGID) & np.isfinite(better.std + least.std))
+    if not places.size:
+        return Exogeneity(0.0, 0.0, 1.0)
+    away = (better.values - least.values)[places]
+    V = np.zeros_like(better.covariance)
+    for one, other in zip(_influences(better), _influences(least), strict=True):
+        # of the first alone where stretches differ
+        variance, _ = long_run_variance(one - other if one.shape == other.shape else one)
+        V = V + variance
+    h = float(away @ scaled_pinv(V[np.ix_(places, places)]) @ away)
+    distance, moved = (float(np.max(np.abs(away) / fit.std[places])) for fit in (better, least))
+    return Exogeneity(distance, moved, float(chi2_tail(places.size, max(h, 0.0))))
+
+
+def _of(fit: Fit, settings: WeakSettings) -> WeakSettings:
+    """The settings with the fit's model and delay."""
+    if fit.delay is not None:
+        settings = settings.delayed(fit.delay)
+    return replace(settings, model=fit.shared.model, estimate_delay=fit.shared.delay)
+
+
+def _influences(fit: Fit) -> list[FloatArray]:
+    """What the stretches (B, Q) of each log move the estimate by."""
+    _, H, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
+    inverse = scaled_pinv(H)
+    influences: list[FloatArray] = []
+    for log in fit.logs:
+        T, scores = scores_of(fit.shared, log, fit.values)
+        influences.append(scores @ T @ inverse)
+    return influences
+
+
+def feedback(p_value: float) -> Notice:
+    """That the measured torque answers what the model lacks."""
+    remedy = Remedy({"estimator": "weak"}, "to compare")
+    return Notice("FEEDBACK", numbers={"p_value": p_value}, remedies=(remedy,))
+
+
+def no_feedback(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> float:
+    """Bonferroni p value of the residual's correlations with later torques without feedback."""
+    settings = replace(_of(fit, settings), estimate_delay=False)
+    products, variance = np.zeros((_LAGS, 2)), np.zeros(2)
+    for kind, sources in ((False, unloaded), (True, loaded)):
+        for source in sources:
+            c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
+            e, y = _residual(source, settings, c)
+            if e.shape[1] > 2 * _LAGS:
+                own, spread = _crossed(e, y)
+                products, variance = products + own, variance + spread
+    if not np.all(variance > 0):
+        return 1.0
+    largest = float(np.max(np.abs(products) / np.sqrt(variance)))
+    return chance(largest, products.size)
+
+
+def _residual(
+    source: Source, settings: WeakSettings, c: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals and torques' moments (2, R) of a log's windows, less their means."""
+    rows = [np.empty((4, 0))]
+    for piece, windows, _ in weak.overlapping(source(), settings):
+        X = windows.equations(settings.model, piece, False, c)
+        residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
+        rows.append(np.concatenate([residual, X[:, -1]]))
+    every = np.concatenate(rows, axis=1)
+    if every.shape[1]:
+        every = every - every.mean(axis=1, keepdims=True)
+    return every[:2], every[2:]
+
+
+def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sums (L, 2) of products of residuals and torques l = 1 … L windows later; variances (2,)."""
+    count = e.shape[1]
+    memory = min(_MEMORY, count // 3)
+
+    def products(x: FloatArray, later: FloatArray, lags: range) -> FloatArray:
+        """Sums (lags, 2) of products of one signal and another, `lags` windows later."""
+        return np.array([np.sum(x[:, : count - lag] * later[:, lag:], axis=1) for lag in lags])
+
+    covariance_e = products(e, e, range(memory)) / count
+    covariance_y = products(y, y, range(memory)) / count
+    both = covariance_e * covariance_y
+    variance = count * np.maximum(both[0] + 2 * both[1:].sum(axis=0), both[0])
+    return products(e, y, range(1, _LAGS + 1)), variance
+
+
+def with_feedback_noted(
+    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
+) -> Fit:
+    """A fit by instruments, with a warning where it is the torque and answers the motion."""
+    if followed([*unloaded, *loaded], settings) is not None:
+        return fit
+    silent = no_feedback(fit, unloaded, loaded, settings)
+    if silent >= LEVEL:
+        return fit
+    return fit.noted(feedback(silent))
+
+
+def unshrunk(fit: Fit, name: str) -> Fit:
+    """The fit of the same likelihoods with one term's parameter free of its prior.
+
+    A parameter far outside its prior is drawn back into it, and the residual that this leaves makes
+    every error bar wider: what is free shows what the logs say of it.
+    """
+    prior, shrinkage = fit.prior, fit.shrinkage
+    if prior is None or shrinkage is None or name not in shrinkage.names:
+        return fit
+    return finish(
+        fit.estimator,
+        fit.shared,
+        fit.logs,
+        fit.values,
+        fit.moved,
+        prior.silent_on((name,)),
+        coloured=True,
+        repeats=fit.repeats,
+        shrinkage=shrinkage.silent_on((name,)),
+    )
+
+
+def of_passive_joint(
+    unloaded: Sequence[Source],
+    settings: WeakSettings,
+    lengths: dict[str, float] | None = None,
+    prior: Prior | None = None,
+) -> Fit | None:
+    """Parameters of an arm with a joint that has no motor, by windowed instruments.
+
+    The equation of such a joint has no torque that scales it: constants near nothing solve it, and
+    where friction and cables pull nearly as hard as the arm's load, its residual draws least
+    squares there. Instruments are not drawn: a motion simulated from the other joint's torque holds
+    nothing of what pulls, so that at the true constants its products with the residual vanish in
+    the mean, and the joint with a motor sets the scale. The constants that it is simulated with
+    need the right ratios and no scale: least squares with equal weights has them.
+
+    Parameters
+    ----------
+    unloaded : sequence of callables
+        Each gives a fresh iterable of `Segment`, the stretches of one log in time.
+    settings : WeakSettings
+        A linear model and no delay to estimate.
+    lengths : dict
+        Known link lengths "l1", "l2" in m.
+    prior : Prior
+        What an earlier result knows of the arm.
+
+    Returns
+    -------
+    Fit or None
+        None where instruments do not converge, or end at constants near nothing or that physics
+        forbids.
+    """
+    start = weak.fit(unloaded, (), settings, lengths, prior)
+    total = np.sum([normal.gram for normal in weak.normals_of(unloaded, settings)], axis=(0, 1, 2))
+    start = replace(start, values=scaled_pinv(total[:-1, :-1]) @ total[:-1, -1])
+    better = instruments.fit(unloaded, (), settings, lengths, prior, start)
+    if not better.converged:
+        return None
+    for one in broken_bounds(better):
+        if one.distance is None or one.distance > better.quantile:
+            return None
+    checked = doubted_without_motor(better, unloaded, (), settings)
+    if checked is not better:
+        return None
+    return better.noted(Notice("INSTRUMENTS", numbers={"case": "passive"}))

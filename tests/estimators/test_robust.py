@@ -1,0 +1,341 @@
+"""The robust answer: closed forms, fixed points, least squares with the same prior, and scenes of
+endogenous torque and of feedback, each with the estimate or the warning that it needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algid.arm import FloatArray
+from algid.base.criteria import AT_REST
+from algid.estimators import instruments, robust, weak
+from algid.estimators.combine import LogInformation, Prior, joined, sandwich, scatters
+from algid.estimators.fit import Fit, finish
+from algid.estimators.parametrisation import Shared
+from algid.estimators.robust import Expected, Problem, _crossed, dispersion, shrink
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import TERMS, Model
+from algid.signals.segments import Segment
+from pipelines.disturbed import DT, NAMES, Scene, scene
+from pipelines.race_peers import even
+from pipelines.run_to_run import runs as runs_of
+
+from .conftest import Bench
+
+SETTINGS = WeakSettings(bandwidth=60.0)
+SHARED = Shared(Model(("offset",)))
+EXPECTED = Expected(
+    ("o1", "o2"), ("offset", "offset"), np.array([0.1, 0.0]), np.array([0.2, 0.4]), np.full(2, 0.5)
+)
+START = (np.zeros(9), np.ones(2))
+
+
+def _log(information: np.ndarray, estimate: np.ndarray, stretches: int = 4) -> LogInformation:
+    """A log whose likelihood has its maximum at `estimate`, with a diagonal information in equal
+    stretches.
+    """
+    S = np.diag(information) / stretches
+    return LogInformation(
+        False,
+        np.zeros(estimate.size),
+        np.stack([S] * stretches),
+        np.stack([S @ estimate] * stretches),
+    )
+
+
+def test_terms_are_drawn_to_what_is_expected_and_constants_are_not() -> None:
+    """With a diagonal information each estimate is the mean of log and prior, weighed by their
+    precisions.
+    """
+    information, estimate = np.linspace(50, 90, 9), np.linspace(1.0, 2.0, 9)
+    prior = EXPECTED.prior(np.ones(2))
+    beta, share = shrink(SHARED, EXPECTED, None, [_log(information, estimate)], START)
+    np.testing.assert_allclose(beta[:7], estimate[:7], rtol=1e-9)
+    # offsets of 2 are far beyond what is expected: the largest spread stands
+    assert np.all(share == 1.0)
+    weight = information[7:] / (information[7:] + np.diag(prior.precision))
+    np.testing.assert_allclose(
+        beta[7:], weight * estimate[7:] + (1 - weight) * EXPECTED.mean, rtol=1e-9
+    )
+
+
+def test_the_spread_is_a_fixed_point_of_expectation_and_maximisation() -> None:
+    information = np.full(9, 400.0)
+    estimate = np.array([*np.ones(7), 0.13, 0.02])
+    beta, share = shrink(SHARED, EXPECTED, None, [_log(information, estimate)], START)
+    variance = 1 / (information[7:] + 1 / (share * EXPECTED.spread) ** 2)
+    squares = ((beta[7:] - EXPECTED.mean) ** 2 + variance) / EXPECTED.spread**2
+    np.testing.assert_allclose(share**2, (squares.sum() + 0.25) / 3, rtol=5e-3)
+    assert share[0] == share[1] < 0.5  # one spread a term
+
+
+def test_what_is_expected_of_a_term_has_the_scale_of_the_arm() -> None:
+    """Of torques of 2 and 3 N m (RMS): shares of a joint's torque, of k3, of a moment, or of 1."""
+    shared = Shared(Model(tuple(name for name, term in TERMS.items() if term.spread)))
+    gram = np.zeros((1, 2, 1, 1))
+    gram[0, :, 0, 0] = 10 * np.array([2.0, 3.0]) ** 2
+    normal = weak.Normal(gram, 1e-3, 1000, np.array([10.0, 10.0]), np.ones(2))
+    beta = np.zeros(len(shared.names))
+    for name, value in (("k1", 0.1), ("k2", 0.5), ("k3", 0.02), ("k4", 4.0)):
+        beta[shared.names.index(name)] = value
+    expected = robust.expectation(shared, [normal], WeakSettings(shared.model), beta)
+    spreads = dict(zip(expected.names, expected.spread.tolist(), strict=True))
+    assert spreads["f1"] == pytest.approx(0.3 * 2)
+    assert spreads["f2"] == pytest.approx(0.3 * 3)
+    assert spreads["o2"] == pytest.approx(0.02 * 3)
+    assert spreads["j2"] == pytest.approx(0.02)
+    assert spreads["e1"] == spreads["e2"] == spreads["gain2"] == pytest.approx(0.03)
+    assert spreads["k2s"] == pytest.approx(0.5 * 0.5)
+    assert spreads["k4s"] == pytest.approx(0.5 * 4)
+
+
+def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
+    rng = np.random.default_rng(3)
+    logs = []
+    for _ in range(40):
+        S = np.stack([np.eye(9)] * 25)
+        logs.append(
+            LogInformation(False, np.zeros(9), S, np.sqrt(6.0) * rng.standard_normal((25, 9)))
+        )
+    # 9 · 39 squares: ± 7.6 %
+    assert dispersion(SHARED, logs, np.zeros(9)) == pytest.approx(6.0, rel=0.15)
+    quiet = [LogInformation(False, log.c0, log.S, log.g / 10) for log in logs]
+    assert dispersion(SHARED, quiet, np.zeros(9)) == 1.0
+    apart = [LogInformation(False, log.c0, log.S, log.g + rng.standard_normal(9)) for log in quiet]
+    # what differs from log to log alone
+    assert dispersion(SHARED, apart, np.zeros(9)) == pytest.approx(25.0, rel=0.2)
+
+
+def test_covariances_of_one_log_and_of_many() -> None:
+    """Of white scores all ways give the inverse information, the prior's part beside it."""
+    rng = np.random.default_rng(4)
+    prior = Prior(("o1", "o2"), np.zeros(2), np.diag([1e-9, 1e6]))
+    S = np.stack([np.eye(9)] * 30)
+    logs = [LogInformation(False, np.zeros(9), S, rng.standard_normal((30, 9))) for _ in range(60)]
+
+    def finished(logs: list[LogInformation]) -> Fit:
+        still = np.ones(2)
+        return finish(
+            "weak", SHARED, logs, np.zeros(9), still, prior, coloured=True, shrinkage=prior
+        )
+
+    many = finished(logs)
+    assert many.intervals == "jackknife"
+    # 60 squares a parameter: ± 18 %
+    np.testing.assert_allclose(np.diag(many.covariance)[:8], 1 / 1800, rtol=0.7)
+    assert np.mean(np.diag(many.covariance)[:8]) == pytest.approx(1 / 1800, rel=0.25)
+    assert many.covariance[8, 8] == pytest.approx(1e-6, rel=0.01)  # held by the prior, as wide
+    one = finished(logs[:1])
+    assert one.intervals == "sandwich"
+    # of one log nothing differs: half of it is the information's, half the sandwich's
+    meat, _ = sandwich(scatters(SHARED, logs[:1], one.values))
+    np.testing.assert_allclose(
+        np.diag(one.covariance)[:8], (1 / 30 + np.diag(meat)[:8] / 900) / 2, rtol=1e-6
+    )
+
+
+def test_two_priors_know_what_each_knows() -> None:
+    first = Prior(("k1", "k2"), np.array([1.0, 2.0]), np.array([[4.0, 1.0], [1.0, 3.0]]))
+    both = joined(first, EXPECTED.prior(np.ones(2)))
+    assert both.names == ("k1", "k2", "o1", "o2")
+    np.testing.assert_array_equal(both.precision[:2, :2], first.precision)
+    np.testing.assert_allclose(np.diag(both.precision)[2:], [25.0, 6.25])
+    assert not both.precision[:2, 2:].any()
+    assert joined(None, first) is first
+
+
+def least_squares(sources: Sequence[Source], settings: WeakSettings) -> Fit:
+    return Problem.of(sources, (), settings).least_squares()
+
+
+def _rubbing(bench: Bench, part: slice) -> Segment:
+    """A log of white noise and of Coulomb friction that only the torque feels."""
+    log = bench.log(sigma=1e-4).part(part.start, part.stop)
+    omega = np.gradient(log.theta, log.dt, axis=1)
+    return Segment(
+        log.start, log.dt, log.theta, log.tau + np.array([[0.05], [0.02]]) * np.tanh(omega / 0.2)
+    )
+
+
+def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
+    logs = [_rubbing(bench, slice(start, start + 1300)) for start in (0, 1300, 2600)]
+    sources: list[Source] = [partial(list, [log]) for log in logs]
+    settings = WeakSettings(bandwidth=60.0)
+    found = least_squares(sources, settings)
+    assert found.shrinkage is not None
+    still = AT_REST * weak.speeds(sources, settings)
+    same = WeakSettings(
+        found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1])
+    )
+    free = weak.fit(sources, settings=same)
+    phi = np.trace(free.logs[0].total[0]) / np.trace(found.logs[0].total[0])
+    prior = Prior(found.shrinkage.names, found.shrinkage.mean, phi * found.shrinkage.precision)
+    every = weak.fit(sources, settings=same, prior=prior)
+    assert every.names == found.names
+    # weights rest on another residual
+    np.testing.assert_allclose(every.values[:7], found.values[:7], rtol=6e-3)
+    np.testing.assert_allclose(found.values[:7], bench.truth[:7], rtol=5e-3)
+    friction = [found.values[found.names.index(name)] for name in ("f1", "f2")]
+    np.testing.assert_allclose(friction, [0.05, 0.02], rtol=0.1)
+
+
+def test_a_joint_that_stands_says_nothing(bench: Bench) -> None:
+    """Joint 2 is held by friction for a while: its torque is then what it happens to be, and moves
+    no estimate.
+    """
+    log = bench.log(sigma=1e-5)
+    held = log.theta.copy()
+    held[1, 2000:] = held[1, 2000]
+    torques = log.tau.copy()
+    found = []
+    for held_by in (0.0, 0.3):
+        torques[1, 2000:] = held_by
+        piece = Segment(0.0, log.dt, held, torques.copy())
+        normal = weak.normal_equations(partial(list, [piece]), WeakSettings(rest=(0.0, 0.5)))
+        assert normal is not None
+        assert 0.3 * normal.rows[0] < normal.rows[1] < 0.6 * normal.rows[0]
+        found.append(normal.gram[-len(normal.gram) // 4 :, 1])
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+def coloured(rng: np.random.Generator, keep: float, count: int) -> FloatArray:
+    """Two autoregressions (2, N) of unit variance."""
+    made = rng.standard_normal((2, count))
+    for place in range(1, count):
+        made[:, place] = keep * made[:, place - 1] + np.sqrt(1 - keep**2) * made[:, place]
+    return made
+
+
+def test_the_variance_of_a_cross_correlation_is_that_of_independent_series() -> None:
+    """Bartlett's: of 400 pairs of independent autoregressions of 0.8 and 0.9, each sum over its
+    deviation.
+    """
+    rng = np.random.default_rng(7)
+    found = []
+    for _ in range(200):
+        products, variance = _crossed(coloured(rng, 0.8, 400), coloured(rng, 0.9, 400))
+        found.append(products[2] / np.sqrt(variance))
+    spread = float(np.sqrt(np.mean(np.square(found))))
+    assert 0.8 < spread < 1.2  # 400 values of ± 4 %, and variances from 400 samples
+
+
+def sources_of(made: Scene, *, reference: bool = False) -> list[Source]:
+    asked = made.reference if reference and made.reference is not None else [None] * len(made.tau)
+    logs = [
+        Segment(0.0, DT, theta, tau, reference=one)
+        for theta, tau, one in zip(made.theta, made.tau, asked, strict=True)
+    ]
+
+    def source(log: Segment) -> Source:
+        return lambda: [log]
+
+    return [source(log) for log in logs[:4]]
+
+
+def settled(made: Scene, *, reference: bool = False) -> tuple[Fit, Fit]:
+    """By least squares, and what stands in the end."""
+    problem = Problem.of(sources_of(made, reference=reference), (), SETTINGS)
+    least = problem.least_squares()
+    return least, problem.instruments_if_endogenous(least)
+
+
+def off(fit: Fit, made: Scene) -> FloatArray:
+    """Errors of k1 … k5 in half widths of their intervals."""
+    places = [fit.names.index(name) for name in NAMES]
+    truth = made.arm.constants()[:5]
+    return np.abs(fit.values[places] - truth) / (fit.quantile * fit.std[places])
+
+
+@pytest.mark.slow
+def test_instruments_stand_where_the_torque_is_endogenous_and_answers_nothing() -> None:
+    made = scene(1, feedback=False)
+    least, found = settled(made)
+    assert off(least, made).max() > 1
+    assert found.estimator == "instruments"
+    assert off(found, made).max() < 1
+    assert [note.code for note in found.notes] == ["INSTRUMENTS"]
+
+
+@pytest.mark.slow
+def test_feedback_is_said_and_leaves_least_squares() -> None:
+    """The logged torque of a PD controller is no instrument."""
+    made = scene(1, feedback=True)
+    least, found = settled(made)
+    assert found.values == pytest.approx(least.values)
+    assert [note.code for note in found.notes] == ["FEEDBACK"]
+    problem = Problem.of(sources_of(made), (), SETTINGS)
+    by_instruments = problem.by_instruments(least, least.values)
+    assert by_instruments is not None
+    watched = robust.with_feedback_noted(by_instruments, sources_of(made), (), problem.settings)
+    assert [note.code for note in watched.notes] == ["FEEDBACK"]
+
+
+@pytest.mark.slow
+def test_a_reference_is_the_instrument_under_feedback() -> None:
+    """The same logs with the reference that the controller follows: no warning, and closer."""
+    made = scene(1, feedback=True)
+    least, found = settled(made, reference=True)
+    assert found.estimator == "instruments"
+    assert [note.code for note in found.notes] == ["INSTRUMENTS"]
+    assert off(found, made).max() < 1
+    assert off(found, made)[0] < 0.5 * off(least, made)[0]  # k1 is attenuated most
+    sources = sources_of(made, reference=True)
+    assert robust.with_feedback_noted(found, sources, (), SETTINGS).notes == found.notes
+    asked = instruments.fit(sources_of(made, reference=True), settings=SETTINGS)
+    by_torque = instruments.fit(sources_of(made), settings=SETTINGS)
+    truth = made.arm.constants()[:5]
+    error, worse = (np.abs(fit.values[:5] / truth - 1).mean() for fit in (asked, by_torque))
+    assert error < 0.5 * worse
+
+
+@pytest.mark.slow
+def test_an_arm_without_unmodelled_torque_keeps_least_squares() -> None:
+    made = scene(2, feedback=True, share=0.0)
+    least, found = settled(made)
+    assert found.notes == ()
+    assert found.values == pytest.approx(least.values)
+    assert found.endogeneity is not None
+
+
+def rubbing(bench: Bench) -> Source:
+    """A log whose torque has a disturbance that no term holds."""
+    log = bench.log(sigma=1e-4)
+    disturbed = replace(log, tau=log.tau + 0.02 * np.sin(40 * log.theta))
+    return lambda: [disturbed]
+
+
+def test_the_covariance_grows_by_the_mean_square_of_what_other_windows_move(bench: Bench) -> None:
+    problem = Problem.of([rubbing(bench)], (), WeakSettings())
+    least = problem.least_squares()
+    found = problem.with_window_scatter(least, least)
+    moved = [problem.least_squares(window).values - least.values for window in (0.5, 2.0)]
+    grown = found.covariance - least.covariance
+    assert grown == pytest.approx((np.outer(*2 * moved[:1]) + np.outer(*2 * moved[1:])) / 2)
+    assert np.array_equal(found.values, least.values)
+    many = replace(least, intervals="jackknife")
+    assert problem.with_window_scatter(many, least) is many
+    open_ = replace(least, status=("NOT_IDENTIFIABLE", *least.status[1:]))
+    grown = problem.with_window_scatter(open_, open_).covariance - open_.covariance
+    assert not grown[0].any()
+    assert grown[1, 1] > 0
+
+
+@pytest.mark.slow
+def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) -> None:
+    """Run 7 of design A.0 was 3.9 standard deviations of the difference off."""
+    runs = [even(log) for log in runs_of(shared_data, "A.0")]
+    alone = Problem.of([partial(list, [runs[6]])], (), WeakSettings())
+    least = alone.least_squares()
+    others: list[Source] = [partial(list, [run]) for place, run in enumerate(runs) if place != 6]
+    rest = least_squares(others, WeakSettings())
+    found = alone.with_window_scatter(least, least)
+    places = [found.names.index(name) for name in NAMES]
+    away = np.abs(found.values - rest.values)[places]
+    assert np.max(away / np.hypot(least.std, rest.std)[places]) > 3
+    assert np.max(away / np.hypot(found.std, rest.std)[places]) < 3
