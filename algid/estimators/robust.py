@@ -128,7 +128,7 @@ def fit(
     ValueError
         If no log is long enough for a window, or there is neither an unloaded log nor `known`.
     """
-    problem = Problem.of(unloaded, loaded, settings or WeakSettings(), lengths, known)
+    problem = RobustProblem.of(unloaded, loaded, settings or WeakSettings(), lengths, known)
     least = problem.least_squares()
     return problem.with_window_scatter(problem.instruments_if_endogenous(least), least)
 
@@ -154,7 +154,7 @@ class Expected:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class RobustProblem:
     """Logs that are long enough, with what all estimates on them have in common.
 
     Parameters
@@ -186,7 +186,7 @@ class Problem:
         settings: WeakSettings,
         lengths: Mapping[str, float] | None = None,
         known: Prior | None = None,
-    ) -> Problem:
+    ) -> RobustProblem:
         """See `fit`."""
         bare = replace(settings, model=replace(settings.model, terms=()), estimate_delay=False)
         long_enough: dict[bool, list[Source]] = {False: [], True: []}

@@ -18,7 +18,7 @@ from algid.estimators import instruments, robust, weak
 from algid.estimators.combine import LogInformation, Prior, joined, sandwich, scatters
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
-from algid.estimators.robust import Expected, Problem, _crossed, dispersion, shrink
+from algid.estimators.robust import Expected, RobustProblem, _crossed, dispersion, shrink
 from algid.estimators.weak import Source, WeakSettings
 from algid.model import TERMS, Model
 from algid.signals.segments import Segment
@@ -151,7 +151,7 @@ def test_two_priors_know_what_each_knows() -> None:
 
 
 def least_squares(sources: Sequence[Source], settings: WeakSettings) -> Fit:
-    return Problem.of(sources, (), settings).least_squares()
+    return RobustProblem.of(sources, (), settings).least_squares()
 
 
 def _rubbing(bench: Bench, part: slice) -> Segment:
@@ -240,7 +240,7 @@ def sources_of(made: Scene, *, reference: bool = False) -> list[Source]:
 
 def settled(made: Scene, *, reference: bool = False) -> tuple[Fit, Fit]:
     """By least squares, and what stands in the end."""
-    problem = Problem.of(sources_of(made, reference=reference), (), SETTINGS)
+    problem = RobustProblem.of(sources_of(made, reference=reference), (), SETTINGS)
     least = problem.least_squares()
     return least, problem.instruments_if_endogenous(least)
 
@@ -269,7 +269,7 @@ def test_feedback_is_said_and_leaves_least_squares() -> None:
     least, found = settled(made)
     assert found.values == pytest.approx(least.values)
     assert [note.code for note in found.notes] == ["FEEDBACK"]
-    problem = Problem.of(sources_of(made), (), SETTINGS)
+    problem = RobustProblem.of(sources_of(made), (), SETTINGS)
     by_instruments = problem.by_instruments(least, least.values)
     assert by_instruments is not None
     watched = robust.with_feedback_noted(by_instruments, sources_of(made), (), problem.settings)
@@ -311,7 +311,7 @@ def rubbing(bench: Bench) -> Source:
 
 
 def test_the_covariance_grows_by_the_mean_square_of_what_other_windows_move(bench: Bench) -> None:
-    problem = Problem.of([rubbing(bench)], (), WeakSettings())
+    problem = RobustProblem.of([rubbing(bench)], (), WeakSettings())
     least = problem.least_squares()
     found = problem.with_window_scatter(least, least)
     moved = [problem.least_squares(window).values - least.values for window in (0.5, 2.0)]
@@ -330,7 +330,7 @@ def test_the_covariance_grows_by_the_mean_square_of_what_other_windows_move(benc
 def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) -> None:
     """Run 7 of design A.0 was 3.9 standard deviations of the difference off."""
     runs = [even(log) for log in runs_of(shared_data, "A.0")]
-    alone = Problem.of([partial(list, [runs[6]])], (), WeakSettings())
+    alone = RobustProblem.of([partial(list, [runs[6]])], (), WeakSettings())
     least = alone.least_squares()
     others: list[Source] = [partial(list, [run]) for place, run in enumerate(runs) if place != 6]
     rest = least_squares(others, WeakSettings())
