@@ -68,8 +68,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
                        "readers signals units", "numpy"),
     "report": room(
-        "arm arrow blocks criteria errors files inspection methods model notices options progress "
-        "quantiles results ros2 significance text verdict words",
+        "arm arrow blocks criteria errors files inspection log methods model notices options "
+        "progress quantiles results ros2 significance text verdict words writers",
         "jinja2 markupsafe mcap numpy plotly pyarrow rich"
     ),
     "check": room("errors files options results", "pydantic"),

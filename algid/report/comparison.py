@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,115 +14,133 @@ import numpy as np
 from algid import __version__
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
-from algid.base.text import (
-    ABSENT,
-    file_name,
-    formatted,
-    joined,
-    resolved,
-    significant,
-    unit_text,
-    visible,
-)
+from algid.base.text import ABSENT, file_name, formatted, joined, percent, visible
 from algid.base.verdict import Verdict
 from algid.base.words import counted
-from algid.report.document import Document, Kind, Section, Table
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot
+from algid.report.document import Document, Section, Table
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot, names_down
 from algid.report.render import page
 from algid.report.tables import flat_settings
-from algid.results import Estimate, LogSummary, Result, Status
+from algid.results import Estimate, Result
+from algid.results.rows import row_of
 
 NAME = "compare.html"
 FAR = sigmas()
 """σ, beyond which chance does not explain a difference."""
-LOOKS = tuple(
-    zip(
-        (BLUE, ORANGE, GREEN, RED, GREY), ("circle", "square", "diamond", "x", "cross"), strict=True
-    )
-)
+COLOURS = (BLUE, ORANGE, GREEN, RED, GREY)
+SYMBOLS = ("circle", "square", "diamond", "x", "cross")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
-    """Results side by side: estimates, their distances from the first one's, other settings.
-
-    `sigma` holds, by parameter, the distance of each result from the first; None where either has
-    no estimate or no interval.
-    """
+    """Results side by side; the first one is what the others are measured against."""
 
     labels: tuple[str, ...]
-    sigma: dict[str, tuple[float | None, ...]]
-    estimates: Table
-    settings: Table
-    results: tuple[Result, ...] = ()
+    results: tuple[Result, ...]
 
     def __repr__(self) -> str:
         far = self.largest_sigma
         largest = "no distance" if far is None else f"the largest distance {far:.1f} σ"
         return f"Comparison({', '.join(self.labels)}: {largest})"
 
-    def tables(self) -> tuple[Table, Table]:
-        """The estimates side by side, and what was set otherwise."""
-        return self.estimates, self.settings
+    @cached_property
+    def by_name(self) -> dict[str, list[Estimate | None]]:
+        """The estimates of each parameter that any of the results has."""
+        names = dict.fromkeys(name for one in self.results for name in one.estimates)
+        return {name: [one.estimates.get(name) for one in self.results] for name in names}
 
-    def as_json(self) -> str:
-        """Estimates, 95 % intervals and distances in σ as the text of a JSON file."""
-        parameters = {}
-        for name, distances in self.sigma.items():
-            every = [result.estimates.get(name) for result in self.results]
-            parameters[name] = {
-                "estimate": [None if one is None else one.estimate for one in every],
-                "std": [None if one is None else one.std for one in every],
-                "ci95": [None if one is None else one.ci95 for one in every],
-                "sigma": (None, *distances),
-            }
-        count = len(self.labels)
-        settings = {}
-        for first in range(0, len(self.settings.rows), count):
-            rows = self.settings.rows[first : first + count]
-            settings[rows[0][0]] = [row[-1] for row in rows]
-        content = {"labels": list(self.labels), "parameters": parameters, "settings": settings}
-        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    @cached_property
+    def sigma(self) -> dict[str, tuple[float | None, ...]]:
+        """By parameter the distance of each other result from the first one, in σ."""
+        pairs = self.by_name.items()
+        return {name: tuple(distance(first, one) for one in rest) for name, (first, *rest) in pairs}
+
+    @cached_property
+    def far(self) -> list[tuple[float, str]]:
+        """The size of each distance that is known, the largest first, and what it is of."""
+        found = []
+        for name, row in self.sigma.items():
+            for label, far in zip(self.labels[1:], row, strict=True):
+                if far is not None:
+                    found.append((abs(far), f"{visible(name)} of {label} ({far:+.1f} σ)"))
+        return sorted(found, reverse=True)
 
     @property
     def largest_sigma(self) -> float | None:
         """The largest distance, None where there is none."""
-        return max(map(abs, self.distances()), default=None)
+        return self.far[0][0] if self.far else None
 
-    def distances(self) -> list[float]:
-        """Every distance that is known, in the order of the parameters."""
-        return [distance for row in self.sigma.values() for distance in row if distance is not None]
+    @cached_property
+    def settings(self) -> dict[str, list[str]]:
+        """What was set otherwise, and how the first log of each kind was read otherwise."""
+        every = list(map(_settings, self.results))
+        names = dict.fromkeys(name for settings in every for name in settings)
+        rows = {name: [settings.get(name, ABSENT) for settings in every] for name in names}
+        return {name: values for name, values in rows.items() if len(set(values)) > 1}
+
+    def tables(self) -> tuple[Table, Table]:
+        """The estimates one below the other, as wide for many results as for two; the settings."""
+        estimates, settings = [], []
+        for name, several in self.by_name.items():
+            first = several[0]
+            for label, one, far in zip(
+                self.labels, several, (None, *self.sigma[name]), strict=True
+            ):
+                if one is None:
+                    continue
+                row, change = row_of(name, one), ABSENT
+                if one is not first and first and first.estimate and one.estimate is not None:
+                    change = percent(one.estimate - first.estimate, first.estimate, 3)
+                number = (row.with_half, row.unit, row.status)
+                estimates.append((row.name, label, *number, formatted(far, "+.1f"), change))
+        for name, values in self.settings.items():
+            for label, value in zip(self.labels, values, strict=True):
+                settings.append((visible(name), label, visible(value)))
+        note = f"Differences are against {self.labels[0]}; ± is 95 %, σ combines both intervals."
+        same = "Every setting is the same, and every log was read the same way."
+        return (
+            Table(
+                "Estimates side by side",
+                {
+                    "Parameter": "name", "Result": "text", "Estimate": "number", "Unit": "text",
+                    "Status": "status", "Δ/σ": "number", "Δ %": "number",
+                },
+                tuple(estimates),
+                note,
+            ),
+            Table(
+                "Settings that differ",
+                {"Setting": "name", "Result": "text", "Value": "text"},
+                tuple(settings),
+                "" if settings else same,
+            ),
+        )  # fmt: skip
+
+    def as_json(self) -> str:
+        """Estimates, 95 % intervals and distances in σ as the text of a JSON file."""
+        parameters = {}
+        for name, several in self.by_name.items():
+            numbers = {
+                key: [None if one is None else getattr(one, key) for one in several]
+                for key in ("estimate", "std", "ci95")
+            }
+            parameters[name] = numbers | {"sigma": [None, *self.sigma[name]]}
+        content = {"labels": self.labels, "parameters": parameters, "settings": self.settings}
+        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> Comparison:
-    """Lay `results` side by side; the first one is what the others are measured against.
+    """Lay two `results` or more side by side.
 
-    Parameters
-    ----------
-    results : at least two results
-    labels : what to call them, by default the names of their first logs
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than two results or not a label each.
+    `labels` are what to call them, by default the names of their first logs.
     """
-    if len(results) < 2:
-        raise ValueError(f"a comparison needs at least two results, got {len(results)}")
-    if labels is not None and len(labels) != len(results):
-        raise ValueError(f"labels must name {counted(len(results), 'result')}, got {len(labels)}")
     shown = list(map(visible, labels or [file_name(result.log.path) for result in results]))
     if len(set(shown)) < len(shown):
         shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
-    first, sigma = results[0].estimates, dict[str, tuple[float | None, ...]]()
-    for name in dict.fromkeys(name for result in results for name in result.estimates):
-        others = [result.estimates.get(name) for result in results[1:]]
-        sigma[name] = tuple(distance_sigma(first.get(name), other) for other in others)
-    tables = _estimates(results, shown, sigma), _settings(results, shown)
-    return Comparison(tuple(shown), sigma, *tables, tuple(results))
+    return Comparison(tuple(shown), tuple(results))
 
 
-def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | None:
+def distance(first: Estimate | None, other: Estimate | None) -> float | None:
     """Signed distance of `other` from `first` over their combined half intervals, in σ.
 
     Of normal intervals that is their combined standard deviation. Of Student's it is larger, so
@@ -135,84 +154,18 @@ def distance_sigma(first: Estimate | None, other: Estimate | None) -> float | No
     return (other.estimate - first.estimate) / combined if combined else None
 
 
-def _estimates(
-    results: Sequence[Result], labels: list[str], sigma: dict[str, tuple[float | None, ...]]
-) -> Table:
-    """The estimates one below the other: as wide for many results as for two."""
-    rows = []
-    for name, distances in sigma.items():
-        first = results[0].estimates.get(name)
-        for label, result, far in zip(labels, results, (None, *distances), strict=True):
-            one, change = result.estimates.get(name), None
-            if one is None:
-                continue
-            if (
-                first is not None
-                and one is not first
-                and first.estimate
-                and one.estimate is not None
-            ):
-                change = 100 * (one.estimate - first.estimate) / abs(first.estimate)
-            off = (formatted(far, "+.1f"), formatted(change, "+.3g"))
-            rows.append((visible(name), label, _with_half(one), unit_text(one.unit), *off))
-    note = f"Differences are against {labels[0]}; ± is 95 %, σ combines both intervals."
-    columns: dict[str, Kind] = {
-        "Parameter": "name", "Result": "text", "Estimate": "number", "Unit": "text",
-        "Δ/σ": "number", "Δ %": "number",
-    }  # fmt: skip
-    return Table("Estimates side by side", columns, tuple(rows), note)
-
-
-def _with_half(estimate: Estimate) -> str:
-    """``estimate ± half its 95 % interval``, and the status where it is not OK."""
-    text = resolved(estimate.estimate, estimate.std)
-    if estimate.half is not None:
-        text += f" ± {significant(estimate.half, 2)}"
-    if estimate.status != Status.OK:
-        text += f" ({estimate.status.value})"
-    return text
-
-
-def _settings(results: Sequence[Result], labels: list[str]) -> Table:
-    """What was set otherwise, and how the first log of each kind was read otherwise."""
-    roles = set.intersection(*({log.role for log in result.logs} for result in results))
-    every = []
-    for result in results:
-        settings = flat_settings(result.settings)
-        settings.pop("command", None)  # it names the logs, and says again what is set
-        settings |= {"estimator": result.estimator, "algid": result.version}
-        firsts = {log.role: log for log in reversed(result.logs)}
-        for role, log in sorted(firsts.items(), reverse=True):  # the unloaded one first
-            if role not in roles:
-                settings[f"{role} log"] = file_name(log.path)
-                continue
-            settings |= {f"{role} log: {name}": text for name, text in _read(log).items()}
-        every.append(settings)
-    rows = []
-    for name in dict.fromkeys(name for settings in every for name in settings):
-        values = [settings.get(name, ABSENT) for settings in every]
-        if len(set(values)) > 1:
-            for label, value in zip(labels, values, strict=True):
-                rows.append((visible(name), label, visible(value)))
-    note = "" if rows else "Every setting is the same, and every log was read the same way."
-    columns: dict[str, Kind] = {"Setting": "name", "Result": "text", "Value": "text"}
-    return Table("Settings that differ", columns, tuple(rows), note)
-
-
-def _read(log: LogSummary) -> dict[str, str]:
-    """How a log was read, a channel in one cell; who said so is no difference."""
-    if log.reading is None:
-        return {}
-    plain = asdict(log.reading)
-    read: dict[str, str] = {}
-    for name, one in plain.pop("channels").items():
-        # of a velocity the unit is stated as its angle's
-        unit = f"{one['unit']}/s" if name.startswith("omega") else one["unit"]
-        factor = "" if one["factor"] == 1 else f", times {one['factor']:.6g}"
-        offset = "" if one["offset"] == 0 else f", {one['offset']:+.6g}"
-        read[name] = f"{one['source']}, {unit}{factor}{offset}"
-    del plain["joints_told"]
-    return read | {name: text or ABSENT for name, text in flat_settings(plain).items()}
+def _settings(result: Result) -> dict[str, str]:
+    """How a result was made: its settings, and how the first log of each kind was read."""
+    settings = flat_settings(result.settings)
+    settings.pop("command", None)  # it names the logs, and says again what is set
+    settings |= {"estimator": result.estimator, "algid": result.version}
+    for log in reversed(result.logs):
+        if log.reading is not None:
+            for name, text in flat_settings(asdict(log.reading)).items():
+                # who said so is no difference
+                if not name.endswith("told"):
+                    settings[f"{log.role} log: {name.removeprefix('channels.')}"] = text or ABSENT
+    return settings
 
 
 def write_comparison(found: Comparison, path: Path, force: bool) -> None:
@@ -223,47 +176,37 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
     OutputError
         If it cannot be written, or exists and `force` is not set.
     """
-    with whole_file(path, force=force) as temporary:
-        temporary.write_text(page(comparison_document(found)), encoding="utf-8")
-
-
-def comparison_document(found: Comparison) -> Document:
-    """The report of a comparison."""
-    names, count = found.labels, counted(len(found.results), "result")
-    distances = [_distances(found)] if found.distances() else []
-    return Document(
+    names, (estimates, settings) = found.labels, found.tables()
+    figures = [_distances(found)] if found.far else []
+    document = Document(
         title="Comparison",
         verdict=verdict(found),
         sections=(
-            Section("numbers", "Differences", (*distances, found.estimates)),
-            Section("settings", "Settings that differ", (found.settings,)),
+            Section("numbers", "Differences", (*figures, estimates)),
+            Section("settings", "Settings that differ", (settings,)),
         ),
         kicker="results side by side",
         name=joined(list(names)) if len(names) < 4 else f"{names[0]} and {len(names) - 1} more",
-        facts=f"{count} · measured against {names[0]}",
+        facts=f"{counted(len(names), 'result')} · measured against {names[0]}",
         made=f"Made by algid {__version__}.",
     )
+    with whole_file(path, force=force) as temporary:
+        temporary.write_text(page(document), encoding="utf-8")
 
 
 def verdict(found: Comparison) -> Verdict:
     """Whether the results agree: distances beyond `FAR` are named, the largest first."""
-    distances = []
-    for name, row in found.sigma.items():
-        for other, distance in zip(found.labels[1:], row, strict=True):
-            if distance is not None:
-                words = f"{visible(name)} of {other} ({distance:+.1f} σ)"
-                distances.append((abs(distance), words))
-    if not distances:
+    if not found.far:
         return Verdict("reservations", "no parameter has error bars in two results")
-    far = [words for size, words in sorted(distances, reverse=True) if size > FAR]
-    if far:
-        more = f" and {len(far) - 3} more" if len(far) > 3 else ""
-        differ = "differs" if len(far) == 1 else "differ"
-        headline = f"{joined(far[:3])}{more} {differ} by more than {FAR:.2g} σ"
+    beyond = [words for size, words in found.far if size > FAR]
+    if beyond:
+        more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
+        differ = "differs" if len(beyond) == 1 else "differ"
+        headline = f"{joined(beyond[:3])}{more} {differ} by more than {FAR:.2g} σ"
         return Verdict("reservations", headline, title="Different")
-    inside = sum(size <= NORMAL for size, _ in distances)
-    within = f"{inside} of {counted(len(distances), 'difference')} within {NORMAL:.2f} σ"
-    return Verdict("good", f"{within}; the largest is {max(distances)[1]}")
+    inside = sum(size <= NORMAL for size, _ in found.far)
+    within = f"{inside} of {counted(len(found.far), 'difference')} within {NORMAL:.2f} σ"
+    return Verdict("good", f"{within}; the largest is {found.far[0][1]}")
 
 
 def _distances(found: Comparison) -> Plot:
@@ -272,11 +215,10 @@ def _distances(found: Comparison) -> Plot:
     panels = Panels([f"Distance from {found.labels[0]}, σ"], height=70 + 24 * len(names))
     for place, label in enumerate(found.labels[1:]):
         far = np.array([found.sigma[name][place] for name in names], dtype=np.float64)
-        colour, symbol = LOOKS[place % len(LOOKS)]
-        panels.dots(0, far, names, label, colour, 8, symbol)
+        look = COLOURS[place % len(COLOURS)], 8, SYMBOLS[place % len(SYMBOLS)]
+        panels.dots(0, far, names, label, *look)
     reach = max(1.1 * (found.largest_sigma or 0.0), 4.0)
-    order = {"type": "category", "categoryarray": names, "autorange": "reversed"}
-    panels.axes(0, {"range": [-reach, reach]}, order)
+    panels.axes(0, {"range": [-reach, reach]}, names_down(names))
     panels.stretch(0, -NORMAL, NORMAL, BLUE)
     reading = f"Within the band, ± {NORMAL:.2f} σ, chance alone puts 19 of 20 differences."
     return Plot("distances", "Distances in σ", panels, reading)

@@ -12,7 +12,7 @@ from algid.base.words import counted
 from algid.methods import settles
 from algid.report.arm import arm_of
 from algid.report.document import Content, Document, Section
-from algid.report.figures import figures, intervals, of_paper
+from algid.report.figures import Figures, intervals
 from algid.report.plot import Plot
 from algid.report.render import markdown, page, write_library, write_texts
 from algid.report.series import Drawn, drawn
@@ -68,52 +68,43 @@ def result_document(
     """The report of an identification; with its `folder` also the figures and its samples."""
     fit, leads = result.fit, settles(result.estimator)
     names = [file_name(log.path) for log in result.logs]
+    first, fitted, terms = list[Content](arm_tables(result)), tuple[Content, ...](), list[Content]()
+    plots, samples, paper = list[Content](), list[Content](), list[Content]()
     raw: Drawn | None = None
-    lost: list[Content] = []
-    plots: list[Content] = []
-    paper: list[Content] = []
-    samples: list[Content] = []
+    other, zero = nuisance_tables(result)
     if folder is not None:
         if (folder / "torque.parquet").is_file():
             try:
                 raw = drawn(folder / "torque.parquet", progress=progress)
-                samples.append(samples_table(raw.logs, names))
+                samples = [samples_table(raw.logs, names)]
             except ResultError as error:
-                lost.append(f"Not shown: {error}.")
-        plots, paper = [*lost, *figures(folder, result, raw)], list(of_paper(folder, result))
-    first: list[Content] = [*arm_tables(result)]
-    other, zero = nuisance_tables(result)
-    if folder is not None and fit is not None:
-        first.append(intervals(result))
+                plots = [f"Not shown: {error}."]
+        drawings = Figures(folder, result, raw)
+        plots, paper = [*plots, *drawings], list(drawings.of_paper())
     if fit is not None:
-        first.append(prediction_table(fit))
-    may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
-    paper += paper_tables(result)
-    of_paper_section = Section("paper", "The paper's figure and tables", tuple(paper), not leads)
-    terms: list[Content] = [other]
-    if fit is not None:
-        terms.append(terms_table(fit))
+        first += [*([] if folder is None else [intervals(result)]), prediction_table(fit)]
+        fitted, terms = fit_tables(fit), [terms_table(fit)]
+    parts = []
+    for place, one in enumerate(plots):
+        key, title = (one.key, one.title) if isinstance(one, Plot) else (f"lost-{place}", "Figure")
+        parts.append(Section(key, title, (one,)))
     notes = tuple(one.sentence for one in result.verdict.notes)
+    quality, origin = (notes, *samples, *log_tables(result.logs)), result_provenance(result)
+    title = "The paper's figure and tables"
+    of_paper = Section("paper", title, (*paper, *paper_tables(result)), not leads)
+    may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
     sections = [
         Section("numbers", "Numbers", tuple(first)),
-        *([of_paper_section] if leads else []),
-        *_parts(plots[:1]),
-        Section("terms", "Other terms of the torque", tuple(terms)),
+        *([of_paper] if leads else []),
+        *parts[:1],
+        Section("terms", "Other terms of the torque", (other, *terms)),
         Section("zero", may_be, (zero,), folded=True),
-        *_parts(plots[1:]),
-        Section(
-            "fit",
-            "Noise, whiteness and bounds",
-            () if fit is None else fit_tables(fit),
-            folded=True,
-        ),
-        Section("data", "Data quality", (notes, *samples, *log_tables(result.logs)), folded=True),
-        Section(
-            "settings", "Settings and provenance",
-            (used_settings(result), result_provenance(result)), folded=True,
-        ),
-        *([] if leads else [of_paper_section]),
-    ]  # fmt: skip
+        *parts[1:],
+        Section("fit", "Noise, whiteness and bounds", fitted, folded=True),
+        Section("data", "Data quality", quality, folded=True),
+        Section("settings", "Settings and provenance", (used_settings(result), origin), True),
+        *([] if leads else [of_paper]),
+    ]
     constants = [one.usable for name, one in result.parameters.items() if name in CONSTANT_NAMES]
     seconds = significant(sum(log.duration for log in result.logs), 4)
     return Document(
@@ -129,12 +120,3 @@ def result_document(
         made=f"Made by algid {result.version} from result.json.",
         arm=arm_of(result, raw),
     )
-
-
-def _parts(plots: list[Content]) -> list[Section]:
-    """A section a figure."""
-    parts = []
-    for place, one in enumerate(plots):
-        key, title = (one.key, one.title) if isinstance(one, Plot) else (f"lost-{place}", "Figure")
-        parts.append(Section(key, title, (one,)))
-    return parts

@@ -168,6 +168,11 @@ class Panels:
         return refs | {f"{open_way}0": 0, f"{open_way}1": 1} | ends
 
 
+def names_down(names: Sequence[str]) -> dict[str, Any]:
+    """An axis of names, the first one at the top."""
+    return {"type": "category", "categoryarray": list(names), "autorange": "reversed"}
+
+
 def ref(name: str, place: int) -> str:
     """What plotly calls an axis of a panel: x, x2, x3."""
     return f"{name}{place + 1}" if place else name

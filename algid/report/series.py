@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.arrow import numbers_of
@@ -67,17 +68,10 @@ def blocks(
         If the file cannot be read, lacks a column, or a number in a `finite` one.
     """
     with _parquet(path) as file:
-        known = file.schema_arrow.names
-        absent = [name for name in names if name not in known]
-        if absent:
-            raise ResultError(
-                f"{path}: expected a column {absent[0]!r}, found none; identify again with this "
-                "version"
-            )
-        for batch in file.iter_batches(batch_size=rows, columns=list(names or known)):
+        for batch in file.iter_batches(batch_size=rows, columns=list(names) or None):
             block: Block = {name: numbers_of(batch.column(name)) for name in batch.schema.names}
-            for name in finite & block.keys():
-                if not np.all(np.isfinite(block[name])):
+            for name in (*names, *(finite & block.keys())):
+                if name not in block or (name in finite and not np.isfinite(block[name]).all()):
                     raise ResultError(
                         f"{path}: column {name!r}: expected a number in every row; identify again "
                         "with this version"
@@ -95,11 +89,12 @@ def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
                 yield int(log[first]), rows_of(block, slice(first, last))
 
 
-def table(path: Path) -> dict[str, list[Any]]:
-    """The columns of a small file. Raises `ResultError` where it cannot be read."""
+def table(path: Path) -> dict[str, NDArray[Any]]:
+    """The columns of a small file, none where it is not there. Raises `ResultError`."""
+    if not path.is_file():
+        return {}
     with _parquet(path) as file:
-        columns: dict[str, list[Any]] = file.read().to_pydict()
-        return columns
+        return {name: np.array(values) for name, values in file.read().to_pydict().items()}
 
 
 def facts_of(path: Path) -> tuple[list[str], int, dict[bytes, bytes]]:
@@ -113,7 +108,7 @@ class LogFacts:
     """One log: its times in s and samples, and each joint's largest residual with its time."""
 
     first: float
-    last: float = 0.0
+    last: float
     samples: int = 0
     period: float = np.nan
     largest_step: float = 0.0
@@ -123,18 +118,16 @@ class LogFacts:
     def add(self, part: Block) -> None:
         """Take the next samples."""
         t = part["t"]
-        steps = np.diff(t, prepend=self.last if self.samples else t[0])
+        steps = np.diff(t, prepend=self.last)
         if np.isnan(self.period) and t.size > 1:
             self.period = median(steps[1:])
-        self.samples += t.size
-        self.last = float(t[-1])
+        self.samples, self.last = self.samples + t.size, float(t[-1])
         self.largest_step = max(self.largest_step, float(steps.max()))
         self.gaps += int(np.count_nonzero(steps > CUT * self.period))
-        for joint in (1, 2):
+        for joint, worst in enumerate(self.worst, start=1):
             size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
             place = int(size.argmax())
-            if size[place] > self.worst[joint - 1][0]:
-                self.worst[joint - 1] = float(size[place]), float(t[place])
+            self.worst[joint - 1] = max(worst, (float(size[place]), float(t[place])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,16 +172,15 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     samples: list[Block] = []
     logs: dict[int, LogFacts] = {}
     for log, part in by_log(blocks(path)):
-        for joint in (1, 2):
-            if f"tau{joint}_predicted" in part:
-                part[f"residual{joint}"] = part[f"tau{joint}"] - part[f"tau{joint}_predicted"]
+        with_residuals(part)
         part["log"] = np.full(part["t"].size, float(log))
-        logs.setdefault(log, LogFacts(float(part["t"][0]))).add(part)
+        start = float(part["t"][0])
+        logs.setdefault(log, LogFacts(start, start)).add(part)
         # which sample of a stretch moves by the golden ratio: never in step with the motion
         at = np.arange(0, part["t"].size, step)
         at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), part["t"].size - 1)
         samples.append({name: part[name][at] for name in ("log", *MOTION) if name in part})
-        parts.append(_reduced(part, size))
+        parts.append(reduced(part, size))
         if progress is not None:
             progress("report", sum(one.samples for one in logs.values()), total)
     if not parts:
@@ -209,7 +201,7 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     return Drawn(columns, logs, concatenated(samples))
 
 
-def _reduced(part: Block, size: int) -> Block:
+def reduced(part: Block, size: int) -> Block:
     """Smallest and largest of each `size` samples, in turn."""
     if size <= 2:
         return part
@@ -224,15 +216,26 @@ def _reduced(part: Block, size: int) -> Block:
 def between(path: Path, log: int, low: float, high: float) -> Block:
     """Every sample of a log with t in [low, high]; row groups elsewhere are not read."""
     with _parquet(path) as file:
-        place = {name: i for i, name in enumerate(file.schema_arrow.names)}
-
-        def may_hold(group: int, name: str, low: float, high: float) -> bool:
-            own = file.metadata.row_group(group).column(place[name]).statistics
-            return own is None or bool(own.min <= high and own.max >= low)
-
-        groups = range(file.num_row_groups)
-        wanted = [g for g in groups if may_hold(g, "log", log, log) and may_hold(g, "t", low, high)]
+        names, wanted = file.schema_arrow.names, []
+        for group in range(file.num_row_groups):
+            columns = [
+                file.metadata.row_group(group).column(names.index(of)) for of in ("log", "t")
+            ]
+            own = [column.statistics for column in columns]
+            ends = zip(own, (log, low), (log, high), strict=True)
+            if all(
+                one is None or (one.min <= last and one.max >= first) for one, first, last in ends
+            ):
+                wanted.append(group)
         rows = file.read_row_groups(wanted)
         block = {name: numbers_of(rows[name].combine_chunks()) for name in rows.column_names}
     near = (block["log"] == log) & (block["t"] >= low) & (block["t"] <= high)
-    return rows_of(block, near)
+    return with_residuals(rows_of(block, near))
+
+
+def with_residuals(part: Block) -> Block:
+    """The block with what the prediction leaves of each torque, where it holds one."""
+    for joint in (1, 2):
+        if f"tau{joint}_predicted" in part:
+            part[f"residual{joint}"] = part[f"tau{joint}"] - part[f"tau{joint}_predicted"]
+    return part

@@ -1,6 +1,7 @@
 """Tables of a result: its estimates, then fit, logs, settings and provenance.
 
-A column that holds nothing but dashes is dropped, so that a table says only what is known.
+A column that holds nothing but dashes is dropped, so that a table says only what is known. What
+shows a table makes its text visible.
 """
 
 from __future__ import annotations
@@ -17,20 +18,18 @@ from algid.base.text import (
     resolved,
     significant,
     unit_text,
-    visible,
     yes_or_no,
 )
 from algid.methods import settles
 from algid.model import DELAYS
 from algid.notices import NAMED
-from algid.report.document import Kind, Table
+from algid.report.document import Table
 from algid.report.phasors import moments
 from algid.report.series import LogFacts
 from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
 from algid.results.rows import known_truth, rows_of
 from algid.results.verdict import replaced_estimator
 
-LONGEST_VALUE = 4_000  # characters: a command that names many logs is there to be copied
 CONVENTIONS = ("zero", "second_angle", "drive", "signs", "offsets")
 """How the angles and torques of a log were taken."""
 INTERVALS_REST_ON = {
@@ -49,16 +48,19 @@ STATES = (
 
 def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Result) -> Table:
     """Estimates with their intervals, the truth where it is known, and what they are."""
-    columns: dict[str, Kind] = {
-        "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
-        "Status": "status", "±, %": "number", "Truth": "number", "Error, %": "number",
-        "Meaning": "text",
-    }  # fmt: skip
     rows = []
     for one in rows_of(result, estimates):
         known = (one.status, one.share, one.truth, one.error, one.meaning)
         rows.append((one.name, one.value, one.half, one.unit, *known))
-    return Table(title, columns, tuple(rows)).without_empty()
+    return Table(
+        title,
+        {
+            "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
+            "Status": "status", "±, %": "number", "Truth": "number", "Error, %": "number",
+            "Meaning": "text",
+        },
+        tuple(rows),
+    ).without_empty()  # fmt: skip
 
 
 def arm_tables(result: Result) -> tuple[Table, ...]:
@@ -68,26 +70,28 @@ def arm_tables(result: Result) -> tuple[Table, ...]:
     for name, one in moments(result).items():
         size, half = resolved(one.size, one.std), significant(one.half, 2)
         rows.append((f"|{name.upper()}|", size, half, unit_text(one.unit), one.angle_text))
-    note = (
-        "K = k + i k_s: the angle of K1 is θ2's zero or link 2's centre of mass, that of K2 less "
-        "it θ1's zero, that of K4 less θ1's zero the load of joint 1 off link 1's line."
-    )
-    columns: dict[str, Kind] = {
-        "Moment": "name", "Size": "number", "± 95 %": "number", "Unit": "text",
-        "Angle, 95 %": "number",
-    }  # fmt: skip
     return (
         estimates_table("Constants", constants, result),
         estimates_table("Payload", result.payload, result),
-        Table("Moments off the links' lines", columns, tuple(rows), note),
-    )
+        Table(
+            "Moments off the links' lines",
+            {
+                "Moment": "name", "Size": "number", "± 95 %": "number", "Unit": "text",
+                "Angle, 95 %": "number",
+            },
+            tuple(rows),
+            "K = k + i k_s: the angle of K1 is θ2's zero or link 2's centre of mass, that of K2 "
+            "less it θ1's zero, that of K4 less θ1's zero the load of joint 1 off link 1's line.",
+        ),
+    )  # fmt: skip
 
 
 def nuisance_tables(result: Result) -> tuple[Table, Table]:
     """The terms beside eq. (1): those that differ from zero, and those that may be zero."""
-    terms = {n: one for n, one in result.parameters.items() if n not in CONSTANT_NAMES}
-    zero = {n: one for n, one in terms.items() if one.status is Status.NOT_SIGNIFICANT}
-    other = {n: one for n, one in terms.items() if n not in zero}
+    other, zero = dict[str, Estimate](), dict[str, Estimate]()
+    for name, one in result.parameters.items():
+        if name not in CONSTANT_NAMES:
+            (zero if one.status is Status.NOT_SIGNIFICANT else other)[name] = one
     return (
         estimates_table("Other terms of the torque", other, result),
         estimates_table("Terms whose interval holds zero", zero, result),
@@ -96,90 +100,76 @@ def nuisance_tables(result: Result) -> tuple[Table, Table]:
 
 def paper_tables(result: Result) -> tuple[Table, ...]:
     """The payload by the paper's route, the loaded arm, and its Table 4 where a truth is known."""
-    columns: dict[str, Kind] = {
-        "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
-        "Truth": "number", "Error, %": "number", "Paper, %": "number",
-    }  # fmt: skip
-    rows: list[tuple[str, ...]] = []
+    rows = []
     for row in result.table4 if known_truth(result) else ():
         half = None if row.std is None else result.quantile * row.std
-        rows.append(
-            (
-                visible(row.parameter),
-                resolved(row.estimate, row.std),
-                significant(half, 2),
-                unit_text(row.unit),
-                significant(row.truth),
-                significant(row.error_percent, 4),
-                significant(row.paper_error_percent, 4),
-            )
-        )
-    note = (
-        "Names and order of the paper's Table 4; Paper, % is the error it reports. The paper does "
-        "not state its torque: that of the synthetic cases was sought for this table."
-    )
+        errors = [significant(one, 4) for one in (row.error_percent, row.paper_error_percent)]
+        numbers = (resolved(row.estimate, row.std), significant(half, 2), unit_text(row.unit))
+        rows.append((row.parameter, *numbers, significant(row.truth), *errors))
     return (
         estimates_table("Payload by the paper's route", result.paper_payload, result),
         estimates_table("Loaded arm", result.loaded, result),
-        Table("Table 4", columns, tuple(rows), note).without_empty(),
-    )
+        Table(
+            "Table 4",
+            {
+                "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
+                "Truth": "number", "Error, %": "number", "Paper, %": "number",
+            },
+            tuple(rows),
+            "Names and order of the paper's Table 4; Paper, % is the error it reports. The paper "
+            "does not state its torque: that of the synthetic cases was sought for this table.",
+        ).without_empty(),
+    )  # fmt: skip
 
 
 def prediction_table(fit: FitSummary) -> Table:
     """How well the model predicts the torque: of the logs used, and of each log by the others."""
-    predictions = {"logs used": fit.residual, "each log by the others": fit.cross_validation}
-    rows, filters, states = [], list[str](), ""
-    for where, one in predictions.items():
+    rows, notes = [], list[str]()
+    for where, one in (
+        ("logs used", fit.residual), ("each log by the others", fit.cross_validation)
+    ):  # fmt: skip
         if one is None:
             continue
-        for joint in range(2):
-            rmse, share = significant(one.rmse[joint], 3), significant(100 * one.nrmse[joint], 3)
-            rows.append((where, str(joint + 1), rmse, share, f"{one.r2[joint]:.5f}"))
-        filters.append(visible(one.filter))
-        text = by_state(one)
-        if text:
-            states += f" RMSE of {where}: {text}."
-    columns: dict[str, Kind] = {
-        "Torque predicted": "name", "Joint": "text", "RMSE, N m": "number",
-        "RMSE / RMS, %": "number", "R²": "number",
-    }  # fmt: skip
-    note = f"Filter: {'; '.join(dict.fromkeys(filters))}.{states}"
-    return Table("Torque prediction", columns, tuple(rows), note)
+        for joint, rmse, nrmse, r2 in zip("12", one.rmse, one.nrmse, one.r2, strict=True):
+            numbers = (significant(rmse, 3), significant(100 * nrmse, 3), f"{r2:.5f}")
+            rows.append((where, joint, *numbers))
+        states = by_state(one)
+        notes += [f"Filter: {one.filter}.", *([f"RMSE of {where}: {states}."] if states else [])]
+    return Table(
+        "Torque prediction",
+        {
+            "Torque predicted": "name", "Joint": "text", "RMSE, N m": "number",
+            "RMSE / RMS, %": "number", "R²": "number",
+        },
+        tuple(rows),
+        " ".join(dict.fromkeys(notes)),
+    )  # fmt: skip
 
 
 def by_state(found: TorquePrediction) -> str:
     """The RMSE of joints that move and of joints that stand, in words; empty where none stands."""
-    if found.rmse_rest is None or found.rmse_rest == (None, None):
+    if found.rmse_rest in (None, (None, None)):
         return ""
     parts = []
     for joint in range(2):
         known = []
         for name, words in STATES:
-            pair = getattr(found, name)
-            if pair is not None and pair[joint] is not None:
-                known.append(f"{significant(pair[joint], 3)} {words}")
+            rmse = (getattr(found, name) or (None, None))[joint]
+            if rmse is not None:
+                known.append(f"{significant(rmse, 3)} {words}")
         if known:
             parts.append(f"joint {joint + 1} {', '.join(known)}")
     return f"{'; '.join(parts)} (N m)"
 
 
 def terms_table(fit: FitSummary) -> Table:
-    """Optional terms of the torque and their worth; those alike without a number share a row."""
-    rows: list[list[str]] = []
-    alike: dict[tuple[str, ...], list[str]] = {}
+    """Optional terms of the torque and their worth."""
+    rows = []
     for term in fit.terms:
         change = None if term.gain_heldout is None else -100 * term.gain_heldout or 0.0  # no −0.00
-        numbers = (
-            formatted(term.delta_bic, "+.1f"),
-            formatted(change, "+.2f"),
-            formatted(term.evidence, "+.1f"),
-        )
-        rest = (*numbers, yes_or_no(term.kept), visible(term.why))
-        if {*numbers} == {ABSENT} and rest in alike:
-            alike[rest][0] += f", {visible(term.term)}"
-            continue
-        rows.append([visible(term.term), *rest])
-        alike[rest] = rows[-1]
+        numbers = ((term.delta_bic, "+.1f"), (change, "+.2f"), (term.evidence, "+.1f"))
+        cells = (formatted(value, form) for value, form in numbers)
+        rows.append((term.term, *cells, yes_or_no(term.kept), term.why))
     note = ""
     if any(term.delta_bic is not None for term in fit.terms):
         note = "A negative change of BIC favours the term."
@@ -189,40 +179,48 @@ def terms_table(fit: FitSummary) -> Table:
             "others; negative: the term lowers it. A term is kept if it does and its log odds are "
             "positive."
         )
-    columns: dict[str, Kind] = {
-        "Term": "name", "Change of BIC": "number", "Held-out error, %": "number",
-        "Log odds": "number", "Kept": "text", "Why": "text",
-    }  # fmt: skip
-    return Table("Terms tried", columns, tuple(map(tuple, rows)), note).without_empty()
+    return Table(
+        "Terms tried",
+        {
+            "Term": "name", "Change of BIC": "number", "Held-out error, %": "number",
+            "Log odds": "number", "Kept": "text", "Why": "text",
+        },
+        tuple(rows),
+        note,
+    ).without_empty()  # fmt: skip
 
 
 def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
     """Noise of the logs, whiteness of the residual, and bounds of physics that are broken."""
-    units = {"theta1": "rad", "theta2": "rad", "tau1": "N m", "tau2": "N m"}
-    noise = []
+    noise, tests, bounds = [], [], []
     for name, std in fit.noise.items():
-        noise.append((visible(name), significant(std, 3), units.get(name, ABSENT)))
-    tests, bounds = [], []
+        noise.append((name, significant(std, 3), "N m" if name.startswith("tau") else "rad"))
     for name, test in fit.whiteness.items():
         numbers = (significant(test.p_value, 2), f"{test.lag1_correlation:.3f}")
-        tests.append((visible(name), yes_or_no(test.white), *numbers))
+        tests.append((name, yes_or_no(test.white), *numbers))
     for one in fit.broken_bounds:
-        distance = significant(one.distance_sigma, 2)
-        bounds.append((visible(one.bound), significant(one.value, 4), distance))
-    white: dict[str, Kind] = {
-        "Residual": "name", "White": "text", "p-value": "number", "Lag-one correlation": "number",
-    }  # fmt: skip
-    rest_on = f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}."
-    broken: dict[str, Kind] = {"Bound": "name", "Value": "number", "Broken by, σ": "number"}
+        bounds.append((one.bound, significant(one.value, 4), significant(one.distance_sigma, 2)))
     return (
         Table(
             "Noise of the logs",
             {"Signal": "name", "Noise, std": "number", "Unit": "text"},
             tuple(noise),
         ),
-        Table("Whiteness of the residual", white, tuple(tests), rest_on),
-        Table("Physical bounds that are broken", broken, tuple(bounds)),
-    )
+        Table(
+            "Whiteness of the residual",
+            {
+                "Residual": "name", "White": "text", "p-value": "number",
+                "Lag-one correlation": "number",
+            },
+            tuple(tests),
+            f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}.",
+        ),
+        Table(
+            "Physical bounds that are broken",
+            {"Bound": "name", "Value": "number", "Broken by, σ": "number"},
+            tuple(bounds),
+        ),
+    )  # fmt: skip
 
 
 def samples_table(logs: Mapping[int, LogFacts], names: Sequence[str]) -> Table:
@@ -232,55 +230,58 @@ def samples_table(logs: Mapping[int, LogFacts], names: Sequence[str]) -> Table:
         span = (f"{one.samples:,}", f"{one.first:.6g}", f"{one.last:.6g}")
         steps = (f"{1e3 * one.period:.4g}", str(one.gaps), f"{1e3 * one.largest_step:.4g}")
         rows.append((names[log], *span, *steps))
-    columns: dict[str, Kind] = {
-        "Log": "name", "Samples used": "number", "From, s": "number", "To, s": "number",
-        "Period, ms": "number", "Gaps": "number", "Largest step, ms": "number",
-    }  # fmt: skip
-    return Table("Samples that were used", columns, tuple(rows))
+    return Table(
+        "Samples that were used",
+        {
+            "Log": "name", "Samples used": "number", "From, s": "number", "To, s": "number",
+            "Period, ms": "number", "Gaps": "number", "Largest step, ms": "number",
+        },
+        tuple(rows),
+    )  # fmt: skip
 
 
 def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
     """`logs`, and from which channel each signal was taken, once for all logs that share it."""
-    rows = []
-    taken: dict[tuple[str, str], list[str]] = {}
+    rows, taken = [], dict[tuple[str, str], list[str]]()
     for log in logs:
         numbers = (f"{log.rows:,}", f"{log.duration:.6g}", f"{log.rate:.6g}")
-        rows.append((file_name(log.path), log.role, visible(log.format), *numbers))
+        rows.append((file_name(log.path), log.role, log.format, *numbers))
         for pair in log.mapping.items():
             taken.setdefault(pair, []).append(file_name(log.path))
     channels = []
-    for (signal, source), names in taken.items():
-        these = f"{names[0]} and {len(names) - 1} more"
-        if len(names) <= NAMED:
-            these = joined(names)
-        if len(names) == len(logs):
-            these = "all logs"
-        channels.append((visible(signal), visible(source), these))
-    columns: dict[str, Kind] = {
-        "Log": "name", "Arm": "text", "Format": "text", "Samples": "number",
-        "Duration, s": "number", "Rate, Hz": "number",
-    }  # fmt: skip
-    heads: dict[str, Kind] = {"Signal": "name", "Taken from": "text", "Log": "text"}
-    return Table("Logs", columns, tuple(rows)), Table("Channels", heads, tuple(channels))
+    for pair, names in taken.items():
+        these = joined(names)
+        if len(names) > NAMED:
+            these = f"{names[0]} and {len(names) - 1} more"
+        channels.append((*pair, "all logs" if len(names) == len(logs) else these))
+    return (
+        Table(
+            "Logs",
+            {
+                "Log": "name", "Arm": "text", "Format": "text", "Samples": "number",
+                "Duration, s": "number", "Rate, Hz": "number",
+            },
+            tuple(rows),
+        ),
+        Table("Channels", {"Signal": "name", "Taken from": "text", "Log": "text"}, tuple(channels)),
+    )  # fmt: skip
 
 
 def settings_table(used: Mapping[str, Any], asked: Mapping[str, str] | None = None) -> Table:
     """Settings by dotted name, beside what was asked for where that is something else."""
-    columns: dict[str, Kind] = {"Setting": "name", "Used": "text", "Asked for": "text"}
     rows = []
     for name, value in flat_settings(used).items():
-        wished = visible((asked or {}).get(name, ABSENT))
-        rows.append((visible(name), visible(value, LONGEST_VALUE), wished))
-    return Table("Settings", columns, tuple(rows)).without_empty()
+        rows.append((name, value, (asked or {}).get(name, ABSENT)))
+    columns = {"Setting": "name", "Used": "text", "Asked for": "text"}
+    return Table("Settings", columns, tuple(rows)).without_empty()  # type: ignore[arg-type]
 
 
 def used_settings(result: Result) -> Table:
     """The settings as they were used; below them how the first log of each kind was read."""
-    used, asked = flat_settings(result.settings), dict[str, str]()
-    decided = {"estimator": result.estimator}
+    asked, decided = flat_settings(result.settings), {"estimator": result.estimator}
+    model, delay, fit = result.torque_model, result.delay, result.fit
     if settles(result.estimator):
         decided["model"] = "plain"
-    model, delay = result.torque_model, result.delay
     if model is not None:
         terms = [*model.terms, *(DELAYS if delay is not None else ())]
         decided["model"] = ", ".join(terms) or "plain"
@@ -289,21 +290,19 @@ def used_settings(result: Result) -> Table:
             decided["model"] += f" (Coulomb friction over {speed} rad/s)"
     if delay is not None and delay.estimate is not None:
         decided["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
-    for name, value in decided.items():
-        if value != used.get(name):
-            asked[name], used[name] = used.get(name, ABSENT), value
-    hold = result.fit.torque_hold if result.fit is not None else None
-    if hold is not None and hold.asked != hold.used:
-        asked["torque_hold"] = hold.asked
-    firsts = {log.role: log.reading for log in reversed(result.logs) if log.reading is not None}
-    for name in CONVENTIONS:
-        words = name.replace("_", " ")
-        values = {role: setting_text(getattr(one, name)) for role, one in firsts.items()}
-        if len(set(values.values())) == 1:
-            used[words] = next(iter(values.values()))
-        else:
-            used |= {f"{words} of the {role} log": value for role, value in values.items()}
-    return settings_table(used, asked)
+    if fit is not None and fit.torque_hold is not None:
+        decided["torque_hold"] = fit.torque_hold.used
+        asked["torque_hold"] = fit.torque_hold.asked
+    read: dict[str, str] = {}
+    for role, reading in {log.role: log.reading for log in reversed(result.logs)}.items():
+        for name in CONVENTIONS if reading is not None else ():
+            words, value = name.replace("_", " "), setting_text(getattr(reading, name))
+            of = words if read.setdefault(words, value) == value else f"{words} of the {role} log"
+            read[of] = value
+    changed = {
+        name: asked.get(name, ABSENT) for name, one in decided.items() if one != asked.get(name)
+    }
+    return settings_table(asked | decided | read, changed)
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -331,19 +330,20 @@ def setting_text(value: object) -> str:
 
 
 def provenance_table(rows: Sequence[tuple[str, str]]) -> Table:
-    """What made a result, from what: `rows` of names and values, made visible here."""
-    shown = tuple((visible(name), visible(value)) for name, value in rows)
-    return Table("Provenance", {"What": "name", "Value": "text"}, shown)
+    """What made a result, from what: `rows` of names and values."""
+    return Table("Provenance", {"What": "name", "Value": "text"}, tuple(rows))
 
 
 def result_provenance(result: Result) -> Table:
     """What made the result, from what."""
-    asked = replaced_estimator(result)
-    estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
+    asked, estimator = replaced_estimator(result), result.estimator
+    if asked is not None:
+        estimator += f", in place of {asked}"
     rows = [("algid", result.version), ("estimator", estimator)]
     for log in result.logs:
-        known = log.sha256 or "unknown, fetched in part"
-        rows.append((f"sha256 of {file_name(log.path)}", known))
-    for log in result.logs:
-        rows.append((f"path of {file_name(log.path)}", log.path))
+        name = file_name(log.path)
+        rows += [
+            (f"sha256 of {name}", log.sha256 or "unknown, fetched in part"),
+            (f"path of {name}", log.path),
+        ]
     return provenance_table(rows)

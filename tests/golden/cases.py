@@ -22,7 +22,7 @@ from algid.log import Log
 from algid.synth.sensors import Sensors
 from tests.golden.scenes import SCENES
 from tests.processes import Outcome
-from tests.report.test_brief import held
+from tests.report.test_brief import shown
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 NOISY = Sensors(position_noise=1e-3, torque_noise=1e-2, seed=4)
@@ -48,10 +48,10 @@ def logs(name: str, duration: float = 4.0, exact: bool = False) -> tuple[Log, Lo
 def summary(result: algid.Result) -> Summary:
     """Estimates with their deviations, statuses, codes, terms and prediction of a result.
 
-    What a terminal shows of it is held to its 25 lines of 80 columns on the way. Of a failed
+    What a terminal shows of it is held to lines of 80 columns on the way. Of a failed
     result, whose numbers are not to be used and may hang on rounding, the reasons are kept alone.
     """
-    held(result)
+    shown(result)
     content = result.model_dump(mode="json")
     estimates = {**content["parameters"], **content["payload"]}
     found: Summary = {

@@ -123,15 +123,3 @@ def test_stamps_that_no_message_holds_are_refused(
     with pytest.raises(OutputError, match=rf"{name}\.parquet: ROS 2 messages hold times from 1970"):
         export_mcap(folder)
     assert not (folder / "estimates.mcap").exists()
-
-
-@pytest.mark.parametrize("told", ["{", "3", '["x"]', "[1e999]"])
-def test_stamps_that_are_none_are_refused(told: str, case_folder: Path, tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(case_folder, tmp_path / case_folder.name))
-    path = folder / "loaded.parquet"
-    pq.write_table(pq.read_table(path).replace_schema_metadata({START_KEY: told}), path)
-    with pytest.raises(ResultError, match="start_ns: expected stamps in ns"):
-        export_mcap(folder)
-    path.write_bytes(path.read_bytes()[:-4] + b"PAR?")
-    with pytest.raises(ResultError, match="cannot read it as Parquet"):
-        export_mcap(folder)

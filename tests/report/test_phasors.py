@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from algid.model import Model
-from algid.report.brief import HEIGHT, WIDTH, brief
+from algid.report.brief import WIDTH, brief
 from algid.report.phasors import moments
 from algid.report.tables import arm_tables
 from algid.results import Result
@@ -39,7 +39,6 @@ def test_size_and_angle_have_the_spread_of_draws() -> None:
 
 def test_the_terminal_and_the_page_show_size_and_angle() -> None:
     lines = brief(bent())
-    assert len(lines) <= HEIGHT
     assert max(map(len, lines)) <= WIDTH
     (line,) = [line for line in lines if line.startswith("|K1|")]
     assert "0.050" in line
