@@ -1,4 +1,4 @@
-"""Torques that a sensor or a drive cuts off: whether they are found, and what intervals hold then.
+"""Torques that a sensor cuts off: whether they are found, and what intervals hold then.
 
     python -m pipelines.saturation [--arms case1,arm22] [--seeds 3] [--levels 0.6,0.8]
 
@@ -6,7 +6,6 @@ Each arm moves under a wide torque, every second log with Coulomb friction. The 
 the torque's largest value, of both joints:
 
 - sensor: the arm gets the whole torque, the log holds what lies within the limit.
-- drive: the arm gets what lies within the limit, the log holds the whole torque.
 - true: the arm gets what the log holds, which stands at the limit. Nothing may be left out.
 
 With ``--sound`` it counts the logs without a limit of which samples would be left out: those of
@@ -38,7 +37,7 @@ from pipelines.accuracy_scenes import ENCODER_STEP, case_of
 RATE, DURATION = 1000.0, 10.0
 SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
 COULOMB, WIDTH = 0.05, 0.02  # of the largest torque; rad/s
-CAUSES = ("sensor", "drive", "true")
+CAUSES = ("sensor", "true")
 
 
 def log_of(name: str, cause: str, level: float, seed: int) -> tuple[FloatArray, Log]:
@@ -59,12 +58,10 @@ def log_of(name: str, cause: str, level: float, seed: int) -> tuple[FloatArray, 
     rng = np.random.default_rng([seed, 11])
     # A motor that overcomes friction by itself: the limit is of the torque with it.
     friction = COULOMB * np.abs(asked).max(axis=1, keepdims=True) * np.tanh(motion.omega / WIDTH)
-    tau = asked if cause == "drive" else motion.tau
-    if seed % 2:
-        tau = tau + friction if cause != "drive" else tau
+    tau = motion.tau + friction * (seed % 2)
     theta = motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape)
     noisy = tau + SIGMA_TAU * rng.standard_normal(tau.shape)
-    logged = {"sensor": np.clip(noisy, -limit, limit), "drive": tau, "true": tau}[cause]
+    logged = np.clip(noisy, -limit, limit) if cause == "sensor" else tau
     return k, Log.from_arrays(t, theta, logged)
 
 

@@ -1,4 +1,4 @@
-"""Torques that a sensor or a drive cuts off: found by motion, reported, and left out."""
+"""Torques that a sensor cuts off: found by motion, reported, and left out."""
 
 from __future__ import annotations
 
@@ -76,7 +76,6 @@ def _notice(origin: Origin, limit: Limit, beyond: int, rows: int) -> Notice:
     source = origin.mapping.get(name, name)
     finite = [abs(side) for side in (limit.low, limit.high) if np.isfinite(side)]
     numbers = {
-        "case": limit.cause,
         "channel": name if source == name else f"{name} ({source})",
         "level": max(finite),
         "count": beyond,

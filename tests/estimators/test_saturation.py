@@ -1,4 +1,4 @@
-"""Limits of sensors and drives: found by motion, and no other."""
+"""Limits of sensors: found by motion, and no other."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def motions() -> FloatArray:
 
 @cache
 def log(cause: str, level: float) -> Segment:
-    """A log whose torque a sensor or a drive cuts off, or a limit that holds."""
+    """A log whose torque a sensor cuts off, or a limit that holds."""
     rng = np.random.default_rng(8)
     noise = rng.standard_normal((2, 2, ROWS))
     limit = level * largest()
@@ -68,7 +68,6 @@ def log(cause: str, level: float) -> Segment:
     noisy = whole + 5e-3 * noise[1]
     tau = {
         "sensor": np.clip(noisy, -limit, limit),
-        "drive": noisy,
         "true": np.clip(whole, -limit, limit),
     }[cause]
     return Segment(0.0, DT, motions()[:, place] + 2e-4 * noise[0], tau)
@@ -78,16 +77,12 @@ def found(one: Segment) -> dict[int, Limit]:
     return {limit.joint: limit for limit in saturation_of([one]).limits}
 
 
-@pytest.mark.parametrize("cause", ["sensor", "drive"])
 @pytest.mark.parametrize("level", [0.6, 0.8])
-def test_a_limit_that_cuts_off_is_found_in_both_joints_at_its_level(
-    cause: str, level: float
-) -> None:
-    limits = found(log(cause, level))
+def test_a_limit_that_cuts_off_is_found_in_both_joints_at_its_level(level: float) -> None:
+    limits = found(log("sensor", level))
     assert set(limits) == {0, 1}
     for joint, limit in limits.items():
         expected = level * largest()[joint, 0]
-        assert limit.cause == cause
         assert 0.96 * expected < limit.high < expected  # what noise leaves open lies outside
         assert limit.low == -limit.high
 
@@ -119,7 +114,7 @@ def test_too_few_samples_tell_nothing() -> None:
     assert saturation_of([]).limits == ()
 
 
-LIMITS = (Limit(0, "sensor", -np.inf, 1.0), Limit(1, "drive", -2.0, 2.0))
+LIMITS = (Limit(0, -np.inf, 1.0), Limit(1, -2.0, 2.0))
 
 
 def ramp(count: int = 2000) -> Segment:
