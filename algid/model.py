@@ -163,7 +163,7 @@ class Model:
         """The time constant in s of the torque's low-pass; 0 without."""
         if self.lag_name is None:
             return 0.0
-        return float(c[self.names.index(self.lag_name)])
+        return float(c[self.names.index(self.lag_name)].flat[0])  # one low-pass for the whole log
 
     def expand(self, c: FloatArray) -> FloatArray:
         """Coefficients of all `COLUMN_NAMES`: zero where a column is switched off."""
@@ -365,7 +365,7 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     ----------
     model : Model
     motion : Motion of N samples
-    c : (q,), in `UNITS`
+    c : (q,), in `UNITS`; or (q, N), coefficients of their own at each sample
         Where a model that is not linear is taken.
 
     Returns
@@ -395,7 +395,8 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     for joint, place, entry in compiled.regressor:
         values.into(Y[joint, place], entry)
     for name, joint in attributes(model, "by_load"):
-        load = Y[joint, list(compiled.loads)].T @ c[list(compiled.loads)]
+        loads = list(compiled.loads)
+        load = _torques(Y[joint, loads], c[loads])
         Y[joint, compiled.place[name]] = np.abs(load) * smooth_sign(model, motion.omega[joint])
     return _amplified(model, c, Y)
 
@@ -450,8 +451,8 @@ def attributes(model: Model, kind: str) -> list[tuple[str, int]]:
 
 
 def gains(model: Model, c: FloatArray) -> FloatArray:
-    """By what (2,) each joint's torque is multiplied at the coefficients `c` (q,)."""
-    factor = np.ones(2)
+    """By what (2, ...) each joint's torque is multiplied at the coefficients `c` (q, ...)."""
+    factor = np.ones((2, *c.shape[1:]))
     for name, joint in attributes(model, "gains"):
         factor[joint] *= 1 + c[model.compiled.place[name]]
     return factor
@@ -460,14 +461,19 @@ def gains(model: Model, c: FloatArray) -> FloatArray:
 def _amplified(model: Model, c: FloatArray, rows: FloatArray) -> FloatArray:
     """`rows` (2, ...), in place, times each joint's gain."""
     for joint, factor in enumerate(gains(model, c)):
-        if factor != 1:
+        if np.any(factor != 1):
             rows[joint] *= factor
     return rows
 
 
+def _torques(rows: FloatArray, c: FloatArray) -> FloatArray:
+    """Torques (..., N) of a regressor's rows (..., q, N) at coefficients (q,) or (q, N)."""
+    return np.einsum("...qn,qn->...n", rows, c.reshape(c.shape[0], -1))
+
+
 def torque(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     """Torque τ (2, N) in N m; without a low-pass, which needs the torque at other instants too."""
-    return np.einsum("aqn,q->an", regressor(model, motion, c), c)
+    return _torques(regressor(model, motion, c), c)
 
 
 def load(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
@@ -489,7 +495,7 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     Parameters
     ----------
     model : Model
-    c : (q,), in `UNITS`
+    c : (q,), in `UNITS`; or (q, N), coefficients of their own at each sample
     motion : Motion of N samples
 
     Returns
@@ -510,9 +516,9 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     place, loads = model.compiled.place, list(model.compiled.loads)
     factor = gains(model, c)
     for name, joint in attributes(model, "gains"):
-        J[joint, place[name]] = J[joint].T @ c / factor[joint]
+        J[joint, place[name]] = _torques(J[joint], c) / factor[joint]
     for name, joint in attributes(model, "by_load"):
-        load = J[joint, loads].T @ c[loads]  # a gain scales it, which leaves its sign
+        load = _torques(J[joint, loads], c[loads])  # a gain scales it, which leaves its sign
         sign = smooth_sign(model, motion.omega[joint])
         J[joint, loads] *= 1 + c[place[name]] * sign * np.sign(load)
     return J
@@ -524,7 +530,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     Parameters
     ----------
     model : Model
-    c : (q,), in `UNITS`
+    c : (q,), in `UNITS`; or (q, N), coefficients of their own at each sample
     motion : Motion of N samples
 
     Returns
@@ -553,7 +559,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
         P[1, joint, joint] += share * np.abs(load) * (1 - sign**2) / model.coulomb_speed
     factor = gains(model, c)
     for joint in range(2):
-        if factor[joint] != 1:
+        if np.any(factor[joint] != 1):
             P[:, joint] *= factor[joint]
     return P
 

@@ -62,7 +62,7 @@ def report(
     $ algid report case1-unloaded.algid --export mcap
     """
     check(report, locals())
-    from algid.tracks.read import is_track
+    from algid.tracks.result import is_track
 
     made = []
     for folder in map(Path, results):
@@ -98,8 +98,7 @@ def _of_result(
 
 def _of_track(folder: Path, export: bool) -> Answer:
     from algid.tracks.page import track_document, write_pages
-    from algid.tracks.read import read_track
-    from algid.tracks.result import track_json
+    from algid.tracks.result import read_track, track_json
 
     result = read_track(folder)
     written = write_pages(result, folder, export)

@@ -125,9 +125,8 @@ def track(
 
 def answer(result: TrackResult, given: Mapping[str, Any]) -> Answer:
     """The report; 3 where the track must not be used as it is, 4 where data were lost."""
-    from algid.tracks.page import track_document, track_folder
+    from algid.tracks.page import track_document, track_folder, verdict
     from algid.tracks.result import track_json
-    from algid.tracks.tables import verdict
 
     return Answer(
         lambda: [track_document(result)],

@@ -30,7 +30,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.parametrisation import Shared
-from algid.estimators.whitening import NoiseLevels, along_stencil, covariance_factor, triangular
+from algid.estimators.whitening import NoiseLevels, along_stencil, triangular, whitened
 from algid.model import Model, Motion, partials, regressor
 from algid.signals.differences import POINTS, Stencil
 
@@ -131,8 +131,7 @@ class Information:
         self._slopes = slopes
         shared, noise = experiment.shared, experiment.noise
         self._weights = Stencil(1 / slopes.rate).weights
-        self._ratio = noise.theta[None, :] / noise.tau[:, None]
-        self._sigma = noise.tau
+        self._noise = noise
         self._delay = shared.delay
         self._logs = []
         for loaded in experiment.kinds:
@@ -144,19 +143,14 @@ class Information:
 
     def _whitened(self, c: FloatArray, T: FloatArray, count: float) -> _Log:
         slopes = self._slopes
-        P = partials(slopes.model, c, slopes.motion)
-        H = along_stencil(P, self._weights) * self._ratio[:, :, None, None]
-        factor = covariance_factor(H)
         Y = slopes.Y
         if self._delay:  # a torque that is late by dt differs by its slope times dt
             torque = np.einsum("aqn,q->an", Y, c[: Y.shape[1]])
             slope = np.gradient(torque, 1 / slopes.rate, axis=1)
             Y = np.concatenate([Y, slope[:, None]], axis=1)
         q, n = Y.shape[1:]
-        rows = np.ascontiguousarray((Y / self._sigma[:, None, None]).transpose(1, 2, 0)).reshape(
-            q, -1
-        )
-        Z = triangular(factor, rows, "N")
+        G = along_stencil(partials(slopes.model, c, slopes.motion), self._weights)
+        H, factor, Z = whitened(Y.swapaxes(0, 1), G, self._noise)
         W = triangular(factor, Z, "T")
         by_joint = np.ascontiguousarray(W.reshape(q, n, 2).transpose(0, 2, 1))
         return _Log(c, T, count, by_joint, H, Z)
@@ -186,13 +180,14 @@ class Information:
 
         The column of a delay counts as one that stays.
         """
-        slopes = self._slopes
+        slopes, noise = self._slopes, self._noise
+        ratio = noise.theta[None, :] / noise.tau[:, None]
         q, n = slopes.Y.shape[1:]
         to_Y, total = np.zeros_like(slopes.Y), np.zeros((COMPONENTS, n))
         for log in self._logs:
             inner = log.count * log.T @ A @ log.T.T
             AW = np.tensordot(inner, log.W, axes=1)
-            to_Y += 2 * AW[:q].transpose(1, 0, 2) / self._sigma[:, None, None]
+            to_Y += 2 * AW[:q].transpose(1, 0, 2) / noise.tau[:, None, None]
             back = np.zeros((AW.shape[0], 2, n + POINTS - 1))  # Gᵀ W
             for point in range(POINTS):
                 back[:, :, point : point + n] += np.einsum(
@@ -200,7 +195,7 @@ class Information:
                 )
             windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
             along = np.tensordot(self._weights, windows, axes=(1, 2))
-            to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * self._ratio[None, :, :, None]
+            to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * ratio[None, :, :, None]
             total += np.einsum("oabn,coabn->cn", to_P, slopes.dP(log.c))
         return total + np.einsum("aqn,caqn->cn", to_Y, slopes.dY)
 

@@ -141,7 +141,7 @@ def linearise(
     Parameters
     ----------
     model : Model
-    c : (q,), in `algid.model.UNITS`
+    c : (q,), in `algid.model.UNITS`, or (q, n) where each torque sample has its own
     theta0 : (2, N), rad
         The trajectory, near the truth.
     piece : Segment of N samples
@@ -165,96 +165,64 @@ def linearise(
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
     motion = Motion(*stencil.differences(theta0))
-    J, modelled = _modelled(model, c, motion, stencil.dt)
+    J, torques_of_model = modelled(model, c, motion, stencil.dt)
     G = along_stencil(partials(model, c, motion), stencil.weights)
-    rising = modelled
+    rising = torques_of_model
     if smooth is not None:
         motion = Motion(*stencil.differences(smooth))
-        J, rising = _modelled(model, c, motion, stencil.dt)
-    error = (
-        stencil.moving(piece.tau)[:, torques] - modelled - forward(G, piece.theta - theta0, first)
-    )
-    H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
-    factor = covariance_factor(H, stencil.taps)
+        J, rising = modelled(model, c, motion, stencil.dt)
+    measured = stencil.moving(piece.tau)[:, torques]
+    error = measured - torques_of_model - forward(G, piece.theta - theta0, first)
     parts = []
     if not residual_only:
         parts.append(J.swapaxes(0, 1))
         if delay:
             parts.append(np.gradient(rising, stencil.dt, axis=1)[None])
     parts.append(error[None])
-    rows = np.concatenate(parts)
-    rows = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
-    columns = triangular(factor, rows.reshape(rows.shape[0], -1), "N", in_place=True)
+    H, factor, columns = whitened(np.concatenate(parts), G, noise, stencil.taps)
     return Linearised(columns, factor, H, first, error, motion, stencil.taps)
 
 
-def _modelled(
-    model: Model, c: FloatArray, motion: Motion, dt: float
-) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (2, q, n) of the torque by coefficients c (q,), and the torque (2, n) in N m."""
-    if model.linear:
-        J = regressor(model, motion)
-        modelled = np.einsum("aqn,q->an", J, c)
-    else:
-        J = sensitivity(model, c, motion)
-        modelled = torque(model, c, motion)
-    if model.lag_name is not None:
-        J[:, model.names.index(model.lag_name)] = -_low_passed_slope(modelled, dt, model.lag(c))
-    return J, modelled
-
-
-def low_passed(signal: FloatArray, dt: float, lag: float) -> FloatArray:
-    """Signals sampled `lag` s later, after a first-order low-pass of that time constant.
+def whitened(
+    rows: FloatArray, G: FloatArray, noise: NoiseLevels, taps: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """H, the factor of V, and the whitened columns (m, 2 n) of torques `rows` (m, 2, n) in N m.
 
     Parameters
     ----------
-    signal : (..., n), unit u
-    dt : float, s
-    lag : float, s
-        A negative one is the mirror image, which runs from the end of the signal to its start.
+    rows : (m, 2, n), N m over each column's unit
+    G : (2, 2, POINTS, n), `along_stencil`
+    noise : NoiseLevels
+    taps : (p,), optional
+        `Stencil.taps`; none are those of a torque as it is logged.
 
-    Returns
-    -------
-    (..., n), unit u
-
-    Notes
-    -----
-    The response is exp(s lag) / (1 + s lag), so that a slow signal passes unchanged and in time.
-    Exact for a signal that is straight between its samples. Both ends continue by point
-    reflection.
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If the covariance is not positive definite in floating point.
     """
-    if abs(lag) < 1e-6 * dt:
-        return signal.copy()
-    if lag < 0:
-        return low_passed(signal[..., ::-1], dt, -lag)[..., ::-1]
-    n = signal.shape[-1]
-    reach = min(n - 1, 2 + int(12 * lag / dt))
-    decay = np.exp(-dt / lag)
-    mean = (1 - decay) * lag / dt
-    numerator, denominator = np.array([1 - mean, mean - decay]), np.array([1.0, -decay])
-    whole = int(lag / dt)
-    rest = lag / dt - whole
-    start = reach + whole
-    # Lagrange's cubic through the four samples around the time wanted.
-    weights = (
-        -rest * (rest - 1) * (rest - 2) / 6,
-        (rest + 1) * (rest - 1) * (rest - 2) / 2,
-        -(rest + 1) * rest * (rest - 2) / 2,
-        (rest + 1) * rest * (rest - 1) / 6,
-    )
-    later = np.zeros_like(signal)
-    for place in np.ndindex(signal.shape[:-1]):
-        row = signal[place]
-        if not row.any():  # of the joint that a column does not act on
-            continue
-        before = 2 * row[0] - row[reach:0:-1]
-        after = 2 * row[-1] - row[-2 : -reach - 2 : -1]
-        extended = np.concatenate([before, row, after])
-        response, _ = recursion(numerator, denominator, extended - extended[0], np.zeros(1))
-        passed = response + extended[0]
-        for point, weight in enumerate(weights, start - 1):
-            later[place] += weight * passed[point : point + n]
-    return later
+    H = G * (noise.theta[None, :, None, None] / noise.tau[:, None, None, None])
+    factor = covariance_factor(H, taps)
+    by_sample = np.ascontiguousarray((rows / noise.tau[None, :, None]).swapaxes(1, 2))
+    columns = triangular(factor, by_sample.reshape(rows.shape[0], -1), "N", in_place=True)
+    return H, factor, columns
+
+
+def modelled(
+    model: Model, c: FloatArray, motion: Motion, dt: float
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (2, q, n) of the torque by coefficients, and the torque (2, n) in N m.
+
+    `c` is (q,), or (q, n) where each sample has its own.
+    """
+    if model.linear:
+        J = regressor(model, motion)
+        tau = np.einsum("aqn,qn->an", J, c.reshape(c.shape[0], -1))
+    else:
+        J, tau = sensitivity(model, c, motion), torque(model, c, motion)
+    if model.lag_name is not None:
+        J[:, model.names.index(model.lag_name)] = -_low_passed_slope(tau, dt, model.lag(c))
+    return J, tau
 
 
 def _low_passed_slope(tau: FloatArray, dt: float, lag: float) -> FloatArray:

@@ -13,7 +13,7 @@ to. Blocks lie within stretches. While changes are sought medians are taken, so 
 not known do not pass for errors.
 
 Whitened rows remember, so that a change shows late in cells, and may show twice. Cells show that
-there is one; `algid.tracks.placing` has the rows around it say whether there is, and when.
+there is one; `algid.tracks.change_times` has the rows around it say whether there is, and when.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.compiled import chi2_exceeded, student_quantile
-from algid.tracks.bins import Cells
+from algid.tracks.cells import Cells
 from algid.tracks.drift import BLOCK, Drift, drift_of
 
 FIRST_SPANS = (1, 2, 3, 5, 8)  # cells: blocks of which few hold a change, before any is known

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.tracks.bins import Cells
+from algid.tracks.cells import Cells
 
 SPACING = 5.0  # s: of the knots
 MOST_KNOTS = 60
@@ -85,8 +85,8 @@ class Drift:
         normal = _normal(cells, starts, self.knots)
         sums = np.add.reduceat(T, starts, axis=0) / normal.A[:, None]
         shift = np.zeros((*self.phi.shape, T.shape[1]))
-        for knot, own, hat in hats(self.knots, cells.middle):
-            shift[knot] += np.tensordot(hat, V[own], axes=1)
+        for interval, own, hats in _intervals(self.knots, cells.middle):
+            shift[interval] += np.einsum("hc,cfp->hfp", hats, V[own])
         by_knot = self.covariance @ (shift.reshape(-1, T.shape[1]) - normal.G.T @ sums)
         phi = between(self.knots, by_knot.reshape(shift.shape), cells.middle)
         return np.asarray(T - np.einsum("cf,cfp->cp", cells.S[:, cells.friction], phi))
@@ -146,20 +146,19 @@ def knots_of(cells: Cells) -> FloatArray:
 
 def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
     """Values (C, ...) at times `t` (C,) by linear interpolation of (H, ...) at the knots (H,)."""
-    values_at = np.zeros((t.size, *values.shape[1:]))
-    for knot, own, hat in hats(knots, t):
-        values_at[own] += hat.reshape(-1, *[1] * (values.ndim - 1)) * values[knot]
-    return values_at
-
-
-def hats(knots: FloatArray, t: FloatArray) -> Iterator[tuple[int, NDArray[np.int64], FloatArray]]:
-    """For each knot and side, which of the times `t` (C,) lie there, and their hat functions."""
     interval = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, knots.size - 2)
     share = (t - knots[interval]) / np.diff(knots)[interval]
-    for place in range(knots.size - 1):
-        own = np.flatnonzero(interval == place)
-        yield place, own, 1 - share[own]
-        yield place + 1, own, share[own]
+    share = share.reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((1 - share) * values[interval] + share * values[interval + 1])
+
+
+def _intervals(knots: FloatArray, t: FloatArray) -> Iterator[tuple[slice, slice, FloatArray]]:
+    """For each interval its two knots, its times among the increasing `t`, their hats (2, c)."""
+    ends = np.searchsorted(t, knots[1:-1])
+    for place, own in enumerate(np.split(t, ends)):
+        first = 0 if place == 0 else int(ends[place - 1])
+        late = (own - knots[place]) / (knots[place + 1] - knots[place])
+        yield slice(place, place + 2), slice(first, first + own.size), np.stack([1 - late, late])
 
 
 def _normal(cells: Cells, starts: NDArray[np.int64], knots: FloatArray | None = None) -> _Normal:
@@ -169,15 +168,10 @@ def _normal(cells: Cells, starts: NDArray[np.int64], knots: FloatArray | None = 
     S, N = cells.S[:, cells.friction], cells.N[:, :, cells.friction]
     G, NN = np.zeros((starts.size, count, f)), np.zeros((count, f, count, f))
     D = np.zeros((count, f))
-    sides = list(hats(knots, cells.middle))
-    for number, (knot, own, hat) in enumerate(sides):
-        D[knot] += hat @ cells.D[own]
-        np.add.at(G[:, knot], group[own], hat[:, None] * S[own])
-        NN[knot, :, knot] += np.tensordot(hat * hat, N[own], axes=1)
-        if number % 2 == 0:  # the interval's other side
-            beside = np.tensordot(hat * sides[number + 1][2], N[own], axes=1)
-            NN[knot, :, knot + 1] += beside
-            NN[knot + 1, :, knot] += beside.T
+    for interval, own, hats in _intervals(knots, cells.middle):
+        D[interval] += hats @ cells.D[own]
+        np.add.at(G[:, interval], group[own], np.einsum("hc,cf->chf", hats, S[own]))
+        NN[interval, :, interval] += np.einsum("hc,kc,cfg->hfkg", hats, hats, N[own], optimize=True)
     return _Normal(
         knots,
         np.maximum(np.add.reduceat(cells.A, starts), 1e-300),

@@ -1,4 +1,4 @@
-"""The report of a track: what it contains, and its folder's files.
+"""The report of a track: tables, figure, verdict, and the files of its folder.
 
 ``track.json``, ``track.parquet``, ``stretches.parquet``, the pages `report.html` and `report.md`,
 and ``track.mcap``.
@@ -6,27 +6,37 @@ and ``track.mcap``.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 
+from algid.base.criteria import HOLE
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL
-from algid.base.text import file_name, significant
+from algid.base.text import ABSENT, file_name, joined, significant
+from algid.base.verdict import Verdict, graded
 from algid.base.words import counted
-from algid.report.document import Document, Section
-from algid.report.export import START_KEY, write_series
+from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
+from algid.report.document import Document, Section, Table
+from algid.report.export import write_series
+from algid.report.plot import BLUE, GREEN, ORANGE, Panels, Plot
 from algid.report.render import markdown, page, write_texts
-from algid.report.tables import settings_table
-from algid.tracks.figures import payload_figure
-from algid.tracks.result import TrackResult, track_json
-from algid.tracks.tables import (
-    change_table,
-    quality_tables,
-    stretch_table,
-    track_provenance,
-    verdict,
-)
+from algid.report.series import reduced
+from algid.report.tables import log_tables, provenance_table, settings_table
+from algid.results.verdict import LEAST_R2, WORST_R2, share_text
+from algid.tracks.cells import CELL
+from algid.tracks.payload import HALF_BAND, Stretch
+from algid.tracks.result import CURVE, FILE, StretchStatus, TrackResult, track_json, write_tables
+
+COLOURED = 4.0  # of the rows' variance: intervals twice as wide as the sensors' noise asks for
+STRANGE = 1e4
+"""Of the rows' variance: a real arm with friction reaches 6e3, another arm 5e4 and more."""
+ALL_BUT = 0.99  # explained of the torque, beyond which such errors are those of very quiet sensors
+MOST_NAMED = 4  # changes whose times the verdict lists
+POINTS = 4_000  # of the curve that are drawn
+MOST_MARKS = 60  # changes beyond which bands over the whole panel would hide it
+SPACE = 0.08  # of the masses' range, above and below
 
 
 def track_document(result: TrackResult) -> Document:
@@ -34,26 +44,35 @@ def track_document(result: TrackResult) -> Document:
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
     sentences = tuple(one.sentence for one in result.notices)
-    origin = (settings_table(result.settings), track_provenance(result))
-    sections = (
-        Section("numbers", "Numbers", (stretch_table(result), change_table(result))),
-        Section("payload", "Payload in time", (payload_figure(result),)),
-        Section("data", "Data quality", (sentences, *quality_tables(result)), folded=True),
-        Section("settings", "Settings and provenance", origin, folded=True),
+    provenance = provenance_table(
+        [
+            ("algid", result.version),
+            ("arm's result", result.arm),
+            ("sha256 of the arm's result", result.arm_sha256),
+            ("path of the log", result.log.path),
+            (f"sha256 of {name}", result.log.sha256 or "unknown, fetched in part"),
+        ]
     )
     return Document(
         title=f"Payload in time of {name}",
         verdict=verdict(result),
-        sections=sections,
+        sections=(
+            Section("numbers", "Numbers", (stretch_table(result), change_table(result))),
+            Section("payload", "Payload in time", (payload_figure(result),)),
+            Section("data", "Data quality", (sentences, *quality_tables(result)), folded=True),
+            Section(
+                "settings",
+                "Settings and provenance",
+                (settings_table(result.settings), provenance),
+                folded=True,
+            ),
+        ),
         kicker="a payload in time",
         name=name,
         facts=f"arm of {file_name(result.arm)} · {seconds} s of log at {rate} Hz · "
         f"{counted(result.log.rows, 'sample')}",
         made=f"Made by algid {result.version}.",
     )
-
-
-TOPIC = "/algid/payload"
 
 
 def track_folder(log: str, parent: Path) -> Path:
@@ -63,14 +82,15 @@ def track_folder(log: str, parent: Path) -> Path:
 
 def write_track(result: TrackResult, folder: Path, mcap: bool = False) -> None:
     """Write everything into `folder`, `track.mcap` where asked. Raises `OutputError`."""
-    _write_curve(result, folder / "track.parquet")
-    _write_stretches(result, folder / "stretches.parquet")
-    write_texts(folder, {"track.json": track_json(result)})
+    write_tables(result, folder)
+    write_texts(folder, {FILE: track_json(result)})
     write_pages(result, folder, mcap)
 
 
 def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[Path]:
     """Write the pages of a track into its `folder`, `track.mcap` where asked.
+
+    The log of ROS 2 has the stamps of the track's own, for Foxglove and PlotJuggler.
 
     Raises `OutputError`.
     """
@@ -78,60 +98,207 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
     pages = {"report.html": page(document), "report.md": markdown(document)}
     written = write_texts(folder, pages)
     if mcap:
-        _write_mcap(result, folder)
+        from mcap.writer import CompressionType, Writer
+
         written.append(folder / "track.mcap")
+        with whole_file(written[-1]) as temporary, temporary.open("wb") as stream:
+            writer = Writer(stream, compression=CompressionType.ZSTD)
+            writer.start(profile="ros2", library=f"algid {result.version}")
+            write_series(writer, folder / CURVE, "/algid/payload")
+            writer.finish()  # type: ignore[no-untyped-call]
     return written
 
 
-def _write_curve(result: TrackResult, path: Path) -> None:
-    """A row each 20 ms: m_p(t) and its band, and the stretch's number, mass and interval."""
-    import polars as pl
-    import pyarrow.parquet as pq
-
-    track = result.track
-    number = track.stretch.astype(np.int64)
-    mass = np.array([one.m_p for one in track.stretches])
-    interval = np.array([one.ci95 for one in track.stretches])
-    curve = pl.DataFrame(
-        {
-            "t": track.t,
-            "m_p": track.m_p,
-            "low": track.m_p - NORMAL * track.std,
-            "high": track.m_p + NORMAL * track.std,
-            "left": track.left,
-            "stretch": number,
-            "stretch_m_p": mass[number],
-            "stretch_low": interval[number, 0],
-            "stretch_high": interval[number, 1],
-        }
-    )
-    with whole_file(path) as temporary:
-        table = curve.to_arrow()
-        pq.write_table(
-            table.replace_schema_metadata({START_KEY: f"[{result.log.start_ns}]"}), temporary
-        )
-
-
-def _write_stretches(result: TrackResult, path: Path) -> None:
-    import polars as pl
-
+def stretch_table(result: TrackResult) -> Table:
+    """The stretches, their masses and intervals."""
     rows = []
-    for one, status in zip(result.track.stretches, result.statuses, strict=True):
-        low, high = one.ci95
-        rows.append((one.start, one.end, one.m_p, one.std, low, high, status.value))
-    frame = pl.DataFrame(
-        rows, schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"], orient="row"
+    truths = result.truth or (None,) * len(result.track.stretches)
+    for place, (stretch, status, truth) in enumerate(
+        zip(result.track.stretches, result.statuses, truths, strict=True), start=1
+    ):
+        true = error = ABSENT
+        if truth is not None:
+            true, error = fixed(truth, stretch.std), fixed(stretch.m_p - truth, stretch.std)
+        span = (f"{stretch.start:.3f}", f"{stretch.end:.3f}")
+        rows.append((str(place), *span, *mass_and_half(stretch), "kg", status.value, true, error))
+    return Table(
+        "Payload by stretch",
+        {
+            "Stretch": "name", "From, s": "number", "To, s": "number", "Payload": "number",
+            "± 95 %": "number", "Unit": "text", "Status": "status", "Truth": "number",
+            "Error": "number",
+        },
+        tuple(rows),
+    ).without_empty()  # fmt: skip
+
+
+def change_table(result: TrackResult) -> Table:
+    """When the payload changed, and by how much."""
+    times = [time for time, _ in result.schedule or () if time > 0]
+    rows = []
+    for place, (moment, low, high) in enumerate(result.track.changes.tolist()):
+        before, after = result.track.stretches[place : place + 2]
+        step = after.m_p - before.m_p
+        by = ("" if step < 0 else "+") + fixed(step, max(before.std, after.std))
+        true = ABSENT
+        if times:
+            true = f"{min(times, key=lambda time: abs(time - moment)):.3f}"
+        between = f"[{low:.3f}, {high:.3f}]"
+        rows.append((str(place + 1), f"{moment:.3f}", by, "kg", between, true))
+    return Table(
+        "Changes",
+        {
+            "Change": "name", "At, s": "number", "By": "number", "Unit": "text",
+            "Between, s": "number", "Truth at, s": "number",
+        },
+        tuple(rows),
+        "Between: the change's 95 % interval.",
+    ).without_empty()  # fmt: skip
+
+
+def quality_tables(result: TrackResult) -> tuple[Table, ...]:
+    """What the track leaves of the torque, the log, its channels, and where it has no samples."""
+    noise = significant(math.sqrt(result.track.colour), 3)
+    fit = (
+        ("torque explained by arm and payload, noise aside", share_text(result.track.explained)),
+        ("slow errors and noise over the sensors' noise", noise),
     )
-    with whole_file(path) as temporary:
-        frame.write_parquet(temporary)
+    log, channels = log_tables([result.log])
+    holes = [(f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist()]
+    return (
+        Table("Fit", {"What": "name", "Value": "number"}, fit),
+        log.without(["Arm"]),
+        channels.without(["Log"]),
+        Table("Times without samples", {"From, s": "name", "To, s": "number"}, tuple(holes)),
+    )
 
 
-def _write_mcap(result: TrackResult, folder: Path) -> None:
-    """The curve as a ROS 2 log with the log's own stamps, for Foxglove and PlotJuggler."""
-    from mcap.writer import CompressionType, Writer
+def mass_and_half(stretch: Stretch) -> tuple[str, str]:
+    """A stretch's mass and half its 95 % interval in kg, to the second digit of the deviation.
 
-    with whole_file(folder / "track.mcap") as temporary, temporary.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library=f"algid {result.version}")
-        write_series(writer, folder / "track.parquet", TOPIC)
-        writer.finish()  # type: ignore[no-untyped-call]
+    A mass that may be nothing is 0, with one digit of the interval.
+    """
+    half = NORMAL * stretch.std
+    if stretch.empty:
+        return "0", fixed(half, 10 * float(f"{half:.0e}"))
+    return fixed(stretch.m_p, stretch.std), fixed(half, stretch.std)
+
+
+def fixed(value: float, std: float) -> str:
+    """`value` with the decimals that its standard deviation resolves, so that columns line up."""
+    decimals = 3
+    if math.isfinite(std) and std > 0:
+        decimals = min(max(1 - math.floor(math.log10(std)), 0), 9)
+    return f"{value:z.{decimals}f}"
+
+
+def verdict(result: TrackResult) -> Verdict:
+    """Judge a track by its stretches, what it explains of the torque, and the arm's own result."""
+    track, statuses, reasons = result.track, result.statuses, []
+    for status, case in (
+        (StretchStatus.WEAK_EXCITATION, "weak"),
+        (StretchStatus.NEGATIVE_MASS, "negative"),
+    ):
+        numbers = [str(place) for place, own in enumerate(statuses, start=1) if own is status]
+        if numbers:
+            reasons.append(Notice("STRETCHES", numbers={"case": case, "numbers": numbers}))
+    if track.explained < LEAST_R2:
+        share = {"case": "track", "percent": max(100 * track.explained, 0.0)}
+        reasons.append(Notice("LITTLE_EXPLAINED", numbers=share))
+    if track.colour > COLOURED:
+        times = {"case": "errors", "times": significant(float(track.colour) ** 0.5, 2)}
+        reasons.append(Notice("LITTLE_EXPLAINED", numbers=times))
+    if result.data_lost and not lossy(result.notices):
+        reasons.append(Notice("DATA_LOST"))
+    reasons += warnings_of(result.notices)
+    notes = notes_of(result.notices)
+    return graded(_headline(result), reasons, notes, failure=_failure(result), things="masses")
+
+
+def _headline(result: TrackResult) -> str:
+    stretches, changes = result.track.stretches, result.track.changes[:, 0].tolist()
+    masses = [mass_and_half(one)[0] for one in stretches]
+    half = mass_and_half(max(stretches, key=lambda stretch: stretch.std))[1]
+    if not changes:
+        return f"the payload does not change: {masses[0]} ± {half} kg throughout"
+    what = f", in {counted(len(stretches), 'stretch', 'stretches')}"
+    if len(changes) <= MOST_NAMED:
+        times = joined([f"{time:.2f}" for time in changes])
+        what = f" at {times} s, weighing {joined(masses)} kg"
+    how_often = {1: "once", 2: "twice"}.get(len(changes), counted(len(changes), "time"))
+    return f"the payload changes {how_often}{what}, the least certain to ± {half} kg (95 %)"
+
+
+def _failure(result: TrackResult) -> str | None:
+    """Why the masses must not be used; None where they may be."""
+    track, statuses = result.track, result.statuses
+    asked = "is it this arm, in these units?"
+    negative = statuses.count(StretchStatus.NEGATIVE_MASS)
+    if has_code(result.notices, "LENGTH_CONTRADICTED"):
+        return "a link length contradicts the arm's result"
+    if track.explained < WORST_R2:
+        share = max(100 * track.explained, 0)
+        return f"arm and payload explain only {share:.0f} % of the torque: {asked}"
+    if track.colour > STRANGE and track.explained < ALL_BUT:
+        times = significant(float(track.colour) ** 0.5, 2)
+        return f"arm and payload miss the torque by {times} times its sensors' noise: {asked}"
+    if 2 * negative >= len(statuses):
+        of_all = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')}"
+        return f"{of_all} with a negative mass: the arm's constants do not fit this log"
+    if set(statuses) == {StretchStatus.WEAK_EXCITATION}:
+        return "the arm moves too little to weigh anything"
+    return None
+
+
+def payload_figure(result: TrackResult) -> Plot:
+    """Payload and residual over time, with the stretches, the changes and the true schedule."""
+    track, stretches = result.track, result.track.stretches
+    titles = ("payload, kg", f"residual over the sensors' noise, RMS of each {CELL:g} s")
+    panels = Panels(titles, height=320, together=True)
+    half = NORMAL * track.std
+    curve = {"t": track.t, "low": track.m_p - half, "m_p": track.m_p, "high": track.m_p + half}
+    curve["left"] = track.left
+    size = max(1, -(-2 * track.t.size // POINTS))
+    # lines break at holes and between stretches
+    apart = np.flatnonzero((np.diff(track.stretch) != 0) | (np.diff(track.t) > HOLE + CELL)) + 1
+    parts = []
+    for part in zip(*(np.split(values, apart) for values in curve.values()), strict=True):
+        drawn = np.array(list(reduced(dict(zip(curve, part, strict=True)), size).values()))
+        parts += [drawn, np.full((len(curve), 1), np.nan)]
+        parts[-1][0] = drawn[0, -1]
+    t, low, m_p, high, left = np.concatenate(parts, axis=1)
+    panels.band(0, t, low, high, "its 95 % band")
+    panels.curve(0, t, m_p, f"m_p(t) from ± {HALF_BAND:g} s around", BLUE, 1.2)
+    ends = np.array([[one.start, one.end] for one in stretches]).ravel()
+    masses = np.repeat([one.m_p for one in stretches], 2)
+    panels.curve(0, ends, masses, "mass of each stretch", GREEN, 2.6)
+    # in view: masses, their intervals and the truth; m_p(t) where it is as certain as usual, but
+    # for jolts
+    certain = track.std <= 3 * np.median(track.std)
+    reach = [*(end for one in stretches for end in one.ci95)]
+    reach.append(float(np.percentile(curve["low"][certain], 1)))
+    reach.append(float(np.percentile(curve["high"][certain], 99)))
+    if result.schedule is not None:
+        last = float(ends[-1])
+        steps = [(max(time, float(ends[0])), mass) for time, mass in result.schedule if time < last]
+        corners = [float(ends[0]), *(time for time, _ in steps), last]
+        true = [0.0, *(mass for _, mass in steps)]
+        x, y = np.repeat(corners, 2)[1:-1], np.repeat(true, 2)
+        panels.curve(0, x, y, "true schedule", ORANGE, 1.6, "dash")
+        reach += true
+    if len(track.changes) <= MOST_MARKS:
+        for _, start, end in track.changes.tolist():
+            for place in (0, 1):
+                panels.stretch(place, start, end, ORANGE)
+    space = SPACE * (max(reach) - min(reach)) or 0.05
+    panels.axes(0, y={"range": [min(reach) - space, max(reach) + space]})
+    panels.curve(1, t, left, "residual", ORANGE, 1.0)
+    panels.line(1, y=1.0)
+    panels.axes(1, "time, s", {"rangemode": "tozero"})
+    reading = (
+        "Blue should run level, green within its band; the payload may step in the orange bands. "
+        "A band that opens wide shows that the arm moved too little. A residual about 1 is the "
+        "sensors' noise; more is torque that neither arm nor payload explains."
+    )
+    note = f"Median of the residual over the noise: {float(np.median(track.left)):.2f}."
+    return Plot("payload", "Payload in time", panels, reading, note)

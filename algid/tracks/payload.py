@@ -22,7 +22,8 @@ from algid.base.criteria import HOLE
 from algid.base.significance import NORMAL
 from algid.estimators.too_short import TooShortError
 from algid.signals.segments import Segment
-from algid.tracks.bins import CELL, Cells, IdentifiedArm, cells_of, joined, with_friction
+from algid.tracks.arm import IdentifiedArm
+from algid.tracks.cells import CELL, Cells, cells_of, joined
 from algid.tracks.change_points import (
     AHEAD,
     BEHIND,
@@ -33,8 +34,8 @@ from algid.tracks.change_points import (
     rough_variance,
     variance,
 )
+from algid.tracks.change_times import Changes, Confirmation, Place, cut_to
 from algid.tracks.drift import Drift, drift_of
-from algid.tracks.placing import Changes, Place, confirmed, cut_to
 
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
 FEWEST = 4  # cells that weigh a stretch
@@ -108,8 +109,7 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     TooShortError
         If the log is too short.
     """
-    arm, covariance = with_friction(arm, covariance)
-    parts = cells_of(source(), arm, arm.k, settle=0)
+    parts = cells_of(source(), arm, arm.k, settle=False)
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise TooShortError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
@@ -146,9 +146,10 @@ def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, rough: Edges) -> li
     masses = _masses(_cut(cells, rough.places), rough.drift)
     changes = Changes(tuple(places), tuple(masses))
     ends = (float(cells.start[0]), float(cells.end[-1]))
-    return confirmed(
-        source, arm, rough.drift, changes, ends, PENALTY * rough.variance, rough.variance
+    evidence = Confirmation(
+        source, arm, rough.drift, ends, PENALTY * rough.variance, rough.variance
     )
+    return evidence.of(changes)
 
 
 def _weigh(

@@ -1,4 +1,4 @@
-"""A track's findings by stretch: the one source of its table, pages and `track.json`."""
+"""A track: findings by stretch, and its files but for the pages."""
 
 from __future__ import annotations
 
@@ -6,13 +6,25 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
 from algid.base.criteria import UNDETERMINED
-from algid.base.significance import SURE
+from algid.base.errors import ResultError
+from algid.base.files import first_misfit, read_text, whole_file
+from algid.base.significance import NORMAL, SURE
 from algid.notices import Notice
+from algid.report.export import START_KEY
+from algid.report.series import blocks
 from algid.results import LogSummary
 from algid.tracks.payload import Stretch, Track
+
+FILE, CURVE = "track.json", "track.parquet"
+COLUMNS = ("t", "m_p", "high", "stretch", "left")
+"""Of the curve, those from which its pages are made again."""
 
 SCHEMA_VERSION = 2
 
@@ -116,3 +128,115 @@ def track_json(result: TrackResult) -> str:
         "notices": list(map(asdict, result.notices)),
     }
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+class _File(BaseModel):
+    """What is read of ``track.json``; it holds more, which follows from this."""
+
+    version: str
+    stretches: list[Stretch]
+    changes: list[dict[str, float]]
+    explained: float
+    excess: float
+    bare: float
+    holes: list[tuple[float, float]]
+    schedule: tuple[tuple[float, float], ...] | None
+    arm: dict[str, str]
+    settings: dict[str, Any]
+    log: LogSummary
+    data_lost: bool
+    notices: tuple[Notice, ...]
+
+
+def is_track(folder: Path) -> bool:
+    """True if a folder is a track's, and not a result's."""
+    return (folder / FILE).is_file()
+
+
+def read_track(folder: Path) -> TrackResult:
+    """The track in `folder`, so that its pages can be made again.
+
+    Raises
+    ------
+    ResultError
+        If its files are missing, damaged, or of another version.
+    """
+    path = folder / FILE
+    again = "run algid track again with this version"
+    try:
+        file = _File.model_validate(json.loads(read_text(path)))
+    except OSError as error:
+        raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
+    except ValidationError as error:
+        raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise ResultError(
+            f"{path}: not JSON ({reason}); expected a track of algid track"
+        ) from error
+    parts = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
+    if not parts:
+        raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
+    t, m_p, high, stretch, left = (
+        np.concatenate([part[name] for part in parts]) for name in COLUMNS
+    )
+    changes = [[one["t"], one["from"], one["to"]] for one in file.changes]
+    return TrackResult(
+        track=Track(
+            stretches=file.stretches,
+            t=t,
+            m_p=m_p,
+            std=(high - m_p) / NORMAL,
+            stretch=stretch,
+            left=left,
+            changes=np.array(changes).reshape(-1, 3),
+            colour=file.excess,
+            explained=file.explained,
+            holes=np.array(file.holes).reshape(-1, 2),
+            tip_equivalent=file.bare,
+        ),
+        log=file.log,
+        arm=file.arm["path"],
+        arm_sha256=file.arm["sha256"],
+        settings=file.settings,
+        version=file.version,
+        schedule=file.schedule,
+        notices=file.notices,
+        data_lost=file.data_lost,
+    )
+
+
+def write_tables(result: TrackResult, folder: Path) -> None:
+    """Write the curve, a row each 20 ms, and the stretches. Raises `OutputError`."""
+    import polars as pl
+    import pyarrow.parquet as pq
+
+    track = result.track
+    stretches = pl.DataFrame(
+        [
+            (one.start, one.end, one.m_p, one.std, *one.ci95, status.value)
+            for one, status in zip(track.stretches, result.statuses, strict=True)
+        ],
+        schema=["start", "end", "m_p", "m_p_std", "low", "high", "status"],
+        orient="row",
+    )
+    number = track.stretch.astype(np.int64)
+    own = stretches[number]
+    curve = pl.DataFrame(
+        {
+            "t": track.t,
+            "m_p": track.m_p,
+            "low": track.m_p - NORMAL * track.std,
+            "high": track.m_p + NORMAL * track.std,
+            "left": track.left,
+            "stretch": number,
+            "stretch_m_p": own["m_p"],
+            "stretch_low": own["low"],
+            "stretch_high": own["high"],
+        }
+    )
+    stamped = curve.to_arrow().replace_schema_metadata({START_KEY: f"[{result.log.start_ns}]"})
+    with whole_file(folder / CURVE) as temporary:
+        pq.write_table(stamped, temporary)
+    with whole_file(folder / "stretches.parquet") as temporary:
+        stretches.write_parquet(temporary)

@@ -19,7 +19,7 @@ from algid.identification.open_logs import LogLike, open_source, read_otherwise
 from algid.identification.recordings import Recordings
 from algid.notices import Notice, lossy, merged
 from algid.results import Result, read_result, result_json
-from algid.tracks.bins import arm_of
+from algid.tracks.arm import arm_of
 from algid.tracks.payload import track
 from algid.tracks.result import TrackResult
 

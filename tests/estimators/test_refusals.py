@@ -11,7 +11,7 @@ import pytest
 
 from algid.estimators import refined, weak
 from algid.estimators.weak import Source
-from algid.estimators.whitening import Linearised, covariance_factor, low_passed
+from algid.estimators.whitening import Linearised, covariance_factor
 from algid.model import Motion
 from algid.signals.differences import POINTS
 from algid.signals.segments import Segment
@@ -65,17 +65,6 @@ def test_a_factor_without_a_pivot_solves_nothing() -> None:
     for solve in (linear.solve, linear.solve_transposed):
         with pytest.raises(np.linalg.LinAlgError, match="substitution failed with info 6"):
             solve(np.ones((1, 24)))
-
-
-def test_a_lag_of_nothing_copies_and_a_straight_line_passes_as_it_is() -> None:
-    t = np.arange(300) * DT
-    line = np.stack([2 * t - 1, 5 - 3 * t])
-    same = low_passed(line, DT, 0.0)
-    np.testing.assert_array_equal(same, line)
-    assert not np.shares_memory(same, line)
-    for lag in (4.3 * DT, -4.3 * DT, 0.2 * DT):
-        # unchanged and in time
-        np.testing.assert_allclose(low_passed(line, DT, lag), line, atol=1e-12)
 
 
 def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: Bench) -> None:

@@ -11,7 +11,6 @@ from scipy.signal import lfilter
 from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit
-from algid.estimators.whitening import low_passed
 from algid.model import TERMS, UNITS, Model, Motion
 from algid.signals.segments import Segment
 from tests.estimators.by_hand import evaluated, torque_by_hand
@@ -117,21 +116,6 @@ def test_terms_that_are_not_linear_are_found_under_a_payload_too(
         fit.std
         < 0.05 * np.array([1.0 if UNITS[n] in ("1", "rad") else known[n] for n in fit.names])
     )
-
-
-@pytest.mark.parametrize("lag", [5.3e-3, 0.7e-3, -3e-3])
-def test_a_low_pass_in_time_is_the_low_pass_brought_forward(lag: float) -> None:
-    t = np.arange(2000) * DT
-    hertz = 6.0
-    # The response exp(iωT) / (1 + iωT) of a sine wave, in closed form.
-    passed = np.exp(2j * np.pi * hertz * (t + lag)) / (1 + 2j * np.pi * hertz * lag)
-    wave = np.sin(2 * np.pi * hertz * t)
-    # beside the joint that a column does not act on
-    nothing, ours = low_passed(np.stack([np.zeros_like(wave), wave]), DT, lag)
-    inner = slice(200, -200)
-    # straight lines between samples: (ω dt)² / 12
-    assert np.allclose(ours[inner], passed.imag[inner], atol=5e-4)
-    assert not nothing.any()
 
 
 def test_an_estimated_term_leaves_the_logs_as_they_were(bench: Bench) -> None:

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from algid.arm import FloatArray
 from algid.log import Log
 from algid.model import Model
 from algid.synth.cases import load_case
+from algid.tracks.arm import IdentifiedArm
 
 CASE = load_case("case1")
 
@@ -28,3 +30,17 @@ def rubbing(log: Log, friction: float) -> Log:
     """The log with Coulomb friction of so many N m in both joints, as `RUBBING` has it."""
     assert log.omega is not None
     return replace(log, tau=log.tau + friction * np.tanh(log.omega / RUBBING.coulomb_speed))
+
+
+def without_coulomb(
+    found: tuple[IdentifiedArm, FloatArray],
+) -> tuple[IdentifiedArm, FloatArray]:
+    """An arm and its covariance less the Coulomb friction that a track adds, which is zero."""
+    arm, covariance = found
+    names = [*arm.model.names, "l1", "l2", *arm.body]
+    added = [names.index(name) for name in ("f1", "f2")]
+    assert not covariance[added].any()
+    assert not arm.k[added].any()
+    terms = tuple(name for name in arm.model.terms if name != "coulomb")
+    lean = replace(arm, model=replace(arm.model, terms=terms), k=np.delete(arm.k, added))
+    return lean, np.delete(np.delete(covariance, added, axis=0), added, axis=1)

@@ -12,16 +12,13 @@ import pytest
 
 import algid
 from algid.base.errors import ResultError
-from algid.estimators.noise import first_guess
 from algid.identification.identify import identify
-from algid.profile import Angle, Profile
 from algid.results import Result, read_result
 from algid.signals.segments import Segment, segments
 from algid.synth.sensors import Sensors
-from algid.tracks.bins import arm_of
-from algid.tracks.run import track_log
+from algid.tracks.arm import arm_of
 from algid.writers import write_log
-from tests.tracks.folders import CASE, noisy
+from tests.tracks.folders import CASE, noisy, without_coulomb
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +56,7 @@ def _with(result: Result, **settings: Any) -> Result:
 
 
 def test_lengths_that_were_estimated_come_with_their_errors(result: Result, first: Segment) -> None:
-    arm, covariance = arm_of(result, first)
+    arm, covariance = without_coulomb(arm_of(result, first))
     assert arm.l1 == result.payload["l1"].estimate == pytest.approx(CASE.arm.l1, rel=0.05)
     assert arm.l2 == result.payload["l2"].estimate == pytest.approx(CASE.arm.l2, rel=0.05)
     assert result.fit is not None
@@ -78,36 +75,13 @@ def test_lengths_that_were_estimated_come_with_their_errors(result: Result, firs
 def test_a_length_that_is_given_goes_before_the_results_and_is_exact(
     result: Result, first: Segment
 ) -> None:
-    arm, covariance = arm_of(result, first, l1=0.4)
+    arm, covariance = without_coulomb(arm_of(result, first, l1=0.4))
     assert (arm.l1, arm.l2) == (0.4, result.payload["l2"].estimate)
     assert not covariance[7].any()
     assert covariance[8, 8] > 0
     told = _with(result, l1=0.5, l2=0.6).model_copy(update={"payload": {}})
     arm, _ = arm_of(told, first, l2=0.3)
     assert (arm.l1, arm.l2) == (0.5, 0.3)
-
-
-def test_a_given_length_serves_where_the_logs_leave_it_undetermined(
-    result: Result, first: Segment
-) -> None:
-    assert result.fit is not None
-    names, covariance = result.fit.covariance_names, np.array(result.fit.covariance)
-    lost: list[list[float | None]] = covariance.tolist()
-    place = names.index("l2")
-    for other in range(len(names)):
-        lost[place][other] = lost[other][place] = None
-    undetermined = result.payload["l2"].model_copy(
-        update={"std": None, "status": "not identifiable"}
-    )
-    changed = result.model_copy(
-        update={
-            "payload": {**result.payload, "l2": undetermined},
-            "fit": result.fit.model_copy(update={"covariance": lost}),
-        }
-    )
-    _, expected = arm_of(result, first, l2=0.3)
-    _, found = arm_of(changed, first, l2=0.3)
-    np.testing.assert_array_equal(found, expected)
 
 
 def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Segment) -> None:
@@ -117,20 +91,6 @@ def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Seg
         arm_of(result.model_copy(update={"payload": {}}), first, l1=0.3)
     with pytest.raises(ResultError, match="has no error bars"):
         arm_of(result.model_copy(update={"fit": None}), first)
-
-
-def test_noise_is_the_results_or_else_the_logs(result: Result, first: Segment) -> None:
-    assert result.fit is not None
-    noise = result.fit.noise
-    arm, _ = arm_of(result, first)
-    np.testing.assert_array_equal(arm.noise.theta, [noise["theta1"], noise["theta2"]])
-    np.testing.assert_array_equal(arm.noise.tau, [noise["tau1"], noise["tau2"]])
-    guess = first_guess(first.theta, first.tau)
-    for lacking in ({}, {**noise, "tau2": 0.0}):
-        bare = result.model_copy(update={"fit": result.fit.model_copy(update={"noise": lacking})})
-        arm, _ = arm_of(bare, first)
-        np.testing.assert_array_equal(arm.noise.theta, guess.theta)
-        np.testing.assert_array_equal(arm.noise.tau, guess.tau)
 
 
 def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first: Segment) -> None:
@@ -144,33 +104,6 @@ def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first
     delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
     estimated = found.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
     assert arm_of(estimated, first)[0].shift == 0.007
-
-
-def test_a_delay_that_the_logs_chose_shifts_the_torque_as_one_that_was_asked_for(
-    result: Result, first: Segment
-) -> None:
-    delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
-    chosen = result.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
-    assert chosen.settings["delay"] == 0.0
-    assert arm_of(chosen, first)[0].shift == 0.007
-
-
-def test_what_the_log_tells_stands_in_the_track(
-    weighed: Path, picking: algid.Log, tmp_path: Path
-) -> None:
-    log = noisy(picking, np.random.default_rng(4))
-    write_log(tmp_path / "log.mcap", log, truth=log.origin.truth)
-    plain = track_log(tmp_path / "log.mcap", weighed)
-    assert not plain.data_lost
-    assert "OTHER_ARM" not in [one.code for one in plain.notices]
-    whole = (tmp_path / "log.mcap").read_bytes()
-    (tmp_path / "torn.mcap").write_bytes(whole[: int(0.9 * len(whole))])
-    broken = track_log(tmp_path / "torn.mcap", weighed)
-    assert broken.data_lost
-    assert "CUT_OFF" in [one.code for one in broken.notices]
-    other = track_log(tmp_path / "log.mcap", weighed, profile=Profile(theta1=Angle(offset=0.01)))
-    (read,) = (one for one in other.notices if one.code == "OTHER_ARM")
-    assert read.numbers["file"] == str(weighed)
 
 
 def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
@@ -193,7 +126,7 @@ def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
         update={"covariance_names": names, "covariance": covariance.tolist()}
     )
     bodied = result.model_copy(update={"payload": {**result.payload, "J_p": J}, "fit": fit})
-    arm, found = arm_of(bodied, first)
+    arm, found = without_coulomb(arm_of(bodied, first))
     assert arm.body == ("J_p",)
     assert arm.gyration**2 == pytest.approx(4e-4 / m_p.estimate)
     assert found.shape == (len(arm.model.names) + 3,) * 2
@@ -229,7 +162,7 @@ def test_the_first_length_by_the_constants_comes_with_what_it_shares_with_them(
             "fit": fit.model_copy(update={"covariance_names": names, "covariance": full.tolist()}),
         }
     )
-    arm, found = arm_of(changed, first)
+    arm, found = without_coulomb(arm_of(changed, first))
     order = [*arm.model.names, "l2"]
     places = [names.index(name) for name in order]
     mean = np.array([changed.estimates[name].estimate for name in order], dtype=np.float64)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import pytest
 from algid.arm import FloatArray, with_payload
 from algid.base.criteria import HOLE
 from algid.base.errors import LogError
-from algid.base.significance import NORMAL
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log, Origin
@@ -23,9 +21,10 @@ from algid.settings import Settings
 from algid.signals.segments import segments
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
-from algid.tracks.bins import CELL, SUMS, Cells, IdentifiedArm, cells_of, joined
+from algid.tracks.arm import IdentifiedArm
+from algid.tracks.cells import CELL, Cells, cells_of, joined
 from algid.tracks.payload import HALF_BAND, Stretch, Track, track
-from algid.tracks.result import StretchStatus, TrackResult, track_json
+from algid.tracks.result import StretchStatus, TrackResult
 from algid.tracks.run import track_log
 from tests.tracks.folders import CASE, noisy
 
@@ -70,28 +69,6 @@ def loaded(mass: float, duration: float = 3.0, seed: int = 3) -> Log:
     return noisy(log, np.random.default_rng(seed))
 
 
-def test_parts_and_joins_keep_every_sum_in_its_place() -> None:
-    cells = numbered(9)
-    assert len(cells) == 9
-    both = joined([cells.part(0, 4), cells.part(4, 9)])
-    for name in SUMS:
-        np.testing.assert_array_equal(getattr(both, name), getattr(cells, name))
-    assert cells.part(2, 5).start.tolist() == [3, 4, 5]
-    assert cells.part(2, 5).S.shape == (3, 7)
-
-
-def test_the_mass_is_the_least_squares_one_and_its_squares_are_those_it_leaves() -> None:
-    cells = numbered(5)
-    assert cells.mass == pytest.approx(3.0)
-    # e² − 2 m g e + m² g²: 20 − 2·3·6 + 9·2 = 2
-    np.testing.assert_allclose(cells.squares(3.0), 2 * np.arange(1.0, 6))
-    np.testing.assert_allclose(
-        cells.squares(np.array([0.0, 1.0, 2.0, 3.0, 4.0])), [20, 20, 12, 8, 20]
-    )
-    empty = numbered(2)
-    assert replace(empty, A=np.zeros(2), B=np.zeros(2)).mass == 0.0
-
-
 def test_a_kilogram_at_the_tip_adds_table_2_to_the_constants() -> None:
     l1, l2, g = CASE.arm.l1, CASE.arm.l2, 9.81
     assert ARM.unit.tolist() == pytest.approx([l1 * l2, g * l2, l2**2, g * l1, l1**2, 0, 0])
@@ -126,12 +103,6 @@ def test_cells_weigh_the_payload_wherever_they_are_linearised(mass: float, about
     # what the payload leaves is white noise of variance one: χ² of as many rows
     left, rows = cells.squares(cells.mass).sum(), cells.rows.sum()
     assert abs(left - rows) < 5 * np.sqrt(2 * rows)
-
-
-def test_pieces_too_short_for_the_stencil_are_left_out() -> None:
-    log = loaded(0.0)
-    assert cells_of(segments([log.part(0, 26)]), ARM, ARM.k) == []
-    assert len(cells_of(segments([log.part(0, 27)]), ARM, ARM.k)) == 1
 
 
 def test_a_track_is_the_weighted_mean_over_its_neighbourhood_and_its_band_that_ones_error() -> None:
@@ -242,28 +213,6 @@ def test_a_stretchs_status_goes_by_its_deviation_and_its_sign(
     found = judged(Stretch(0.0, 2.0, 0.0, 0.01), Stretch(2.0, 4.0, m_p, std))
     assert found.statuses == [StretchStatus.OK, status]
     assert found.complete is (status is StretchStatus.OK)
-
-
-def test_the_truth_of_a_stretch_is_that_amid_it() -> None:
-    schedule = ((1.0, 0.5), (3.0, 0.2))
-    one, other, last = Stretch(0.0, 1.9, 0, 1), Stretch(1.1, 4.8, 0, 1), Stretch(2.0, 4.0, 0, 1)
-    found = judged(one, other, last, schedule=schedule)
-    assert found.truth == (0.0, 0.5, 0.2)
-    assert judged(one).truth == ()
-
-
-def test_track_json_holds_what_was_found() -> None:
-    found = judged(Stretch(0.0, 2.0, 0.5, 0.01), schedule=((0.0, 0.5),))
-    content = json.loads(track_json(found))
-    (stretch,) = content["stretches"]
-    assert stretch["ci95"] == pytest.approx([0.5 - 0.01 * NORMAL, 0.5 + 0.01 * NORMAL])
-    assert (stretch["status"], stretch["truth"], stretch["unit"]) == ("OK", 0.5, "kg")
-    assert content["changes"] == [{"t": 2.0, "from": 1.9, "to": 2.1}]
-    assert content["holes"] == [[5.0, 6.0]]
-    assert (content["excess"], content["explained"], content["bare"]) == (1.5, 0.99, 0.1)
-    assert content["arm"] == {"path": "arm", "sha256": "0" * 64}
-    assert content["data_lost"] is True
-    assert [one["text"] for one in content["notices"]] == ["a warning"]
 
 
 def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:

@@ -13,19 +13,15 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from algid.arm import FloatArray
-from algid.tracks.bins import CELL, Cells
+from algid.tracks.cells import CELL, Cells
 from algid.tracks.change_points import (
-    AHEAD,
-    BEHIND,
     CHANCE,
     PENALTY,
     SHORTEST,
     Starts,
-    calm_parts,
     cuts,
     edges,
     excess,
-    variance,
 )
 
 
@@ -136,15 +132,6 @@ def test_few_starts_are_kept_where_nothing_changes(monkeypatch: pytest.MonkeyPat
     assert max(kept) < 300
 
 
-def test_a_log_of_one_mass_is_not_cut_and_a_step_is_where_it_is() -> None:
-    A = np.ones(60)
-    assert cuts(A, 3.0 * A, 10.0, 5) == []
-    assert cuts(A, np.repeat([0.0, 5.0, 1.0], 20), 10.0, 5) == [20, 40]
-    # a step of d between n cells each of information one explains n d²/2: 20 · 1.0²/2 = 10
-    for step, found in ((0.99, []), (1.01, [20])):
-        assert cuts(np.ones(40), np.repeat([0.0, step], 20), 10.0, 5) == found
-
-
 def test_cells_without_information_do_not_stop_the_cut() -> None:
     A = np.where(np.arange(60) % 3 == 0, 0.0, 1.0)
     assert cuts(A, A * np.repeat([0.0, 5.0, 1.0], 20), 10.0, 5) == pytest.approx([20, 40], abs=1)
@@ -209,26 +196,6 @@ def test_errors_of_the_constants_are_taken_from_the_excess() -> None:
     B = np.sqrt(A) * rng.standard_normal(2000) + T[:, 0] * wrong
     assert excess(A, B, whole) > 5
     assert excess(A, B, whole, known=(T, np.array([[4 * wrong**2]]))) < 2
-
-
-@pytest.mark.parametrize("size", [0, 3, 8])
-def test_too_few_cells_tell_no_excess(size: int) -> None:
-    A = np.ones(size)
-    assert excess(A, 1e3 * (-A) ** np.arange(size), [(0, size)]) == 1.0
-
-
-@pytest.mark.parametrize("spread", [1.0, 3.0])
-def test_the_rows_variance_is_that_of_their_noise_one_at_least(spread: float) -> None:
-    cells = cells_of(np.full(500, 0.4), np.random.default_rng(2), spread)
-    assert variance(cells, [(0, 500)]) == pytest.approx(spread**2, rel=0.15)
-    quiet = cells_of(np.zeros(500), np.random.default_rng(2), 0.1)
-    assert variance(quiet, [(0, 500)]) == 1.0
-
-
-def test_calm_parts_keep_away_from_changes_and_are_never_negative() -> None:
-    assert calm_parts([0, 40]) == [(0, 40)]
-    assert calm_parts([0, 40, 90]) == [(0, 40 - AHEAD), (40 + BEHIND, 90)]
-    assert calm_parts([0, 40, 50, 90])[1] == (45, 45)
 
 
 @pytest.mark.parametrize("step", [0.0, 1.0])

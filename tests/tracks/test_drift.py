@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.tracks.bins import CELL, Cells
-from algid.tracks.drift import Drift, between, drift_of, knots_of
+from algid.tracks.cells import CELL, Cells
+from algid.tracks.drift import between, drift_of, knots_of
 
 COUNT, ROWS = 600, 8
 STARTS = np.array([0, 180, 400])
@@ -78,24 +78,6 @@ def test_friction_as_it_was_is_left_alone() -> None:
     rng = np.random.default_rng(1)
     for _ in range(40):
         assert drift_of(summed(*rows(np.zeros((COUNT, 2)), rng)), STARTS, 1.0) is None
-
-
-def test_an_arm_without_columns_of_friction_has_no_drift() -> None:
-    cells = summed(*rows(rising(), np.random.default_rng(2)))
-    none = Cells(
-        *(
-            getattr(cells, name)
-            for name in ("start", "end", "A", "B", "S", "E", "Q", "rows", "N", "D")
-        )
-    )
-    assert drift_of(none, STARTS, 1.0) is None
-
-
-def test_a_variance_between_knots_is_that_of_the_nearest() -> None:
-    blocks = np.diag([1.0, 4.0, 9.0, 16.0])
-    drift = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), blocks)
-    slope = np.array([[1.0, 0.0], [0.0, 2.0]])
-    assert drift.variance_at(np.array([1.0, 4.0]), slope).tolist() == [1.0, 64.0]
 
 
 @pytest.mark.parametrize("duration", [1.0, 12.0, 3600.0])

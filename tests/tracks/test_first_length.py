@@ -12,7 +12,8 @@ from algid.identification.known import first_length, payload_length
 from algid.results import Result
 from algid.signals.segments import Segment
 from algid.synth.sensors import Sensors
-from algid.tracks.bins import arm_of
+from algid.tracks.arm import arm_of
+from tests.tracks.folders import without_coulomb
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,9 @@ def test_the_better_of_constants_and_payload_is_taken(weighed: Result) -> None:
 def test_a_length_of_constants_errs_as_they_do(weighed: Result) -> None:
     by_constants = first_length(weighed)
     assert by_constants is not None
-    _, covariance = arm_of(with_payload_std(weighed, by_constants[1] * 2), segment())
+    _, covariance = without_coulomb(
+        arm_of(with_payload_std(weighed, by_constants[1] * 2), segment())
+    )
     assert covariance[-2, -2] == pytest.approx(by_constants[1] ** 2)
     assert covariance == pytest.approx(covariance.T, rel=1e-6)
     deviations = np.sqrt(np.diag(covariance))

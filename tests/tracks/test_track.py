@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 import pytest
-from click.testing import CliRunner
 from scipy.stats import chi2
 
 import algid
@@ -21,13 +18,11 @@ from algid.log import Log
 from algid.model import Model
 from algid.signals.segments import segments
 from algid.synth.run import Acquisition, excitation, with_schedule
-from algid.synth.sensors import Sensors
 from algid.tracks import drift
-from algid.tracks.bins import CELL, IdentifiedArm
-from algid.tracks.change_points import cuts
+from algid.tracks.arm import IdentifiedArm
+from algid.tracks.cells import CELL
 from algid.tracks.payload import HALF_BAND, Track, track
 from algid.writers import write_log
-from tests.cli.commands import app
 from tests.intervals import holds_95
 from tests.tracks.folders import CASE, RUBBING, noisy, rubbing
 
@@ -129,12 +124,6 @@ def test_friction_that_changed_biases_no_mass(picking: Log, known: float) -> Non
     assert low < np.sum(np.square(errors)) < high
 
 
-def test_a_constant_payload_is_one_stretch(picking: Log) -> None:
-    found = _track(noisy(picking.part(0, 1400), np.random.default_rng(2)))
-    assert len(found.stretches) == 1
-    assert np.all(np.abs(found.m_p) < 5 * found.std)
-
-
 def test_slow_errors_of_the_torque_pass_for_no_payload(picking: Log) -> None:
     """As unmodelled friction does, they alternate between the joints' turning points."""
     log = picking.part(0, 1500)
@@ -146,15 +135,6 @@ def test_slow_errors_of_the_torque_pass_for_no_payload(picking: Log) -> None:
     assert low < 0 < high
 
 
-def test_stretches_follow_one_another_without_a_hole(picking: Log) -> None:
-    found = _track(noisy(picking, np.random.default_rng(6)))
-    assert [s.end for s in found.stretches[:-1]] == pytest.approx(
-        [s.start for s in found.stretches[1:]], abs=1e-9
-    )
-    for stretch in range(3):
-        assert np.diff(found.t[found.stretch == stretch]) == pytest.approx(0.02, abs=1e-9)
-
-
 def test_errors_of_the_constants_are_no_colour(picking: Log) -> None:
     rng = np.random.default_rng(7)
     k = CASE.arm.constants()
@@ -163,46 +143,6 @@ def test_errors_of_the_constants_are_no_colour(picking: Log) -> None:
     wrong = k * (1 + 1e-2 * rng.standard_normal(7))
     log = noisy(picking, rng)
     assert _track(log, wrong, covariance).colour < _track(log, wrong).colour / 3
-
-
-def test_cuts_are_the_best_ones() -> None:
-    rng = np.random.default_rng(3)
-    A = rng.uniform(1, 3, 24)
-    B = A * np.repeat([0.0, 4.0, 1.0], 8) + np.sqrt(A) * rng.standard_normal(24)
-
-    def cost(edges: list[int]) -> float:
-        both = list(pairwise(edges))
-        return sum(10.0 - B[a:b].sum() ** 2 / A[a:b].sum() for a, b in both)
-
-    # by trying every pair
-    best = min(([0, a, b, 24] for a in range(3, 22) for b in range(a + 3, 22)), key=cost)
-    assert cuts(A, B, penalty=10.0, shortest=3) == best[1:-1] == [8, 16]
-
-
-def test_the_command_writes_both_tables(picking: Log, tmp_path: Path) -> None:
-    unloaded, _ = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
-    )
-    identify(unloaded, out=tmp_path, name="arm", report=False)
-    write_log(tmp_path / "picking.parquet", noisy(picking, np.random.default_rng(4)))
-    lengths = ["--l1", str(CASE.arm.l1), "--l2", str(CASE.arm.l2)]
-    command = [
-        "track",
-        str(tmp_path / "picking.parquet"),
-        "--parameters",
-        str(tmp_path / "arm.algid"),
-        *lengths,
-    ]
-    done = CliRunner().invoke(app, [*command, "-o", str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    stretches = pl.read_parquet(tmp_path / "picking.track/stretches.parquet")
-    assert stretches["m_p"].to_list() == pytest.approx(MASSES, abs=0.005)
-    assert pl.read_parquet(tmp_path / "picking.track/track.parquet").columns[:4] == [
-        "t",
-        "m_p",
-        "low",
-        "high",
-    ]
 
 
 @pytest.mark.parametrize("suffix", ["mcap", "parquet", "csv"])

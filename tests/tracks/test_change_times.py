@@ -7,24 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from algid.estimators.whitening import NoiseLevels, covariance_factor
+from algid.estimators.whitening import Linearised, NoiseLevels, covariance_factor
 from algid.log import Log
-from algid.model import Model
+from algid.model import Model, Motion
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment, segments
-from algid.tracks.bins import IdentifiedArm
-from algid.tracks.drift import Drift
-from algid.tracks.placing import (
+from algid.tracks.arm import IdentifiedArm
+from algid.tracks.change_times import (
     Changes,
+    Confirmation,
     Place,
     Rows,
-    confirmed,
     cut_to,
     place,
     rows_of,
     step_response,
     windows,
 )
+from algid.tracks.drift import Drift
 from tests.tracks.folders import CASE, RUBBING, noisy, rubbing
 
 ARM = IdentifiedArm(
@@ -43,7 +43,8 @@ def rough(*moments: float) -> tuple[Place, ...]:
 
 def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[Place]:
     changes = Changes(rough(*moments), masses)
-    return confirmed(lambda: segments([log]), ARM, None, changes, (0.0, 4.5), 60.0, 1.0)
+    evidence = Confirmation(lambda: segments([log]), ARM, None, (0.0, 4.5), 60.0, 1.0)
+    return evidence.of(changes)
 
 
 def test_a_step_of_acceleration_is_seen_as_differences_see_it() -> None:
@@ -85,17 +86,8 @@ def test_a_sliver_beside_a_change_is_made_one_with_it_and_a_change_of_nothing_go
 def test_a_window_too_short_for_candidates_leaves_a_change_where_it_was(picking: Log) -> None:
     log = noisy(picking.part(1460, 1530), np.random.default_rng(2))
     changes = Changes(rough(0.04), (0.0, 0.05))
-    found = confirmed(lambda: segments([log]), ARM, None, changes, (0.0, 0.07), 60.0, 1.0)
-    assert found == list(changes.places)
-
-
-def test_changes_are_replaced_with_the_masses_between_them() -> None:
-    changes = Changes(rough(1.0, 2.0, 3.0), (0.0, 1.0, 2.0, 3.0))
-    (new,) = rough(1.5)
-    merged = changes.merged(0, 1, new)
-    assert (merged.places, merged.masses) == ((new, changes.places[2]), (0.0, 2.0, 3.0))
-    less = changes.without(1)
-    assert (less.places, less.masses) == ((changes.places[0], changes.places[2]), (0.0, 1.0, 3.0))
+    evidence = Confirmation(lambda: segments([log]), ARM, None, (0.0, 0.07), 60.0, 1.0)
+    assert evidence.of(changes) == list(changes.places)
 
 
 def test_rows_do_not_depend_on_how_a_log_was_cut(picking: Log) -> None:
@@ -162,12 +154,14 @@ def test_rows_that_err_alike_are_worth_as_much_less(alike: int) -> None:
     rng = np.random.default_rng(5)
     n = 3000
     t, g = 1e-3 * np.arange(n), np.ones((2, n))
-    factor = covariance_factor(np.zeros((2, 2, POINTS, n)))
+    H = np.zeros((2, 2, POINTS, n))
+    still = Motion(*np.zeros((3, 2, n)))
+    linear = Linearised(np.zeros((0, 2 * n)), covariance_factor(H), H, 0, g, still)
     worths = []
     for _ in range(60):
         shared = np.repeat(rng.standard_normal((n // alike, 2)), alike, axis=0)
         step = 0.1 * (t > 1.5)[:, None]
-        rows = Rows(t, 1e-3, g, (shared + step).ravel(), factor)
+        rows = Rows(t, 1e-3, g, (shared + step).ravel(), linear)
         worths.append(place(rows, 1.5, 1.5, 1.0).gain)
     # a step of 0.1 amid 6,000 rows of variance one is worth 0.1² · 6000 / 4 squares,
     # and one chance more; where 200 rows are one, chance alone is three times its half a square
