@@ -17,18 +17,16 @@ two histories, tested for drift and for outliers apart.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
+from scipy.special import gammaincc
 
 from algid.base.significance import CERTAIN, sigmas
-
-if TYPE_CHECKING:
-    import polars as pl
 
 FloatArray = NDArray[np.float64]
 
@@ -70,62 +68,43 @@ def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataF
         logs on either side), job (the first one after it), parameter, step and step_std (in the
         parameter's unit), share (the step over the estimate before), p (of the change).
     """
-    import polars as pl
-
     ordered = jobs.sort("robot", "time", nulls_last=False, maintain_order=True)
-    dated = ordered["time"].is_not_null().to_numpy()
-    robots = ordered["robot"].rle_id().to_numpy()
-    y = np.stack([_numbers(ordered[name]) for name in parameters])
-    std = np.stack([_numbers(ordered[f"{name}_std"]) for name in parameters])
+    y = ordered.select(parameters).fill_null(np.nan).to_numpy().T
+    std = ordered.select(f"{name}_std" for name in parameters).fill_null(np.nan).to_numpy().T
     known = np.isfinite(y) & (std > 0)
     w = np.where(known, 1 / np.where(known, std, 1.0) ** 2, 0.0)
-    y = np.where(w > 0, y, 0.0)
-    stint = np.zeros(len(ordered), dtype=np.int32)
-    rows: list[dict[str, object]] = []
-    edges = np.flatnonzero(np.diff(robots, prepend=-1, append=-1))
+    y = np.where(known, y, 0.0)
     t = ordered["time"].dt.epoch("ms").to_numpy().astype(np.float64)
-    for first, last in pairwise(edges.tolist()):
-        own = np.arange(first, last)[dated[first:last]]
+    dated = np.flatnonzero(ordered["time"].is_not_null())
+    robots = ordered["robot"].rle_id().to_numpy()[dated]
+    stint = np.zeros(len(ordered), dtype=np.int32)
+    found: list[dict[str, object]] = []
+    for own in np.split(dated, np.flatnonzero(np.diff(robots)) + 1):
         for change in _changes(t[own], y[:, own], w[:, own]):
-            at = own[change.place]
+            before, at = own[change.place - 1 : change.place + 1].tolist()
             stint[own[change.place :]] += 1
-            rows += _rows_of(ordered, change, at, own[change.place - 1], parameters, y)
-    kinds: dict[str, Any] = dict.fromkeys(("robot", "job", "parameter"), pl.String())
-    kinds |= dict.fromkeys(("before", "after"), jobs.schema["time"])
-    kinds |= dict.fromkeys(("step", "step_std", "share", "p"), pl.Float64())
-    frame = pl.DataFrame(rows, schema=kinds)
-    return ordered.with_columns(stint=pl.Series(stint)), frame
-
-
-def _numbers(column: pl.Series) -> FloatArray:
-    return np.asarray(column.fill_null(float("nan")).to_numpy(), dtype=np.float64)
-
-
-def _rows_of(
-    jobs: pl.DataFrame,
-    change: Change,
-    at: int,
-    before: int,
-    parameters: Sequence[str],
-    y: FloatArray,
-) -> Iterator[dict[str, object]]:
-    sizes = np.abs(change.step) / np.maximum(change.std, _LEAST)
-    sizes = np.where(np.isfinite(change.std), sizes, 0.0)
-    for place in np.argsort(-sizes):
-        if sizes[place] < CLEAR and place != sizes.argmax():
-            continue
-        level = abs(y[place, before]) or np.nan
-        yield {
-            "robot": jobs["robot"][int(at)],
-            "before": jobs["time"][int(before)],
-            "after": jobs["time"][int(at)],
-            "job": jobs["job"][int(at)],
-            "parameter": parameters[place],
-            "step": float(change.step[place]),
-            "step_std": float(change.std[place]),
-            "share": float(change.step[place] / level),
-            "p": change.p,
-        }
+            sizes = np.abs(change.step) / np.maximum(change.std, _LEAST)  # no std is infinite
+            for place in np.argsort(-sizes)[: max(1, np.count_nonzero(sizes >= CLEAR))].tolist():
+                step, level = change.step[place], abs(y[place, before]) or np.nan
+                found.append(
+                    {
+                        "robot": ordered["robot"][at],
+                        "before": ordered["time"][before],
+                        "after": ordered["time"][at],
+                        "job": ordered["job"][at],
+                        "parameter": parameters[place],
+                        "step": step,
+                        "step_std": change.std[place],
+                        "share": step / level,
+                        "p": change.p,
+                    }
+                )
+    schema: dict[str, Any] = {
+        **dict.fromkeys(("robot", "job", "parameter"), pl.String),
+        **dict.fromkeys(("before", "after"), jobs.schema["time"]),
+        **dict.fromkeys(("step", "step_std", "share", "p"), pl.Float64),
+    }
+    return ordered.with_columns(stint=pl.Series(stint)), pl.DataFrame(found, schema=schema)
 
 
 def _changes(t: FloatArray, y: FloatArray, w: FloatArray) -> list[Change]:
@@ -135,7 +114,7 @@ def _changes(t: FloatArray, y: FloatArray, w: FloatArray) -> list[Change]:
         return []
     at = change.place
     late = _changes(t[at:], y[:, at:], w[:, at:])
-    later = [Change(one.place + at, one.p, one.step, one.std) for one in late]
+    later = [replace(one, place=one.place + at) for one in late]
     return [*_changes(t[:at], y[:, :at], w[:, :at]), change, *later]
 
 
@@ -149,8 +128,6 @@ def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:
     w : (P, N) float64
         Weights, 1 / std²; 0 where there is no estimate.
     """
-    from scipy.special import gammaincc
-
     n = t.size
     if n < 2 * FEWEST:
         return None
@@ -158,11 +135,9 @@ def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:
     total, moment = w.sum(axis=1, keepdims=True), (w * y).sum(axis=1, keepdims=True)
     y = np.where(w > 0, y - moment / np.maximum(total, _LEAST), 0.0)
     left, sums = np.cumsum(w, axis=1)[:, :-1], np.cumsum(w * y, axis=1)[:, :-1]
-    right = total - left
-    both = (left > 0) & (right > 0)
-    explained = np.where(
-        both, sums**2 * (1 / np.maximum(left, _LEAST) + 1 / np.maximum(right, _LEAST)), 0.0
-    )
+    # what the difference of the two means is known by: of information left and right, both needed
+    pooled = left * (total - left) / np.maximum(total, _LEAST)
+    explained = np.where(pooled > 0, sums**2 / np.maximum(pooled, _LEAST), 0.0)
     squares = (w * y * y).sum(axis=1, keepdims=True)
     freedom = np.maximum((w > 0).sum(axis=1, keepdims=True) - 2, 1)
     scale = np.maximum((squares - explained) / freedom, 1.0)
@@ -173,10 +148,9 @@ def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:
     if p >= ALPHA or _line(t, y, w, squares, freedom) > best:
         return None
     at = place - 1
-    step = np.where(both[:, at], -sums[:, at] / np.maximum(left[:, at], _LEAST), 0.0)
-    step += np.where(both[:, at], -sums[:, at] / np.maximum(right[:, at], _LEAST), 0.0)
-    information = left[:, at] * right[:, at] / np.maximum(total[:, 0], _LEAST)
-    std = np.where(both[:, at], np.sqrt(scale[:, at] / np.maximum(information, _LEAST)), np.inf)
+    both, known = pooled[:, at] > 0, np.maximum(pooled[:, at], _LEAST)
+    step = np.where(both, -sums[:, at] / known, 0.0)
+    std = np.where(both, np.sqrt(scale[:, at] / known), np.inf)
     return Change(place, p, step, std)
 
 

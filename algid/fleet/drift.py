@@ -17,14 +17,11 @@ add up to a window's: the cost is O(N).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import polars as pl
+from scipy.special import stdtr
 
 from algid.base.significance import LEVEL
-
-if TYPE_CHECKING:
-    import polars as pl
 
 SPAN = 3
 ALPHA = LEVEL
@@ -50,37 +47,33 @@ def windows(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)
         those of `by`, parameter, month, end (time of its last log), logs, mean, mean_std, slope,
         slope_std (of the parameter a month; NaN where not tested), p, drift.
     """
-    import polars as pl
-
     known = jobs.filter(
         pl.col("time").is_not_null()
         & (pl.col(f"{parameter}_std") > 0)
         & pl.col(parameter).is_finite()
     )
     known = known.with_columns(pl.col(parameter).mean().over(*by).alias("centre"))
-    w, t, y = 1 / pl.col(f"{parameter}_std") ** 2, pl.col("t"), pl.col(parameter) - pl.col("centre")
+    weight, t, y = (
+        1 / pl.col(f"{parameter}_std") ** 2,
+        pl.col("t"),
+        pl.col(parameter) - pl.col("centre"),
+    )
     months = known.group_by(*by, "month", maintain_order=False).agg(
         pl.col("centre").first(),
         pl.col("time").max().alias("end"),
-        w.sum().alias("w"),
-        (w * t).sum().alias("wt"),
-        (w * t * t).sum().alias("wtt"),
-        (w * y).sum().alias("wy"),
-        (w * t * y).sum().alias("wty"),
-        (w * y * y).sum().alias("wyy"),
+        weight.sum().alias("w"),
+        (weight * t).sum().alias("wt"),
+        (weight * t * t).sum().alias("wtt"),
+        (weight * y).sum().alias("wy"),
+        (weight * t * y).sum().alias("wty"),
+        (weight * y * y).sum().alias("wyy"),
         pl.len().cast(pl.Float64).alias("n"),
     )
     months = months.sort(*by, "month")
     summed = months.rolling(index_column="month", period=f"{SPAN}i", group_by=list(by)).agg(
         pl.col("centre").last(), pl.col("end").last(), *(pl.col(name).sum() for name in _SUMS)
     )
-    return _regressed(summed, parameter, by)
-
-
-def _regressed(summed: pl.DataFrame, parameter: str, by: tuple[str, ...]) -> pl.DataFrame:
-    import polars as pl
-    from scipy.special import stdtr
-
+    # the weighted line through each window's logs, by its sums
     w, wt, wtt, wy, wty, wyy, n = (summed[name].to_numpy() for name in _SUMS)
     middle = wt / w
     # logs of one instant, or a single one, have a mean and no slope

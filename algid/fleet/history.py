@@ -6,7 +6,9 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import polars as pl
 
 from algid.base.errors import ResultError
 from algid.base.files import whole_file
@@ -15,12 +17,9 @@ from algid.base.progress import Progress
 from algid.base.words import counted
 from algid.fleet.changes import with_stints
 from algid.fleet.drift import FEWEST, SPAN, windows
-from algid.fleet.findings import mislabelled, outliers
+from algid.fleet.outliers import mislabelled, outliers
 from algid.notices import Notice
 from algid.physics.terms import ALWAYS, OPTIONAL
-
-if TYPE_CHECKING:
-    import polars as pl
 
 MONTH_DAYS = 30.4375
 
@@ -40,7 +39,7 @@ FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the other
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
-    """The finished jobs of ``jobs.parquet``.
+    """The finished jobs of ``jobs.parquet``; a number that is none, or beyond all bounds, is null.
 
     ``t`` is in months, ``month`` whole, both null without a time.
 
@@ -49,100 +48,40 @@ def read_jobs(path: Path) -> pl.DataFrame:
     ResultError
         If the table is missing or not one of algid batch.
     """
-    import polars as pl
-
+    expected = "expected jobs.parquet of algid batch"
     if not path.is_file():
         problem = "it is no regular file" if path.exists() else "there is no such file"
-        raise ResultError(f"{path}: {problem}; expected jobs.parquet of algid batch")
+        raise ResultError(f"{path}: {problem}; {expected}")
     try:
         names = list(pl.read_parquet_schema(path))
-        own = ("job", "robot", "time", "status", "label_payload", "m_p", "m_p_std")
-        wanted = [name for name in names if name in own]
-        for parameter in PARAMETERS:
-            if parameter in names and f"{parameter}_std" in names:
-                wanted += [parameter, f"{parameter}_std"]
-        jobs = pl.read_parquet(path, columns=wanted)
+        missing = [name for name in ("job", "robot", "status", "time") if name not in names]
+        if missing:
+            raise ResultError(f"{path}: no column {', '.join(missing)}; {expected}")
+        followed = [name for name in PARAMETERS if name in names and f"{name}_std" in names]
+        payload = ["label_payload", "m_p", "m_p_std"]
+        numbers = payload + followed + [f"{name}_std" for name in followed]
+        wanted = ["job", "robot", "status", "time", *numbers]
+        jobs = pl.read_parquet(path, columns=[name for name in wanted if name in names])
+        jobs = jobs.with_columns(
+            pl.lit(None, pl.Float64).alias(name) for name in payload if name not in names
+        )
+        # a manifest's labels may be words: then they are no numbers
+        size = pl.col(numbers).cast(pl.Float64, strict=False).abs()
+        least = 1 / LIMITS.largest_value
+        sound = (size <= LIMITS.largest_value) & ((size == 0) | (size >= least))
+        jobs = jobs.with_columns(
+            pl.col("job", "robot", "status").cast(pl.String),
+            pl.col("time").cast(pl.Datetime("us", "UTC")),
+            pl.when(sound).then(pl.col(numbers).cast(pl.Float64, strict=False)).name.keep(),
+        )
     # a panic of polars is no Exception
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
-        raise ResultError(
-            f"{path}: cannot read it ({reason}); expected jobs.parquet of algid batch"
-        ) from error
-    missing = {"job", "robot", "time", "status"} - set(names)
-    if missing:
-        raise ResultError(
-            f"{path}: no column {', '.join(sorted(missing))}; expected jobs.parquet of algid batch"
-        )
-    jobs = _typed(jobs, path)
-    months = (pl.col("time") - pl.col("time").min().over("robot")).dt.total_seconds() / (
-        86400 * MONTH_DAYS
-    )
+        raise ResultError(f"{path}: cannot read it ({reason}); {expected}") from error
+    age = pl.col("time") - pl.col("time").min().over("robot")
+    jobs = jobs.with_columns(t=age.dt.total_seconds() / (86400 * MONTH_DAYS))
     finished = jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
-    return finished.with_columns(months.alias("t")).with_columns(
-        pl.col("t").floor().cast(pl.Int32).alias("month")
-    )
-
-
-def _typed(jobs: pl.DataFrame, path: Path) -> pl.DataFrame:
-    """The jobs with the types that algid batch writes.
-
-    a number that is none, or beyond all bounds, is null.
-
-    Raises
-    ------
-    ResultError
-        If a column holds something else.
-    """
-    import polars as pl
-
-    columns = []
-    for name, kind in jobs.schema.items():
-        number = name not in ("job", "robot", "time", "status")
-        if name == "time":
-            fits, wanted = kind == pl.Datetime or kind == pl.Date, "times"
-            column = pl.col(name).cast(
-                pl.Datetime("us", getattr(kind, "time_zone", None)), strict=False
-            )
-            zoned = getattr(kind, "time_zone", None) is not None
-            column = (
-                column.dt.convert_time_zone("UTC") if zoned else column.dt.replace_time_zone("UTC")
-            )
-        elif number:
-            labels = name == "label_payload"  # a manifest's, which may be words: then there is none
-            fits, wanted = kind.is_numeric() or labels, "numbers"
-            column = (
-                pl.col(name).cast(pl.Float64, strict=False)
-                if kind.is_numeric()
-                else pl.lit(None, pl.Float64)
-            )
-            size = column.abs()
-            low = 1 / LIMITS.largest_value if name.endswith("_std") else 0.0
-            column = (
-                pl.when((size <= LIMITS.largest_value) & (size >= low)).then(column).alias(name)
-            )
-        else:
-            fits, wanted = kind == pl.String or isinstance(kind, pl.Categorical | pl.Enum), "text"
-            column = pl.col(name).cast(pl.String)
-        if kind == pl.Null:
-            none = (
-                pl.Datetime("us", "UTC")
-                if name == "time"
-                else pl.Float64()
-                if number
-                else pl.String()
-            )
-            fits, column = True, pl.lit(None, none)
-        if not fits:
-            raise ResultError(
-                f"{path}: column {name}: expected {wanted}, found {kind}; run algid batch again"
-            )
-        columns.append(column.alias(name))
-    typed = jobs.select(columns)
-    if typed["job"].null_count():
-        raise ResultError(
-            f"{path}: column job: expected a name in every row, found none; run algid batch again"
-        )
-    return typed
+    return finished.with_columns(month=pl.col("t").floor().cast(pl.Int32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,17 +94,17 @@ class History:
     findings : as `outliers` and `mislabelled` give them
     roster : a row a robot: robot, logs, undated, first and last (times), latest (job), and
         tested (for drift of anything)
-    nameless : logs that name no robot, and are left out
     jobs : every log, the latest of each robot first, as `read_jobs` gives them
     changes : as `with_stints` gives them
+    nameless : logs that name no robot, and are left out
     """
 
     windows: pl.DataFrame
     findings: pl.DataFrame
     roster: pl.DataFrame
+    jobs: pl.DataFrame
+    changes: pl.DataFrame
     nameless: int = 0
-    jobs: pl.DataFrame | None = None
-    changes: pl.DataFrame | None = None
 
     @property
     def robots(self) -> int:
@@ -178,23 +117,14 @@ class History:
         return int(self.roster["logs"].sum())
 
     @property
-    def parameters(self) -> list[str]:
-        """Those that were followed."""
-        return [str(name) for name in self.windows["parameter"].unique(maintain_order=True)]
-
-    @property
     def drifts(self) -> pl.DataFrame:
         """The latest drifting window of each robot and parameter, the clearest first."""
-        import polars as pl
-
         last = self.windows.filter("drift").sort("month").group_by("robot", "parameter").last()
         return last.sort(pl.col("p"), "robot", "parameter")
 
     @property
     def untested(self) -> list[Notice]:
         """What was not looked for, and why."""
-        import polars as pl
-
         undated = int(self.roster["undated"].sum())
         steady = self.roster.filter(~pl.col("tested")).height
         alone = self.roster.filter(pl.col("logs") < FEWEST_PEERS).height
@@ -224,9 +154,12 @@ class History:
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""
-        frames = {"robots": self.roster, "drifts": self.drifts, "findings": self.findings}
-        if self.changes is not None:
-            frames["changes"] = self.changes
+        frames = {
+            "robots": self.roster,
+            "drifts": self.drifts,
+            "findings": self.findings,
+            "changes": self.changes,
+        }
         rows = {
             name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()
         }
@@ -243,8 +176,6 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     ResultError
         If it cannot be read, or no finished job has both a robot and parameters.
     """
-    import polars as pl
-
     finished = read_jobs(path)
     names = [name for name in PARAMETERS if name in finished.columns]
     jobs = finished.filter(pl.col("robot").is_not_null())
@@ -269,12 +200,10 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     findings = pl.concat(standing_out).sort("kind", "robot", "time", "parameter")
     listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
     nameless = finished.height - jobs.height
-    return History(history, findings, _roster(jobs, history), nameless, listed, changes)
+    return History(history, findings, _roster(jobs, history), listed, changes, nameless)
 
 
 def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
-    import polars as pl
-
     tested = history.filter(pl.col("p").is_not_nan())["robot"].unique().implode()
     return (
         jobs.group_by("robot")

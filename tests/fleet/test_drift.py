@@ -17,7 +17,7 @@ import pytest
 from scipy import stats
 
 from algid.base.errors import ResultError
-from algid.fleet.history import history_of, read_jobs, write_history
+from algid.fleet.history import history_of, read_jobs
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 MONTH = 30.4375  # days
@@ -111,16 +111,6 @@ def test_every_window_is_weighted_least_squares_with_students_test(
     assert found["drift"].any() == (growth / scatter > 0.001 and growth > 0)
 
 
-@pytest.mark.parametrize(("logs", "tested"), [(7, False), (8, True)])
-def test_eight_logs_are_tested(logs: int, tested: bool, tmp_path: Path) -> None:
-    (row,) = followed(table([1.0 + 0.5 * day for day in range(logs)]), tmp_path).rows(named=True)
-    assert row["drift"] == tested
-    assert math.isnan(row["p"]) != tested
-    assert math.isnan(row["slope"]) != tested
-    assert math.isnan(row["slope_std"]) != tested
-    assert row["logs"] == logs
-
-
 @pytest.mark.parametrize(("factor", "alarm"), [(0.999, False), (1.001, True)])
 def test_the_alarm_is_at_nine_in_ten_thousand(factor: float, alarm: bool, tmp_path: Path) -> None:
     """On a line without scatter the intervals alone count: t is slope × √Σ(t - t̄)² / std."""
@@ -131,29 +121,6 @@ def test_the_alarm_is_at_nine_in_ten_thousand(factor: float, alarm: bool, tmp_pa
     assert row["p"] == pytest.approx(p, rel=1e-6)
     assert row["drift"] == alarm
     assert row["slope"] == pytest.approx(-factor * critical, rel=1e-8)
-
-
-def test_a_window_forgets_what_is_three_months_old(tmp_path: Path) -> None:
-    """Months count from a robot's own first log, and one without logs has no row of its own."""
-    days = [0, 1, 45, 100, 101, 200]
-    when = pl.Series([START + timedelta(days=day) for day in days], dtype=STAMP)
-    found = followed(table([1, 2, 3, 4, 5, 6], time=when), tmp_path)
-    assert found.select("month", "logs").rows() == [(0, 2), (1, 3), (3, 3), (6, 1)]
-    assert found["mean"].to_numpy() == pytest.approx([1.5, 2.0, 4.0, 6.0], rel=1e-12)
-    # alone in its window it has the error that its interval says
-    assert found["mean_std"].to_numpy()[-1] == pytest.approx(0.01, rel=1e-9)
-
-
-def test_robots_do_not_see_each_other(tmp_path: Path) -> None:
-    one = table([1.0 + 0.01 * day for day in range(20)])
-    other = table([5.0 - 0.01 * day for day in range(20)], robot=["s"] * 20)
-    both = followed(pl.concat([one, other]), tmp_path)
-    alone = [followed(jobs, tmp_path) for jobs in (one, other)]
-    for robot, expected in zip(("r", "s"), alone, strict=True):
-        mine = both.filter(robot=robot)
-        for name in ("mean", "mean_std", "slope", "slope_std", "p"):
-            assert mine[name].to_numpy() == pytest.approx(expected[name].to_numpy(), rel=1e-10)
-    assert both.filter(robot="r")["slope"][0] > 0 > both.filter(robot="s")["slope"][0]
 
 
 def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> None:
@@ -175,13 +142,6 @@ def test_what_is_not_finished_is_not_read(status: str, tmp_path: Path) -> None:
     assert found["job"].to_list() == ["j0", "j2"]
     assert found["month"].to_list() == [0, 0]
     assert found["t"].to_numpy() == pytest.approx([0, 2 / MONTH], rel=1e-12)
-
-
-def test_a_job_without_a_date_has_no_month(tmp_path: Path) -> None:
-    when = pl.Series([START, None, START + timedelta(days=31)], dtype=STAMP)
-    jobs = table([1.0, 2.0, 3.0], time=when)
-    assert read(jobs, tmp_path)["month"].to_list() == [0, None, 1]
-    assert followed(jobs, tmp_path)["logs"].sum() == 1 + 2
 
 
 @pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True), (-6.01, True)])
@@ -258,46 +218,6 @@ def test_labels_are_judged_robot_by_robot_and_only_where_there_are_any(tmp_path:
         assert nothing.schema == found.schema
 
 
-def test_the_history_has_a_row_a_robot_and_its_findings_in_order(tmp_path: Path) -> None:
-    when = pl.Series([START + timedelta(days=day) for day in range(9)] + [None], dtype=STAMP)
-    later = table([1.0] * 10, robot=["s"] * 10, time=when, job=[f"s{row}" for row in range(10)])
-    early = table([1.0] * 4 + [9.0, 9.5] + [1.0] * 6, job=[f"r{row}" for row in range(12)])
-    pl.concat([later, early]).write_parquet(tmp_path / "jobs.parquet")
-    history = history_of(tmp_path / "jobs.parquet")
-    assert history.roster.columns == [
-        "robot",
-        "logs",
-        "undated",
-        "first",
-        "last",
-        "latest",
-        "tested",
-    ]
-    last = {"r": START + timedelta(days=11), "s": START + timedelta(days=8)}
-    assert history.roster.rows() == [
-        ("r", 12, 0, START, last["r"], "r11", True),
-        ("s", 10, 1, START, last["s"], "s8", True),
-    ]
-    assert (history.robots, history.logs, history.nameless) == (2, 22, 0)
-    assert history.findings.select("robot", "job", "value").rows() == [
-        ("r", "r4", 9.0),
-        ("r", "r5", 9.5),
-    ]
-    assert history.jobs is not None
-    assert history.jobs.select("robot", "job").rows()[:2] == [("r", "r11"), ("r", "r10")]
-    # without a date it stands last
-    assert history.jobs.select("robot", "job").rows()[-1] == (
-        "s",
-        "s9",
-    )
-    assert [one.text for one in history.untested] == [
-        (
-            "No drift was looked for in 1 log without a date: stamps count from 1970, or a "
-            "manifest gives the time."
-        )
-    ]
-
-
 def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_path: Path) -> None:
     days = 100
     faint = [1 + 0.04 * (day % 2) + 0.0009 * day for day in range(days)]
@@ -313,16 +233,6 @@ def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_pa
     assert [row["robot"] for row in plain["drifts"]] == ["s", "r"]
     assert plain["robots"][0]["first"].startswith("2026-01-01")
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
-
-
-def test_files_hold_what_the_history_holds(tmp_path: Path) -> None:
-    table([1.0] * 9 + [2.0]).write_parquet(tmp_path / "jobs.parquet")
-    history = history_of(tmp_path / "jobs.parquet")
-    written = write_history(history, tmp_path / "new" / "page", tmp_path)
-    assert [path.name for path in written] == ["fleet.parquet", "findings.parquet", "fleet.html"]
-    assert pl.read_parquet(written[0]).equals(history.windows)
-    assert pl.read_parquet(written[1]).equals(history.findings)
-    assert {path.name for path in written[0].parent.iterdir()} == {path.name for path in written}
 
 
 @pytest.mark.parametrize(
@@ -374,15 +284,3 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path: Path) -> None:
     ) as raised:
         history_of(path)
     assert "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize(("logs", "told"), [(2, True), (3, False)])
-def test_of_three_logs_one_can_stand_out(logs: int, told: bool, tmp_path: Path) -> None:
-    table([1.0] * logs).write_parquet(tmp_path / "jobs.parquet")
-    untested = history_of(tmp_path / "jobs.parquet").untested
-    assert ("alone" in [one.numbers["case"] for one in untested]) == told
-
-
-def test_of_two_payloads_the_one_that_agrees_with_its_label_tells_how_well(tmp_path: Path) -> None:
-    pair = table([1.0, 1.0], m_p=[0.5, 0.9], m_p_std=[0.001, 0.001], label_payload=[0.5, 0.5])
-    assert standing_out(pair, tmp_path, "payload")["job"].to_list() == ["j1"]

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
+import polars as pl
 
 from algid.base.significance import CERTAIN, sigmas
-
-if TYPE_CHECKING:
-    import polars as pl
 
 OUTLYING = 6.0  # robust standard deviations
 MISLABELLED = sigmas(CERTAIN)  # one false alarm in a million logs
@@ -35,8 +30,6 @@ def outliers(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",
     pl.DataFrame
         kind, robot, job, time, parameter, value, expected, sigmas.
     """
-    import polars as pl
-
     std = pl.col(f"{parameter}_std")
     scaled = jobs.filter((std > 0) & pl.col(parameter).is_finite()).with_columns(
         pl.col(parameter).median().over(*by).alias("expected")
@@ -56,37 +49,22 @@ def mislabelled(jobs: pl.DataFrame) -> pl.DataFrame:
     scatter counts. Medians are the lower ones, so that of two logs the one that agrees with its
     label shows how well they can.
     """
-    import polars as pl
-
-    if (
-        not {"label_payload", "m_p", "m_p_std"} <= set(jobs.columns)
-        or jobs["label_payload"].dtype != pl.Float64
-    ):
-        none = jobs.head(0).with_columns(
-            m_p=pl.lit(np.nan), expected=pl.lit(np.nan), sigmas=pl.lit(np.nan)
-        )
-        return _as_findings(none, "payload", "m_p")
     labelled = jobs.filter(
         (pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()
     ).with_columns(
         pl.col("label_payload").alias("expected"),
         ((pl.col("m_p") - pl.col("label_payload")) / pl.col("m_p_std")).alias("sigmas"),
     )
-    centred = (pl.col("sigmas") - _lower_median(pl.col("sigmas")).over("robot")).abs()
-    scatter = (_MAD * _lower_median(centred).over("robot")).clip(lower_bound=1.0)
+    middle = pl.col("sigmas").quantile(0.5, interpolation="lower").over("robot")
+    centred = (pl.col("sigmas") - middle).abs().quantile(0.5, interpolation="lower")
+    scatter = (_MAD * centred.over("robot")).clip(lower_bound=1.0)
     wrong = labelled.with_columns(pl.col("sigmas") / scatter).filter(
         pl.col("sigmas").abs() > MISLABELLED
     )
     return _as_findings(wrong, "payload", "m_p")
 
 
-def _lower_median(values: pl.Expr) -> pl.Expr:
-    return values.quantile(0.5, interpolation="lower")
-
-
 def _as_findings(rows: pl.DataFrame, kind: str, name: str) -> pl.DataFrame:
-    import polars as pl
-
     return rows.select(
         pl.lit(kind).alias("kind"),
         "robot",
