@@ -93,7 +93,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm criteria errors estimators files identification limits log model names "
         "notices options progress report results signals significance synth text verdict words "
         "writers",
-        "numpy polars pydantic scipy",
+        "numpy polars pydantic pydantic_core scipy",
     ),
     "exports": room(
         "arm compiled errors estimators files identification model names notices options physics "

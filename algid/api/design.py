@@ -23,14 +23,12 @@ if TYPE_CHECKING:
 
     from algid.base.progress import Progress
     from algid.designs.campaign import Campaign, Design
-    from algid.designs.prior import BelievedArm
+    from algid.designs.prior import PriorArm
     from algid.designs.request import Request
     from algid.designs.write import Provenance
     from algid.estimators.whitening import NoiseLevels
     from algid.identification.open_logs import LogLike
     from algid.report.document import Document
-
-RATE, DURATION = 1000.0, 10.0
 
 NOISE: Range = (1e-12, PHYSICAL.noise[1])
 SEED: Range = (0, 2**63)
@@ -196,29 +194,25 @@ def design(
     """
     from algid.base.runtime import one_blas_thread
     from algid.designs.campaign import plan
-    from algid.designs.prior import KnownBefore, prior_of
+    from algid.designs.prior import PriorKnowledge, prior_of
     from algid.designs.request import request
     from algid.designs.write import Provenance, write_design
 
     check(design, locals())
-    of_flags = {
+    asked_for = {
         "range": range,
         "speed": speed,
         "acceleration": acceleration,
         "torque": torque,
-        "runs": runs,
-    }
-    flags: dict[str, str | float | None] = {
         "tip_height": tip_height,
         "duration": duration,
         "rate": rate,
+        "runs": runs,
     }
-    for name, value in of_flags.items():
-        flags[name] = _spelled(value)
     file = None
     if limits is not None:
         file = Path(limits)
-    asked = request(file, flags)
+    asked = request(file, asked_for)
     names = two_names("joints", joints)
     source = called(prior)
     folder = None
@@ -226,12 +220,12 @@ def design(
         folder = folder_of(source, Path(out))
         refuse_existing(folder, force)
     loaded = None
-    if asked.get("runs", None) is not None:
-        loaded = asked.content["runs"][1] > 0
+    if asked.runs is not None:
+        loaded = bool(asked.runs[1] > 0)
     known = prior_of(
         prior if isinstance(prior, Result) else source,
         loaded,
-        KnownBefore(l1, l2, payload, prior_error),
+        PriorKnowledge(l1, l2, payload, prior_error),
     )
     noise = noise_of(known, position_noise, torque_noise, noise_from)
     campaign = campaign_of(known, asked, noise, wanted, margin, seed)
@@ -262,7 +256,7 @@ def folder_of(prior: str, out: Path) -> Path:
 
 
 def campaign_of(
-    prior: BelievedArm,
+    prior: PriorArm,
     asked: Request,
     noise: NoiseLevels,
     wanted: Sequence[str] | str | None,
@@ -270,29 +264,29 @@ def campaign_of(
     seed: int,
 ) -> Campaign:
     """The campaign that is asked for, with defaults where nothing is."""
-    from algid.designs.belief import asked_for
+    from algid.designs.belief import objective_of
     from algid.designs.campaign import Campaign
     from algid.designs.information import Experiment
     from algid.designs.request import limits_of
 
     shared = prior.belief.shared
-    runs = asked.get("runs", (1, int(shared.payload)))
+    unloaded, loaded = (1, shared.payload) if asked.runs is None else asked.runs
     names = None
     if wanted is not None:
         names = [name.strip() for name in parts_of(wanted)]
     return Campaign(
-        experiment=Experiment(shared, runs, noise, asked.get("rate", RATE)),
+        experiment=Experiment(shared, (int(unloaded), int(loaded)), noise, asked.rate),
         belief=prior.belief,
         limits=limits_of(asked, prior.lengths),
-        asked=asked_for(prior.belief, names, prior.source),
-        duration=asked.get("duration", DURATION),
+        asked=objective_of(prior.belief, names, prior.source),
+        duration=asked.duration,
         margin=margin,
         seed=seed,
     )
 
 
 def noise_of(
-    prior: BelievedArm, position: float | None, torque: float | None, log: LogLike | None
+    prior: PriorArm, position: float | None, torque: float | None, log: LogLike | None
 ) -> NoiseLevels:
     """Noise that is given, else of a log, else of the logs behind the prior.
 
@@ -329,18 +323,3 @@ def noise_of(
                 f"or {flag('noise_from')}=LOG"
             )
     return NoiseLevels(**levels)
-
-
-def _spelled(value: Any) -> str | None:
-    """A limit as the command line has it: ``1.2``, ``1.2,1.0``, ``-2.7:-0.4,-1.2:1.2``."""
-    if value is None or isinstance(value, str):
-        return value
-    if not isinstance(value, tuple | list):
-        return str(value)
-    parts = []
-    for one in value:
-        if isinstance(one, tuple | list):
-            parts.append(":".join(map(str, one)))
-        else:
-            parts.append(str(one))
-    return ",".join(parts)

@@ -112,7 +112,7 @@ class Belief:
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Objective:
     """Sizes (Q,) of the parameters, which of them the prior knows (Q,), and the wanted ones (Q,).
 
     A parameter whose prior is not significantly different from zero has the size of its class.
@@ -125,8 +125,8 @@ class Asked:
     def covariance(self, S: FloatArray) -> FloatArray:
         """Covariance (Q, Q) of the estimates.
 
-        A direction that S leaves open is held at `UNKNOWN` sizes.  S has no negative eigenvalue
-        but by rounding; what then comes out below zero is computed by eigenvalues.
+        A direction that S leaves open is held at `UNKNOWN` sizes. S has no negative eigenvalue but
+        by rounding; what then comes out below zero is computed by eigenvalues.
         """
         size = np.outer(self.size, self.size)
         scaled = S * size
@@ -156,7 +156,7 @@ class Asked:
         return 0.5 * float(np.log(top) + np.log(total) / sharpness), -(C * by_diagonal) @ C
 
 
-def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked:
+def objective_of(belief: Belief, names: Sequence[str] | None, source: str) -> Objective:
     """What a design for the parameters `names` makes small.
 
     For all that the prior knows where None, but for a delay.
@@ -171,7 +171,7 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
     known = np.abs(mean) > _SEEN * belief.std
     size = np.where(known, np.abs(mean), sizes(every, mean))
     if names is None:
-        return Asked(size, known, known & ~np.isin(every, DELAYS))
+        return Objective(size, known, known & ~np.isin(every, DELAYS))
     for name in names:
         if name not in every:
             hint = ""
@@ -188,4 +188,4 @@ def asked_for(belief: Belief, names: Sequence[str] | None, source: str) -> Asked
                 f"{belief.std[place]:.2g}), so that no error is large or small beside it; leave it "
                 "out"
             )
-    return Asked(size, known, np.isin(every, list(names)))
+    return Objective(size, known, np.isin(every, list(names)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,8 +11,8 @@ from algid.arm import FloatArray
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import SettingError
 from algid.base.progress import Progress
-from algid.designs.belief import Asked, Belief
-from algid.designs.information import Experiment, Information, Slopes, informations
+from algid.designs.belief import Belief, Objective
+from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.limits import Limits, Row, Usage, resting, usage
 from algid.designs.optimise import optimise
 from algid.designs.position import JUDGED_RATE, PositionProblem
@@ -35,7 +34,7 @@ class Campaign:
     experiment : Experiment
     belief : Belief
     limits : Limits
-    asked : Asked
+    asked : Objective
     duration : float, s, of one run
     margin : float
         Share of each limit that the plan leaves.
@@ -45,7 +44,7 @@ class Campaign:
     experiment: Experiment
     belief: Belief
     limits: Limits
-    asked: Asked
+    asked: Objective
     duration: float
     margin: float = MARGIN
     seed: int = 0
@@ -137,16 +136,18 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
         problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
         optimum = optimise(problem, rate, campaign.seed, progress)
         motion = problem.family.motion(optimum.x, problem.family.basis(t))
-        slopes = Slopes(experiment.shared.model, motion, rate)
+        slopes = Sensitivities(experiment.shared.model, motion, rate)
         # the error bars of its log
-        recorded = dict.fromkeys(experiment.kinds, motion)
+        whole = Information(experiment, belief.mean, slopes)
+        C = campaign.asked.covariance(whole.S)
         every = max(1, round(rate / JUDGED_RATE))
-        whole = informations(experiment, recorded, belief.mean, 1, rate)
-        C = _covariance(campaign, whole)
+        signals = motion.theta, motion.omega, motion.alpha
+        thinned = Motion(*(signal[:, ::every] for signal in signals))
+        coarse = Sensitivities(experiment.shared.model, thinned, rate / every)
         worst = np.diag(C)
         for arm in belief.draws(ARMS, campaign.seed):
-            drawn = informations(experiment, recorded, arm, every, rate)
-            worst = np.maximum(worst, np.diag(_covariance(campaign, drawn)))
+            drawn = campaign.asked.covariance(Information(experiment, arm, coarse).S)
+            worst = np.maximum(worst, np.diag(drawn))
     except np.linalg.LinAlgError as error:
         # Torque noise below the rounding of the noise of twice differentiated angles.
         raise SettingError(
@@ -155,7 +156,7 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
             f"or less {flag('position_noise')}"
         ) from error
     kinds = (False, True) if experiment.shared.payload else (False,)
-    parts = np.sum([one.parts(round(SECOND * rate)) for one in whole], axis=0)
+    parts = whole.parts(round(SECOND * rate))
     return Design(
         campaign=campaign,
         t=t,
@@ -167,8 +168,3 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
         usage=usage(campaign.limits, slopes, loads, derivatives=False),
         interrupted=optimum.interrupted,
     )
-
-
-def _covariance(campaign: Campaign, runs: Sequence[Information]) -> FloatArray:
-    """Covariance (Q, Q) of the parameters from all runs together."""
-    return campaign.asked.covariance(np.sum([one.S for one in runs], axis=0))

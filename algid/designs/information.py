@@ -30,7 +30,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.parametrisation import Shared
-from algid.estimators.whitening import NoiseLevels, along_stencil, triangular, whitened
+from algid.estimators.whitening import NoiseLevels, adjoint, along_stencil, triangular, whitened
 from algid.model import Model, Motion, partials, regressor
 from algid.signals.differences import POINTS, Stencil
 
@@ -65,7 +65,7 @@ class Experiment:
         return tuple(loaded for loaded, runs in zip((False, True), self.runs, strict=True) if runs)
 
 
-class Slopes:
+class Sensitivities:
     """Regressor and torque derivatives along a motion at `rate` Hz, and theirs by the motion."""
 
     def __init__(self, model: Model, motion: Motion, rate: float) -> None:
@@ -123,11 +123,11 @@ class Information:
     ----------
     experiment : Experiment
     beta : (Q,), the arm's parameters
-    slopes : Slopes
+    slopes : Sensitivities
         Of the motion at equal steps in time. What lies beyond its ends counts as rest.
     """
 
-    def __init__(self, experiment: Experiment, beta: FloatArray, slopes: Slopes) -> None:
+    def __init__(self, experiment: Experiment, beta: FloatArray, slopes: Sensitivities) -> None:
         self._slopes = slopes
         shared, noise = experiment.shared, experiment.noise
         self._weights = Stencil(1 / slopes.rate).weights
@@ -188,31 +188,9 @@ class Information:
             inner = log.count * log.T @ A @ log.T.T
             AW = np.tensordot(inner, log.W, axes=1)
             to_Y += 2 * AW[:q].transpose(1, 0, 2) / noise.tau[:, None, None]
-            back = np.zeros((AW.shape[0], 2, n + POINTS - 1))  # Gᵀ W
-            for point in range(POINTS):
-                back[:, :, point : point + n] += np.einsum(
-                    "abn,qan->qbn", log.H[:, :, point], log.W
-                )
+            back = np.stack([adjoint(log.H, w, 0, n + POINTS - 1) for w in log.W])  # Gᵀ W
             windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
             along = np.tensordot(self._weights, windows, axes=(1, 2))
             to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * ratio[None, :, :, None]
             total += np.einsum("oabn,coabn->cn", to_P, slopes.dP(log.c))
         return total + np.einsum("aqn,caqn->cn", to_Y, slopes.dY)
-
-
-def informations(
-    experiment: Experiment, motions: dict[bool, Motion], beta: FloatArray, every: int, rate: float
-) -> list[Information]:
-    """The information of each kind's runs, from every `every`-th of `rate` samples a second."""
-    gathered = []
-    for loaded, motion in motions.items():
-        runs = (experiment.runs[0], 0)
-        if loaded:
-            runs = (0, experiment.runs[1])
-        own = Experiment(experiment.shared, runs, experiment.noise, experiment.rate)
-        thinned = Motion(
-            motion.theta[:, ::every], motion.omega[:, ::every], motion.alpha[:, ::every]
-        )
-        slopes = Slopes(experiment.shared.model, thinned, rate / every)
-        gathered.append(Information(own, beta, slopes))
-    return gathered

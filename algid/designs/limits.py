@@ -23,7 +23,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.errors import SettingError
 from algid.designs.belief import Load
-from algid.designs.information import COMPONENTS, Slopes
+from algid.designs.information import COMPONENTS, Sensitivities
 from algid.model import Model, Motion
 from algid.options import flag
 
@@ -119,14 +119,16 @@ _Use = tuple[Row, FloatArray, FloatArray]
 """A limit, its use (N,), and the derivatives (6, N) of that by the motion."""
 
 
-def usage(limits: Limits, slopes: Slopes, loads: Sequence[Load], derivatives: bool = True) -> Usage:
+def usage(
+    limits: Limits, slopes: Sensitivities, loads: Sequence[Load], derivatives: bool = True
+) -> Usage:
     """Use of each limit by the motion of `slopes`, for every arm of the belief behind `loads`.
 
     Parameters
     ----------
     limits : Limits
         Those that are infinite have no row.
-    slopes : Slopes
+    slopes : Sensitivities
         Of the motion, at N instants.
     loads : sequence of Load
     derivatives : bool
@@ -168,7 +170,9 @@ def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
         yield Row("tip-height", None, upper=False), used, slope
 
 
-def _torque(limit: FloatArray, slopes: Slopes, load: Load, derivatives: bool) -> Iterator[_Use]:
+def _torque(
+    limit: FloatArray, slopes: Sensitivities, load: Load, derivatives: bool
+) -> Iterator[_Use]:
     torque, more, by_Y = load.largest(slopes.Y)
     for joint in np.flatnonzero(np.isfinite(limit)).tolist():
         for sign in (1.0, -1.0):
@@ -194,7 +198,7 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
     first, second = np.linspace(low, high, _STEPS, axis=1)
     theta = np.stack([np.repeat(first, _STEPS), np.tile(second, _STEPS)])
     still = Motion(theta, np.zeros_like(theta), np.zeros_like(theta))
-    used = usage(limits, Slopes(model, still, 1.0), loads, derivatives=False)
+    used = usage(limits, Sensitivities(model, still, 1.0), loads, derivatives=False)
     most = used.u.max(axis=0)
     central, best = theta.shape[1] // 2, int(np.argmin(most))
     if most[central] <= _EASY:

@@ -1,4 +1,4 @@
-"""A design's `report.html`: one file that opens offline."""
+"""A design's report: predicted deviations, active limits, the motion, and a verdict."""
 
 from __future__ import annotations
 
@@ -7,20 +7,30 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid import __version__
-from algid.base.text import file_name, significant
-from algid.designs.campaign import SECOND, Design
-from algid.designs.figures import motion
-from algid.designs.tables import bound_table, limit_table, verdict
-from algid.notices import Notice
+from algid.base.text import ABSENT, file_name, percent, resolved, significant, unit_text
+from algid.base.verdict import Verdict, graded
+from algid.base.words import counted
+from algid.designs.campaign import ARMS, SECOND, Design
+from algid.designs.limits import Row
+from algid.model import UNITS
+from algid.notices import Notice, Remedy
 from algid.report.arm import ArmDrawing
-from algid.report.document import Document, Section
+from algid.report.document import Document, Section, Table
 from algid.report.figures import shares_of_time
-from algid.report.render import page
+from algid.report.plot import BLUE, ORANGE, Panels, Plot
 
-
-def page_html(design: Design, source: str, doubts: Sequence[Notice] = ()) -> str:
-    """The page's text."""
-    return page(design_document(design, source, doubts))
+# of what the margin leaves: a limit that is used as far is what keeps the error bars from being
+# less
+BINDS = 0.98
+POINTS = 2_000  # of the motion that are drawn
+_YES = {True: "yes", False: ""}
+SIGNS = {
+    "range": "rad",
+    "speed": "rad/s",
+    "acceleration": "rad/s²",
+    "torque": "N m",
+    "tip-height": "m",
+}
 
 
 def design_document(design: Design, source: str, doubts: Sequence[Notice] = ()) -> Document:
@@ -59,3 +69,160 @@ def _arm(design: Design) -> ArmDrawing | None:
     if height is not None:
         reading += ", the red one its limit"
     return ArmDrawing(l1, l2, design.t, design.motion.theta, f"{reading}.", payload, height)
+
+
+def bound_table(design: Design) -> Table:
+    """Every parameter with the error bar that the campaign will give it."""
+    asked = design.campaign.asked
+    mean = design.campaign.belief.mean
+    rows = []
+    for place, name in enumerate(design.names):
+        relative = worst = ABSENT
+        if asked.known[place]:
+            relative = percent(design.std[place], asked.size[place])
+            worst = percent(design.worst[place], asked.size[place])
+        rows.append(
+            (
+                name,
+                resolved(float(mean[place]), float(design.std[place])),
+                significant(float(design.std[place]), 2),
+                unit_text(UNITS[name]),
+                relative,
+                _YES[bool(asked.wanted[place])],
+                worst,
+            )
+        )
+    kinds = zip(design.campaign.experiment.runs, ("unloaded", "loaded"), strict=True)
+    runs = " and ".join(counted(count, f"{kind} run") for count, kind in kinds if count)
+    note = (
+        f"One standard deviation, from {runs} together, if sensors are as noisy as stated. "
+        f"The worst arm is the worst of {ARMS} drawn from what is believed."
+    )
+    return Table(
+        "Predicted standard deviations",
+        {
+            "Parameter": "name", "Believed": "number", "Predicted ±": "number", "Unit": "text",
+            "± %": "number", "Requested": "text", "Worst arm ± %": "number",
+        },
+        tuple(rows),
+        note,
+    )  # fmt: skip
+
+
+def limit_table(design: Design) -> Table:
+    """Each kind of limit with what is used of it where it is tightest, the tightest kind first."""
+    most = 1 - design.campaign.margin
+    tightest: dict[str, tuple[Row, float]] = {}
+    for row, used in design.binding:
+        tightest.setdefault(kind_name(row), (row, used))
+    rows = []
+    for kind, (row, used) in tightest.items():
+        limit, value = amounts(design, row, used)
+        rows.append(
+            (
+                kind,
+                significant(value, 4),
+                significant(limit, 4),
+                percent(used, 1.0, 3),
+                _YES[used >= BINDS * most],
+                SIGNS[row.limit],
+                place_name(row) or ABSENT,
+            )
+        )
+    note = (
+        f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller "
+        "overshoots. Torque is the largest that any arm of those believed possible asks for."
+    )
+    return Table(
+        "Active limits",
+        {
+            "Limit": "name", "Used": "number", "Allowed": "number", "%": "number",
+            "Active": "text", "Unit": "text", "Tightest": "text",
+        },
+        tuple(rows),
+        note,
+    )  # fmt: skip
+
+
+def kind_name(row: Row) -> str:
+    """What a limit is of, in words."""
+    load = {None: "", True: ", loaded", False: ", unloaded"}[row.loaded]
+    return f"{row.limit.replace('-', ' ')}{load}"
+
+
+def place_name(row: Row) -> str:
+    """Where a limit is: a joint, and which way."""
+    if row.joint is None:
+        return ""
+    return f"joint {row.joint + 1}, {'up' if row.upper else 'down'}"
+
+
+def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
+    """A limit and the most extreme value of the motion, in the limit's unit and with its sign."""
+    limits = design.campaign.limits
+    if row.joint is None:
+        reach = float(limits.lengths.sum())
+        return limits.height, reach - used * (reach - limits.height)
+    if row.limit == "range":
+        low, high = float(limits.low[row.joint]), float(limits.high[row.joint])
+        middle, half = 0.5 * (low + high), used * 0.5 * (high - low)
+        if row.upper:
+            return high, middle + half
+        return low, middle - half
+    limit = float(getattr(limits, row.limit)[row.joint])
+    if not row.upper:
+        limit = -limit
+    return limit, used * limit
+
+
+_WIDER = tuple(Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs"))
+
+
+def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
+    """The design in one clause, with reasons: `doubts` about its prior, undetermined parameters."""
+    reasons = []
+    if design.open_parameters:
+        numbers = {"names": list(design.open_parameters)}
+        reasons.append(
+            Notice("NOT_REACHED", numbers={"case": "parameters"} | numbers, remedies=_WIDER)
+        )
+    reasons += doubts
+    if design.interrupted:
+        reasons.append(Notice("NOT_REACHED", numbers={"case": "stopped"}))
+    relative = np.where(design.campaign.asked.wanted, design.relative, -np.inf)
+    row, used = design.binding[0]
+    limit = kind_name(row) if row.joint is None else f"{kind_name(row)} of {place_name(row)}"
+    return graded(
+        f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; "
+        f"{design.names[int(np.argmax(relative))]} is the least certain); active limit: {limit} "
+        f"({percent(used, 1.0, 3)} %)",
+        reasons,
+    )
+
+
+def motion(design: Design) -> Plot:
+    """Angles, velocities and torques of both joints over time, with their limits."""
+    limits, planned = design.campaign.limits, design.motion
+    series = {
+        "Angles, rad": (planned.theta, limits.low, limits.high),
+        "Velocities, rad/s": (planned.omega, -limits.speed, limits.speed),
+    }
+    for loaded, torque in design.torque.items():
+        kind = {True: "loaded", False: "unloaded"}[loaded]
+        series[f"Torques, {kind}, N m"] = (torque, -limits.torque, limits.torque)
+    panels = Panels(list(series), height=200, together=True)
+    every = max(1, design.t.size // POINTS)
+    for place, (values, *sides) in enumerate(series.values()):
+        size = float(np.abs(values).max())
+        for joint, colour, dash in ((0, BLUE, "solid"), (1, ORANGE, "5px,2px")):
+            y = values[joint, ::every]
+            panels.curve(place, design.t[::every], y, f"joint {joint + 1}", colour, 1.4, dash)
+            for side in sides:
+                if abs(side[joint]) < 3 * size:  # a limit far away would flatten the motion
+                    panels.line(place, y=float(side[joint]), colour=colour)
+    panels.axes(len(series) - 1, "time, s")
+    reading = (
+        "The motion starts and ends at rest; torques are the believed arm's. Dashed lines are "
+        "limits, which hold for every arm that is believed possible."
+    )
+    return Plot("motion", "The motion", panels, reading)

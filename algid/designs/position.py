@@ -25,8 +25,8 @@ from functools import cache, cached_property
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.designs.belief import Asked, Belief
-from algid.designs.information import Experiment, Information, Slopes
+from algid.designs.belief import Belief, Objective
+from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.limits import Limits, usage
 from algid.designs.optimise import Evaluation, Stage, soft_maximum
 from algid.model import Motion
@@ -108,7 +108,7 @@ class PositionProblem:
     experiment : Experiment
     belief : Belief
     limits : Limits
-    asked : Asked
+    asked : Objective
     duration : float, s
     rest : (2,), rad
         A posture within the limits, for all arms of the belief.
@@ -119,7 +119,7 @@ class PositionProblem:
         experiment: Experiment,
         belief: Belief,
         limits: Limits,
-        asked: Asked,
+        asked: Objective,
         duration: float,
         rest: FloatArray,
     ) -> None:
@@ -134,15 +134,17 @@ class PositionProblem:
         self.rest = np.concatenate([rest, np.zeros(self.family.size - 2)])
         self._basis = cache(lambda rate: self.family.basis(middles(duration, rate)))
 
-    def slopes(self, x: FloatArray, rate: float) -> Slopes:
+    def slopes(self, x: FloatArray, rate: float) -> Sensitivities:
         """The motion of `x` at `rate` Hz."""
-        return Slopes(self._experiment.shared.model, self.family.motion(x, self._basis(rate)), rate)
+        return Sensitivities(
+            self._experiment.shared.model, self.family.motion(x, self._basis(rate)), rate
+        )
 
     def random(self, rng: np.random.Generator) -> FloatArray:
         """A random motion about the resting posture."""
         return self.family.random(rng, self.rest[:2])
 
-    def criterion(self, slopes: Slopes, stage: Stage) -> tuple[float, FloatArray]:
+    def criterion(self, slopes: Sensitivities, stage: Stage) -> tuple[float, FloatArray]:
         """Figure to make small, and its derivatives (6, N) by the motion."""
         information = Information(self._experiment, self._belief.mean, slopes)
         figure, A = self._asked.figure(information.S, stage.sharpness)

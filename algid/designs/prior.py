@@ -37,7 +37,7 @@ _UNPLANNED = tuple(name for name, term in TERMS.items() if not term.linear or te
 
 
 @dataclass(frozen=True, eq=False)
-class BelievedArm:
+class PriorArm:
     """An arm as it is believed to be.
 
     Parameters
@@ -60,7 +60,7 @@ class BelievedArm:
 
 
 @dataclass(frozen=True)
-class KnownBefore:
+class PriorKnowledge:
     """What the user knows beside the prior: link lengths, payload, and the error of the rest."""
 
     l1: float | None = None
@@ -79,7 +79,7 @@ class KnownBefore:
         return lengths
 
 
-def prior_of(given: Result | str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
+def prior_of(given: Result | str, loaded: bool | None, knowns: PriorKnowledge) -> PriorArm:
     """The prior that is given.
 
     Parameters
@@ -88,7 +88,7 @@ def prior_of(given: Result | str, loaded: bool | None, knowns: KnownBefore) -> B
         A result, its folder or file, the name of a shipped case, or a TOML file of an arm.
     loaded : bool or None
         Whether there are to be runs with the payload; None where there are if a payload is known.
-    knowns : KnownBefore
+    knowns : PriorKnowledge
 
     Raises
     ------
@@ -117,7 +117,7 @@ def prior_of(given: Result | str, loaded: bool | None, knowns: KnownBefore) -> B
     return prior
 
 
-def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -> BelievedArm:
+def of_case(case: Case, source: str, loaded: bool | None, knowns: PriorKnowledge) -> PriorArm:
     """The prior of a simulated or drawn arm: masses and friction uncertain, lengths exact.
 
     Raises
@@ -155,7 +155,7 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: KnownBefore) -
     for place, (other, its_mass) in enumerate(wrong):
         spread[:, place] = _parameters(shared, case, other, its_mass) - mean
     belief = Belief(shared, mean, spread, box=True)
-    return BelievedArm(source, belief, np.array([arm.l1, arm.l2]), None)
+    return PriorArm(source, belief, np.array([arm.l1, arm.l2]), None)
 
 
 def _shared(
@@ -163,7 +163,7 @@ def _shared(
     mass: float | None,
     loaded: bool | None,
     source: str,
-    knowns: KnownBefore,
+    knowns: PriorKnowledge,
     body: tuple[str, ...],
 ) -> Shared:
     if loaded and not mass:
@@ -193,8 +193,8 @@ def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray
 
 
 def _of_result(
-    result: Result, source: str, loaded: bool | None, knowns: KnownBefore
-) -> BelievedArm:
+    result: Result, source: str, loaded: bool | None, knowns: PriorKnowledge
+) -> PriorArm:
     model, left_out = _planned(model_of(result))
     lengths = given_lengths(result) | knowns.lengths
     value = _estimates(result, knowns.payload) | lengths
@@ -216,7 +216,7 @@ def _of_result(
     reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
     doubts = left_out + contradictions(result, knowns.lengths)
     belief = Belief(shared, mean, spread, box=False)
-    return BelievedArm(source, belief, reach, noise_of(result), doubts)
+    return PriorArm(source, belief, reach, noise_of(result), doubts)
 
 
 def _estimates(result: Result, payload: float | None) -> dict[str, float]:

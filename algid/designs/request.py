@@ -1,185 +1,28 @@
-"""Limits and runs, out of a TOML file and flags over it."""
+"""What a campaign keeps to, from a TOML file, the command line's text, or keywords: one model."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError, ValidationInfo
+from pydantic_core import PydanticCustomError
 
 from algid.arm import FloatArray
 from algid.base.errors import SettingError
-from algid.base.files import read_toml
+from algid.base.files import misfit, toml_content
 from algid.base.limits import PLANNED
 from algid.designs.limits import HANGING, Limits
 from algid.options import flag
 
-Positive = Annotated[float, Field(gt=0)]  # inf is no limit
-Pair = Positive | tuple[Positive, Positive]
-Span = tuple[float, float]
+RATE, DURATION = 1000.0, 10.0  # Hz and s
 MOST_RUNS = 1000
-Runs = Annotated[int, Field(ge=0, le=MOST_RUNS)]
 FURTHEST = 2 * np.pi  # rad to either side: few joints turn further
 SMALLEST, LARGEST = 1e-6, 1e6
 """What a limit in rad, rad/s, rad/s² or N m may be, but for 0 and inf."""
-
-
-def _within(name: str) -> Any:
-    """What a number of the file may be: as the option of that name."""
-    low, high = PLANNED[name]
-    return Field(ge=low, le=high, allow_inf_nan=False)
-
-
-class LimitsFile(BaseModel):
-    """What a TOML file may say: a number for both joints, or one for each."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    range: Positive | tuple[Positive, Positive] | tuple[Span, Span] | None = None
-    speed: Pair | None = None
-    acceleration: Pair | None = None
-    torque: Pair | None = None
-    tip_height: float | None = None
-    duration: Annotated[float, _within("duration")] | None = None
-    rate: Annotated[float, _within("rate")] | None = None
-    runs: tuple[Runs, Runs] | None = None
-
-
-@dataclass(frozen=True)
-class Request:
-    """What a campaign is asked to keep to, flags and file put together."""
-
-    content: Mapping[str, Any]
-    source: str
-
-    def get(self, name: str, default: Any) -> Any:
-        """What is asked of `name`."""
-        value = self.content.get(name)
-        if value is None:
-            return default
-        return value
-
-
-def request(file: Path | None, flags: Mapping[str, str | float | None]) -> Request:
-    """The file's limits with the flags over them.
-
-    Raises
-    ------
-    SettingError
-        If either is wrong; the flag is named, and the file's line beside it.
-    """
-    content: dict[str, Any] = {}
-    source = "the flags"
-    if file is not None:
-        content = read_toml(file, LimitsFile).model_dump(exclude_none=True)
-        source = str(file)
-    for name, value in flags.items():
-        if value is None:
-            continue
-        content[name] = value
-        if isinstance(value, str):
-            content[name] = _parsed(name, value)
-        if content[name] is None:
-            raise SettingError(f"{flag(name)}: expected {_LIKE[name]}, found {value!r}")
-    return Request(content, source)
-
-
-def limits_of(asked: Request, lengths: FloatArray) -> Limits:
-    """The limits of a request for an arm of these link lengths (2,).
-
-    Raises
-    ------
-    SettingError
-        If a limit that must be given is not, or makes no sense.
-    """
-    for name in ("range", "speed", "torque"):
-        if name not in asked.content:
-            raise SettingError(
-                f"{flag(name)}: it must be given, or `{name} = …` in the file of {flag('limits')}; "
-                "inf is no limit at all"
-            )
-    for name in ("range", "speed", "acceleration", "torque"):
-        _check(name, asked.content.get(name))
-    low, high = _range(asked.content["range"])
-    height = float(asked.get("tip_height", -np.inf))
-    if np.isfinite(height) and not np.all(np.isfinite(lengths)):
-        raise SettingError(
-            f"{flag('tip_height')}: the link lengths are not known; give {flag('l1')} and "
-            f"{flag('l2')}"
-        )
-    reach = float(np.sum(lengths))
-    if height >= reach:
-        raise SettingError(
-            f"{flag('tip_height')}: expected less than the arm's reach, {reach:.4g} m, found "
-            f"{height:g} m"
-        )
-    limits = Limits(
-        low=low,
-        high=high,
-        speed=_both(asked.get("speed", np.inf)),
-        acceleration=_both(asked.get("acceleration", np.inf)),
-        torque=_both(asked.get("torque", np.inf)),
-        height=height,
-        lengths=lengths,
-    )
-    every = np.stack([limits.half, limits.speed, limits.acceleration, limits.torque])
-    if not np.any(np.isfinite(every)):
-        raise SettingError(
-            f"{flag('range')}: without any limit no motion is the best, found inf for all; give one"
-        )
-    return limits
-
-
-def _check(name: str, value: Any) -> None:
-    """Raises `SettingError` where a limit is neither inf nor such as an arm may have, in rad."""
-    if value is None:
-        return
-    numbers = np.abs(np.array(value, dtype=np.float64)).ravel()
-    wrong = ~(np.isinf(numbers) | (numbers == 0) | ((numbers >= SMALLEST) & (numbers <= LARGEST)))
-    if np.any(wrong):
-        raise SettingError(
-            f"{flag(name)}: expected from {SMALLEST:g} to {LARGEST:g}, or inf, found "
-            f"{numbers[wrong][0]:g}"
-        )
-    far = numbers[np.isfinite(numbers)].max(initial=0.0)
-    if name == "range" and far > FURTHEST:
-        raise SettingError(
-            f"{flag(name)}: expected rad, found {far:g}, more than a turn: for {far:g}° give "
-            f"{np.radians(far):.4g}; inf is no limit"
-        )
-
-
-def _both(value: Any) -> FloatArray:
-    """A number for both joints, or one of each."""
-    if not isinstance(value, tuple | list):
-        value = (value, value)
-    return np.array(value, dtype=np.float64)
-
-
-def _range(value: Any) -> tuple[FloatArray, FloatArray]:
-    ends = _both(value)
-    if ends.ndim == 2:
-        low, high = ends.T
-    else:  # one number a joint is to both sides of hanging
-        low, high = np.array(HANGING) - ends, np.array(HANGING) + ends
-    for joint in range(2):
-        if not low[joint] < high[joint]:
-            raise SettingError(
-                f"{flag('range')}: expected LOW:HIGH with LOW below HIGH for joint {joint + 1}, "
-                f"found {low[joint]:g}:{high[joint]:g}"
-            )
-        if np.isfinite(low[joint]) != np.isfinite(high[joint]):
-            raise SettingError(
-                f"{flag('range')}: expected both ends of joint {joint + 1} or neither, found "
-                f"{low[joint]:g}:{high[joint]:g}; give a wide one in place of inf"
-            )
-    return low, high
-
-
-_LIKE = {
+EXAMPLES = {
     "range": "rad like 1.2 (to both sides of hanging), 1.2,1.0, or -2.7:-0.4,-1.2:1.2",
     "speed": "rad/s like 3 or 3,4",
     "acceleration": "rad/s² like 30 or 30,60",
@@ -188,34 +31,133 @@ _LIKE = {
 }
 
 
-def _parsed(name: str, text: str) -> Any:
-    """A number, a pair of them, or a pair of spans; None where the flag cannot mean that."""
+def _pair(value: Any, info: ValidationInfo) -> FloatArray:
+    """Numbers (2,) of both joints or both kinds of run; of a range its ends (2, 2) by joint.
+
+    One number stands for both joints, and of a range for both sides of hanging.
+
+    Raises
+    ------
+    PydanticCustomError
+        If it can be no such limit.
+    """
+    name = str(info.field_name)
+    wrong = PydanticCustomError("limit", "expected {like}", {"like": EXAMPLES[name]})
+    if isinstance(value, str):
+        value = [part.split(":") for part in value.split(",")]
     try:
-        parts = [tuple(map(float, part.split(":"))) for part in text.split(",")]
-        table = np.array(parts)
-    except ValueError:  # no numbers, or not as many in each part
-        return None
+        table = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):  # no numbers, or not as many in each part
+        raise wrong from None
+    if table.shape[-1:] == (1,):
+        table = table[..., 0]
+    spans = name == "range" and table.shape == (2, 2)
+    if not spans and (table.shape not in ((), (1,), (2,)) or not np.all(table >= 0)):
+        raise wrong
     if np.any(np.isnan(table)):
-        return None
-    if table.shape == (2, 2) and name == "range":
-        return tuple(parts)
-    if table.shape not in ((1, 1), (2, 1)):
-        return None
-    numbers = tuple(table[:, 0].tolist())
+        raise wrong
     if name == "runs":
-        return _runs(numbers)
-    if min(numbers) <= 0:
-        return None
-    if len(numbers) == 1:
-        return numbers[0]
-    return numbers
+        whole = np.all(table == np.rint(table)) and table.max() <= MOST_RUNS
+        if table.shape != (2,) or not whole or not np.any(table):
+            raise wrong
+        return table
+    sizes = np.abs(table[np.isfinite(table)])
+    if not spans and not np.all(table > 0):
+        raise wrong
+    if np.any((sizes > 0) & ((sizes < SMALLEST) | (sizes > LARGEST))):
+        bounds = {"low": f"{SMALLEST:g}", "high": f"{LARGEST:g}"}
+        raise PydanticCustomError("limit", "expected from {low} to {high}, or inf", bounds)
+    if name != "range":
+        return np.broadcast_to(table, 2)
+    far = sizes.max(initial=0.0)
+    if far > FURTHEST:
+        turn = {"far": f"{far:g}", "rad": f"{np.radians(far):.4g}"}
+        said = "expected rad, at most a turn (for {far}° give {rad}), or inf"
+        raise PydanticCustomError("limit", said, turn)
+    if not spans:
+        half = np.broadcast_to(table, 2)
+        return np.stack([np.array(HANGING) - half, np.array(HANGING) + half], axis=1)
+    low, high = table.T
+    if not np.all(low < high) or np.any(np.isfinite(low) != np.isfinite(high)):
+        said = "expected LOW:HIGH with LOW below HIGH, both finite or neither"
+        raise PydanticCustomError("limit", said)
+    return table
 
 
-def _runs(numbers: Sequence[float]) -> tuple[int, int] | None:
-    """Numbers of runs without and with the payload; None where these are none."""
-    if len(numbers) != 2 or not any(numbers):
-        return None
-    for number in numbers:
-        if not number.is_integer() or not 0 <= number <= MOST_RUNS:
-            return None
-    return int(numbers[0]), int(numbers[1])
+Pair = Annotated[FloatArray, PlainValidator(_pair)]
+UNLIMITED = np.full(2, np.inf)
+
+
+def _within(name: str) -> Any:
+    """What a number may be: as the option of that name."""
+    low, high = PLANNED[name]
+    return Field(ge=low, le=high, allow_inf_nan=False)
+
+
+class Request(BaseModel):
+    """What a campaign is asked to keep to; inf is no limit."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    range: Pair
+    speed: Pair
+    torque: Pair
+    acceleration: Pair = UNLIMITED
+    tip_height: float = -np.inf
+    duration: Annotated[float, _within("duration")] = DURATION
+    rate: Annotated[float, _within("rate")] = RATE
+    runs: Pair | None = None
+
+
+def request(file: Path | None, given: Mapping[str, Any]) -> Request:
+    """What the file asks for, and over it what is given; None leaves it to the file.
+
+    Raises
+    ------
+    SettingError
+        If either is wrong; it names the option or the file's line.
+    """
+    content = {} if file is None else toml_content(file)
+    own = {name: value for name, value in given.items() if value is not None}
+    try:
+        return Request.model_validate(content | own)
+    except ValidationError as error:
+        place, said = misfit(error)
+        name = place.partition(".")[0]
+        if error.errors()[0]["type"] == "missing":
+            said = (
+                f"it must be given, or `{name} = …` in the file of {flag('limits')}; inf is no "
+                "limit at all"
+            )
+        elif name not in own:
+            raise SettingError(f"{file}: {place}: {said}") from error
+        raise SettingError(f"{flag(name)}: {said}") from error
+
+
+def limits_of(asked: Request, lengths: FloatArray) -> Limits:
+    """The limits of a request for an arm of these link lengths (2,).
+
+    Raises
+    ------
+    SettingError
+        If the height of the tip cannot be kept to, or nothing is limited.
+    """
+    height, reach = asked.tip_height, float(np.sum(lengths))
+    if np.isfinite(height) and not np.isfinite(reach):
+        raise SettingError(
+            f"{flag('tip_height')}: the link lengths are not known; give {flag('l1')} and "
+            f"{flag('l2')}"
+        )
+    if height >= reach:
+        raise SettingError(
+            f"{flag('tip_height')}: expected less than the arm's reach, {reach:.4g} m, found "
+            f"{height:g} m"
+        )
+    low, high = asked.range.T
+    limits = Limits(low, high, asked.speed, asked.acceleration, asked.torque, height, lengths)
+    every = np.stack([limits.half, limits.speed, limits.acceleration, limits.torque])
+    if not np.any(np.isfinite(every)):
+        raise SettingError(
+            f"{flag('range')}: without any limit no motion is the best, found inf for all; give one"
+        )
+    return limits

@@ -19,11 +19,11 @@ from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.designs.campaign import Design
 from algid.designs.limits import Row
-from algid.designs.page import page_html
-from algid.designs.tables import amounts, verdict
+from algid.designs.page import amounts, design_document, verdict
 from algid.log import Log, Origin
 from algid.model import UNITS
 from algid.notices import Notice
+from algid.report.render import page
 
 # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
 POINTS = 50.0
@@ -62,7 +62,7 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
     write_log(folder / "trajectory.mcap", log, kind="mcap")
     texts = {
         "design.json": design_json(design, origin),
-        "report.html": page_html(design, origin.source, origin.doubts),
+        "report.html": page(design_document(design, origin.source, origin.doubts)),
         "joint_trajectory.yaml": joint_trajectory(design, origin.joints),
     }
     for name, text in texts.items():

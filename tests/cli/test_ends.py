@@ -21,7 +21,7 @@ from algid.batches.jobs import Job
 from algid.batches.records import JobRecord, JobStatus
 from algid.batches.run import BatchOutcome
 from algid.cli.output import shown
-from algid.designs.prior import KnownBefore, prior_of
+from algid.designs.prior import PriorKnowledge, prior_of
 from algid.designs.request import request
 from algid.estimators.whitening import NoiseLevels
 from algid.synth.cases import load_case
@@ -253,7 +253,7 @@ def test_no_torque_and_a_replayed_one(tmp_path: Path) -> None:
 
 
 def prior() -> Any:
-    return prior_of("case1", None, KnownBefore(None, None, None, None))
+    return prior_of("case1", None, PriorKnowledge(None, None, None, None))
 
 
 def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ import pytest
 from algid.arm import Arm
 from algid.base.errors import AlgidError
 from algid.base.significance import SURE
-from algid.designs.belief import asked_for
-from algid.designs.prior import BelievedArm, KnownBefore, of_case, prior_of
+from algid.designs.belief import objective_of
+from algid.designs.prior import PriorArm, PriorKnowledge, of_case, prior_of
 from algid.model import Model
 from algid.results import Result, result_json
 from algid.synth.cases import Case
@@ -26,19 +26,17 @@ CASE = Case("mine", ARM, 0.5, None, {})
 PAYLOAD = {"m_p": 0.5, "l1": 0.4, "l2": 0.3}
 
 
-def believed(
-    result: Result, folder: Path, loaded: bool | None = None, **knowns: Any
-) -> BelievedArm:
+def believed(result: Result, folder: Path, loaded: bool | None = None, **knowns: Any) -> PriorArm:
     file = folder / "arm.json"
     file.write_text(result_json(result), encoding="utf-8")
-    return prior_of(str(file), loaded, KnownBefore(**knowns))
+    return prior_of(str(file), loaded, PriorKnowledge(**knowns))
 
 
 def test_the_spread_of_a_case_is_what_each_mass_and_friction_moves() -> None:
     """By Table 1: each column is what the parameters change by if a mass, with its inertia, is 10
     % larger.
     """
-    prior = of_case(CASE, "mine", None, KnownBefore(error=0.1))
+    prior = of_case(CASE, "mine", None, PriorKnowledge(error=0.1))
     belief = prior.belief
     assert belief.shared.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "m_p", "l1", "l2")
     g = 9.81
@@ -54,13 +52,13 @@ def test_the_spread_of_a_case_is_what_each_mass_and_friction_moves() -> None:
     assert belief.box
     np.testing.assert_array_equal(prior.lengths, [0.4, 0.3])
     assert (prior.noise, prior.doubts, prior.source) == (None, (), "mine")
-    usual = of_case(CASE, "mine", None, KnownBefore()).belief.spread
+    usual = of_case(CASE, "mine", None, PriorKnowledge()).belief.spread
     # a fifth where nothing is told
     np.testing.assert_allclose(usual, 2 * belief.spread, atol=1e-14)
 
 
 def test_what_the_user_knows_beats_the_case() -> None:
-    prior = of_case(CASE, "mine", None, KnownBefore(l1=0.5, l2=0.35, payload=0.2))
+    prior = of_case(CASE, "mine", None, PriorKnowledge(l1=0.5, l2=0.35, payload=0.2))
     names = prior.belief.shared.names
     assert names[-1] == "m_p"  # lengths that are known are not estimated
     value = dict(zip(names, prior.belief.mean, strict=True))
@@ -68,30 +66,6 @@ def test_what_the_user_knows_beats_the_case() -> None:
     assert value["k1"] == pytest.approx(1.0 * 0.5 * 0.15)
     np.testing.assert_array_equal(prior.lengths, [0.5, 0.35])
     assert prior.belief.shared.lengths == {"l1": 0.5, "l2": 0.35}
-
-
-@pytest.mark.parametrize(
-    ("payload", "loaded", "carried"),
-    [
-        (0.5, None, True),
-        (0.0, None, False),
-        (0.5, False, False),
-        (0.5, True, True),
-        (0.0, False, False),
-    ],
-)
-def test_there_are_loaded_runs_if_asked_for_or_a_payload_is_known(
-    payload: float, loaded: bool | None, carried: bool
-) -> None:
-    belief = of_case(replace(CASE, payload=payload), "mine", loaded, KnownBefore()).belief
-    assert belief.shared.payload is carried
-    assert ("m_p" in belief.shared.names) is carried
-
-
-def test_a_horizontal_arm_has_no_weight_to_be_wrong_about() -> None:
-    belief = of_case(replace(CASE, arm=replace(ARM, g=0.0)), "mine", False, KnownBefore()).belief
-    assert belief.shared.names == ("k1", "k3", "k5", "k6", "k7")
-    assert belief.shared.model.gravity == 0
 
 
 def test_a_results_covariance_is_believed_whole(tmp_path: Path) -> None:
@@ -109,25 +83,6 @@ def test_a_results_covariance_is_believed_whole(tmp_path: Path) -> None:
     assert not prior.belief.box
     np.testing.assert_allclose(prior.lengths, [0.4, 0.3])
     assert prior.noise is None  # the made-up result tells none
-
-
-def test_noise_of_a_result_is_taken_where_all_of_it_is_there(tmp_path: Path) -> None:
-    result = result_of(values_of(ODD))
-    assert result.fit is not None
-    for noise, known in (
-        ({"theta1": 1e-3, "theta2": 2e-3, "tau1": 0.1, "tau2": 0.2}, True),
-        ({"theta1": 1e-3, "theta2": 0.0, "tau1": 0.1, "tau2": 0.2}, False),
-        ({"theta1": 1e-3, "tau1": 0.1, "tau2": 0.2}, False),
-    ):
-        prior = believed(
-            result.model_copy(update={"fit": result.fit.model_copy(update={"noise": noise})}),
-            tmp_path,
-        )
-        assert (prior.noise is not None) == known
-        if prior.noise is not None:
-            np.testing.assert_array_equal(
-                [prior.noise.theta, prior.noise.tau], [[1e-3, 2e-3], [0.1, 0.2]]
-            )
 
 
 def test_a_payload_that_is_given_is_as_wrong_as_told(tmp_path: Path) -> None:
@@ -188,18 +143,6 @@ def test_what_a_result_cannot_tell_is_refused(
     assert str(refused.value) == f"{tmp_path / 'arm.json'}: {message}"
 
 
-def test_lengths_that_the_result_was_told_are_not_estimated(tmp_path: Path) -> None:
-    told = result_of(values_of(ODD), payload={"m_p": 0.5}, l1=0.4, l2=0.3)
-    prior = believed(told, tmp_path)
-    assert prior.belief.shared.names[-1] == "m_p"
-    np.testing.assert_array_equal(prior.lengths, [0.4, 0.3])
-    other = believed(told, tmp_path, l2=0.31)
-    np.testing.assert_array_equal(other.lengths, [0.4, 0.31])
-    assert believed(result_of(values_of(ODD)), tmp_path).lengths.tolist() == pytest.approx(
-        [np.nan] * 2, nan_ok=True
-    )
-
-
 BENT = Case(
     "bent", replace(ARM, delta1=0.2, delta2=-0.3), 0.5, None, {}, place=(0.28, 0.04), inertia=0.002
 )
@@ -207,7 +150,7 @@ BENT = Case(
 
 def test_a_bent_arm_and_a_body_are_believed_with_their_sine_parts() -> None:
     """Its logs' coefficients are those of the simulator's arm, with the payload and without."""
-    belief = of_case(BENT, "bent", None, KnownBefore(error=0.1)).belief
+    belief = of_case(BENT, "bent", None, PriorKnowledge(error=0.1)).belief
     names = belief.shared.names
     assert names[-5:] == ("m_p", "l1", "l2", "y_p", "J_p")
     model = belief.shared.model
@@ -218,5 +161,5 @@ def test_a_bent_arm_and_a_body_are_believed_with_their_sine_parts() -> None:
     heavier = dict(zip(names, belief.spread[:, 4].tolist(), strict=True))
     assert (heavier["m_p"], heavier["J_p"]) == pytest.approx((0.05, 0.0002))
     assert heavier["y_p"] == heavier["k1s"] == 0.0
-    asked = asked_for(belief, ["y_p", "J_p"], "bent")
+    asked = objective_of(belief, ["y_p", "J_p"], "bent")
     assert [name for name, yes in zip(names, asked.wanted, strict=True) if yes] == ["y_p", "J_p"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,13 +13,13 @@ from click.testing import CliRunner
 from algid.arm import FloatArray, inverse_dynamics
 from algid.base.errors import AlgidError, SettingError
 from algid.base.progress import Progress
-from algid.designs.belief import asked_for
+from algid.designs.belief import objective_of
 from algid.designs.campaign import Campaign, Design, plan
 from algid.designs.information import Experiment, Information
 from algid.designs.limits import resting
 from algid.designs.optimise import kept
 from algid.designs.position import PositionProblem
-from algid.designs.prior import KnownBefore, prior_of
+from algid.designs.prior import PriorKnowledge, prior_of
 from algid.designs.request import limits_of, request
 from algid.estimators.whitening import NoiseLevels
 from algid.readers import read_log
@@ -60,12 +58,12 @@ def one_start() -> Iterator[None]:
 
 
 def campaign(names: list[str] | None = None) -> Campaign:
-    prior = prior_of("case1", None, KnownBefore())
+    prior = prior_of("case1", None, PriorKnowledge())
     return Campaign(
         experiment=Experiment(prior.belief.shared, (1, 1), NOISE, 500.0),
         belief=prior.belief,
         limits=limits_of(request(None, FLAGS), prior.lengths),
-        asked=asked_for(prior.belief, names, "case1"),
+        asked=objective_of(prior.belief, names, "case1"),
         duration=DURATION,
     )
 
@@ -88,18 +86,6 @@ def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Design) -
             k = belief.shared.coefficients(arm, loaded)
             torque = inverse_dynamics(k, motion.theta, motion.omega, motion.alpha)
             assert np.all(np.abs(torque) <= limits.torque[:, None])
-
-
-def test_limits_are_used_up_to_the_margin(design: Design) -> None:
-    assert max(used for _, used in design.binding) == pytest.approx(
-        1 - design.campaign.margin, rel=1e-3
-    )
-
-
-def test_the_motion_is_at_rest_at_both_ends_and_as_long_as_asked(design: Design) -> None:
-    assert design.t[-1] == DURATION
-    np.testing.assert_allclose(design.motion.omega[:, [0, -1]], 0, atol=1e-9)
-    np.testing.assert_allclose(design.motion.alpha[:, [0, -1]], 0, atol=1e-9)
 
 
 def random_bounds(count: int) -> FloatArray:
@@ -192,7 +178,7 @@ def test_the_folder_holds_the_trajectory_in_every_form(folder: Path) -> None:
     motion = [
         table.select(f"{name}1", f"{name}2").to_numpy().T for name in ("theta", "omega", "alpha")
     ]
-    k = prior_of("case1", None, KnownBefore()).belief.load(True).c
+    k = prior_of("case1", None, PriorKnowledge()).belief.load(True).c
     loaded = table.select("loaded_tau1", "loaded_tau2").to_numpy().T
     np.testing.assert_allclose(inverse_dynamics(k, *motion), loaded, atol=1e-9)
 
@@ -219,22 +205,6 @@ def test_the_joint_trajectory_is_what_a_controller_takes(folder: Path) -> None:
         np.testing.assert_allclose(
             values, table[rows].select(f"{name}1", f"{name}2").to_numpy(), atol=1e-8
         )
-
-
-def test_the_report_states_every_parameter_and_runs_its_own_scripts_only(folder: Path) -> None:
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    content = json.loads((folder / "design.json").read_text(encoding="utf-8"))
-    assert all(f">{name}</th>" in text for name in content["parameters"])
-    assert '<svg viewBox="' in text
-    policy = text.split('http-equiv="Content-Security-Policy" content="')[1].split('"')[0]
-    (scripts,) = (part for part in policy.split(";") if "script-src" in part)
-    nonce = scripts.split("'nonce-")[1].rstrip("'")
-    assert scripts.strip() == f"script-src 'nonce-{nonce}'"
-    tags = re.findall(r"<script\b[^>]*>", text)
-    assert [tag for tag in tags if 'type="text/plain"' not in tag] == [f'<script nonce="{nonce}">']
-    assert content["largest_relative_bound"] == max(
-        row["relative"] for row in content["parameters"].values()
-    )
 
 
 def test_the_campaign_can_be_rehearsed(folder: Path, tmp_path: Path) -> None:
@@ -265,8 +235,8 @@ REFUSED = [
     (["case1", *LIMITS], "--position-noise: case1 does not tell"),
     (["case1", *SENSORS, *LIMITS, "--range", "x"], "--range: expected rad like 1.2"),
     (["case1", *SENSORS, *LIMITS, "--range=-60:60,-60:60"], "for 60° give 1.047"),
-    (["case1", *SENSORS, *LIMITS, "--range", "7,inf"], "found 7, more than a turn"),
-    (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "LOW below HIGH for joint 1"),
+    (["case1", *SENSORS, *LIMITS, "--range", "7,inf"], "at most a turn (for 7° give 0.1222)"),
+    (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "LOW below HIGH"),
     (["case1", *SENSORS, *LIMITS, "--speed=-3"], "--speed: expected rad/s"),
     (
         ["case1", *SENSORS, *LIMITS, "--range=-0.2:0.2,-0.1:0.1", "--torque", "0.2,0.2"],
@@ -314,33 +284,16 @@ def test_a_rate_at_which_noise_hides_the_torque_is_refused(tmp_path: Path) -> No
     assert list(tmp_path.iterdir()) == []
 
 
-def test_limits_of_a_file_are_beaten_by_flags(tmp_path: Path) -> None:
-    file = tmp_path / "limits.toml"
-    file.write_text(
-        "range = [[-2.5, -0.5], [-1, 1]]\nspeed = 2\ntorque = [3, inf]\nruns = [2, 1]\n",
-        encoding="utf-8",
-    )
-    asked = request(file, {"speed": "4,5", "torque": None})
-    limits = limits_of(asked, np.array([0.2, 0.2]))
-    np.testing.assert_array_equal(limits.low, [-2.5, -1])
-    np.testing.assert_array_equal(limits.speed, [4, 5])
-    np.testing.assert_array_equal(limits.torque, [3, np.inf])
-    assert asked.get("runs", None) == (2, 1)
-    file.write_text("pace = 2\n", encoding="utf-8")
-    with pytest.raises(SettingError, match=r"limits\.toml: pace"):
-        request(file, {})
-
-
 def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
     file = tmp_path / "arm.toml"
     file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
-    belief = prior_of(str(file), None, KnownBefore()).belief
+    belief = prior_of(str(file), None, PriorKnowledge()).belief
     value = dict(zip(belief.shared.names, belief.mean, strict=True))
     assert value["k3"] == pytest.approx(1.0 * 0.3**2 / 3)  # a rod about its end
     assert value["k5"] == pytest.approx(2.0 * 0.4**2 / 3 + 1.0 * 0.4**2)
     assert "m_p" not in value
-    asked = asked_for(belief, None, "arm")
+    asked = objective_of(belief, None, "arm")
     # no friction is known, so none is asked for
     assert not asked.wanted[belief.shared.names.index("k6")]
     with pytest.raises(SettingError, match="cannot tell it from zero"):
-        asked_for(belief, ["k6"], "arm")
+        objective_of(belief, ["k6"], "arm")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,20 +10,15 @@ from ruamel.yaml import YAML
 
 from algid import __version__
 from algid.arm import FloatArray
-from algid.designs.belief import Asked, Belief
+from algid.designs.belief import Belief, Objective
 from algid.designs.campaign import Campaign, Design
-from algid.designs.figures import motion
 from algid.designs.information import Experiment
 from algid.designs.limits import Limits, Row, Usage
-from algid.designs.page import design_document, page_html
-from algid.designs.tables import limit_table
 from algid.designs.write import Provenance, design_json, joint_trajectory, trajectory
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion
 from algid.notices import Notice
-from tests.report.pages import Page, named, typed
-from tests.terminals import shown
 
 RATE, COUNT = 120.0, 61
 T = np.arange(COUNT) / RATE
@@ -39,7 +32,7 @@ def moved(shift: float) -> Motion:
 
 def made_up(*, loaded: tuple[bool, ...] = (False, True)) -> Design:
     shared = Shared(Model())
-    asked = Asked(np.maximum(MEAN, 0.1), MEAN > 0, np.array([True] * 6 + [False]))
+    asked = Objective(np.maximum(MEAN, 0.1), MEAN > 0, np.array([True] * 6 + [False]))
     limits = Limits(
         low=np.array([-np.inf, -1.0]),
         high=np.array([np.inf, 3.0]),
@@ -118,18 +111,6 @@ def test_points_of_the_joint_trajectory_come_fifty_times_a_second_and_at_the_end
             np.testing.assert_allclose(point[name], expected, atol=0.5001e-9)
 
 
-def test_a_zero_of_a_joint_trajectory_has_no_sign_and_few_samples_are_all_taken() -> None:
-    one = made_up()
-    still = Motion(*(np.full((2, 3), -1e-12) for _ in range(3)))
-    slow = replace(one.campaign, experiment=replace(one.campaign.experiment, rate=2.0))
-    text = joint_trajectory(
-        replace(one, t=np.array([0.0, 0.5, 1.0]), motion=still, campaign=slow), ("a", "b")
-    )
-    assert text.count("positions: [0.0, 0.0]") == 3
-    assert "-0.0" not in text
-    assert re.findall(r"time_from_start: (\{.*\})", text)[-1] == "{sec: 1, nanosec: 0}"
-
-
 def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     one = made_up()
     origin = Provenance(
@@ -181,87 +162,3 @@ def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     assert k4["information_by_second"] == [0.25, 0.1235]
     assert (k7["relative"], k7["asked"]) == (None, False)  # what is zero has no relative error
     assert content["largest_relative_bound"] == pytest.approx(0.8)
-
-
-def test_a_design_names_what_stays_open_and_what_binds_first() -> None:
-    one = made_up()
-    assert one.open_parameters == ["k4"]  # 80 % of itself
-    assert replace(one, std=0.499 * one.campaign.asked.size).open_parameters == []
-    assert len(replace(one, std=0.501 * one.campaign.asked.size).open_parameters) == 6
-    assert one.largest == pytest.approx(0.8)
-    assert [(row.limit, used) for row, used in one.binding] == [
-        ("speed", 0.9),
-        ("torque", 0.7),
-        ("range", 0.5),
-    ]
-    assert one.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
-    assert made_up(loaded=(True,)).motion is not None
-
-
-def test_a_height_stands_in_the_json_where_there_is_one() -> None:
-    one = made_up()
-    limited = replace(one.campaign, limits=replace(one.campaign.limits, height=-0.3))
-    usage = Usage((Row("tip-height", None, upper=False),), np.array([[0.25]]))
-    content = json.loads(
-        design_json(replace(one, campaign=limited, usage=usage), Provenance("a", "b"))
-    )
-    assert content["limits"]["tip_height"] == -0.3
-    (used,) = content["used"]
-    assert (used["limit"], used["joint"], used["allowed"]) == ("tip-height", None, -0.3)
-    # a quarter of the metre below the stretched arm's tip
-    assert used["most"] == pytest.approx(0.7 - 0.25 * 1.0)
-
-
-def test_points_are_a_fiftieth_of_a_second_apart_whatever_the_rate() -> None:
-    one = made_up()
-    fast = replace(one.campaign, experiment=replace(one.campaign.experiment, rate=600.0))
-    text = joint_trajectory(replace(one, campaign=fast, t=np.arange(COUNT) / 600), ("a", "b"))
-    stamps = [int(nanosec) for nanosec in re.findall(r"time_from_start: .*nanosec: (\d+)", text)]
-    assert stamps == [20_000_000 * place for place in range(6)]
-
-
-def test_a_kind_of_limit_has_one_row_with_its_tightest_joint() -> None:
-    table = limit_table(made_up())
-    assert [(row[0], row[3], row[6]) for row in table.rows] == [
-        ("speed", "90.0", "joint 1, up"),
-        ("torque, loaded", "70.0", "joint 1, down"),
-        ("range", "50.0", "joint 2, down"),
-    ]
-
-
-def test_the_page_draws_the_motion_within_its_limits() -> None:
-    one = made_up()
-    limits, plot = one.campaign.limits, motion(one)
-    titles = [each["text"] for each in plot.figure.layout["annotations"]]
-    assert titles[:2] == ["<b>Angles, rad</b>", "<b>Velocities, rad/s</b>"]
-    assert len(titles) == 2 + len(one.torque)
-    first, second = named(plot.figure.data, "joint 1")[0], named(plot.figure.data, "joint 2")[0]
-    assert typed(first["y"]) == pytest.approx(one.motion.theta[0], rel=1e-5)
-    assert typed(second["y"]) == pytest.approx(one.motion.theta[1], rel=1e-5)
-    levels = [each["y0"] for each in plot.figure.layout["shapes"] if each["yref"] == "y2"]
-    size = 3 * np.abs(one.motion.omega).max()
-    wanted = [side * speed for speed in limits.speed for side in (-1, 1) if speed < size]
-    assert levels == pytest.approx(wanted)
-    far = replace(limits, speed=np.full(2, 1.1 * size))  # it would flatten the motion
-    shapes = motion(replace(one, campaign=replace(one.campaign, limits=far))).figure.layout[
-        "shapes"
-    ]
-    assert not [each for each in shapes if each["yref"] == "y2"]
-
-
-def test_a_page_speaks_of_a_limit_of_the_tip_that_is_drawn_alone() -> None:
-    one = made_up()
-    for height, said in ((-np.inf, False), (-0.5, True)):
-        limits = replace(one.campaign.limits, height=height)
-        bare = replace(one.campaign.experiment, runs=(2, 0))
-        campaign = replace(one.campaign, limits=limits, experiment=bare)
-        text = page_html(replace(one, campaign=campaign), "arm")
-        assert ("the red one its limit" in text) is said
-        assert ('class="limit"' in text) is said
-        assert list(Page(text).figures) == ["motion", "information", "arm"]
-
-
-def test_a_design_fits_a_terminal_of_eighty_columns(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.designs.page._arm", lambda _: None)  # made up without a payload
-    lines = shown(design_document(made_up(), "a/long/path/to/the/arm-of-cell-12.toml"))
-    assert len(lines) <= 40  # two tables: what it will tell, and what limits bind

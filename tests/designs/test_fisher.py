@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.designs.information import Experiment, Information, Slopes, informations
+from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.position import Fourier, middles
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
@@ -108,7 +108,7 @@ def test_information_is_that_of_the_whole_covariance(sigma: float, runs: tuple[i
     one = motion()
     experiment = Experiment(SHARED, runs, noise, 1000.0)
     assert experiment.kinds == tuple(loaded for loaded in (False, True) if runs[loaded])
-    S = Information(experiment, BETA, Slopes(SHARED.model, one, RATE)).S
+    S = Information(experiment, BETA, Sensitivities(SHARED.model, one, RATE)).S
     expected = by_hand(noise, runs, one, 1000.0)
     scale = np.sqrt(np.diag(expected))
     np.testing.assert_allclose(
@@ -124,7 +124,7 @@ def test_without_noise_of_the_angles_each_sample_adds_its_own() -> None:
         lambda b: torque_by_hand(b, one.theta, one.omega, one.alpha, False), BETA
     ).reshape(2, -1, BETA.size)
     information = Information(
-        Experiment(SHARED, (2, 0), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
+        Experiment(SHARED, (2, 0), noise, RATE), BETA, Sensitivities(SHARED.model, one, RATE)
     )
     parts = information.parts(25)
     ends = (0, 25, 60)  # the last 10 of 60 samples are no part of their own
@@ -144,7 +144,7 @@ def test_a_delay_is_told_by_the_slope_of_the_torque_and_takes_of_the_rest() -> N
     one, delayed = motion(), replace(SHARED, delay=True)
     q = len(SHARED.model.names)
     beta = np.insert(BETA, q, 1e-3)
-    slopes = Slopes(SHARED.model, one, RATE)
+    slopes = Sensitivities(SHARED.model, one, RATE)
     S = Information(Experiment(delayed, (2, 0), noise, RATE), beta, slopes).S
     tau = np.einsum("aqn,q->an", slopes.Y, BETA[:q])
     columns = np.concatenate([slopes.Y, np.gradient(tau, 1 / RATE, axis=1)[:, None]], axis=1)
@@ -166,7 +166,9 @@ def test_noise_takes_information_away_and_none_adds_any() -> None:
         noise = NoiseLevels(np.full(2, sigma), np.full(2, 0.02))
         found.append(
             Information(
-                Experiment(SHARED, (1, 1), noise, RATE), BETA, Slopes(SHARED.model, one, RATE)
+                Experiment(SHARED, (1, 1), noise, RATE),
+                BETA,
+                Sensitivities(SHARED.model, one, RATE),
             ).S
         )
     scale = np.sqrt(np.diag(found[0]))
@@ -176,34 +178,9 @@ def test_noise_takes_information_away_and_none_adds_any() -> None:
         assert lost.max() > 0.1
 
 
-def test_kinds_that_move_differently_each_tell_their_own() -> None:
-    noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 0.02))
-    experiment = Experiment(SHARED, (2, 3), noise, RATE)
-    both = {False: motion(1), True: motion(2)}
-    bare, loaded = informations(experiment, both, BETA, 1, RATE)
-    for found, runs, one in ((bare, (2, 0), both[False]), (loaded, (0, 3), both[True])):
-        expected = by_hand(noise, runs, one, RATE)
-        np.testing.assert_allclose(found.S, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-    # every other sample weighs twice as much
-    thin = informations(experiment, {True: motion(2)}, BETA, 2, RATE)[0]
-    kept = Motion(
-        *(signal[:, ::2] for signal in (both[True].theta, both[True].omega, both[True].alpha))
-    )
-    whole = Information(
-        Experiment(SHARED, (0, 3), noise, RATE), BETA, Slopes(SHARED.model, kept, RATE / 2)
-    )
-    np.testing.assert_array_equal(thin.S, whole.S)
-    quiet = NoiseLevels(np.full(2, 1e-12), np.full(2, 0.02))
-    alone = Experiment(SHARED, (0, 1), quiet, RATE)
-    once, half = (
-        Information(alone, BETA, Slopes(SHARED.model, kept, rate)).S for rate in (RATE, RATE / 2)
-    )
-    np.testing.assert_allclose(half, 2 * once, rtol=1e-9, atol=1e-12 * half.max())
-
-
 def test_slopes_by_the_motion_are_those_of_the_torque_by_hand() -> None:
     one = motion()
-    slopes = Slopes(SHARED.model, one, RATE)
+    slopes = Sensitivities(SHARED.model, one, RATE)
     c = BETA[:9]
     signals = np.concatenate([one.theta, one.omega, one.alpha])
     for component in range(6):

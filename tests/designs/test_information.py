@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray, inverse_dynamics
-from algid.designs.belief import Asked, Belief
-from algid.designs.information import Experiment, Information, Slopes
+from algid.designs.belief import Belief, Objective
+from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.limits import Limits, usage
 from algid.designs.position import Fourier, middles
-from algid.designs.prior import KnownBefore, prior_of
+from algid.designs.prior import PriorKnowledge, prior_of
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Motion
 from pipelines.cramer_rao import Truth, joint_bound
@@ -24,7 +24,7 @@ FAMILY = Fourier(4.0)
 
 
 def belief_of(case: str) -> Belief:
-    return prior_of(case, None, KnownBefore()).belief
+    return prior_of(case, None, PriorKnowledge()).belief
 
 
 def experiment(belief: Belief, rate: float = 500.0) -> Experiment:
@@ -56,9 +56,11 @@ def test_error_bars_are_those_of_an_independent_bound(case: str) -> None:
         )
 
     expected = joint_bound(truth(False), truth(True), belief.mean, 9.81, 1e-3, 1e-2)
-    asked = Asked(np.abs(belief.mean), *(np.ones(belief.mean.size, bool),) * 2)
+    asked = Objective(np.abs(belief.mean), *(np.ones(belief.mean.size, bool),) * 2)
     for coarse in (50.0, 100.0):
-        slopes = Slopes(belief.shared.model, motion_at(x, middles(FAMILY.duration, coarse)), coarse)
+        slopes = Sensitivities(
+            belief.shared.model, motion_at(x, middles(FAMILY.duration, coarse)), coarse
+        )
         std = np.sqrt(
             np.diag(asked.covariance(Information(experiment(belief), belief.mean, slopes).S))
         )
@@ -69,16 +71,18 @@ def test_error_bars_are_those_of_an_independent_bound(case: str) -> None:
 
 def test_gradient_by_the_motion_is_that_of_differences() -> None:
     belief, rate = belief_of("case1"), 50.0
-    asked = Asked(np.abs(belief.mean), *(np.ones(belief.mean.size, bool),) * 2)
+    asked = Objective(np.abs(belief.mean), *(np.ones(belief.mean.size, bool),) * 2)
     basis = FAMILY.basis(middles(FAMILY.duration, rate))
 
     def figure(x: FloatArray) -> float:
-        slopes = Slopes(belief.shared.model, FAMILY.motion(x, basis), rate)
+        slopes = Sensitivities(belief.shared.model, FAMILY.motion(x, basis), rate)
         return asked.figure(Information(experiment(belief), belief.mean, slopes).S, 8.0)[0]
 
     x = drawn(2)
     information = Information(
-        experiment(belief), belief.mean, Slopes(belief.shared.model, FAMILY.motion(x, basis), rate)
+        experiment(belief),
+        belief.mean,
+        Sensitivities(belief.shared.model, FAMILY.motion(x, basis), rate),
     )
     _, A = asked.figure(information.S, 8.0)
     gradient = FAMILY.gradient(information.gradient(A), basis)
@@ -91,19 +95,13 @@ def test_gradient_by_the_motion_is_that_of_differences() -> None:
 
 def test_parts_of_the_motion_add_up() -> None:
     belief, rate = belief_of("case1"), 50.0
-    slopes = Slopes(belief.shared.model, motion_at(drawn(3), middles(FAMILY.duration, rate)), rate)
+    slopes = Sensitivities(
+        belief.shared.model, motion_at(drawn(3), middles(FAMILY.duration, rate)), rate
+    )
     information = Information(experiment(belief), belief.mean, slopes)
     np.testing.assert_allclose(
         information.parts(60).sum(axis=0), information.S, rtol=1e-9, atol=1e-9 * information.S.max()
     )
-
-
-def test_two_runs_tell_twice_as_much() -> None:
-    belief, rate = belief_of("case1"), 50.0
-    slopes = Slopes(belief.shared.model, motion_at(drawn(3), middles(FAMILY.duration, rate)), rate)
-    once = Information(experiment(belief), belief.mean, slopes).S
-    twice = Information(Experiment(belief.shared, (2, 2), NOISE, 500.0), belief.mean, slopes).S
-    np.testing.assert_allclose(twice, 2 * once, rtol=1e-12)
 
 
 def limits_for(belief: Belief) -> Limits:
@@ -125,9 +123,11 @@ def test_usage_derivatives_are_those_of_differences() -> None:
     x = drawn(4)
 
     def used(x: FloatArray) -> FloatArray:
-        return usage(limits, Slopes(belief.shared.model, FAMILY.motion(x, basis), rate), loads).u
+        return usage(
+            limits, Sensitivities(belief.shared.model, FAMILY.motion(x, basis), rate), loads
+        ).u
 
-    found = usage(limits, Slopes(belief.shared.model, FAMILY.motion(x, basis), rate), loads)
+    found = usage(limits, Sensitivities(belief.shared.model, FAMILY.motion(x, basis), rate), loads)
     assert found.by_motion is not None
     share = np.random.default_rng(0).uniform(size=found.u.shape)
     gradient = FAMILY.gradient(found.by_motion * share[:, None], basis)
@@ -143,7 +143,7 @@ def test_usage_derivatives_are_those_of_differences() -> None:
 def test_no_arm_of_a_box_asks_for_more_torque_than_the_largest_told() -> None:
     belief = belief_of("case2")
     motion = motion_at(drawn(5), middles(FAMILY.duration, 50.0))
-    Y = Slopes(belief.shared.model, motion, 50.0).Y
+    Y = Sensitivities(belief.shared.model, motion, 50.0).Y
     corners = np.array(np.meshgrid(*[[-1, 1]] * belief.spread.shape[1])).reshape(
         belief.spread.shape[1], -1
     )
@@ -157,24 +157,6 @@ def test_no_arm_of_a_box_asks_for_more_torque_than_the_largest_told() -> None:
         # reached at a corner, so that the bound is no larger than it must be; its corners are
         # rounded by 1e-6
         np.testing.assert_allclose(np.abs(torque) + more, worst, rtol=0, atol=1e-5 * worst.max())
-
-
-@pytest.mark.parametrize("duration", [1.0, 4.0, 60.0])
-def test_a_motion_is_at_rest_at_both_ends_and_its_derivatives_are_its_own(duration: float) -> None:
-    family = Fourier(duration)
-    x = family.random(np.random.default_rng(1), np.array([0.5, -0.5]))
-    ends = family.motion(x, family.basis(np.array([0.0, duration])))
-    np.testing.assert_allclose(ends.theta, [[0.5, 0.5], [-0.5, -0.5]], atol=1e-12)
-    np.testing.assert_allclose([ends.omega, ends.alpha], 0.0, atol=1e-9)
-    t, h = np.linspace(0.02, 0.98, 301) * duration, 1e-5
-    ahead, here, behind = (family.motion(x, family.basis(t + step)) for step in (h, 0.0, -h))
-    scale = np.abs(here.alpha).max()
-    np.testing.assert_allclose(
-        (ahead.theta - behind.theta) / (2 * h), here.omega, atol=1e-6 * scale
-    )
-    np.testing.assert_allclose(
-        (ahead.omega - behind.omega) / (2 * h), here.alpha, atol=1e-5 * scale
-    )
 
 
 @pytest.mark.parametrize("box", [True, False])

@@ -11,8 +11,8 @@ from algid.arm import FloatArray
 from algid.base.errors import SettingError
 from algid.base.significance import SURE
 from algid.designs.belief import Load
-from algid.designs.information import Slopes
-from algid.designs.limits import HANGING, Limits, Row, resting, usage
+from algid.designs.information import Sensitivities
+from algid.designs.limits import Limits, resting, usage
 from algid.model import Model, Motion
 
 FREE = Limits(
@@ -40,8 +40,8 @@ def at(
     theta: tuple[float, float],
     omega: tuple[float, float] = (0, 0),
     alpha: tuple[float, float] = (0, 0),
-) -> Slopes:
-    return Slopes(
+) -> Sensitivities:
+    return Sensitivities(
         Model(),
         Motion(*(np.array(pair, dtype=float)[:, None] for pair in (theta, omega, alpha))),
         1.0,
@@ -50,13 +50,6 @@ def at(
 
 def load(spread: FloatArray, *, box: bool, loaded: bool = False) -> Load:
     return Load(loaded, K, spread, box)
-
-
-def test_limits_that_are_not_there_have_no_rows() -> None:
-    only_speed = replace(FREE, speed=np.array([np.inf, 2.0]))
-    used = usage(only_speed, at((1, 2), (7, -3)), [load(np.zeros((7, 1)), box=True)])
-    assert used.rows == (Row("speed", 1, True), Row("speed", 1, False))
-    np.testing.assert_allclose(used.most, [-1.5, 1.5])
 
 
 def test_usages_by_hand() -> None:
@@ -120,14 +113,6 @@ def test_a_margin_is_taken_off_each_side() -> None:
     upper = [row.upper and row.limit != "tip-height" for row in whole.rows]
     np.testing.assert_allclose(whole.most[upper], 0.9)
     np.testing.assert_allclose(less.most[upper], 1.0)
-
-
-def test_the_middle_of_the_range_is_where_a_motion_rests_if_it_is_easy() -> None:
-    strong = replace(TIGHT, torque=np.array([50.0, 25.0]), height=-np.inf)
-    np.testing.assert_allclose(
-        resting(strong, Model(), [load(np.zeros((7, 1)), box=True)]), [-1.0, 1.0]
-    )
-    np.testing.assert_allclose(resting(replace(FREE, speed=np.ones(2)), Model(), []), HANGING)
 
 
 def test_a_weak_arm_rests_where_it_needs_least() -> None:

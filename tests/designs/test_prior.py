@@ -10,9 +10,9 @@ import pytest
 import algid
 from algid.base.errors import ResultError, SettingError
 from algid.base.significance import SURE
-from algid.designs.belief import Belief, asked_for
-from algid.designs.prior import KnownBefore, prior_of
-from algid.results import Result, Status, write_result
+from algid.designs.belief import Belief, objective_of
+from algid.designs.prior import PriorKnowledge, prior_of
+from algid.results import Result, write_result
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
 
@@ -32,7 +32,7 @@ def saved(result: Result, folder: Path, **changes: object) -> str:
 
 
 def test_a_result_is_believed_as_far_as_its_error_bars_go(result: Result, tmp_path: Path) -> None:
-    prior = prior_of(saved(result, tmp_path), None, KnownBefore())
+    prior = prior_of(saved(result, tmp_path), None, PriorKnowledge())
     assert prior.belief.shared.payload
     assert prior.noise is not None
     assert result.fit is not None
@@ -54,31 +54,26 @@ def test_a_result_without_error_bars_needs_to_be_told_how_wrong_it_is(
 ) -> None:
     file = saved(result, tmp_path, fit=None)
     with pytest.raises(ResultError, match=r"no error bars; .*--set prior_error"):
-        prior_of(file, None, KnownBefore())
-    belief = prior_of(file, None, KnownBefore(error=0.2)).belief
+        prior_of(file, None, PriorKnowledge())
+    belief = prior_of(file, None, PriorKnowledge(error=0.2)).belief
     np.testing.assert_allclose(SURE * belief.std, 0.2 * np.abs(belief.mean), rtol=1e-6)
-
-
-def test_what_a_result_leaves_open_is_named(result: Result, tmp_path: Path) -> None:
-    k7 = result.parameters["k7"].model_copy(update={"status": Status.NOT_IDENTIFIABLE, "std": None})
-    file = saved(result, tmp_path, parameters={**result.parameters, "k7": k7})
-    with pytest.raises(ResultError, match="leaves k7 without error bars"):
-        prior_of(file, None, KnownBefore())
 
 
 def test_a_length_far_from_the_results_is_a_warning(result: Result, tmp_path: Path) -> None:
     file = saved(result, tmp_path)
-    (doubt,) = prior_of(file, None, KnownBefore(l2=0.2)).doubts
+    (doubt,) = prior_of(file, None, PriorKnowledge(l2=0.2)).doubts
     assert doubt.code == "LENGTH_CONTRADICTED"
     assert (doubt.numbers["name"], doubt.numbers["given"]) == ("l2", 0.2)
-    assert prior_of(file, None, KnownBefore(l2=result.payload["l2"].estimate)).doubts == ()
+    assert prior_of(file, None, PriorKnowledge(l2=result.payload["l2"].estimate)).doubts == ()
 
 
 def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
     k1 = result.parameters["k1"].model_copy(update={"estimate": 0.1})
     with pytest.raises(SettingError, match="not positive definite"):
         prior_of(
-            saved(result, tmp_path, parameters={**result.parameters, "k1": k1}), None, KnownBefore()
+            saved(result, tmp_path, parameters={**result.parameters, "k1": k1}),
+            None,
+            PriorKnowledge(),
         )
 
 
@@ -87,9 +82,11 @@ def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_pa
         "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
     )
     settings = Settings(model="coulomb,offset")
-    belief = prior_of(saved(algid.identify(*logs, settings), tmp_path), None, KnownBefore()).belief
+    belief = prior_of(
+        saved(algid.identify(*logs, settings), tmp_path), None, PriorKnowledge()
+    ).belief
     assert {"f1", "f2", "o1", "o2"} <= set(belief.shared.names)
-    asked = asked_for(belief, None, "it")
+    asked = objective_of(belief, None, "it")
     places = [belief.shared.names.index(name) for name in ("o1", "o2")]
     assert not asked.wanted[
         places
@@ -102,20 +99,12 @@ def test_a_delay_that_was_estimated_is_planned_for_and_no_aim(tmp_path: Path) ->
         "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
     )
     found = algid.identify(*logs, Settings(model="delay"))
-    belief = prior_of(saved(found, tmp_path), None, KnownBefore()).belief
+    belief = prior_of(saved(found, tmp_path), None, PriorKnowledge()).belief
     assert belief.shared.delay
     place = belief.shared.names.index("delay")
     sure = Belief(
         belief.shared, belief.mean + 1e-3 * np.eye(belief.mean.size)[place], belief.spread, False
     )
-    assert not asked_for(sure, None, "it").wanted[place]
-    assert asked_for(sure, ["delay"], "it").wanted[place]
+    assert not objective_of(sure, None, "it").wanted[place]
+    assert objective_of(sure, ["delay"], "it").wanted[place]
     assert belief.load(False).c.size == len(belief.shared.model.names)
-
-
-def test_loaded_runs_need_a_payload(tmp_path: Path) -> None:
-    file = tmp_path / "arm.toml"
-    file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
-    with pytest.raises(SettingError, match="give --payload KG, or --runs 1,0"):
-        prior_of(str(file), True, KnownBefore())
-    assert prior_of(str(file), True, KnownBefore(payload=0.5)).belief.shared.payload
