@@ -88,7 +88,7 @@ def peak_above_arrays(path: Path) -> float:
     """MB of memory that reading a file takes beyond its arrays and what the imports take."""
     code = (
         "import re, sys; from pathlib import Path; from algid.readers import read_log\n"
-        "import algid.readers.messages.plan, zstandard, mcap.records, mcap.data_stream\n"
+        "import algid.readers.messages.joint_topic, zstandard, mcap.records, mcap.data_stream\n"
         "words = lambda: Path('/proc/self/status').read_text()\n"
         "status = lambda key: int(re.search(key + r':\\s*(\\d+)', words())[1]) * 1024\n"
         "Path('/proc/self/clear_refs').write_text('5')\n"  # forget the peak of the imports

@@ -187,7 +187,7 @@ def test_every_notice_of_the_code_is_made_of_numbers() -> None:
 ASSERTED = {
     ("identification/efforts.py", "effort"),  # unloaded logs have nothing of an arm
     ("inspection/channels.py", "unwrap"),  # the same angle, whatever the log holds
-    ("readers/messages/plan.py", "clock"),  # the other of two
+    ("readers/messages/joint_topic.py", "clock"),  # the other of two
     ("inspection/sampling.py", ""),  # the rest that the notice is of
     ("inspection/conventions.py", ""),  # found by the search, or tried
     ("readers/convert.py", ""),  # all the user's own

@@ -312,7 +312,7 @@ def entries_of(opened: TableFile | MessageLog) -> Entries:
 
 
 def _topics(file: MessageFile) -> Iterator[Entry]:
-    from algid.readers.messages.plan import fields_shown
+    from algid.readers.messages.joint_topic import fields_shown
 
     first, last = file.span_ns or (0, 0)
     for place, (number, channel) in enumerate(sorted(file.channels.items())):

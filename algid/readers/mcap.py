@@ -7,12 +7,14 @@ searched for: `mcap recover` does that.
 from __future__ import annotations
 
 import io
+import math
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any
 
@@ -21,7 +23,8 @@ import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, ChunkIndex, Metadata, MetadataIndex, Schema, Statistics
+from mcap.reader import SeekingReader
+from mcap.records import Channel, Chunk, Metadata, Schema
 from numpy.typing import NDArray
 
 from algid.base.errors import LogError
@@ -30,30 +33,73 @@ from algid.base.runtime import ahead
 from algid.base.words import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
-from algid.readers.messages.batch import MessageBatch, Messages, gaps_between, gather
+from algid.readers.messages.batch import MessageBatch, Messages, gather
 from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.messages.reader import MessageLog
 
 _MAGIC = b"\x89MCAP0\r\n"
 _FRAME = struct.Struct("<BQ")
-_FOOTER = struct.Struct("<BQQQI8s")
+_FOOTER_BYTES = 37
+"""Of a footer with the magic behind it; its checksum covers the summary and the first 25."""
 _HEAD_BYTES = 31
 """Of a message record before its payload: code, length, channel, sequence, two times."""
 _HEAD = np.dtype(
     [("code", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_ns", "<i8")]
 )
-_LEAST = {Opcode.MESSAGE: _HEAD_BYTES - 9, Opcode.DATA_END: 4}
-_MOST = {Opcode.DATA_END: 4}
+_DEFINITIONS = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata}
 _LOOSE_BYTES = 1 << 23
-"""Of messages outside of chunks that are read at once."""
-_SMALL_BYTES, _GROUP_BYTES = 1 << 13, 1 << 19
-"""Of a small chunk, and of the chunks whose messages are decoded together."""
+"""Of records outside of chunks that are read at once."""
+_SMALL_BYTES = 1 << 13
 
 
 def open_mcap(paths: Sequence[Path]) -> MessageLog:
     """An MCAP log, or the splits of one in their order."""
     name = str(paths[0] if len(paths) == 1 else paths[0].parent)
     return MessageLog(name, "mcap", [cache(partial(mcap_file, path)) for path in paths])
+
+
+@dataclass(frozen=True)
+class ChunkRange:
+    """Where a chunk's content lies in the file, or records outside of chunks (`loose`).
+
+    `channels` are those that have messages in it, None where nobody knows. Message indexes of
+    `index_length` bytes follow.
+    """
+
+    start: int
+    length: int
+    index_length: int = 0
+    channels: frozenset[int] | None = None
+    loose: bool = False
+    torn: bool = False
+
+
+@dataclass
+class FileIndex:
+    """What a file defines and where its messages lie."""
+
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    chunks: list[ChunkRange] = field(default_factory=list)
+    counts: dict[int, int] = field(default_factory=dict)
+    span_ns: tuple[int, int] | None = None
+    notices: list[Notice] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    redefined: float = math.inf
+    """From which byte on a channel or schema is another than before: messages there are not read,
+    since nobody knows which definition they follow."""
+
+    def define(self, others: Sequence[tuple[int, bytes]], place: int) -> None:
+        """Take in the definitions of a chunk at a byte: the first one of an id holds."""
+        for code, content in others:
+            one: Any = _parsed(_DEFINITIONS[Opcode(code)], content)
+            if isinstance(one, Metadata):
+                self.metadata.setdefault(one.name, one.metadata)
+                continue
+            known: dict[int, Any] = self.schemas if isinstance(one, Schema) else self.channels
+            if known.setdefault(one.id, one) != one:
+                self.redefined = min(place, self.redefined)
 
 
 def mcap_file(path: Path) -> MessageFile:
@@ -66,15 +112,16 @@ def mcap_file(path: Path) -> MessageFile:
     """
     with _stream(path) as stream:
         size = stream.seek(0, io.SEEK_END)
-        notice, why = Notice("DAMAGED_INDEX", numbers={"case": "none"}), []
+        found, why = None, []
+        numbers: dict[str, Any] = {"case": "none"}
         try:
             found = _from_summary(stream, size)
         except Exception as error:  # what the package raises of bytes that are no records
-            found, why = None, [f"its summary: {error}"]
-            notice = Notice("DAMAGED_INDEX", numbers={"case": "summary", "why": str(error)})
+            numbers = {"case": "summary", "why": str(error)}
+            why = [f"its summary: {error}"]
         if found is None:
             found = _walked(stream, size)
-            found.notices.insert(0, notice)
+            found.notices.insert(0, Notice("DAMAGED_INDEX", numbers=numbers))
             found.damage[:0] = why
     text = found.metadata.get(KEY, {}).get(KEY)
     try:
@@ -83,22 +130,15 @@ def mcap_file(path: Path) -> MessageFile:
         raise LogError(
             f"{path}: the truth in the file's metadata cannot be read ({error})"
         ) from error
+    channels = {}
+    for number, one in found.channels.items():
+        schema = found.schemas.get(one.schema_id) or Schema(0, b"", "", "")
+        form = (one.message_encoding, schema.encoding, schema.data)
+        channels[number] = MessageChannel(one.topic, schema.name, *form, one.metadata)
+    batches = partial(_batches, path, found)
+    notices = tuple(found.notices)
     return MessageFile(
-        str(path),
-        {number: _channel(one, found.schemas) for number, one in found.channels.items()},
-        partial(_batches, path, found),
-        found.counts,
-        found.span_ns,
-        tuple(found.notices),
-        found.damage,
-        truth,
-    )
-
-
-def _channel(one: Channel, schemas: dict[int, Schema]) -> MessageChannel:
-    schema = schemas.get(one.schema_id) or Schema(0, b"", "", "")
-    return MessageChannel(
-        one.topic, schema.name, one.message_encoding, schema.encoding, schema.data, one.metadata
+        str(path), channels, batches, found.counts, found.span_ns, notices, found.damage, truth
     )
 
 
@@ -112,201 +152,8 @@ def _stream(path: Path) -> Iterator[IO[bytes]]:
         yield stream
 
 
-@dataclass(frozen=True)
-class _Part:
-    """A chunk record's content, or adjacent message records, by their place in the file.
-
-    `channels` are those that have messages in it, None where nobody knows.
-    """
-
-    start: int
-    length: int
-    index_length: int = 0
-    channels: frozenset[int] | None = None
-    loose: bool = False
-    torn: bool = False
-
-
-@dataclass
-class _Contents:
-    """What a file defines and where its messages lie."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    redefined: dict[tuple[int, int], int] = field(default_factory=dict)
-    """By code and id of a schema or channel the first byte from which it means something else."""
-    parts: list[_Part] = field(default_factory=list)
-    counts: dict[int, int] = field(default_factory=dict)
-    span_ns: tuple[int, int] | None = None
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    notices: list[Notice] = field(default_factory=list)
-    damage: list[str] = field(default_factory=list)
-    _known: set[tuple[int, bytes]] = field(default_factory=set)
-
-    def define(self, code: int, content: bytes, place: int) -> None:
-        """Take in a schema or a channel: the first of an id holds, up to one that differs."""
-        if (code, content) in self._known:  # recorders repeat them in every chunk
-            return
-        one: Any = _parsed(Schema if code == Opcode.SCHEMA else Channel, content)
-        known: dict[int, Any] = self.schemas if code == Opcode.SCHEMA else self.channels
-        if known.setdefault(one.id, one) == one:
-            self._known.add((code, content))
-        else:
-            self.redefined[code, one.id] = min(place, self.redefined.get((code, one.id), place))
-
-    def holds(self, channel: int, place: int) -> bool:
-        """Whether a channel and its schema mean at a byte what they meant first."""
-        schema = self.channels[channel].schema_id
-        others = ((Opcode.CHANNEL, channel), (Opcode.SCHEMA, schema))
-        return all(self.redefined.get(one, place + 1) > place for one in others)
-
-
 def _parsed(kind: Any, content: bytes) -> Any:
     return kind.read(ReadDataStream(io.BytesIO(content)))
-
-
-def _from_summary(stream: IO[bytes], size: int) -> _Contents | None:
-    """What a summary says, None where it does not tell enough.
-
-    It is believed if its checksum holds, and no chunk or message stands beside those it lists.
-
-    Raises
-    ------
-    ValueError
-        If it is damaged; the package raises more.
-    """
-    tail = _read(stream, max(0, size - _FOOTER.size), min(_FOOTER.size, size))
-    if not tail.endswith(_MAGIC) or len(tail) < _FOOTER.size:
-        raise ValueError("the file has no end: it was cut off")
-    code, length, start, _, checksum, _ = _FOOTER.unpack(tail)
-    end = size - _FOOTER.size
-    if code != Opcode.FOOTER or length != 20:
-        raise ValueError("its footer is damaged")
-    if start == 0:
-        return None
-    if not len(_MAGIC) <= start <= end or end - start > LIMITS.summary_bytes:
-        raise ValueError(f"its footer claims a summary at byte {start}")
-    content = _read(stream, start, end - start)
-    if checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
-        raise ValueError("its checksum is wrong")
-    found, statistics = _Contents(), None
-    chunks: list[ChunkIndex] = []
-    for code, place, length in _frames(io.BytesIO(content), 0, len(content)):
-        body = content[place : place + length]
-        if code in (Opcode.SCHEMA, Opcode.CHANNEL):
-            found.define(code, body, 0)
-        elif code == Opcode.CHUNK_INDEX:
-            chunks.append(_parsed(ChunkIndex, body))
-        elif code == Opcode.STATISTICS:
-            statistics = _parsed(Statistics, body)
-        elif code == Opcode.METADATA_INDEX:
-            one = _parsed(MetadataIndex, body)
-            if one.name == KEY:
-                record = _parsed(Metadata, _read(stream, one.offset + 9, one.length - 9))
-                found.metadata.setdefault(record.name, record.metadata)
-    if statistics is None or not chunks or not found.channels:
-        return None
-    counts = {one: count for one, count in statistics.channel_message_counts.items() if count}
-    if found.redefined or counts.keys() - found.channels.keys():
-        raise ValueError("it defines a channel twice, or counts messages of one it does not define")
-    indexed = [(one.message_index_length, len(one.message_index_offsets)) for one in chunks]
-    entries = sum(length - 15 * channels for length, channels in indexed)
-    if all(channels for _, channels in indexed) and entries != 16 * sum(counts.values()):
-        raise ValueError("its indexes and its statistics count different numbers of messages")
-    place = len(_MAGIC)
-    for chunk in sorted(chunks, key=lambda one: one.chunk_start_offset):
-        _check_between(stream, place, chunk.chunk_start_offset)
-        place = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-        channels = frozenset(chunk.message_index_offsets) or None
-        part = _Part(chunk.chunk_start_offset + 9, chunk.chunk_length - 9)
-        found.parts.append(
-            replace(part, index_length=chunk.message_index_length, channels=channels)
-        )
-    _check_between(stream, place, start)
-    found.counts = counts
-    found.span_ns = statistics.message_start_time, statistics.message_end_time
-    return found
-
-
-def _check_between(stream: IO[bytes], start: int, end: int) -> None:
-    """Refuse a summary that leaves out chunks or messages between those it lists."""
-    if start > end:
-        raise ValueError(f"its chunks overlap at byte {end}")
-    for code, place, length in _frames(stream, start, end):
-        if code in (Opcode.CHUNK, Opcode.MESSAGE) or place + length > end:
-            raise ValueError(f"it leaves out a record at byte {place - 9}")
-
-
-def _walked(stream: IO[bytes], size: int) -> _Contents:
-    """What stands in a file up to its end, or to its first break."""
-    found, ended, whole = _Contents(), False, len(_MAGIC)
-    last: dict[str, Any] = {"case": "end"}
-    try:
-        for code, start, length in _frames(stream, whole, size):
-            end = start + length
-            if end > size:
-                last = {
-                    "case": "chunk" if code == Opcode.CHUNK else "record",
-                    "bytes": size - whole,
-                }
-                if code == Opcode.CHUNK:
-                    found.parts.append(_Part(start, size - start, torn=True))
-                raise ValueError(f"it breaks off at byte {whole}")
-            before = found.parts[-1] if found.parts else _Part(0, 0)
-            adjacent = whole == before.start + before.length + before.index_length
-            if code in (Opcode.SCHEMA, Opcode.CHANNEL):
-                found.define(code, _read(stream, start, length), start)
-            elif code == Opcode.METADATA:
-                record = _parsed(Metadata, _read(stream, start, length))
-                found.metadata.setdefault(record.name, record.metadata)
-            elif code == Opcode.MESSAGE_INDEX and adjacent and not before.loose:
-                index_length = before.index_length + 9 + length
-                found.parts[-1] = replace(before, index_length=index_length)
-            elif code == Opcode.CHUNK:
-                found.parts.append(_Part(start, length))
-            elif (
-                code == Opcode.MESSAGE
-                and adjacent
-                and before.loose
-                and before.length < _LOOSE_BYTES
-            ):
-                found.parts[-1] = replace(before, length=before.length + 9 + length)
-            elif code == Opcode.MESSAGE:
-                found.parts.append(_Part(whole, length + 9, loose=True))
-            # data behind an end: it was none
-            ended = code == Opcode.DATA_END or (
-                ended and code not in (Opcode.CHUNK, Opcode.MESSAGE)
-            )
-            whole = end
-            if code == Opcode.FOOTER:
-                if _read(stream, end, size - end) != _MAGIC:
-                    ended = False
-                    raise ValueError(f"its end stands at byte {end}, and more behind it")
-                break
-    except Exception as error:  # what the package raises of bytes that are no records
-        if not ended:
-            found.damage.append(str(error))
-            if last["case"] == "end":
-                numbers = {"bytes": size - whole, "first": whole, "why": str(error)}
-                found.notices.append(Notice("DAMAGED", numbers={"case": "bytes"} | numbers))
-                ended = True
-    if not ended:
-        found.notices.append(Notice("CUT_OFF", numbers=last))
-    for number, part in enumerate(found.parts):
-        try:
-            records = _records(stream, part)
-            for code, content in records.others:
-                found.define(code, content, part.start)
-            own, sizes = np.unique(records.heads["channel"], return_counts=True)
-            counts = dict(zip(own.tolist(), sizes.tolist(), strict=True))
-            found.parts[number] = replace(part, channels=frozenset(counts))
-        except Exception as error:  # told when it is read
-            found.damage.append(f"{error} (at byte {part.start})")
-            index = _read(stream, part.start + part.length, part.index_length)
-            counts = {channel: offsets.size for channel, offsets in _listed(index).items()}
-        for channel, count in counts.items():
-            found.counts[channel] = found.counts.get(channel, 0) + count
-    return found
 
 
 def _read(stream: IO[bytes], start: int, length: int) -> bytes:
@@ -317,28 +164,124 @@ def _read(stream: IO[bytes], start: int, length: int) -> bytes:
     return content
 
 
-def _frames(stream: IO[bytes], start: int, end: int) -> Iterator[tuple[int, int, int]]:
-    """Code, and start and length of the content, of each record; the last may reach past the end.
+def _from_summary(stream: IO[bytes], size: int) -> FileIndex | None:
+    """What a summary says, None where it does not tell enough.
 
     Raises
     ------
     ValueError
-        Where what follows is no record.
+        If it is damaged; the package raises more.
     """
-    while start < end:
-        code, length = _FRAME.unpack(_read(stream, start, _FRAME.size))
+    tail = _read(stream, max(0, size - _FOOTER_BYTES), min(_FOOTER_BYTES, size))
+    if not tail.endswith(_MAGIC) or len(tail) < _FOOTER_BYTES:
+        raise ValueError("the file has no end: it was cut off")
+    stream.seek(0)
+    reader = SeekingReader(stream, record_size_limit=LIMITS.chunk_bytes)
+    summary = reader.get_summary()
+    if summary is None or summary.statistics is None:
+        return None
+    if not summary.chunk_indexes or not summary.channels:
+        return None
+    start, checksum = struct.unpack_from("<Q8xI", tail, 9)
+    content = _read(stream, start, size - _FOOTER_BYTES - start)
+    if checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
+        raise ValueError("its checksum is wrong")
+    statistics, chunks = summary.statistics, []
+    counts = {one: count for one, count in statistics.channel_message_counts.items() if count}
+    entries = 0
+    for one in sorted(summary.chunk_indexes, key=lambda one: one.chunk_start_offset):
+        entries += one.message_index_length - 15 * len(one.message_index_offsets)
+        channels = frozenset(one.message_index_offsets) or None
+        place = one.chunk_start_offset + 9, one.chunk_length - 9, one.message_index_length
+        chunks.append(ChunkRange(*place, channels))
+    indexed = all(one.channels for one in chunks)
+    # what lies outside of the chunks that it lists, or a chunk that it does not list
+    if (indexed and entries != 16 * sum(counts.values())) or counts.keys() - summary.channels:
+        raise ValueError("its indexes and its statistics count different messages")
+    if any(one.start + one.length > after.start for one, after in pairwise(chunks)):
+        raise ValueError("its chunks overlap")
+    found = FileIndex(summary.channels, summary.schemas, {}, chunks, counts)
+    found.span_ns = statistics.message_start_time, statistics.message_end_time
+    if any(one.name == KEY for one in summary.metadata_indexes):
+        for record in reader.iter_metadata():
+            found.metadata.setdefault(record.name, record.metadata)
+    return found
+
+
+def _walked(stream: IO[bytes], size: int) -> FileIndex:
+    """What stands in a file up to its end, or to its first break."""
+    found, chunks = FileIndex(), list[ChunkRange]()
+    place = begin = len(_MAGIC)  # of records outside of chunks that are in no range yet
+    ended = False
+    while True:
+        head = _read(stream, place, min(_FRAME.size, size - place))
+        code, length = _FRAME.unpack(head.ljust(_FRAME.size, b"\0"))
+        end = place + _FRAME.size + length
         known = 0 < code <= Opcode.DATA_END or code >= 0x80
-        if not known or not _LEAST.get(code, 0) <= length <= _MOST.get(code, length):
-            raise ValueError(f"what stands at byte {start} is no record")
-        yield code, start + _FRAME.size, length
-        start += _FRAME.size + length
+        known &= length >= _HEAD_BYTES - 9 or code != Opcode.MESSAGE
+        known &= length == 4 or code != Opcode.DATA_END
+        apart = code in (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.DATA_END)
+        if not known or end > size or apart or place - begin >= _LOOSE_BYTES:
+            if place > begin:
+                chunks.append(ChunkRange(begin, place - begin, loose=True))
+            begin = place
+        if not known or end > size:
+            break
+        if code == Opcode.CHUNK:
+            chunks.append(ChunkRange(place + _FRAME.size, length))
+        elif code == Opcode.MESSAGE_INDEX and begin == place and chunks:
+            index_length = chunks[-1].index_length + end - place
+            chunks[-1] = replace(chunks[-1], index_length=index_length)
+            apart = True
+        elif code == Opcode.DATA_END:
+            ended = True
+        place = end
+        if code == Opcode.FOOTER:
+            break
+        if apart:  # what the summary repeats is in no range
+            begin = size if ended else end
+    left = size - place
+    if ended and left > len(_MAGIC) and code == Opcode.FOOTER:
+        why = "its end stands there, and more behind it"
+    elif not ended and left and not known and len(head) == _FRAME.size:
+        why = "what stands there is no record"
+    else:
+        why = ""
+    numbers: dict[str, Any] = {"case": "end"}
+    if why:
+        numbers = {"case": "bytes", "bytes": left, "first": place, "why": why}
+        found.notices.append(Notice("DAMAGED", numbers=numbers))
+    elif not ended:
+        if left:
+            numbers = {"case": "chunk" if code == Opcode.CHUNK else "record", "bytes": left}
+        found.notices.append(Notice("CUT_OFF", numbers=numbers))
+    if not ended and left:
+        found.damage.append(f"it breaks off at byte {place}")
+        if known and code == Opcode.CHUNK:
+            chunks.append(ChunkRange(place + _FRAME.size, left - _FRAME.size, torn=True))
+    for chunk in chunks:
+        try:
+            records = _records(stream, chunk)
+            found.define(records.others, chunk.start)
+            own, sizes = np.unique(records.heads["channel"], return_counts=True)
+            counts = dict(zip(own.tolist(), sizes.tolist(), strict=True))
+            found.chunks.append(replace(chunk, channels=frozenset(counts)))
+        except Exception as error:  # what the libraries raise; told when it is read
+            found.chunks.append(chunk)
+            found.damage.append(f"{error} (at byte {chunk.start})")
+            index = _read(stream, chunk.start + chunk.length, chunk.index_length)
+            counts = {channel: offsets.size for channel, offsets in _listed(index).items()}
+        for channel, count in counts.items():
+            found.counts[channel] = found.counts.get(channel, 0) + count
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Records:
-    """Unpacked bytes, heads (M,) of the messages in them and their offsets, and other records.
+    """The records of a chunk, unpacked: heads (M,) of its messages, their offsets, and the rest.
 
-    Of those code and content.
+    `others` are code and content of definitions, `torn` of a torn chunk the bytes that are there
+    and those that there should be.
     """
 
     content: NDArray[np.uint8]
@@ -347,9 +290,8 @@ class _Records:
     others: Sequence[tuple[int, bytes]]
     checked: bool
     torn: tuple[int, int] | None = None
-    """Of a torn chunk the bytes that are there, and those that there should be."""
 
-    def messages_of(self, channels: frozenset[int]) -> Messages:
+    def batch_of(self, channels: frozenset[int]) -> MessageBatch:
         """The messages of some channels, in bytes of their own if they are of one size."""
         numbers = self.heads["channel"]
         one = next(iter(channels))  # numpy.isin takes longer than all else here
@@ -358,41 +300,38 @@ class _Records:
         )
         sizes = self.heads["length"][ours].astype(np.int64) - (_HEAD_BYTES - 9)
         log_ns = self.heads["log_ns"][ours].astype(np.int64)
-        return Messages(self.content, self.offsets[ours] + _HEAD_BYTES, sizes, log_ns).compacted()
+        messages = Messages(self.content, self.offsets[ours] + _HEAD_BYTES, sizes, log_ns)
+        return MessageBatch(messages.compacted(), self.checked, torn=self.torn)
 
 
-def _records(stream: IO[bytes], part: _Part) -> _Records:
-    """The records of a part.
+def _records(stream: IO[bytes], chunk: ChunkRange) -> _Records:
+    """The records of a chunk.
 
     Raises
     ------
     ValueError
         If they are damaged; the libraries raise more.
     """
-    body, index = _read(stream, part.start, part.length), b""
-    if part.loose:
-        content, size, checked = body, len(body), False
-    else:
-        chunk = _parsed(Chunk, body)
-        size, checked = chunk.uncompressed_size, chunk.uncompressed_crc != 0
-        content = _unpacked(chunk)
-        if len(content) != size and not part.torn:
+    content, index = _read(stream, chunk.start, chunk.length), b""
+    size, checked = len(content), False
+    if not chunk.loose:
+        packed = _parsed(Chunk, content)
+        content, size = _unpacked(packed), packed.uncompressed_size
+        checked = packed.uncompressed_crc != 0
+        if len(content) != size and not chunk.torn:
             unpacked = "more" if len(content) > size else f"{len(content):,}"
             raise ValueError(f"a chunk of {counted(size, 'byte')} unpacks to {unpacked}")
-        if len(content) == size and checked and zlib.crc32(content) != chunk.uncompressed_crc:
+        if len(content) == size and checked and zlib.crc32(content) != packed.uncompressed_crc:
             raise ValueError("a chunk's checksum is wrong")
-        index = _read(stream, part.start + part.length, part.index_length)
+        index = _read(stream, chunk.start + chunk.length, chunk.index_length)
     octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
     # a small chunk is sooner walked than compared with its index
-    listed = None if len(content) < _SMALL_BYTES else _by_index(octets, content, index)
-    if listed is not None:
-        return _Records(octets, *listed, checked)
-    found, others, end = _one_by_one(content)
-    if end != len(content) and not part.torn:
+    listed = _by_index(octets, content, index) if size > _SMALL_BYTES else None
+    offsets, others, end = listed or _one_by_one(content, 0, len(content))
+    if end != len(content) and not chunk.torn:
         raise ValueError("its records do not fill it")
-    offsets = np.array(found, np.int64)
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
-    if part.torn and end != size:  # nothing vouches for what is there, which CUT_OFF says
+    if chunk.torn and end != size:  # nothing vouches for what is there, which CUT_OFF says
         return _Records(octets[:end], offsets, heads, others, True, (end, size))
     return _Records(octets, offsets, heads, others, checked)
 
@@ -403,7 +342,7 @@ def _unpacked(chunk: Chunk) -> bytes:
     Raises
     ------
     ValueError
-        If it claims more than memory is for, or its packing is not known.
+        If it claims more memory than a recorder's chunk needs, or its packing is not known.
     """
     size = chunk.uncompressed_size
     if size > LIMITS.chunk_bytes:
@@ -420,40 +359,39 @@ def _unpacked(chunk: Chunk) -> bytes:
     return chunk.data[: size + 1]
 
 
-def _one_by_one(content: bytes) -> tuple[list[int], list[tuple[int, bytes]], int]:
-    """The records that are whole, found by their lengths.
+Listed = tuple[IntArray, list[tuple[int, bytes]], int]
+"""Offsets of messages, code and content of definitions, and where the last whole record ends."""
 
-    Offsets of messages, code and content of definitions, and where the last record ends.
+
+def _one_by_one(content: bytes, place: int, stop: int) -> Listed:
+    """The whole records in [place, stop), found by their lengths.
 
     Raises
     ------
     ValueError
         If a message is shorter than its head.
     """
-    offsets, others, place = list[int](), list[tuple[int, bytes]](), 0
-    unpack, last = _FRAME.unpack_from, len(content) - _FRAME.size
-    while place <= last:
+    offsets, others = list[int](), list[tuple[int, bytes]]()
+    unpack = _FRAME.unpack_from
+    while place + 9 <= stop:
         code, length = unpack(content, place)
         end = place + 9 + length
-        if end > last + 9:
+        if end > stop:
             break
-        if code != Opcode.MESSAGE:
-            if code in (Opcode.SCHEMA, Opcode.CHANNEL):
-                others.append((code, content[place + 9 : end]))
-        elif length < _HEAD_BYTES - 9:
-            raise ValueError("a message is shorter than its head")
-        else:
+        if code == Opcode.MESSAGE:
+            if length < _HEAD_BYTES - 9:
+                raise ValueError("a message is shorter than its head")
             offsets.append(place)
+        elif code in _DEFINITIONS:
+            others.append((code, content[place + 9 : end]))
         place = end
-    return offsets, others, place
+    return np.array(offsets, np.int64), others, place
 
 
-def _by_index(
-    octets: NDArray[np.uint8], content: bytes, index: bytes
-) -> tuple[IntArray, NDArray[np.void], list[tuple[int, bytes]]] | None:
-    """Offsets and heads of messages, and other records, by the message index behind a chunk.
+def _by_index(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Listed | None:
+    """The same by the message indexes behind a chunk.
 
-    None where the messages that it lists, with the few other records between, do not tile it: an
+    None where the messages that they list, with the definitions between, do not fill the chunk: an
     index has no checksum of its own.
     """
     offsets = np.sort(np.concatenate([np.empty(0, np.int64), *_listed(index).values()]))
@@ -463,16 +401,15 @@ def _by_index(
     lengths = heads["length"]
     if np.any(heads["code"] != Opcode.MESSAGE) or lengths.max() > octets.size:
         return None
-    borders = gaps_between(offsets, offsets + 9 + lengths.astype(np.int64), octets.size)
-    if borders is None or lengths.min() < _HEAD_BYTES - 9:
-        return None
+    starts = np.append(offsets, octets.size)
+    ends = np.append(0, offsets + 9 + lengths.astype(np.int64))
     others: list[tuple[int, bytes]] = []
-    for first, last in borders:
-        hidden, between, end = _one_by_one(content[first:last])
-        if hidden or end != last - first:
+    for gap in np.flatnonzero(starts != ends).tolist():
+        unlisted, between, end = _one_by_one(content, int(ends[gap]), int(starts[gap]))
+        if unlisted.size or end != starts[gap]:
             return None
         others += between
-    return offsets, heads, others
+    return offsets, others, octets.size
 
 
 def _listed(index: bytes) -> dict[int, IntArray]:
@@ -488,64 +425,23 @@ def _listed(index: bytes) -> dict[int, IntArray]:
     return found
 
 
-def _batches(path: Path, found: _Contents, channels: frozenset[int]) -> Iterator[MessageBatch]:
-    """The messages of `channels` in file order; a damaged part yields its reason."""
-    yield from ahead(_grouped(_parts(path, found, channels), channels))
+def _batches(path: Path, found: FileIndex, channels: frozenset[int]) -> Iterator[MessageBatch]:
+    """The messages of `channels` in file order; a damaged chunk yields its reason."""
 
+    def batches() -> Iterator[MessageBatch]:
+        with _stream(path) as stream:
+            for chunk in found.chunks:
+                if chunk.channels is not None and not chunk.channels & channels:
+                    continue
+                try:
+                    records = _records(stream, chunk)
+                    found.define(records.others, chunk.start)
+                    if chunk.start >= found.redefined:
+                        raise ValueError("a channel or its schema is defined anew and differently")
+                    batch = records.batch_of(channels)
+                except Exception as error:  # what the libraries raise of damaged bytes
+                    reason = f"{error or 'it breaks off'} (at byte {chunk.start})"
+                    batch = MessageBatch(None, checked=True, reason=reason)
+                yield batch
 
-def _parts(
-    path: Path, found: _Contents, channels: frozenset[int]
-) -> Iterator[_Records | MessageBatch]:
-    """The records of each part with messages of `channels`, or why they are lost."""
-    with _stream(path) as stream:
-        for part in found.parts:
-            if part.channels is not None and not part.channels & channels:
-                continue
-            try:
-                records = _records(stream, part)
-                for code, content in records.others:
-                    found.define(code, content, part.start)
-                if not all(found.holds(channel, part.start) for channel in channels):
-                    raise ValueError("a channel or its schema is defined anew and differently")
-                yield records
-            except Exception as error:  # what the libraries raise of damaged bytes
-                reason = f"{error or 'it breaks off'} (at byte {part.start})"
-                yield MessageBatch(None, checked=True, reason=reason)
-
-
-def _grouped(
-    parts: Iterator[_Records | MessageBatch], channels: frozenset[int]
-) -> Iterator[MessageBatch]:
-    """Their messages, those of small chunks together: a batch costs more than a few messages."""
-    held: list[_Records] = []
-    size = 0
-    for part in parts:
-        alone = isinstance(part, MessageBatch) or part.torn is not None
-        if held and (alone or size >= _GROUP_BYTES):
-            yield _joined(held, channels)
-            held, size = [], 0
-        if isinstance(part, MessageBatch):
-            yield part
-        else:
-            held.append(part)
-            size += _GROUP_BYTES if alone else part.content.size
-    if held:
-        yield _joined(held, channels)
-
-
-def _joined(held: Sequence[_Records], channels: frozenset[int]) -> MessageBatch:
-    checked = all(one.checked or not one.offsets.size for one in held)
-    ends = np.cumsum([one.content.size for one in held])
-    offsets = [one.offsets + end - one.content.size for one, end in zip(held, ends, strict=True)]
-    whole = (
-        held[0]
-        if len(held) == 1
-        else _Records(
-            np.concatenate([one.content for one in held]),
-            np.concatenate(offsets),
-            np.concatenate([one.heads for one in held]),
-            (),
-            checked,
-        )
-    )
-    return MessageBatch(whole.messages_of(channels), checked, torn=whole.torn)
+    return ahead(batches())

@@ -16,9 +16,6 @@ from algid.base.errors import LogError
 from algid.base.ros2 import HEADER
 from algid.profile import Profile
 from algid.readers import mcap, open_log, read_log
-from algid.readers.messages.batch import Messages
-from algid.readers.messages.columnar import Decoder
-from algid.readers.messages.json import _Paths
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import (
@@ -271,26 +268,6 @@ def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
         read_log(tmp_path / "log.mcap")
 
 
-@pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE])
-def test_small_chunks_are_loaded_many_at_a_time(
-    index: IndexType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    small_chunks(tmp_path / "a.mcap", index_types=index)
-    decoded: list[int] = []
-    columns = Decoder.columns
-
-    def counted(self: Decoder, messages: Messages) -> Any:
-        decoded.append(len(messages))
-        return columns(self, messages)
-
-    monkeypatch.setattr(Decoder, "columns", counted)
-    log = read_log(tmp_path / "a.mcap")
-    assert len(log) == 1000
-    assert np.array_equal(log.theta[0], np.sin(np.arange(1000) * 0.01))
-    assert sum(decoded) == 1000
-    assert len(decoded) <= 12
-
-
 def test_a_file_without_summary_is_walked_once_for_all_passes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -307,20 +284,6 @@ def test_a_file_without_summary_is_walked_once_for_all_passes(
     assert reader.rows == 1000
     assert [sum(map(len, reader.blocks())) for _ in range(2)] == [1000, 1000]
     assert len(walks) == 1
-
-
-def test_a_json_path_is_looked_up_once_among_many_fields() -> None:
-    found = _Paths({"name": ["a", "b", "b"], "position": [1.5, 2, 3], "x": 1})
-    assert [
-        found.value(path)
-        for path in (["position", "[a]"], ["position", "[2]"], ["position", "[b]"])
-    ] == [
-        1.5,
-        3,
-        None,
-    ]
-    assert found.value(["x"]) == 1
-    assert found.value(["x", "y"]) is None
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])

@@ -125,49 +125,41 @@ def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
     return edit
 
 
-COUNTS = "its indexes and its statistics count different numbers of messages"
-TWICE = "it defines a channel twice, or counts messages of one it does not define"
-WRONG: dict[str, tuple[Callable[[Records], Records], str]] = {
-    "a chunk of another length": (
-        changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)),
-        "what stands at byte|its chunks overlap|it leaves out a record",
+WRONG: dict[str, Callable[[Records], Records]] = {
+    "a chunk of another length": changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)),
+    "an index behind the end": changing(
+        ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)
     ),
-    "a chunk behind the end": (
-        changing(ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)),
-        COUNTS,
+    "a count": changing(
+        Statistics, lambda one: one.channel_message_counts.update({1: len(LOG) - 1})
     ),
-    "a count": (
-        changing(Statistics, lambda one: one.channel_message_counts.update({1: len(LOG) - 1})),
-        COUNTS,
+    "a count of another channel": changing(
+        Statistics, lambda one: one.channel_message_counts.update({7: 1})
     ),
-    "a count of another channel": (
-        changing(Statistics, lambda one: one.channel_message_counts.update({7: 1})),
-        TWICE,
-    ),
-    "chunks over one another": (overlapping, r"its chunks overlap at byte \d+"),
-    "a chunk in no list": (hiding, r"it leaves out a record at byte \d+"),
-    "a channel without definition": (
-        changing(Channel, lambda one: setattr(one, "id", 5)),
-        TWICE,
-    ),
-    "a schema twice": (redefined(Schema, data=b"int8 x"), TWICE),
-    "a channel twice": (redefined(Channel, topic="/other"), TWICE),
+    "chunks over one another": overlapping,
+    "a chunk in no list": hiding,
+    "a channel without definition": changing(Channel, lambda one: setattr(one, "id", 5)),
+    "a schema twice": redefined(Schema, data=b"int8 x"),
+    "a channel twice": redefined(Channel, topic="/other"),
 }
 
 
 @pytest.mark.parametrize("checksum", [True, False])
 @pytest.mark.parametrize("fault", WRONG)
-def test_a_summary_that_does_not_agree_with_the_file_is_not_used(
+def test_a_summary_that_does_not_agree_with_the_file_loses_nothing_unseen(
     fault: str, checksum: bool, whole: bytes, tmp_path: Path
 ) -> None:
-    edit, told = WRONG[fault]
     path = tmp_path / "log.mcap"
-    path.write_bytes(summarised(whole, edit, checksum))
+    path.write_bytes(summarised(whole, WRONG[fault], checksum))
+    if fault.endswith("twice"):
+        with pytest.raises(LogError, match="defined anew and differently"):
+            read_log(path)
+        return
     found = read_log(path)
-    assert same(found, LOG)
-    (notice,) = found.notices
-    assert (notice.code, notice.lossy) == ("DAMAGED_INDEX", False)
-    assert re.search(rf"cannot be used \(({told})", notice.text)
+    told = {notice.code: notice.lossy for notice in found.notices}
+    assert told
+    assert same(found, LOG) or any(told.values())
+    assert same(found, LOG) == ("DAMAGED_INDEX" in told)
 
 
 @pytest.mark.parametrize(
@@ -218,24 +210,23 @@ def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("damage", "told"),
+    "damage",
     [
-        (lambda whole: poked(whole, -37, "<B", 7), "its footer is damaged"),
-        (lambda whole: poked(whole, -36, "<Q", 21), "its footer is damaged"),
-        (lambda whole: poked(whole, -28, "<Q", 7), "its footer claims a summary at byte 7"),
-        (lambda whole: poked(whole, -12, "<I", 1), "its checksum is wrong"),
-        (lambda whole: whole[:-1], "the file has no end: it was cut off"),
+        lambda whole: poked(whole, -37, "<B", 7),
+        lambda whole: poked(whole, -36, "<Q", 21),
+        lambda whole: poked(whole, -28, "<Q", 7),
+        lambda whole: poked(whole, -12, "<I", 1),
+        lambda whole: whole[:-1],
     ],
 )
 def test_a_damaged_footer_is_told_and_the_file_is_walked(
-    damage: Callable[[bytes], bytes], told: str, whole: bytes, tmp_path: Path
+    damage: Callable[[bytes], bytes], whole: bytes, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
     path.write_bytes(damage(whole))
     found = read_log(path)
     assert same(found, LOG)
-    first = found.notices[0]
-    assert first.text == f"the file's summary cannot be used ({told}); read by scanning"
+    assert [(one.code, one.case) for one in found.notices] == [("DAMAGED_INDEX", "summary")]
 
 
 def test_two_files_behind_one_another_are_not_one(whole: bytes, tmp_path: Path) -> None:
@@ -243,7 +234,7 @@ def test_two_files_behind_one_another_are_not_one(whole: bytes, tmp_path: Path) 
     path.write_bytes(whole + whole)
     found = read_log(path)
     assert same(found, LOG)
-    assert f"its end stands at byte {len(whole) - 8}" in lost(found)["DAMAGED"]
+    assert f"from byte {len(whole) - 8} on" in lost(found)["DAMAGED"]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.95])

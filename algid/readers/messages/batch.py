@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.base.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice
 
@@ -51,21 +50,6 @@ def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np
         max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,)
     )
     return window[places]
-
-
-def gaps_between(starts: IntArray, ends: IntArray, size: int) -> list[tuple[int, int]] | None:
-    """Bytes [first, last) before, between and behind records [starts, ends) (N,) within `size`.
-
-    None where records lie in one another or beyond the end, or too many apart.
-    """
-    gaps = np.flatnonzero(ends[:-1] != starts[1:])
-    if gaps.size > LIMITS.index_gaps:
-        return None
-    firsts = np.concatenate(([0], ends[gaps], ends[-1:]))
-    lasts = np.concatenate((starts[:1], starts[gaps + 1], [size]))
-    if np.any(firsts > lasts):
-        return None
-    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
 
 
 @dataclass(frozen=True)

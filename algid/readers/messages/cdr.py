@@ -1,4 +1,4 @@
-"""CDR, the encoding of ROS 2 messages (XCDR version 1, either byte order): a message's shape.
+"""CDR, the encoding of ROS 2 messages (XCDR version 1, either byte order): a message's layout.
 
 Numbers are aligned to their own size, counted from behind the four bytes of the encapsulation.
 Messages of ROS 1 have neither: their numbers, little endian, stand one behind the other.
@@ -9,9 +9,10 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
+from algid.base.limits import LIMITS
 from algid.base.words import counted
-from algid.readers.messages.columnar import MisfitError, Numbers, Shape
-from algid.readers.messages.definitions import PRIMITIVES, TEXTS, Field, Types
+from algid.readers.messages.definitions import PRIMITIVES, SEQUENCE, TEXTS, Field, Types
+from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 from algid.readers.stated import GROUPS
 
 _ENDINGS = {0: ">", 1: "<"}
@@ -24,40 +25,48 @@ _PADDING = 7
 class _Walk:
     payload: bytes
     types: Types
-    shape: Shape
-    order: str = "<"
-    head: int = _HEAD
-    aligned: bool = True
+    layout: MessageLayout
+    order: str
+    head: int
+    aligned: bool
+    depth: int = 0
 
     def __post_init__(self) -> None:
         self.place = self.head
 
     def structure(self, name: str, prefix: str) -> None:
-        self.shape.count(1 + len(self.types[name]))
+        self.depth += 1
+        if self.depth > LIMITS.definition_depth:  # a type that holds itself has no end
+            raise MisfitError(f"{name}: types nested more than {LIMITS.definition_depth} deep")
         for field in self.types[name]:
-            self.field(field, f"{prefix}{field.name}")
+            path = f"{prefix}{field.name}"
+            if field.count is None:
+                self.one(field.type, path)
+            else:
+                self.several(field, path)
+        self.depth -= 1
 
-    def field(self, field: Field, path: str) -> None:
-        if field.count is None:
-            self.one(field.type, path)
-            return
-        count = self.length() if field.count < 0 else field.count
+    def several(self, field: Field, path: str) -> None:
+        count = self.length() if field.count == SEQUENCE else field.count or 0
+        if field.count == SEQUENCE and count > len(self.payload):
+            raise MisfitError(
+                f"a message of {counted(len(self.payload), 'byte')} that claims a list of {count}"
+            )
         if field.type in PRIMITIVES:
             self.numbers(field.type, path, count)
         elif field.type in TEXTS:
-            self.shape.count(self.possible(count, 4))
-            self.shape.texts[path] = tuple(self.text(field.type) for _ in range(count))
+            self.layout.texts[path] = tuple(self.text(field.type) for _ in range(count))
         else:
-            for index in range(self.possible(count, 1)):
+            for index in range(count):
                 self.one(field.type, f"{path}[{index}]")
 
     def one(self, kind: str, path: str) -> None:
         if kind in PRIMITIVES:
             self.numbers(kind, path, 1)
         elif kind in TEXTS and path.rpartition(".")[2] in GROUPS:
-            self.shape.labels[path] = self.text(kind)
+            self.layout.labels[path] = self.text(kind)
         elif kind in TEXTS:
-            self.skipped_text(kind)
+            self.advance(self.text_bytes(kind))
         else:
             self.structure(kind, f"{path}.")
 
@@ -66,7 +75,7 @@ class _Walk:
         width = int(code[1])
         if count:
             self.align(width)
-        self.shape.numbers[path] = Numbers(
+        self.layout.numbers[path] = Numbers(
             self.place, f"{self.order}{code}" if width > 1 else f"|{code}", count
         )
         self.advance(count * width)
@@ -75,18 +84,18 @@ class _Walk:
         self.align(4)
         start = self.place
         self.advance(4)
-        self.shape.fix(start, self.place)
+        self.layout.pin(start, self.place)
         return int(struct.unpack_from(f"{self.order}I", self.payload, start)[0])
 
+    def text_bytes(self, kind: str) -> int:
+        return self.length() * (4 if kind == "wstring" else 1)
+
     def text(self, kind: str) -> str:
-        size = self.length() * (4 if kind == "wstring" else 1)
+        size = self.text_bytes(kind)
         start = self.place
         self.advance(size)
-        self.shape.fix(start, self.place)
+        self.layout.pin(start, self.place)
         return self.payload[start : self.place].rstrip(b"\0").decode("utf-8", errors="replace")
-
-    def skipped_text(self, kind: str) -> None:
-        self.advance(self.length() * (4 if kind == "wstring" else 1))
 
     def align(self, width: int) -> None:
         if self.aligned:
@@ -100,54 +109,29 @@ class _Walk:
                 f"{self.place} at least"
             )
 
-    def possible(self, count: int, least: int) -> int:
-        if count * least > len(self.payload) - self.place:
-            raise MisfitError(
-                f"a message of {counted(len(self.payload), 'byte')} that claims a list of {count}"
-            )
-        return count
 
-
-def walk(payload: bytes, root: str, types: Types) -> Shape:
-    """The shape of one message.
+def parse_layout(payload: bytes, root: str, types: Types, *, ros1: bool = False) -> MessageLayout:
+    """The layout of one message, of ROS 1 on request.
 
     Raises
     ------
     MisfitError
         If its representation is not plain CDR, or its bytes do not fit the schema.
     """
-    if len(payload) < _HEAD:
-        raise MisfitError(f"a message of {counted(len(payload), 'byte')}; CDR has four at least")
-    representation = int.from_bytes(payload[:2], "big")
-    if representation not in _ENDINGS:
-        raise MisfitError(
-            "the representation "
-            f"0x{representation:04x}{' (XCDR2)' if 6 <= representation <= 11 else ''}; "
-            "expected plain CDR, 0x0000 or 0x0001"
-        )
-    shape = Shape()
-    shape.fix(0, _HEAD)
-    walk = _Walk(payload, types, shape, _ENDINGS[representation])
+    layout, order, head = MessageLayout(), "<", 0
+    if not ros1:
+        head = int.from_bytes(payload[:2], "big")
+        if len(payload) < _HEAD or head not in _ENDINGS:
+            xcdr2 = " (XCDR2)" if 6 <= head <= 11 else ""
+            raise MisfitError(
+                f"the representation 0x{head:04x}{xcdr2}; expected plain CDR, 0x0000 or 0x0001"
+            )
+        order, head = _ENDINGS[head], _HEAD
+        layout.pin(0, _HEAD)
+    walk = _Walk(payload, types, layout, order, head, aligned=not ros1)
     walk.structure(root, "")
-    if len(payload) - walk.place > _PADDING:
+    if len(payload) - walk.place > (0 if ros1 else _PADDING):
         raise MisfitError(
             f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}"
         )
-    return shape
-
-
-def walk_ros1(payload: bytes, root: str, types: Types) -> Shape:
-    """The shape of one message of ROS 1.
-
-    Raises
-    ------
-    MisfitError
-        If its bytes do not fit the schema.
-    """
-    walk = _Walk(payload, types, Shape(), head=0, aligned=False)
-    walk.structure(root, "")
-    if len(payload) != walk.place:
-        raise MisfitError(
-            f"a message of {counted(len(payload), 'byte')} where its schema ends at {walk.place}"
-        )
-    return walk.shape
+    return layout

@@ -7,19 +7,13 @@ from collections.abc import Mapping
 from algid.base.errors import LogError
 from algid.readers.messages import cdr, protobuf
 from algid.readers.messages import json as jsontext
-from algid.readers.messages.columnar import ColumnDecoder, Decoder, Walk
-from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg, parse_ros1
+from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages.layout import ColumnDecoder, Decoder, Parser
 from algid.readers.messages.message_file import MessageChannel
 
-_PARSERS = {
-    ("cdr", "ros2msg"): (parse_msg, cdr.walk),
-    ("cdr", "ros2idl"): (parse_idl, cdr.walk),
-    ("ros1", "ros1msg"): (parse_ros1, cdr.walk_ros1),
-}
 
-
-def walk_for(path: str, channel: MessageChannel) -> Walk:
-    """The walk over single messages of a channel.
+def parser_for(path: str, channel: MessageChannel) -> Parser:
+    """What gives the layout of a channel's messages.
 
     Raises
     ------
@@ -27,27 +21,27 @@ def walk_for(path: str, channel: MessageChannel) -> Walk:
         If the encoding of the messages or of the schema is not known, or the schema cannot be read.
     """
     place = f"{path}: topic {channel.topic!r}"
-    encoding = (channel.encoding, channel.definition_encoding)
+    root, text = channel.type, channel.definition.decode("utf-8", errors="replace")
+    encoding, form = channel.encoding, channel.definition_encoding
     try:
-        if encoding in _PARSERS:
-            parse, walk = _PARSERS[encoding]
-            types = parse(channel.type, channel.definition.decode("utf-8", errors="replace"))
-            return lambda payload: walk(payload, channel.type, types)
-        if encoding == ("protobuf", "protobuf"):
-            messages = protobuf.parse(channel.type, channel.definition)
-            return lambda payload: protobuf.walk(payload, channel.type, messages)
+        if (encoding, form) in (("cdr", "ros2msg"), ("ros1", "ros1msg"), ("cdr", "ros2idl")):
+            ros1 = encoding == "ros1"
+            types = parse_idl(root, text) if form == "ros2idl" else parse_msg(root, text, ros1=ros1)
+            return lambda payload: cdr.parse_layout(payload, root, types, ros1=ros1)
+        if (encoding, form) == ("protobuf", "protobuf"):
+            messages = protobuf.parse(root, channel.definition)
+            return lambda payload: protobuf.parse_layout(payload, root, messages)
     except DefinitionError as error:
         raise LogError(f"{place}: the message definition cannot be read: {error}") from error
-    if encoding[0] == "json":
-        return jsontext.walk
-    if encoding == ("cdr", ""):
+    if encoding == "json":
+        return jsontext.parse_layout
+    if encoding == "cdr" and not form:
         raise LogError(
-            f"{place}: the file holds no definition of {channel.type}, and none is known; "
-            "record with MCAP"
+            f"{place}: the file holds no definition of {root}, and none is known; record with MCAP"
         )
     raise LogError(
-        f"{place}: message encoding {encoding[0]!r} with schema encoding {encoding[1]!r}; "
-        "expected cdr with ros2msg or ros2idl, ros1 with ros1msg, protobuf, or json"
+        f"{place}: message encoding {encoding!r} with schema encoding {form!r}; expected cdr with "
+        "ros2msg or ros2idl, ros1 with ros1msg, protobuf, or json"
     )
 
 
@@ -57,9 +51,8 @@ def decoder_for(path: str, channel: MessageChannel, wanted: Mapping[str, str]) -
     Raises
     ------
     LogError
-        As `walk_for`.
+        As `parser_for`.
     """
-    walk = walk_for(path, channel)
     if channel.encoding == "json":
         return jsontext.JsonDecoder(wanted)
-    return ColumnDecoder(wanted, walk=walk)
+    return ColumnDecoder(wanted, parse=parser_for(path, channel))

@@ -63,19 +63,15 @@ class MessageFile:
     truth: Truth | None = None
 
 
-def channels_of(file: MessageFile, topic: str, type_name: str) -> frozenset[int]:
-    """Numbers of the channels with a topic and type whose definition is that of the first one."""
-    return channels_by_type(file).get((topic, type_name), frozenset())
-
-
-def channels_by_type(file: MessageFile) -> dict[tuple[str, str], frozenset[int]]:
-    """Channel numbers by topic and type: those defined and encoded as the first of them."""
-    groups: dict[tuple[str, str], tuple[MessageChannel, list[int]]] = {}
-    for number, channel in sorted(file.channels.items()):
-        first, numbers = groups.setdefault((channel.topic, channel.type), (channel, []))
+def channels_by_topic(file: MessageFile) -> dict[str, frozenset[int]]:
+    """Channel numbers by topic: those defined and encoded as the first one that has messages."""
+    groups: dict[str, tuple[MessageChannel, list[int]]] = {}
+    for number in sorted(file.channels, key=lambda one: (not file.counts.get(one), one)):
+        channel = file.channels[number]
+        first, numbers = groups.setdefault(channel.topic, (channel, []))
         if first == channel:
             numbers.append(number)
-    return {name: frozenset(numbers) for name, (_, numbers) in groups.items()}
+    return {topic: frozenset(numbers) for topic, (_, numbers) in groups.items()}
 
 
 def listed(file: MessageFile) -> str:

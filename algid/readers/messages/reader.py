@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from algid.base.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice
+from algid.profile import Profile
 from algid.readers.assemble import TableReader, make_reader
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.joints import moving_joints
+from algid.readers.messages.joint_topic import NothingFoundError, plan
 from algid.readers.messages.message_file import MessageFile
-from algid.readers.messages.topic import Fields, Topic
+from algid.readers.messages.topic import Topic
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable
-
-if TYPE_CHECKING:
-    from algid.profile import Profile
 
 _LOOKED = 1 << 14
 """Messages whose other joints are looked at."""
@@ -36,7 +34,7 @@ class MessageLog:
     notices: tuple[Notice, ...] = ()
 
 
-def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
+def open_messages(log: MessageLog, profile: Profile) -> TableReader:
     """A reader of the topics and fields that a profile, or the messages themselves, choose.
 
     Raises
@@ -47,8 +45,6 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
     NothingFoundError
         If no topic of a sound file holds the joints.
     """
-    from algid.readers.messages.plan import NothingFoundError, plan
-
     name, file = log.path, log.files[0]()
     try:
         wanted = plan(file, profile)
@@ -61,8 +57,7 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
         raise LogError(f"{file.path}: {text}") from error
     main = wanted.topics[0]
     beside = moving_joints(
-        wanted.others,
-        lambda paths: Topic(main.name, main.type, Fields(paths, None), "log").tables(file, _LOOKED),
+        wanted.others, lambda paths: Topic(main.name, paths, None, "log").tables(file, _LOOKED)
     )
     origin = Origin(name, log.kind, wanted.mapping, file.truth, wanted.reading)
 
@@ -71,33 +66,25 @@ def open_messages(log: MessageLog, profile: Profile | None) -> TableReader:
             yield from topic.tables(opened(), rows)
 
     def tables(rows: int) -> Iterator[SampleTable]:
-        samples, others = read(main, rows), wanted.topics[1:]
-        if not others:
+        samples = read(main, rows)
+        if len(wanted.topics) == 1:
             return samples
         needed: list[Series] = []
         followed: list[Series] = []
         left_out: list[Notice] = []
-        for one in others:
-            paths = one.fields.paths
+        for one in wanted.topics[1:]:
+            only_followed = set(one.paths) <= set(REFERENCES)
             try:
-                series = whole_topic(name, one.name, paths, read(one, BLOCK_ROWS))
+                series = whole_topic(name, one.name, one.paths, read(one, BLOCK_ROWS))
+                (followed if only_followed else needed).append(series)
             except LogError as error:
-                if set(paths) - set(REFERENCES):
+                if not only_followed:
                     raise
-                numbers = {"topic": one.name, "why": str(error).removeprefix(f"{name}: ")}
-                left_out.append(
-                    Notice("MESSAGES_LEFT_OUT", numbers={"case": "reference"} | numbers)
-                )
-                continue
-            (needed if set(paths) - set(REFERENCES) else followed).append(series)
+                why = str(error).removeprefix(f"{name}: ")
+                numbers = {"case": "reference", "topic": one.name, "why": why}
+                left_out.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
         return aligned(in_order(name, samples), needed, followed, left_out)
 
-    return make_reader(
-        origin,
-        tables,
-        profile,
-        wanted.units,
-        (*log.notices, *wanted.notices, *beside),
-        main.count(file),
-        wanted.said,
-    )
+    notices = (*log.notices, *wanted.notices, *beside)
+    rows = main.count(file)
+    return make_reader(origin, tables, profile, wanted.units, notices, rows, wanted.said)

@@ -1,9 +1,8 @@
-"""The shape of a message: the places of its numbers, the bytes that fix them, its strings.
+"""Columns out of messages: one scalar parse for each layout, NumPy for every message that has it.
 
-Messages of one size whose fixing bytes are equal have the same shape, so what one walk over one
-message found holds for all of them: that is what makes reading by columns possible.
-
-Columns out of messages: one scalar walk for each layout, NumPy for every message that has it.
+A layout has the places of a message's numbers, the bytes that fix them, and its strings. Messages
+of one size whose fixing bytes are equal have the same layout: what was found in one message holds
+for all of them.
 """
 
 from __future__ import annotations
@@ -21,8 +20,6 @@ from algid.base.limits import LIMITS
 from algid.base.words import counted
 from algid.log import IntArray
 from algid.readers.messages.batch import Messages, gather, padding
-
-_NAMED = re.compile(r"[^\[\]]*\[([^\]]*)\]")
 
 
 class MisfitError(Exception):
@@ -43,8 +40,8 @@ class Numbers:
 
 
 @dataclass
-class Shape:
-    """What a walk over a message found. Ranges in `fixed` are [start, end)."""
+class MessageLayout:
+    """What a parse of one message found. Ranges in `fixed` are [start, end)."""
 
     numbers: dict[str, Numbers] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -54,23 +51,10 @@ class Shape:
     flags: list[int] = field(default_factory=list)
     """Bytes of which only the highest bit is fixed: those of a varint."""
     absent: Callable[[str], bool] = lambda _: False
-    """Whether a path is that of a number which the message leaves out because it is zero."""
-    parts: int = 0
+    """True for the path of a number which the message leaves out because it is zero."""
 
-    def count(self, parts: int = 1) -> None:
-        """Note so many parts more: fields, structures, strings.
-
-        Raises
-        ------
-        MisfitError
-            If they are more than `FileLimits.message_parts`.
-        """
-        self.parts += parts
-        if self.parts > LIMITS.message_parts:
-            raise MisfitError(f"a message of more than {LIMITS.message_parts} parts")
-
-    def fix(self, start: int, end: int) -> None:
-        """Note that the bytes [start, end) fix the shape."""
+    def pin(self, start: int, end: int) -> None:
+        """Note that the bytes [start, end) fix the layout."""
         if self.fixed and self.fixed[-1][1] == start:
             self.fixed[-1] = (self.fixed[-1][0], end)
         else:
@@ -104,10 +88,6 @@ class Shape:
             return None
         return Numbers(numbers.offset + index * int(numbers.kind[-1]), numbers.kind)
 
-    def has(self, paths: Iterable[str]) -> bool:
-        """Whether the message has the numbers at all of the paths."""
-        return all(self.find(path) is not None for path in paths)
-
     def _list_with(self, name: str, parent: str) -> Sequence[str]:
         """The first list of strings within `parent` that holds a name; empty where none does."""
         for path, texts in self.texts.items():
@@ -115,49 +95,47 @@ class Shape:
                 return texts
         return ()
 
-    def of_others(self, paths: Iterable[str]) -> bool:
-        """Whether the message is of other joints than those of `paths` such as ``effort[elbow]``.
+    def missing(self, wanted: Mapping[str, str]) -> tuple[str, ...]:
+        """Names of the `wanted` numbers that the message lacks; none where it is of other joints.
 
-        A message that names one of them, or numbers without any name, is no other publisher's: it
-        lacks something.
+        It is if it names joints, and none of those of the paths such as ``effort[elbow]``, or if it
+        is empty.
         """
-        joints, listed = set(), set()
-        for path in paths:
-            place, bracket, _ = path.partition("[")
+        joints, lists = set(), set()
+        for path in wanted.values():
+            place, bracket, rest = path.partition("[")
             if bracket:
-                listed.add(place)
-            named = _NAMED.match(path)
-            if named and not named[1].isdigit():
-                joints.add(named[1])
-        lists = list(filter(None, self.texts.values()))
-        if not joints or any(map(joints.intersection, lists)):
-            return False
-        return bool(lists) or not any(
-            one.count and path.partition("[")[0] in listed for path, one in self.numbers.items()
-        )
+                lists.add(place)
+            if bracket and not rest.partition("]")[0].isdigit():
+                joints.add(rest.partition("]")[0])
+        named = set().union(*self.texts.values())
+        held = (path.partition("[")[0] for path, one in self.numbers.items() if one.count)
+        if joints and joints.isdisjoint(named) and (named or lists.isdisjoint(held)):
+            return ()
+        return tuple(name for name, path in wanted.items() if self.find(path) is None)
 
 
-Walk = Callable[[bytes], Shape]
-Fields = dict[str, NDArray[np.generic]]
+Parser = Callable[[bytes], MessageLayout]
+"""Gives the layout of one payload, or raises `MisfitError`."""
+Columns = dict[str, NDArray[np.generic]]
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Which words fix the shape, their values there, and where each wanted number stands.
+class _Pattern:
+    """Which words fix a layout, their values there, and where each wanted number stands.
 
-    Messages are gathered with `lead` bytes before them so that their size is whole words (8 bytes).
+    Messages are rows of whole words (8 bytes): see `_words`. `places` is None where a message lacks
+    one of the wanted numbers, `lacks` names those.
     """
 
-    lead: int
     words: NDArray[np.intp]
     masks: NDArray[np.uint64]
     values: NDArray[np.uint64]
-    fields: Mapping[str, Numbers] | None
+    places: Mapping[str, Numbers] | None
     lacks: tuple[str, ...] = ()
-    """Without fields: the missing ones; empty if the message is of other joints."""
 
     def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Which of the rows (R,) of messages (N, words) have this layout."""
+        """True for those of the rows (R,) of messages (N, words) that have this layout."""
         fits = np.ones(rows.size, np.bool_)
         whole = rows.size == table.shape[0]
         for word, mask, value in zip(self.words, self.masks, self.values, strict=True):
@@ -166,17 +144,13 @@ class Layout:
                 break
         return fits
 
-    def read(self, table: NDArray[np.uint64]) -> Fields:
-        """The wanted numbers of messages (N, words), each (N,)."""
-        octets, columns = table.view(np.uint8), Fields()
-        for name, at in (self.fields or {}).items():
-            start, rows = self.lead + at.offset, octets.shape[0]
-            # in base 128, the lowest seven bits first
-            if at.kind in (
-                "varint",
-                "unsigned",
-                "zigzag",
-            ):
+    def read(self, table: NDArray[np.uint64], lead: int) -> Columns:
+        """The wanted numbers of messages (N, words), each (N,), behind `lead` bytes."""
+        octets, columns = table.view(np.uint8), Columns()
+        for name, at in (self.places or {}).items():
+            start, rows = lead + at.offset, octets.shape[0]
+            if at.kind in ("varint", "unsigned", "zigzag"):
+                # in base 128, the lowest seven bits first
                 digits = (octets[:, start : start + at.width] & 0x7F).astype(np.uint64)
                 total = np.bitwise_or.reduce(
                     digits << (7 * np.arange(at.width, dtype=np.uint64)), axis=1
@@ -184,7 +158,7 @@ class Layout:
                 if at.kind == "zigzag":
                     total = (total >> np.uint64(1)) ^ (np.uint64(0) - (total & np.uint64(1)))
                 columns[name] = total if at.kind == "unsigned" else total.view(np.int64)
-            elif at.kind == "zero":  # a number that protobuf leaves out because it is zero
+            elif at.kind == "zero":
                 columns[name] = np.zeros(rows)
             else:
                 # a copy: the messages are not kept for the sake of some numbers of theirs
@@ -192,35 +166,6 @@ class Layout:
                     rows, np.dtype(at.kind), octets.data, start, (octets.strides[0],)
                 ).copy()
         return columns
-
-
-def layout(payload: bytes, shape: Shape, wanted: Mapping[str, str]) -> Layout:
-    """The layout of a message; its fields are None where it lacks one of those `wanted`."""
-    lead = padding(len(payload))
-    mask = np.zeros(lead + len(payload), np.uint8)
-    for start, end in shape.fixed:
-        mask[lead + start : lead + end] = 0xFF
-    mask[lead + np.array(shape.flags, np.intp)] |= 0x80
-    masks = mask.view(np.uint64)
-    words = np.flatnonzero(masks)
-    whole = np.frombuffer(bytes(lead) + payload, np.uint64)
-    places = {}
-    for name, path in wanted.items():
-        at = shape.find(path)
-        if at is not None:
-            places[name] = at
-    if len(places) == len(wanted):
-        return Layout(lead, words, masks[words], whole[words] & masks[words], places)
-    return Layout(
-        lead, words, masks[words], whole[words] & masks[words], None, missing(shape, wanted)
-    )
-
-
-def missing(shape: Shape, wanted: Mapping[str, str]) -> tuple[str, ...]:
-    """Names of the `wanted` numbers that a message lacks; none where it is of other joints."""
-    if shape.of_others(wanted.values()):
-        return ()
-    return tuple(name for name, path in wanted.items() if shape.find(path) is None)
 
 
 @dataclass
@@ -253,28 +198,15 @@ class Decoder(ABC):
     misfit: str = ""
     labels: dict[str, set[str]] = field(default_factory=dict)
 
+    @abstractmethod
+    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Columns]:
+        """True for the messages (N,) that hold what is wanted; their numbers in file order."""
+
     def label(self, path: str, text: str) -> None:
         """Note whose a message is; of very many names a few are enough."""
         known = self.labels.setdefault(path, set())
         if len(known) < LIMITS.joints:
             known.add(text)
-
-    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Fields]:
-        """Which messages (N,) hold the wanted fields, and their numbers by name, in file order."""
-        before = self.misfits + self.lacking
-        held = np.zeros(len(messages), np.bool_)
-        fields = self.read(messages, held)
-        self.skipped += int(held.size - np.count_nonzero(held)) - (
-            self.misfits + self.lacking - before
-        )
-        return held, fields
-
-    @abstractmethod
-    def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
-        """The numbers of the messages that hold what is wanted, by name.
-
-        Notes in `held` (N,) which do.
-        """
 
     def misfitting(self, why: str, messages: int = 1) -> None:
         """Count messages that do not fit their schema."""
@@ -286,90 +218,94 @@ class Decoder(ABC):
         if lacks:
             self.lacking += messages
             self.lacks = self.lacks or lacks
+        else:
+            self.skipped += messages
 
 
 @dataclass
 class ColumnDecoder(Decoder):
     """The decoder of encodings in which a number's place is known by its message's layout.
 
-    Remembers those it met.
-
-    `walk` gives the shape of one payload, or raises `MisfitError`.
+    Remembers the layouts it met by their messages' size.
     """
 
-    walk: Walk = field(kw_only=True)
-    _known: dict[int, list[Layout]] = field(default_factory=dict)
-    _words: int = 0
+    parse: Parser = field(kw_only=True)
+    _known: dict[int, list[_Pattern]] = field(default_factory=dict)
 
-    def read(self, messages: Messages, held: NDArray[np.bool_]) -> Fields:
-        """The numbers of the messages that hold what is wanted, by name.
-
-        Notes in `held` (N,) which do.
-        """
-        parts: list[tuple[NDArray[np.intp], Fields]] = []
+    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Columns]:
+        """True for the messages (N,) that hold what is wanted; their numbers in file order."""
+        held = np.zeros(len(messages), np.bool_)
+        chosen: list[NDArray[np.intp]] = []
+        parts: list[Columns] = []
         for rows in _by_size(messages.sizes):
             size = int(messages.sizes[rows[0]])
             if size > LIMITS.message_bytes:
                 self.misfitting(f"messages of {counted(size, 'byte')}", rows.size)
                 continue
-            for chosen, fields in self._of_one_size(messages, size, rows):
-                held[chosen] = True
-                parts.append((chosen, fields))
+            for own, columns in self._of_one_size(messages, size, rows):
+                held[own] = True
+                chosen.append(own)
+                parts.append(columns)
         if not parts:
-            return dict.fromkeys(self.wanted, np.empty(0))
+            return held, dict.fromkeys(self.wanted, np.empty(0))
         if len(parts) == 1:
-            return parts[0][1]
-        chosen_rows, several = zip(*parts, strict=True)
-        return rows_of(concatenated(several), np.argsort(np.concatenate(chosen_rows)))
+            return held, parts[0]
+        return held, rows_of(concatenated(parts), np.argsort(np.concatenate(chosen)))
 
     def _of_one_size(
         self, messages: Messages, size: int, rows: NDArray[np.intp]
-    ) -> Iterator[tuple[NDArray[np.intp], Fields]]:
+    ) -> Iterator[tuple[NDArray[np.intp], Columns]]:
         """Numbers of messages of one size by layout, each with the messages that have it."""
         table = _words(messages.content, messages.starts[rows], size)
         known = self._known.setdefault(size, [])
         left, tried = np.arange(rows.size), 0
         while left.size:
-            one = known[tried] if tried < len(known) else self._new(messages, int(rows[left[0]]))
-            if one is None:
-                left = left[1:]
-                continue
             if tried == len(known):
-                if len(known) == LIMITS.layouts or self._words > LIMITS.layout_words:
-                    if one.fields is None:
-                        self.without(one.lacks)
-                    else:
-                        yield rows[left[:1]], one.read(table[left[:1]])
-                    # one by one from here: what is remembered must not grow with the file
+                start = int(messages.starts[rows[left[0]]])
+                pattern = self._new(messages.content[start : start + size].tobytes())
+                if pattern is None:
                     left = left[1:]
                     continue
-                known.append(one)
-                self._words += one.words.size
-            fits = one.matches(table, left)
+                if tried == LIMITS.layouts:  # what is remembered must not grow with the file
+                    known.clear()
+                    tried = 0
+                known.append(pattern)
+            pattern = known[tried]
+            fits = pattern.matches(table, left)
             tried += 1
-            if one.fields is None:
-                self.without(one.lacks, int(np.count_nonzero(fits)))
+            if pattern.places is None:
+                self.without(pattern.lacks, int(np.count_nonzero(fits)))
+            elif fits.all() and left.size == rows.size:
+                yield rows, pattern.read(table, padding(size))
             elif fits.any():
-                whole = fits.all() and left.size == rows.size
-                yield (
-                    (rows, one.read(table))
-                    if whole
-                    else (rows[left[fits]], one.read(table[left[fits]]))
-                )
+                yield rows[left[fits]], pattern.read(table[left[fits]], padding(size))
             left = left[~fits]
 
-    def _new(self, messages: Messages, row: int) -> Layout | None:
-        """The layout of a message, None where it does not fit its schema."""
-        start = int(messages.starts[row])
-        payload = messages.content[start : start + int(messages.sizes[row])].tobytes()
+    def _new(self, payload: bytes) -> _Pattern | None:
+        """The pattern of a message's layout, None where it does not fit its schema."""
         try:
-            shape = self.walk(payload)
+            layout = self.parse(payload)
         except MisfitError as error:
             self.misfitting(str(error))
             return None
-        for path, text in shape.labels.items():
+        for path, text in layout.labels.items():
             self.label(path, text)
-        return layout(payload, shape, self.wanted)
+        lead = padding(len(payload))
+        mask = np.zeros(lead + len(payload), np.uint8)
+        for start, end in layout.fixed:
+            mask[lead + start : lead + end] = 0xFF
+        mask[lead + np.array(layout.flags, np.intp)] |= 0x80
+        masks = mask.view(np.uint64)
+        words = np.flatnonzero(masks)
+        masks = masks[words]
+        values = np.frombuffer(bytes(lead) + payload, np.uint64)[words] & masks
+        places = {}
+        for name, path in self.wanted.items():
+            at = layout.find(path)
+            if at is None:
+                return _Pattern(words, masks, values, None, layout.missing(self.wanted))
+            places[name] = at
+        return _Pattern(words, masks, values, places)
 
 
 def _by_size(sizes: IntArray) -> Iterator[NDArray[np.intp]]:
@@ -390,3 +326,8 @@ def _words(octets: NDArray[np.uint8], starts: IntArray, size: int) -> NDArray[np
     else:
         rows = octets[firsts[0] : firsts[-1] + width]
     return rows.view(np.uint64).reshape(starts.size, -1)
+
+
+def has(layout: MessageLayout, paths: Iterable[str]) -> bool:
+    """True if the message has the numbers at all of the paths."""
+    return all(layout.find(path) is not None for path in paths)
