@@ -65,6 +65,8 @@ EVERY_TERM = by_name(ALWAYS + OPTIONAL)
 TERMS = {term.name: term for term in OPTIONAL if not term.delays}
 """Terms that a model may have; a delay acts before a model does, on the log's times."""
 DELAYS = names_of(term for term in OPTIONAL if term.delays)
+FIRST_TERMS = tuple(name for name, term in TERMS.items() if term.usual)
+"""Terms that most real joints have."""
 CHOICES = names_in(OPTIONAL)
 """Names that ``--model`` takes."""
 PARAMETERS: dict[str, Parameter] = {}

@@ -23,7 +23,7 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES
 from algid.estimators import refined, robust
-from algid.estimators.selection import Selection, select
+from algid.estimators.terms import Selection, select
 from algid.estimators.weak import WeakSettings
 from algid.model import Model
 from pipelines import real_arms

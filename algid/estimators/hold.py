@@ -112,10 +112,3 @@ class Lateness:
         if self.faster:
             return 0.5 * CONTROLLER, CONTROLLER
         return 0.5 * self.half, 0.5 * self.half
-
-    def after(self, mean: float, std: float) -> Lateness:
-        """The same by a posterior of `mean` and `std`, in s, without the prior."""
-        expected, spread = self._expected
-        precision = max(std**-2 - spread**-2, 1e-6 * spread**-2)
-        late = (mean * std**-2 - expected * spread**-2) / precision
-        return Lateness(late, precision**-0.5, self.half)

@@ -33,12 +33,14 @@ from algid.estimators.noise import (
     variance_score,
 )
 from algid.estimators.parametrisation import Shared
+from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.model import Model, Motion
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces
+from algid.signals.shift import TorqueShift
 
 Beside = Callable[[Model, FloatArray, Motion, float], FloatArray]
 """Torques (m, 2, n) in N m beside those of a model at coefficients (q,), of a motion sampled every
@@ -111,8 +113,8 @@ class LogEvidence:
     source : callable that gives a fresh pass over the log's segments
     loaded : bool
     shared : Shared
-    stencil : callable
-        The stencil for samples `dt` s apart at coefficients c (q,).
+    shift : TorqueShift
+        After how long a logged torque acts; its delay is where none is estimated.
     known : NoiseLevels or None
         Noise levels that are not to be estimated.
 
@@ -125,14 +127,14 @@ class LogEvidence:
         source: Source,
         loaded: bool,
         shared: Shared,
-        stencil: Callable[[float, FloatArray], Stencil],
+        shift: TorqueShift,
         known: NoiseLevels | None,
     ) -> None:
         self.loaded = loaded
         self.sure = self.smooth = False
         self._source = source
         self._shared = shared
-        self._stencil = stencil
+        self._shift = shift
         self._known = known
         kept, self.whole = spread_pieces(self._pieces(), _TRAINED, PIECE_SAMPLES)
         self.kept = [replace(piece, omega=None) for piece in kept]
@@ -171,8 +173,22 @@ class LogEvidence:
 
     @property
     def refuted(self) -> bool:
-        """Whether the torque's error is not white: far above neighbouring samples' differences."""
-        return bool(np.any(self.noise.tau > np.maximum(_EXCESS * self._rough, self._least)))
+        """True if the noise level so far is implausible: see `is_implausible`."""
+        return self.is_implausible(self.noise.tau)
+
+    def is_implausible(self, tau: FloatArray) -> bool:
+        """True if errors (2,) of the torques in N m are no white noise of a sensor.
+
+        A sensor's is not far above what neighbouring samples differ by.
+        """
+        return bool(np.any(tau > np.maximum(_EXCESS * self._rough, self._least)))
+
+    def exceeds_noise(self, tau: FloatArray, factor: float) -> bool:
+        """True if errors (2,) of the torques in N m are `factor` times what neighbours differ by.
+
+        Not in a log without noise to speak of, where it is the error of sampling.
+        """
+        return bool(np.any((tau > factor * self._rough) & (self._rough > self._least)))
 
     @property
     def state(self) -> tuple[NoiseLevels, list[FloatArray]]:
@@ -263,6 +279,19 @@ class LogEvidence:
             gram = gram + whitened @ whitened.T
         return Imprint(self.loaded, gram)
 
+    def products(self, c: FloatArray) -> tuple[FloatArray, float]:
+        """Products (2, q + 1, q + 1) by joint of the training set's whitened columns at `c`.
+
+        The residual's is the last column. With them the logarithm of the covariance's determinant.
+        """
+        gram, determinant = np.zeros(()), 0.0
+        for piece, theta in zip(self.kept, self._trajectories, strict=True):
+            linear = self._linearise(c, theta, piece)
+            by_joint = linear.columns.reshape(len(linear.columns), -1, 2).transpose(2, 0, 1)
+            gram = gram + by_joint @ by_joint.swapaxes(1, 2)
+            determinant += 2 * float(np.log(linear.factor[-1]).sum())
+        return gram, determinant
+
     def _improve_noise(self, score: VarianceScore, information: LogInformation) -> FloatArray:
         """Better noise levels; the change (4,) of each log variance."""
         before, (S, _) = self.noise, information.total
@@ -287,12 +316,46 @@ class LogEvidence:
             c[: len(shared.model.names)],
             theta,
             piece,
-            self._stencil(piece.dt, c),
+            self._stencil(shared, piece.dt, c),
             self.noise,
             shared.delay,
             residual_only=residual_only,
             smooth=smooth,
         )
+
+    def _stencil(self, shared: Shared, dt: float, c: FloatArray) -> Stencil:
+        """The stencil for samples `dt` s apart at coefficients c (q,)."""
+        shift = self._shift
+        if shared.delay:
+            shift = replace(shift, delay=float(c[-1]))
+        return Stencil(dt, shift.at(dt), held=shift.held, lag=shared.model.lag(c))
+
+
+def opened(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source],
+    shared: Shared,
+    shift: TorqueShift,
+    noise: NoiseLevels | None = None,
+) -> list[LogEvidence]:
+    """The logs that are long enough.
+
+    Raises
+    ------
+    TooShortError
+        If there are logs of a kind and none is.
+    """
+    logs: list[LogEvidence] = []
+    for kind, sources in (("unloaded", unloaded), ("loaded", loaded)):
+        every = [LogEvidence(one, kind == "loaded", shared, shift, noise) for one in sources]
+        kept = [log for log in every if log.kept]
+        if every and not kept:
+            raise TooShortError(
+                f"no {kind} log is long enough for the likelihood: expected at least {SHORTEST} "
+                "samples without a gap"
+            )
+        logs += kept
+    return logs
 
 
 def _smoothed(theta: FloatArray, dt: float) -> FloatArray:

@@ -28,17 +28,15 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.identifiability import judge, open_directions
 from algid.estimators.imprint import Imprint
 from algid.estimators.integration import deviations, widened_by_integration
-from algid.estimators.log_likelihood import SHORTEST, Beside, LogEvidence, Outcome
+from algid.estimators.log_likelihood import Beside, LogEvidence, Outcome, opened
 from algid.estimators.misfit import columns, misfit
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, grouped
-from algid.estimators.too_short import TooShortError
 from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.estimators.widths import Width, has_width, likeliest_width
 from algid.notices import Notice
-from algid.signals.differences import Stencil
 from algid.signals.segments import Segment
 
 _STEPS = 20
@@ -51,9 +49,7 @@ _MOST_COMPARED = 32  # logs among which repeats of a motion are looked for, pair
 _CLOSE = 0.1  # standard deviations of the last step: friction's step at noisy speeds may keep it up
 _FAR = 3.0  # standard deviations of the training set beyond which the last step is repeated
 _PASSES = 4
-_MANY = 4  # logs of which one is tried alone before all of them are
 _DRIVEN = 0.5  # standard deviations of a step back over the one before: noise drives it
-_GROWING = 1.5  # factor of a torque's error in a step: a step makes at most e of it
 _WIDTHS = 4  # times that the width of friction's step is looked for
 _WIDTH_SETTLED = 0.05  # change of its logarithm
 _WIDTH_FAR = 0.5  # the same where the likelihood was refuted: no less would mend that
@@ -110,18 +106,13 @@ def fit(
         )
     start = weak_fit(unloaded, loaded, settings, lengths, prior)
     shared, anchored = start.shared, _anchored(start)
-    logs = _opened(unloaded, False, shared, settings, noise)
-    logs += _opened(loaded, True, shared, settings, noise)
+    logs = opened(unloaded, loaded, shared, settings.shift, noise)
     turn, dt = max((largest_turn(log.kept), log.kept[0].dt) for log in logs)
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}
         return start.noted(Notice("SLOW_SAMPLING", numbers=numbers))
     refuted = start.noted(Notice("REFUTED", numbers={"case": "noise", "kept": start.estimator}))
     try:
-        if len(logs) >= _MANY:
-            steps = _refuted_alone(shared, logs[0], start.values, anchored)
-            if steps:
-                return replace(refuted, iterations=steps)
         beta, outcomes, iterations, end = _train(shared, logs, start.values, anchored, progress)
         width = None
         if has_width(shared.model):
@@ -219,40 +210,6 @@ def _anchored(start: Fit) -> Prior | None:
     return Prior(start.names, mean, precision)
 
 
-def _opened(
-    sources: Sequence[Source],
-    loaded: bool,
-    shared: Shared,
-    settings: WeakSettings,
-    noise: NoiseLevels | None,
-) -> list[LogEvidence]:
-    """The logs of a kind that are long enough.
-
-    Raises
-    ------
-    TooShortError
-        If there are logs and none is.
-    """
-
-    def stencil(dt: float, c: FloatArray) -> Stencil:
-        shift = settings.shift
-        if shared.delay:
-            shift = replace(shift, delay=float(c[-1]))
-        return Stencil(dt, shift.at(dt), held=shift.held, lag=shared.model.lag(c))
-
-    every = [LogEvidence(source, loaded, shared, stencil, noise) for source in sources]
-    kept = [log for log in every if log.kept]
-    if every and not kept:
-        which = "unloaded"
-        if loaded:
-            which = "loaded"
-        raise TooShortError(
-            f"no {which} log is long enough for the likelihood: expected at least {SHORTEST} "
-            "samples without a gap"
-        )
-    return kept
-
-
 FAR = 0.35
 """rad from one sample to the next: beyond it derivatives by differences do not follow a turn. A
 stencil of nine samples errs by the eighth power of this angle, over 3150, of the fastest part of
@@ -331,29 +288,6 @@ def _overshot(step: FloatArray, before: FloatArray, S: FloatArray) -> bool:
     parameters that only such columns tell apart are chased to and fro.
     """
     return -float(step @ S @ before) > float(before @ S @ before) > 0
-
-
-def _refuted_alone(shared: Shared, log: LogEvidence, beta: FloatArray, prior: Prior | None) -> int:
-    """Steps after which a log by itself refutes the likelihood; 0 where it does not.
-
-    With parameters of its own it is explained better than with those of all logs: what it refutes
-    alone, it refutes among others. It is given up once its torque's error stops growing.
-    """
-    untrained = log.state
-    try:
-        for step in range(1, _NOISE_STEPS + 1):
-            before = log.noise.tau
-            outcome = log.train(shared.coefficients(beta, log.loaded))
-            beta, _, _ = combine(shared, [outcome.information], beta, prior)
-            if log.refuted:
-                return step
-            if float(np.max(log.noise.tau / before)) < _GROWING:
-                break
-    except np.linalg.LinAlgError:  # it leaves open what others may determine
-        return 0
-    finally:
-        log.restore(untrained)
-    return 0
 
 
 def _settled_width(

@@ -19,11 +19,12 @@ from algid.estimators.doubt import doubted_without_motor
 from algid.estimators.fit import Fit, Misfit
 from algid.estimators.hold import Hold
 from algid.estimators.prediction import PredictionSums
-from algid.estimators.selection import FIRST_TERMS, Selection, TermTrial, has_need, plausible
+from algid.estimators.terms import Selection, TermTrial, has_need, plausible
 from algid.identification.passes import Pass, long_enough, passes, weak_settings
 from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
-from algid.model import DELAYS, TERMS, Model
+from algid.model import DELAYS, FIRST_TERMS, TERMS, Model
+from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.settings import Settings
 from algid.signals.segments import Segment
@@ -81,14 +82,22 @@ def run_fit(
             windows = weak_settings(settings, selection)
             return estimate(unloaded, loaded, windows, settings.lengths, known, survey.progress)
 
-        fit = fitted(chosen)
-        if fit.misfit is not None and settings.chooses:
-            fit, chosen = completed(fit, chosen, fitted)
-            ours = weak_settings(settings, chosen)
-            sums.clear()
+        # why no term is chosen but every one shrunk, if so
+        notes: tuple[Notice, ...] | None = None
         picked = chosen
-        if fit.refuted and settings.chooses:
-            fit, chosen = _shrunk(fit, unloaded, loaded, ours, settings, chosen, prior)
+        if chosen.refuted and settings.chooses and estimator.name == "refined":
+            notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
+        else:
+            fit = fitted(chosen)
+            if fit.misfit is not None and settings.chooses:
+                fit, chosen = completed(fit, chosen, fitted)
+                ours = weak_settings(settings, chosen)
+                sums.clear()
+            picked = chosen
+            if fit.refuted and settings.chooses:
+                notes = fit.notes
+        if notes is not None:
+            fit, chosen = _shrunk(notes, unloaded, loaded, ours, settings, chosen, prior)
             sums.clear()
         if not chosen.shrunk and fit.shared.model != chosen.model:
             # the fit has estimated the width of friction's step
@@ -174,8 +183,8 @@ def _of_motorless(
     if chosen.chosen_by == "logs":
         terms = within(terms, FIRST_TERMS)
     dropped = {trial.term for trial in chosen.trials if trial.kept}.difference(terms)
-    model = replace(chosen.model, terms=terms)
-    plainer = replace(chosen.left_out(dropped, _BY_NOTHING), model=model, delay=False, late=None)
+    plainer = replace(chosen.left_out(dropped, _BY_NOTHING), delay=False, late=None)
+    model = plainer.model
     if plainer.hold_by == "logs":
         plainer = replace(plainer, hold="foh")
     ours = weak_settings(settings, plainer)
@@ -190,7 +199,7 @@ _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
 
 
 def _shrunk(
-    refuted: Fit,
+    notes: tuple[Notice, ...],
     unloaded: Sequence[Pass],
     loaded: Sequence[Pass],
     ours: weak.WeakSettings,
@@ -198,7 +207,7 @@ def _shrunk(
     chosen: Selection,
     prior: Prior | None,
 ) -> tuple[Fit, Selection]:
-    """The fit with every term shrunk in place of the `refuted` one's, and its model."""
+    """The fit with every term shrunk, and its model; `notes` say why no other stands."""
     hold: Hold = chosen.hold
     if chosen.hold_by == "logs":
         hold = "foh"  # else by a likelihood that does not hold: a term takes up the delay
@@ -208,12 +217,11 @@ def _shrunk(
     nothing = absent(settings.effort, every.names)
     known = without(prior, nothing)
     fit = robust.fit(unloaded, loaded, shaped, settings.lengths, known)
-    notes = refuted.notes + fit.notes
-    fit = replace(fit, notes=notes)
+    fit = replace(fit, notes=notes + fit.notes)
     terms = fit.shared.model.terms
     if fit.shared.delay:
         terms += DELAYS
-    trials = tuple(TermTrial(term, True, np.nan, np.nan, _SHRUNK) for term in terms)
+    trials = tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms)
     shrunken = Selection(
         fit.shared.model,
         fit.shared.delay,

@@ -10,13 +10,13 @@ from algid.estimators.doubt import doubted, doubted_without_motor
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionScore, score
-from algid.estimators.selection import FIRST_TERMS, Selection
+from algid.estimators.terms import Selection
 from algid.identification.passes import passes, weak_settings
 from algid.identification.predicted import prediction
 from algid.identification.recordings import Recordings
 from algid.identification.remarks import exchanged
 from algid.identification.series import torque_coefficients, torque_shift
-from algid.model import RIGID
+from algid.model import FIRST_TERMS, RIGID
 from algid.notices import Notice
 from algid.settings import Settings
 

@@ -35,7 +35,7 @@ from algid.settings import DEFAULTS, OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
     from algid.estimators.fit import Fit
-    from algid.estimators.selection import Selection
+    from algid.estimators.terms import Selection
     from algid.identification.by_likelihood import Predictions
     from algid.notices import Notice
     from algid.profile import Profile
@@ -315,7 +315,7 @@ def _fitted(
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
     from algid.identification.by_likelihood import run_fit
     from algid.identification.known import prior_of
-    from algid.identification.model_choice import choose_model, with_hold_of_fit, without_nothing
+    from algid.identification.model_choice import choose_model, without_insignificant
 
     survey.begin("choosing terms")
     if earlier is None:
@@ -326,12 +326,9 @@ def _fitted(
     survey.begin("fitting")
     settings = settings.but(torque_hold=chosen.hold)
     fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
-    better = without_nothing(with_hold_of_fit(fit, chosen), fit, settings)
-    if (better.model, better.delay, better.hold) != (chosen.model, chosen.delay, chosen.hold):
-        settings = settings.but(torque_hold=better.hold)
+    better = without_insignificant(chosen, fit, settings)
+    if (better.model, better.delay) != (chosen.model, chosen.delay):
         fit, predictions, chosen = run_fit(survey, settings, better, prior)
-    else:
-        chosen = better
     return fit, predictions, chosen
 
 

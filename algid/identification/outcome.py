@@ -17,7 +17,7 @@ from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatabilit
 from algid.estimators.fit import Fit, own_estimates
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionScore, cross_validate, score
-from algid.estimators.selection import Selection
+from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Predictions
 from algid.identification.predicted import prediction
 from algid.identification.recordings import Recordings
@@ -257,7 +257,6 @@ def fit_summary(
             coulomb_speed=chosen.model.coulomb_speed,
             stribeck_speed=chosen.model.stribeck_speed,
             chosen_by=chosen.chosen_by,
-            held_out=chosen.held_out,
             shrunk=_expected(fit, chosen),
         ),
         terms=list(_terms(fit, chosen)),
@@ -404,7 +403,6 @@ def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
         yield results.TermCriterion(
             term=trial.term,
             kept=trial.kept,
-            gain_heldout=finite(trial.prediction),
             # a Wald statistic is twice a difference of log-likelihoods
             evidence=finite(0.5 * trial.evidence),
             why=trial.reason,

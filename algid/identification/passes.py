@@ -9,7 +9,7 @@ from functools import partial
 
 from algid.base.errors import LogError
 from algid.estimators import weak
-from algid.estimators.selection import Selection
+from algid.estimators.terms import Selection
 from algid.estimators.too_short import TooShortError
 from algid.identification.recordings import Recording, Recordings
 from algid.identification.velocities import with_velocities

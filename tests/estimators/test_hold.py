@@ -38,20 +38,6 @@ def test_the_prior_of_both_makes_errors_as_large_as_it_says(share: float, true: 
     assert np.mean(np.abs(z) < 1.96) > 0.945
 
 
-def test_the_posterior_without_its_prior_is_the_likelihood() -> None:
-    before = Lateness(0.7 * HALF, 0.4 * HALF, HALF)
-    prior = before.prior
-    weight = float(prior.precision[0, 0])
-    precision = before.std**-2 + weight
-    mean = (before.late * before.std**-2 + float(prior.mean[0]) * weight) / precision
-    after = before.after(mean, precision**-0.5)
-    assert (after.late, after.std) == pytest.approx((before.late, before.std))
-
-
-def test_a_posterior_wider_than_its_prior_tells_nothing() -> None:
-    assert not Lateness(0.0, HALF, HALF).after(HALF, 2 * HALF).decided
-
-
 def test_a_delay_of_five_milliseconds_is_no_hold() -> None:
     late = Lateness(5e-3, 1e-5, HALF)
     assert late.decided

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from algid.estimators import instruments, refined, weak
+from algid.estimators import instruments, refined, terms, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.weak import Source, WeakSettings
@@ -174,6 +174,20 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4
+
+
+def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evenly spread, for the choice of terms."""
+    monkeypatch.setattr(terms, "_MOST_LOGS", 2)
+    looked_at: list[int] = []
+
+    def source(number: int) -> list[Segment]:
+        looked_at.append(number)
+        return [bench.log(sigma=1e-3, seed=number)]
+
+    sources: list[Source] = [partial(source, number) for number in range(4)]
+    assert not terms.select(sources, [], WeakSettings()).model.terms
+    assert looked_at == [0, 2]
 
 
 def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:

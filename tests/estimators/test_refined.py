@@ -167,35 +167,6 @@ def test_unmodelled_dynamics_hand_back_the_weak_estimate(bench: Bench) -> None:
     assert fit.intervals == "sandwich"
 
 
-@pytest.mark.parametrize("place", [0, 3])
-def test_one_log_of_many_refutes_the_likelihood_of_all(bench: Bench, place: int) -> None:
-    """The first by itself, before the others are trained; another among them."""
-    logs = [bench.log(sigma=1e-4, seed=seed) for seed in range(4)]
-    slow = 0.3 * np.sign(np.sin(2 * np.pi * 1.3 * bench.bare.t))
-    logs[place] = replace(logs[place], tau=logs[place].tau + slow)
-    trained: list[str] = []
-    fit = refined.fit(
-        [partial(list, [log]) for log in logs], progress=lambda stage, *_: trained.append(stage)
-    )
-    assert fit.refuted
-    assert fit.estimator == "weak"
-    assert bool(trained) is (place > 0)
-
-
-def test_to_try_one_log_of_many_changes_nothing(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    logs: list[weak.Source] = [
-        partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(4)
-    ]
-    tried = refined.fit(logs)
-    monkeypatch.setattr(refined, "_MANY", 5)
-    together = refined.fit(logs)
-    assert tried.converged
-    np.testing.assert_array_equal(tried.values, together.values)
-    np.testing.assert_array_equal(tried.covariance, together.covariance)
-
-
 @pytest.mark.parametrize("sigma", [1e-5, 1e-4, 1e-3])
 def test_few_passes_end_close_to_where_many_would(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, sigma: float
@@ -217,7 +188,7 @@ def test_a_pass_tells_what_one_at_its_better_noise_levels_would(bench: Bench) ->
     """To first order: where levels are a hundredth off, what is left is a hundredth of that."""
     source: weak.Source = partial(list, [bench.log(sigma=1e-3)])
     start = weak.fit([source])
-    (log,) = refined._opened([source], False, start.shared, WeakSettings(), None)
+    (log,) = evidence.opened([source], [], start.shared, TorqueShift())
     for _ in range(4):
         log.train(start.values)
     levels = log.noise

@@ -16,7 +16,7 @@ from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
 from algid.estimators.identifiability import Whiteness
 from algid.estimators.prediction import PredictionScore
-from algid.estimators.selection import Selection
+from algid.estimators.terms import Selection
 from algid.estimators.whitening import NoiseLevels
 from algid.identification.open_logs import open_source
 from algid.identification.outcome import (

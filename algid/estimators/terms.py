@@ -1,0 +1,602 @@
+"""Which terms the torque's model needs, by the likelihood of its first pass.
+
+One pass of the likelihood over pieces of the logs is linearised with the columns of every term, at
+the weak form's estimate with the most common ones. Whitened by the noise levels that neighbouring
+samples show, its normal equations hold every model without some of the terms: each is linear
+algebra. From no term on, the one whose evidence outweighs its price most is added,
+
+    W / s² > n (log N + 2 log T)
+
+with W what its n coefficients explain of the squares, s² the mean square that all terms leave (1 at
+least), N the samples (Schwarz 1978) and T the terms to choose from (Chen & Chen 2008, γ = 1); then
+those are dropped that are not worth it beside the others.
+
+======  ==================================================================  ====================
+symbol  name                                                                shape
+======  ==================================================================  ====================
+p       coefficients of all columns, the delay, the loaded arm's k1 … k5    (P,)
+G       products of a log's whitened columns by joint, the torque last      (2, P + 1, P + 1)
+======  ==================================================================  ====================
+
+Loaded logs share every coefficient with unloaded ones save k1 … k5, so that friction is one where
+both kinds determine it and no payload need be guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.arm import FloatArray
+from algid.base.names import evenly_spread, outside
+from algid.estimators import weak
+from algid.estimators.combine import scaled_pinv
+from algid.estimators.hold import SURE, Hold, Lateness
+from algid.estimators.log_likelihood import LogEvidence, opened
+from algid.estimators.modulating_functions import Known, row_weights
+from algid.estimators.parametrisation import Shared
+from algid.estimators.too_short import OF_A_WINDOW, TooShortError
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import (
+    CHOICES,
+    DELAYS,
+    EVERY_TERM,
+    FIRST_TERMS,
+    LARGEST_PHASE,
+    PARAMETERS,
+    SINES,
+    TERMS,
+    Model,
+    loads_of,
+    names_of,
+    terms_named,
+    without_delay,
+)
+from algid.physics.motion import Widths
+from algid.physics.terms import ALWAYS
+from algid.signals.segments import Segment, pieces, spread_pieces
+
+CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
+"""Terms that the logs choose from; one column serves lag and delay, equal to first order."""
+_DELAY = tuple(name for name, term in EVERY_TERM.items() if term.delays)
+_LAG = tuple(name for name, term in EVERY_TERM.items() if term.lags)
+# Where a joint has no motor, its gain is nothing and makes its equation vanish.
+_OF_BOTH_TORQUES = tuple(name for name in CHOICE if EVERY_TERM[name].gains)
+_STARTS = {
+    "coulomb_speed": np.array([0.01, 0.02, 0.04, 0.08, 0.16, 0.32]),
+    "stribeck_speed": np.array([0.1, 0.3, 0.9]),
+}
+"""rad/s: widths of friction that windows are tried with; drives' lie between."""
+_MOST_LOGS = 8
+"""Logs of a kind, evenly spread, that are looked at: terms are those of the arm, not of a log."""
+_PIECES, _PIECE_SAMPLES = 4, 16384
+_ROUNDS = 3
+_EXCESS = 4.0
+"""Times what neighbouring samples differ by: what every term leaves of a torque is no more where
+the likelihood stands. Of 60 simulated logs with sound models none leaves 1.2 times, of real arms
+each leaves 4.8 times or more, which the likelihood's own noise level then takes beyond ten."""
+_STAMPS = 0.01
+"""Of a period: what stamps leave open at least, also in the log of a simulator."""
+
+
+@dataclass(frozen=True)
+class TermTrial:
+    """What became of one term, beside those that were kept.
+
+    Parameters
+    ----------
+    term : str
+    kept : bool
+    evidence : float
+        Its Wald statistic less its price; negative where it is not worth it.
+    reason : str
+        Why it was kept or left out, in words.
+    """
+
+    term: str
+    kept: bool
+    evidence: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The model chosen, whether a delay is estimated beside it, and who chose.
+
+    `trials` are those of the terms; where the terms were given there are none. `shapes` is the
+    model whose friction has the shape that windows give it before any term is chosen; `refuted`
+    says that the first pass with every term leaves more than a sensor's noise, `shrunk` that none
+    was chosen in the end, but every term shrunk. `hold` is the torque's between samples, and `late`
+    how late the logs say it acts where it is not held.
+    """
+
+    model: Model
+    delay: bool
+    chosen_by: Literal["logs", "settings", "parameters"] = "settings"
+    trials: tuple[TermTrial, ...] = ()
+    shapes: Model | None = None
+    refuted: bool = False
+    shrunk: bool = False
+    hold: Hold = "foh"
+    hold_by: Literal["logs", "settings", "parameters"] = "settings"
+    late: Lateness | None = None
+
+    def left_out(self, terms: Collection[str], reason: str) -> Selection:
+        """The same without `terms`, whose trials end in this `reason`."""
+        kept = outside(self.model.terms, terms)
+        return replace(
+            self,
+            model=replace(self.model, terms=kept),
+            delay=self.delay and set(_DELAY).isdisjoint(terms),
+            trials=self._ended(terms, kept=False, reason=reason),
+        )
+
+    def with_term(self, term: str, reason: str) -> Selection:
+        """The same with one more term, whose trial ends in its being kept for this `reason`."""
+        model = replace(self.model, terms=self.model.terms + without_delay((term,)))
+        delay = self.delay or EVERY_TERM[term].delays
+        trials = self._ended((term,), kept=True, reason=reason)
+        return replace(self, model=model, delay=delay, trials=trials)
+
+    def _ended(self, terms: Collection[str], *, kept: bool, reason: str) -> tuple[TermTrial, ...]:
+        """The trials, those of `terms` with another end."""
+        ended = []
+        for trial in self.trials:
+            if trial.term in terms:
+                trial = replace(trial, kept=kept, reason=reason)
+            ended.append(trial)
+        return tuple(ended)
+
+    @property
+    def undetermined(self) -> Lateness | None:
+        """The torque's lateness, if the logs were to choose its hold and leave it open."""
+        if self.hold_by != "logs" or self.late is None or self.late.determined:
+            return None
+        return self.late
+
+
+def price(count: float, samples: float, choices: int) -> float:
+    """Evidence that `count` coefficients have to outweigh: see the module."""
+    return float(count * (np.log(samples) + 2 * np.log(max(2, choices))))
+
+
+def has_need(term: str, terms: Collection[str]) -> bool:
+    """Whether the term without which `term` has no meaning, if there is one, is among `terms`."""
+    needed = EVERY_TERM[term].needs
+    return needed is None or needed in terms
+
+
+def plausible(values: Mapping[str, float]) -> bool:
+    """Whether coefficients, by name, are of a plausible size and sign."""
+    for name, value in values.items():
+        low, high = PARAMETERS[name].plausible
+        if not low <= value <= high:
+            return False
+    return True
+
+
+def _using(shape: str) -> tuple[str, ...]:
+    """Terms that a width of friction shapes."""
+    return tuple(name for name, term in TERMS.items() if shape in term.shapes)
+
+
+def needs_shape(terms: Sequence[str]) -> bool:
+    """Whether some of `terms` have a width that is to be found."""
+    return any(not set(_using(shape.name)).isdisjoint(terms) for shape in fields(Widths))
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Evenly spread pieces of logs of one kind, and what models have in common of their windows."""
+
+    logs: tuple[tuple[Segment, ...], ...]
+    known: tuple[dict[Hashable, Known], ...]
+
+    @classmethod
+    def of(cls, sources: Sequence[Source]) -> _Pieces:
+        """Those of one pass over each of the logs, or of some, evenly spread."""
+        logs = []
+        for source in evenly_spread(sources, _MOST_LOGS):
+            every = pieces(source(), _PIECE_SAMPLES)
+            logs.append(tuple(spread_pieces(every, _PIECES, _PIECE_SAMPLES)[0]))
+        return cls(tuple(logs), tuple({} for _ in logs))
+
+    @property
+    def sources(self) -> list[Source]:
+        """The pieces as a pass gives them."""
+        return [partial(tuple, log) for log in self.logs]
+
+    def normals(self, settings: WeakSettings) -> list[weak.Normal]:
+        """Normal equations of the logs that are long enough."""
+        every = [
+            weak.normal_equations(source, settings, None, known)
+            for source, known in zip(self.sources, self.known, strict=True)
+        ]
+        return [normal for normal in every if normal is not None]
+
+
+def _start(
+    kinds: Sequence[_Pieces], settings: WeakSettings
+) -> tuple[Model, dict[bool, FloatArray]]:
+    """Widths of friction, and coefficients of the first terms, by windows; loaded logs' apart.
+
+    Raises
+    ------
+    TooShortError
+        If no log is long enough for a window.
+    """
+    model = settings.model
+
+    def solved(model: Model) -> tuple[float, dict[bool, FloatArray]]:
+        cost, at = 0.0, {}
+        for loaded, own in enumerate(kinds):
+            # beside a delay, which looks like friction where joints turn back
+            normals = own.normals(replace(settings, model=model, estimate_delay=True))
+            if normals:
+                c, _ = weak.solve(normals)
+                grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
+                rows = np.stack([normal.rows for normal in normals])
+                weights = row_weights(grams, np.append(-c, 1.0), rows)
+                cost -= float(np.sum(rows * np.log(weights)))
+                at[bool(loaded)] = c[:-1]
+        if not at:
+            raise TooShortError(f"no {OF_A_WINDOW}")
+        return cost, at
+
+    for shape, values in _STARTS.items():
+        using = _using(shape)
+        if not using:
+            continue
+        terms = FIRST_TERMS + using[:1] if not set(using) & set(FIRST_TERMS) else FIRST_TERMS
+        costs = []
+        for value in values:
+            trial = replace(model, **{shape: float(value)})  # type: ignore[arg-type]
+            costs.append(solved(replace(trial, terms=terms))[0])
+        best = float(np.exp(_lowest(np.log(values), costs)))
+        model = replace(model, **{shape: best})  # type: ignore[arg-type]
+    model = replace(model, terms=FIRST_TERMS)
+    return model, solved(model)[1]
+
+
+def _lowest(x: FloatArray, y: Sequence[float]) -> float:
+    """Where the parabola through the least value and its neighbours has its bottom.
+
+    At an end, the end itself.
+    """
+    least = int(np.argmin(y))
+    if least in (0, len(x) - 1):
+        return float(x[least])
+    a, b, _ = np.polyfit(x[least - 1 : least + 2] - x[least], y[least - 1 : least + 2], 2)
+    return float(x[least] - b / (2 * a))
+
+
+class FirstPass:
+    """Normal equations of one pass of the likelihood, with the columns of every term.
+
+    Parameters
+    ----------
+    logs : each opened with the model of every term and a delay
+    at : coefficients (q,) of that model, of unloaded and of loaded logs
+        Where it is linearised.
+    base : float, s
+        The delay from which the column of the delay counts.
+    """
+
+    def __init__(
+        self,
+        logs: Sequence[LogEvidence],
+        shared: Shared,
+        at: Mapping[bool, FloatArray],
+        base: float,
+    ) -> None:
+        self.shared = shared
+        self.names = shared.log_names
+        loads = loads_of(shared.model)
+        self._rigid = np.flatnonzero([name in loads for name in self.names])
+        self._both = len({log.loaded for log in logs}) == 2
+        self.size = len(self.names) + self._both * len(self._rigid)
+        self._logs = logs
+        self._base = base
+        self.determinant = 0.0
+        grams = []
+        for log in logs:
+            log.reshape(shared)
+            gram, determinant = log.products(at[log.loaded])
+            self.determinant += determinant
+            # the torque itself in the place of what the point of linearisation leaves of it
+            change = np.eye(gram.shape[-1])
+            change[:-1, -1] = at[log.loaded]
+            change[-2, -1] -= base
+            grams.append(self._wide(log.loaded, change.T @ gram @ change))
+        self._grams = np.array(grams)
+        self.total = self._grams.sum(axis=(0, 1))
+        self.samples = sum(log.trained for log in logs)
+        self.dt = max(log.kept[0].dt for log in logs)
+        of_delay = self.names.index(DELAYS[0])
+        self.open_squares = (_STAMPS * self.dt) ** 2 * float(self.total[of_delay, of_delay])
+
+    def _places(self, loaded: bool) -> NDArray[np.int64]:
+        """Where a log's coefficients stand in p."""
+        places = np.arange(len(self.names))
+        if loaded and self._both:
+            places[self._rigid] = len(self.names) + np.arange(len(self._rigid))
+        return places
+
+    def _wide(self, loaded: bool, gram: FloatArray) -> FloatArray:
+        """Products (2, P + 1, P + 1) in p of a log's (2, q + 1, q + 1)."""
+        rows = np.append(self._places(loaded), self.size)
+        wide = np.zeros((2, self.size + 1, self.size + 1))
+        wide[:, rows[:, None], rows] = gram
+        return wide
+
+    def columns(self, terms: Iterable[str]) -> NDArray[np.int64]:
+        """Places in p of eq. (1) and of `terms`."""
+        return self._named(names_of(ALWAYS) + names_of(terms_named(terms)))
+
+    def own(self, term: str) -> NDArray[np.int64]:
+        """Places in p of the coefficients of one term."""
+        return self._named(EVERY_TERM[term].names)
+
+    def _named(self, names: Collection[str]) -> NDArray[np.int64]:
+        """Places in p of coefficients by name, the loaded arm's with them."""
+        wanted = np.array([name in names for name in self.names])
+        if self._both:
+            wanted = np.append(wanted, wanted[self._rigid])
+        return np.flatnonzero(wanted)
+
+    def solve(self, columns: NDArray[np.int64]) -> tuple[FloatArray, float, FloatArray]:
+        """Least squares on `columns`: p (P,), the squares left, and the inverse of its matrix."""
+        inverse = scaled_pinv(self.total[np.ix_(columns, columns)])
+        p = np.zeros(self.size)
+        p[columns] = inverse @ self.total[columns, -1]
+        left = float(self.total[-1, -1] - p[columns] @ self.total[columns, -1])
+        return p, max(left, 0.0), inverse
+
+    def coefficients(self, p: FloatArray) -> dict[bool, FloatArray]:
+        """Coefficients (q,) of unloaded and of loaded logs, the delay whole."""
+        at = {}
+        for loaded in (False, True):
+            c = p[self._places(loaded)].copy()
+            c[-1] += self._base
+            at[loaded] = c
+        return at
+
+    def mean_square(self, columns: NDArray[np.int64]) -> float:
+        """Mean square of what `columns` leave, 1 where the model holds; no less."""
+        _, left, _ = self.solve(columns)
+        return max(1.0, left / max(2 * self.samples - len(columns), 1))
+
+    def refuted(self, columns: NDArray[np.int64]) -> bool:
+        """Whether `columns` leave more than a sensor's noise in a joint's torque of some log."""
+        p, _, _ = self.solve(columns)
+        v = np.append(-p, 1.0)
+        for log, gram in zip(self._logs, self._grams, strict=True):
+            left = np.maximum(np.einsum("i,aij,j->a", v, gram, v), 0.0)
+            if log.exceeds_noise(log.noise.tau * np.sqrt(left / log.trained), _EXCESS):
+                return True
+        return False
+
+    def lateness(self, terms: Sequence[str]) -> Lateness:
+        """How late the torque acts in the model with `terms`."""
+        rest = self.columns(without_delay(terms))
+        delay = self.names.index(DELAYS[0])
+        columns = np.append(rest, delay)
+        scale = np.sqrt(self.mean_square(columns))
+        p, _, inverse = self.solve(columns)
+        # what a delay that is left out adds to the others, beside their deviations
+        _, _, beside = self.solve(rest)
+        slope = beside @ self.total[rest, delay]
+        size = scale * np.sqrt(np.maximum(np.diag(beside), 0.0))
+        return Lateness(
+            self._base + float(p[delay]),
+            float(scale * np.sqrt(max(inverse[-1, -1], 0.0))),
+            0.5 * self.dt,
+            float(np.max(np.abs(slope) / np.maximum(size, 1e-300))),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Forward from the fixed terms by the most evident one, then backward."""
+
+    first: FirstPass
+    candidates: tuple[str, ...]
+    fixed: tuple[str, ...]
+    absent: Collection[str]
+    scale: float
+
+    def evidence(self, term: str, beside: Sequence[str]) -> float:
+        """Evidence of `term` less its price."""
+        squares = self.explained(term, beside)
+        count = len(self.first.own(term))
+        return squares / self.scale - price(count, self.first.samples, len(self.candidates))
+
+    def explained(self, term: str, beside: Sequence[str]) -> float:
+        """By how much `term` lowers the squares."""
+        _, without, _ = self.first.solve(self.first.columns(beside))
+        _, left, _ = self.first.solve(self.first.columns([*beside, term]))
+        return without - left
+
+    def beyond_sampling(self, term: str, beside: Sequence[str]) -> bool:
+        """Whether the squares fall by more than what the log's stamps leave open.
+
+        A simulator's log has no noise, and what its integration and sampling leave is no term.
+        """
+        return self.explained(term, beside) > self.first.open_squares
+
+    def plausible(self, term: str, beside: Sequence[str]) -> bool:
+        """Whether the coefficients of `term` beside those terms are plausible."""
+        p, _, _ = self.first.solve(self.first.columns([*beside, term]))
+        c = self.first.coefficients(p)[False]
+        value = dict(zip(self.first.names, c.tolist(), strict=True))
+        own = set(EVERY_TERM[term].names).difference(self.absent).intersection(value)
+        for name in own.intersection(SINES):
+            if np.arctan2(abs(value[name]), value[SINES[name]]) > LARGEST_PHASE:
+                return False
+        return plausible({name: value[name] for name in own})
+
+    def supported(self, term: str, beside: Sequence[str]) -> bool:
+        """Whether `term` is evident, beyond sampling and plausible."""
+        return (
+            self.evidence(term, beside) > 0
+            and self.beyond_sampling(term, beside)
+            and self.plausible(term, beside)
+        )
+
+    def run(self) -> list[str]:
+        """The terms that stay."""
+        kept = list(self.fixed)
+        while True:
+            left = [term for term in self.candidates if term not in kept and has_need(term, kept)]
+            better = [
+                (self.evidence(term, kept), term) for term in left if self.supported(term, kept)
+            ]
+            if not better:
+                break
+            kept.append(max(better)[1])
+        while True:
+            needed = {EVERY_TERM[term].needs for term in kept}
+            poor = []
+            for term in outside(kept, self.fixed):
+                if term in needed:
+                    continue
+                others = outside(kept, (term,))
+                if not self.supported(term, others):
+                    poor.append((self.evidence(term, others), term))
+            if not poor:
+                return kept
+            kept.remove(min(poor)[1])
+
+    def trial(self, term: str, kept: Sequence[str], asked: Sequence[str]) -> TermTrial:
+        """What became of a term, beside those that were kept."""
+        beside = [other for other in kept if other != term and EVERY_TERM[other].needs != term]
+        if term not in asked and not has_need(term, beside):
+            reason = f"left out: no meaning without {EVERY_TERM[term].needs}"
+            return TermTrial(term, False, 0.0, reason)
+        evidence = self.evidence(term, beside)
+        if term in asked:
+            reason = "asked for"
+        elif term in kept:
+            reason = "kept: evident in the first pass of the likelihood"
+        elif evidence <= 0:
+            reason = "left out: not significant"
+        elif not self.beyond_sampling(term, beside):
+            reason = "left out: explains less than sampling leaves open"
+        elif not self.plausible(term, beside):
+            reason = "left out: its value would contradict physics"
+        else:
+            reason = "left out: other terms explain the same"
+        return TermTrial(term, term in kept or term in asked, evidence, reason)
+
+
+def select(
+    unloaded: Sequence[Source],
+    loaded: Sequence[Source],
+    settings: WeakSettings,
+    candidates: Sequence[str] = CHOICE,
+    kept: Sequence[str] = (),
+    absent: Collection[str] = (),
+) -> Selection:
+    """Choose the terms of the torque's model.
+
+    Parameters
+    ----------
+    unloaded, loaded : sequences of callables
+        Each gives a fresh iterable of `Segment`; it is called once. Of more than `_MOST_LOGS` some,
+        evenly spread.
+    settings : WeakSettings
+        Its model's gravity, its window, bandwidth, hold and delay.
+    candidates : names in `CHOICE`
+        A delay that turns out negative is a lag where that explains more.
+    kept : names in `CHOICES`
+        Terms that stay whatever the data say; only their shapes are found.
+    absent : names of parameters
+        That the unloaded arm's torque does not hold: what is found for them is noise.
+
+    Raises
+    ------
+    TooShortError
+        If no log is long enough for a window, or for the likelihood.
+    """
+    kinds = [_Pieces.of(unloaded), _Pieces.of(loaded)]
+    shapes, start = _start(kinds, settings)
+    every = replace(shapes, terms=tuple(name for name, term in TERMS.items() if not term.lags))
+    shared = Shared(every, delay=True)
+    every_log = opened(kinds[0].sources, kinds[1].sources, shared, settings.shift)
+    logs = [log for log in every_log if log.loaded in start]
+    driven = [
+        any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
+    ]
+    if not all(driven):
+        candidates = outside(candidates, _OF_BOTH_TORQUES)
+    at: dict[bool, FloatArray] = {}
+    for is_loaded, c in start.items():
+        at[is_loaded] = np.zeros(len(shared.log_names))
+        at[is_loaded][[shared.log_names.index(name) for name in shapes.names]] = c
+        at[is_loaded][-1] = settings.shift.delay
+    fixed = tuple(kept)
+    everything = tuple(dict.fromkeys(tuple(candidates) + fixed))
+    base = settings.shift.delay
+    first = FirstPass(logs, shared, at, base)
+    before: list[str] | None = None
+    for _ in range(_ROUNDS):
+        offered = first.columns(everything)
+        refuted = first.refuted(offered)
+        scale = first.mean_square(offered)
+        search = _Search(first, outside(candidates, fixed), fixed, absent, scale)
+        terms = search.run()
+        after = first.coefficients(first.solve(first.columns(terms))[0])
+        # a delay of samples that explains most is far from linear in its column
+        late = (after[False][-1] - at[logs[0].loaded][-1]) / first.dt
+        far = abs(late) > 1 and terms[len(fixed) : len(fixed) + 1] == [*_DELAY]
+        linear = all(EVERY_TERM[term].linear and not EVERY_TERM[term].timing for term in terms)
+        if (refuted and not far) or linear or terms == before:
+            break
+        at, before = after, terms
+        first = FirstPass(logs, shared, at, base)
+        if far and late < 0 and _LAG:
+            other = _lagging(logs, shared, at, base)
+            others = [term for term in terms if term not in _DELAY]
+            left, column = first.columns(terms), other.columns([*others, *_LAG])
+            scale = other.mean_square(column)
+            less = (first.solve(left)[1] - other.solve(column)[1]) / scale
+            # the noise of a torque whose low-pass is undone is larger
+            if less + first.determinant - other.determinant > 2 * SURE:
+                first, shared = other, other.shared
+                at = first.coefficients(first.solve(column)[0])
+                candidates = [term for term in candidates if term not in _DELAY] + [*_LAG]
+                everything = tuple(dict.fromkeys((*candidates, *fixed)))
+    lateness = first.lateness(terms)
+    if refuted:  # of what a model that does not hold leaves, no part is the delay's
+        lateness = replace(lateness, std=np.inf)
+    own = without_delay(terms)
+    chosen = Selection(
+        replace(shapes, terms=own),
+        len(own) < len(terms),
+        shapes=shapes,
+        refuted=refuted,
+        late=lateness,
+    )
+    if not candidates:
+        return chosen
+    trials = tuple(search.trial(term, terms, kept) for term in everything)
+    return replace(chosen, chosen_by="logs", trials=trials)
+
+
+def _lagging(
+    logs: Sequence[LogEvidence], shared: Shared, at: Mapping[bool, FloatArray], base: float
+) -> FirstPass:
+    """The first pass with a lag of the torque in place of the delay at `at`, which is negative."""
+    model = replace(shared.model, terms=shared.model.terms + _LAG)
+    lagging = replace(shared, model=model)
+    place = lagging.log_names.index(EVERY_TERM[_LAG[0]].names[0])
+    shifted = {}
+    for loaded, c in at.items():
+        shifted[loaded] = np.insert(c, place, base - c[-1])
+        shifted[loaded][-1] = base
+    return FirstPass(logs, lagging, shifted, base)

@@ -1,0 +1,128 @@
+"""The terms of the torque that logs choose, and how late they show it to act."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from algid.estimators.terms import CHOICE, Selection, needs_shape, select
+from algid.estimators.weak import Source, WeakSettings
+from algid.model import EVERY_TERM, TERMS, Model
+from algid.signals.segments import Segment
+from tests.estimators.conftest import Bench
+from tests.estimators.test_terms import term_log, term_values
+
+SETTINGS = WeakSettings(bandwidth=60.0)
+
+
+def _of(log: Segment, **asked: object) -> Selection:
+    return select([partial(list, [log])], [], SETTINGS, **asked)  # type: ignore[arg-type]
+
+
+def _chosen(bench: Bench, terms: tuple[str, ...], **asked: object) -> Selection:
+    model = Model(terms, coulomb_speed=0.05)
+    values = term_values(bench, terms)
+    bare, burdened = (term_log(bench, model, values, loaded) for loaded in (False, True))
+    unloaded: list[Source] = [partial(list, [bare])]
+    return select(unloaded, [partial(list, [burdened])], SETTINGS, **asked)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [(), ("coulomb",), ("offset", "rotor"), ("load",), ("gain",), ("phases",), ("lag",)],
+    ids="+".join,
+)
+def test_the_terms_that_are_there_are_chosen_and_no_other(
+    bench: Bench, terms: tuple[str, ...]
+) -> None:
+    chosen = _chosen(bench, terms)
+    assert chosen.model.terms == terms
+    assert (chosen.delay, chosen.refuted, chosen.chosen_by) == (False, False, "logs")
+    assert {trial.term for trial in chosen.trials if trial.kept} == set(terms)
+    assert len(chosen.trials) == len(CHOICE)
+
+
+@pytest.mark.parametrize(("share", "found"), [(1e-4, False), (0.1, True)])
+@pytest.mark.parametrize("term", ["rotor", "offset"])
+def test_a_term_below_the_sampling_error_of_a_log_without_noise_is_left_out(
+    bench: Bench, term: str, share: float, found: bool
+) -> None:
+    """A hundredth of a period in the stamps makes more of the torque than such a term."""
+    values = term_values(bench, (term,))
+    values |= {name: share * values[name] for name in EVERY_TERM[term].names}
+    log = term_log(bench, Model((term,)), values, noise=0.0)
+    chosen = _of(log, candidates=("rotor", "offset", "gain"))
+    assert chosen.model.terms == ((term,) if found else ())
+    if not found:
+        reasons = {trial.term: trial.reason for trial in chosen.trials}
+        assert reasons[term] == "left out: explains less than sampling leaves open"
+
+
+def test_the_width_of_friction_that_is_asked_for_is_found(bench: Bench) -> None:
+    chosen = _chosen(bench, ("coulomb",), candidates=(), kept=("coulomb",))
+    assert (chosen.chosen_by, chosen.model.terms) == ("settings", ("coulomb",))
+    # velocities are smoothed: a widest guess
+    assert chosen.model.coulomb_speed == pytest.approx(0.05, rel=0.5)
+    shaped = {term for term in TERMS if needs_shape([term])}
+    assert shaped == {"coulomb", "stribeck", "asymmetry", "load"}
+
+
+def test_terms_that_physics_does_not_allow_or_that_need_another_are_left_out(bench: Bench) -> None:
+    """Drives that push with the motion are as evident as friction is."""
+    pushed = replace(bench.log(sigma=1e-4), tau=bench.log(sigma=1e-4).tau - 0.1 * _signs(bench))
+    chosen = _of(pushed, candidates=("coulomb", "stribeck"))
+    trials = {trial.term: trial for trial in chosen.trials}
+    assert trials["coulomb"].reason == "left out: its value would contradict physics"
+    assert trials["coulomb"].evidence > 0
+    assert trials["stribeck"].reason == "left out: no meaning without coulomb"
+    assert chosen.model.terms == ()
+    asked = _of(pushed, candidates=("coulomb",), kept=("coulomb",))
+    assert asked.model.terms == ("coulomb",)
+    assert asked.trials[0].reason == "asked for"
+
+
+def _signs(bench: Bench) -> np.ndarray:
+    return np.asarray(np.tanh(bench.bare.omega / 0.05))
+
+
+@pytest.mark.parametrize("samples", [6, -6], ids=["late", "early"])
+def test_a_torque_that_acts_late_or_early_is_a_delay_and_no_lag(bench: Bench, samples: int) -> None:
+    """A lag would lag the more the faster the torque."""
+    log = bench.log(sigma=1e-4)
+    count = len(log) - abs(samples)
+    theta, tau = max(-samples, 0), max(samples, 0)
+    shifted = replace(
+        log,
+        theta=log.theta[:, theta : theta + count],
+        tau=log.tau[:, tau : tau + count],
+        omega=None,
+    )
+    chosen = _of(shifted, candidates=("delay",))
+    assert (chosen.delay, chosen.model.terms) == (True, ())
+    late = chosen.late
+    assert late is not None
+    assert late.late == pytest.approx(samples * log.dt, abs=5e-2 * log.dt)
+
+
+def test_a_joint_without_a_motor_has_no_gain_to_choose(bench: Bench) -> None:
+    log = bench.log(sigma=1e-3)
+    passive = replace(log, tau=log.tau * np.array([[1.0], [0.0]]))
+    assert [one.term for one in _of(passive, candidates=("gain", "rotor")).trials] == ["rotor"]
+
+
+def test_torque_that_no_term_explains_refutes_the_first_pass(bench: Bench) -> None:
+    log = bench.log(sigma=1e-4)
+    slow = 0.3 * np.sign(np.sin(2 * np.pi * 1.3 * bench.bare.t))
+    chosen = _of(replace(log, tau=log.tau + slow))
+    assert chosen.refuted
+    assert chosen.late is not None
+    assert not chosen.late.determined
+    assert not _of(log).refuted
+
+
+def test_logs_too_short_for_a_window_are_refused() -> None:
+    with pytest.raises(ValueError, match="no log is long enough"):
+        select([list], [], SETTINGS)
