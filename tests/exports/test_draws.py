@@ -6,7 +6,6 @@ import io
 import json
 import xml.etree.ElementTree as ET
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -19,8 +18,7 @@ from algid.base.errors import ResultError, SettingError
 from algid.exports.draws import draws_of, freedom_of
 from algid.exports.links import Knowns
 from algid.model import Model
-from algid.results import Result, result_json
-from tests.cli.commands import call
+from algid.results import Result
 from tests.exports.arms import ODD, result_of, states, values_of
 
 VALUE = values_of(ODD, f1=0.4, f2=0.3)
@@ -70,11 +68,6 @@ def test_the_degrees_of_freedom_are_those_of_the_interval() -> None:
     for nu in (2.0, 3.3, 40.0, 1e4):
         assert freedom_of(student_quantile(nu)) == pytest.approx(nu, rel=1e-6)
     assert freedom_of(1.9599) == np.inf
-
-
-def test_a_given_length_holds_in_every_draw() -> None:
-    for numbers, *_ in islice(draws_of(correlated(), "arm", 0, Knowns(l1=0.41), links=False), 20):
-        assert 9.81 * numbers["k1"] / numbers["k2"] == pytest.approx(0.41, rel=1e-9)
 
 
 def test_every_draw_is_a_possible_arm() -> None:
@@ -149,35 +142,6 @@ def test_draws_cover_held_out_torques_as_often_as_stated() -> None:
         covered.append(np.mean((low <= true) & (true <= high)))
     # of the share by arm, whose torques share their errors: three standard errors about 95 %
     assert np.mean(covered) == pytest.approx(0.95, abs=3 * np.std(covered) / np.sqrt(len(covered)))
-
-
-def test_the_command_writes_a_folder_that_a_seed_repeats(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("arm.json").write_text(result_json(correlated()), encoding="utf-8")
-    assert call("export", "arm.json", "--to", "mjcf", "--draws", "3").code == 0
-    folder = Path("arm-draws")
-    names = ["draw-1.xml", "draw-2.xml", "draw-3.xml", "manifest.json"]
-    assert sorted(path.name for path in folder.iterdir()) == names
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    assert manifest["degrees_of_freedom"] == pytest.approx(NU)
-    assert (manifest["seed"], manifest["known"]) == (0, {})
-    for to, name in (("csv", "more"), ("parquet", "same")):
-        assert call("export", "arm.json", "--to", to, "--draws", "9", "-o", name).code == 0
-    table = pl.read_csv("more/draws.csv")
-    assert table.equals(pl.read_parquet("same/draws.parquet"))
-    # the payload does not go by the links' lengths, as the constants do
-    for name in ("m_p", "l1", "l2"):
-        assert table[name][:3].to_list() == [row[name] for row in manifest["draws"]]
-    for arguments, said in (
-        (("csv",), "--to csv: a table of draws; say how many by --draws"),
-        (("payload", "--draws", "2"), "--draws: payload has no draws; leave it out"),
-        (("csv", "--draws", "2", "--set", "m1=1"), "--set m1: csv holds no such number"),
-        (("mjcf", "--draws", "3", "-o", "more"), "more: exists already"),
-    ):
-        done = call("export", "arm.json", "-o", "new", "--to", *arguments)
-        assert (done.code, said in done.err) == (2, True), done
 
 
 def test_draws_of_what_has_no_error_bars_are_refused() -> None:

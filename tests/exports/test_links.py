@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from algid.arm import Arm
 from algid.base.errors import AlgidError, ResultError, SettingError
 from algid.base.significance import NORMAL
-from algid.exports.description import coefficients_of, describe
-from algid.exports.formats import FORMATS, exported
+from algid.exports.description import coefficients_of
+from algid.exports.formats import exported
 from algid.exports.links import Knowns, Link, links_of
 from algid.model import Model
-from algid.results import Result, result_json
-from tests.cli.commands import app
-from tests.exports.arms import ODD, UNIFORM, result_of, values_of
+from algid.results import Result
+from tests.exports.arms import ODD, result_of, values_of
 
 POSITIVE = st.floats(0.05, 20)
 
@@ -42,32 +39,6 @@ def constants_of(links: tuple[Link, Link], rotor: float, arm: Arm) -> list[float
         arm.g,
     )
     return list(made.constants())
-
-
-@pytest.mark.parametrize("l2", [None, 0.3])
-def test_uniform_links_are_found_from_their_constants(l2: float | None) -> None:
-    value = values_of(UNIFORM)
-    first, second = links_of(value, 9.81, 9.81 * value["k1"] / value["k2"], Knowns(l2=l2), "arm")
-    found = (
-        first.mass,
-        first.centre,
-        first.inertia,
-        second.length,
-        second.mass,
-        second.centre,
-        second.inertia,
-    )
-    expected = (
-        UNIFORM.m1,
-        UNIFORM.lc1,
-        UNIFORM.I1,
-        UNIFORM.l2,
-        UNIFORM.m2,
-        UNIFORM.lc2,
-        UNIFORM.I2,
-    )
-    # a minimum is found to the root of rounding
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
 
 
 @given(
@@ -155,41 +126,6 @@ def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
     assert found.value["k3"] == ODD.constants()[2]
 
 
-def test_without_error_bars_both_constants_give_way() -> None:
-    result = result_of(values_of(ODD)).model_copy(update={"fit": None, "estimator": "weak"})
-    found = coefficients_of(result, "arm", 0.44)
-    assert found.value["k1"] * 9.81 / found.value["k2"] == pytest.approx(0.44, rel=1e-12)
-    moved = found.value["k1"] / ODD.constants()[0] - 1, found.value["k2"] / ODD.constants()[1] - 1
-    assert moved[0] == pytest.approx(-moved[1] * ODD.l1 / 0.44 * 1.1, rel=0.11)
-    assert moved[0] > 0 > moved[1]
-
-
-def test_the_file_says_what_is_identified_given_and_chosen() -> None:
-    result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3})
-    numbers = {
-        number.name: number
-        for number in describe(result, "a", Knowns(m2=0.7, rotor1=0.01), links=True).numbers
-    }
-    origins = {name: number.origin.split(",")[0].split(":")[0] for name, number in numbers.items()}
-    assert origins == dict.fromkeys(
-        ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "lc2", "I2"), "identified"
-    ) | {
-        "l1": "identified with the payload",
-        "g": "given",
-        "m2": "given",
-        "rotor1": "given",
-        "m1": "chosen",
-        "lc1": "chosen with the masses",
-        "I1": "chosen with the masses",
-        "l2": "identified with the payload",
-    }
-    assert numbers["I2"].value == pytest.approx(ODD.I2)
-    for to in FORMATS:
-        text = exported(result, "a--b", to, Knowns())[0]
-        assert "identified, ± 0.00" in text
-        assert "a--b" in text or FORMATS[to].links
-
-
 @pytest.mark.parametrize(
     ("to", "known", "message"),
     [
@@ -248,66 +184,3 @@ def test_results_that_no_arm_explains_are_refused() -> None:
             "payload",
             Knowns(),
         )
-
-
-def test_the_payload_comes_with_its_error_bars() -> None:
-    result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=0.01)
-    text, warnings = exported(result, "arm", "payload", Knowns())
-    assert warnings == ()
-    assert "  mass: 0.5  # kg\n  mass_std: 0.005\n" in text
-    assert (
-        "  centre_of_gravity: [0.3, 0.0, 0.0]  # m\n  centre_of_gravity_std: [0.003, 0.0, 0.0]\n"
-        in text
-    )
-    text, (warning,) = exported(result, "arm", "payload", Knowns(l2=0.4))
-    assert "[0.4, 0.0, 0.0]" in text
-    assert "centre_of_gravity_std: [0.0," in text
-    assert warning.text == "l2 is given as 0.4 m, but identified as 0.3 ± 0.0059 m (33 σ apart)"
-
-
-def run(result: Result, folder: Path, *arguments: str) -> tuple[int, str, set[str]]:
-    """Exit code, what was said, and the files there are but for the result."""
-    file = folder / "arm.json"
-    file.write_text(result_json(result), encoding="utf-8")
-    done = CliRunner().invoke(app, ["export", str(file), *arguments])
-    said = (
-        done.output
-        if done.exception is None or isinstance(done.exception, SystemExit)
-        else str(done.exception)
-    )
-    code = 2 if isinstance(done.exception, AlgidError) else done.exit_code
-    return code, said, {path.name for path in folder.iterdir()} - {"arm.json"}
-
-
-def test_the_command_warns_refuses_and_never_overwrites(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    result = result_of(values_of(ODD))
-    code, said, files = run(result, tmp_path, "--to", "urdf", "--l1", "0.41")
-    assert (code, files) == (0, {"arm.urdf"})
-    told = "l1 is given as 0.41 m, but identified as 0.4 ± 0.0011 m (18 σ apart)"
-    assert told in said
-    assert told in (tmp_path / "arm.urdf").read_text(encoding="utf-8")
-    code, said, _ = run(result, tmp_path, "--to", "urdf")
-    assert code == 2
-    assert "arm.urdf: exists already" in said
-    assert run(result, tmp_path, "--to", "urdf", "--force")[0] == 0
-    assert run(result, tmp_path, "--to", "stl")[0] == 2
-    bare = result.model_copy(update={"parameters": {}})
-    code, said, files = run(bare, tmp_path, "--to", "mjcf")
-    assert (code, said, files) == (
-        2,
-        f"{tmp_path / 'arm.json'}: the result has no k1; identify it from logs that determine it",
-        {"arm.urdf"},
-    )
-
-
-@pytest.mark.parametrize("to", ["c", "python"])
-def test_words_of_the_templates_stay_as_they_are_in_a_files_name(to: str) -> None:
-    for name in ("ROTOR.algid", "ANGLE1.algid", "$SIGNS.algid", "${M11}.algid", "K3ROTOR"):
-        text = exported(result_of(values_of(ODD, j2=0.004), Model(("rotor",))), name, to, Knowns())[
-            0
-        ]
-        assert f"Two-link arm by algid export, from {name}, estimator refined.\n" in text
-        assert "$" not in text.replace(name, "")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import itertools
 import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -17,7 +16,7 @@ from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.exports.description import coefficients_of
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
-from algid.model import TERMS, Model, Motion, acceleration, torque
+from algid.model import Model, Motion, acceleration, torque
 from algid.synth.excitation import SampledTorque
 from algid.synth.simulator import simulate
 from tests.estimators.test_model import FULL, VALUES
@@ -146,27 +145,6 @@ def test_bent_links_in_a_plane_and_of_a_length_that_is_given() -> None:
     assert 9.81 * abs(K1) == pytest.approx(0.41 * abs(K2), rel=1e-14)
     text = text_of("mjcf", value, BENT, l1=0.41)
     assert_close(by_mujoco(text), wanted(dict(found.value), BENT), CLOSE)
-
-
-def test_sdf_stands_as_urdf_and_mjcf_do() -> None:
-    """No library here computes with it: the same places, turns and inertias as URDF's."""
-    value = bent(0.2)
-    sdf = ET.fromstring(text_of("sdf", value, BENT))
-    urdf = ET.fromstring(text_of("urdf", value, BENT))
-    for name in ("link1", "link2"):
-        ours = sdf.find(f".//link[@name='{name}']/inertial/pose")
-        theirs = urdf.find(f".//link[@name='{name}']/inertial/origin")
-        assert ours is not None
-        assert theirs is not None
-        assert (ours.text or "").split()[:3] == theirs.attrib["xyz"].split()
-    turned, joint = (
-        sdf.find(".//link[@name='link1']/pose"),
-        urdf.find("joint[@name='joint1']/origin"),
-    )
-    assert turned is not None
-    assert joint is not None
-    assert (turned.text or "").split()[3:] == joint.attrib["rpy"].split()
-    assert list(map(float, joint.attrib["rpy"].split())) == pytest.approx([0, -0.2, 0])
 
 
 def test_mujocos_simulation_follows_algids() -> None:
@@ -326,22 +304,3 @@ def test_sdf_tells_the_same_links() -> None:
     np.testing.assert_allclose(arm.constants(), ODD.constants(), rtol=1e-12)
     assert number("model/joint[@name='joint2']/axis/dynamics/friction") == 0.3
     assert root.findtext("model/joint[@name='joint1']/axis/xyz") == "0 -1 0"
-
-
-@pytest.mark.parametrize(
-    ("to", "term"), list(itertools.product(["urdf", "mjcf", "sdf", "python", "c"], TERMS))
-)
-def test_a_file_says_which_terms_it_lacks(to: str, term: str) -> None:
-    held = {
-        "urdf": {"coulomb", "phases"},
-        "sdf": {"coulomb", "phases"},
-        "mjcf": {"coulomb", "rotor", "phases"},
-        "python": set(TERMS) - {"lag"},
-        "c": set(TERMS) - {"lag"},
-    }[to]
-    value = {
-        **values_of(ODD),
-        **{name: VALUES[name] for one in TERMS.values() for name in one.names},
-    }
-    text = text_of(to, value, Model((term,)))
-    assert (f"lacks {TERMS[term].title}" in text) == (term not in held)

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-import algid
 from algid.arm import inverse_dynamics
 from algid.base.errors import ResultError
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.exports.read_urdf import read_urdf
 from algid.model import Model, Motion, torque
-from tests.cli.commands import app
 from tests.exports.arms import ODD, result_of, states, values_of
 
 CAD = """<robot name="cad">
@@ -128,28 +124,3 @@ def test_a_centre_beside_its_line_is_taken_over(tmp_path: Path) -> None:
         wanted = pin.rnea(robot, data, q, omega[:, place], alpha[:, place])
         wanted += damping * omega[:, place]
         np.testing.assert_allclose(found[:, place], wanted, rtol=0, atol=1e-9 * np.abs(found).max())
-
-
-def test_validate_simulates_results_and_files_alike(tmp_path: Path) -> None:
-    unloaded, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
-    log, file = tmp_path / "run.csv", tmp_path / "arm.urdf"
-    algid.write_log(log, unloaded)
-    result = algid.identify(
-        log, settings=algid.Settings(estimator="weak", model="plain"), out=tmp_path, report=False
-    )
-    file.write_text(exported(result, "run", "urdf", Knowns())[0])
-    found = []
-    for judged in (tmp_path / "run.algid", file):
-        done = CliRunner().invoke(app, ["validate", str(judged), str(log), "--simulate"])
-        assert done.exit_code == 0, done.output
-        assert done.output.count("rad") >= 2
-        done = CliRunner().invoke(
-            app, ["validate", str(judged), str(log), "--simulate", "--format", "json"]
-        )
-        found.append(json.loads(done.stdout)["simulation"]["all logs"])
-    ours, theirs = found
-    assert [row["horizon"] for row in ours] == [0.1, 0.5, 2.0]
-    for mine, other in zip(ours, theirs, strict=True):
-        assert mine["starts"] == other["starts"] > 0
-        np.testing.assert_allclose(mine["rmse"], other["rmse"], rtol=1e-3)
-        assert max(mine["rmse"]) < 0.02 * max(mine["moved"])

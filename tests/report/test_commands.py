@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from algid.api.compare import labels_of as labels
 from algid.base.errors import SettingError
-from algid.results import read_result, result_json
 from tests.cli.commands import app
 
 
@@ -37,12 +35,6 @@ def test_report_writes_its_files_and_prints_the_table(folder: Path) -> None:
     )
 
 
-def test_json_is_the_result_alone(folder: Path) -> None:
-    out, _ = run("report", folder, "--format", "json", "--set", "shared_library=true")
-    assert out == result_json(read_result(folder))
-    assert (folder.parent / "plotly.min.js").exists()
-
-
 def test_compare_tells_sigma_in_every_format(folder: Path) -> None:
     table, _ = run("compare", folder, folder / "result.json")
     assert "Every setting is the same, and every log was read the same way." in " ".join(
@@ -56,8 +48,3 @@ def test_compare_tells_sigma_in_every_format(folder: Path) -> None:
 def test_one_result_is_too_few(folder: Path) -> None:
     with pytest.raises(SettingError, match="expected two results or more, found 1"):
         run("compare", folder)
-
-
-def test_labels_are_names_where_they_tell_apart() -> None:
-    assert labels([Path("a/x.algid"), Path("a/y.algid/result.json")]) == ["x", "y"]
-    assert labels([Path("a/x.algid"), Path("b/x.algid")]) == ["a/x", "b/x"]

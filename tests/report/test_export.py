@@ -96,15 +96,6 @@ def test_series_are_flat_fields(messages: dict[str, list[Any]], case_folder: Pat
     np.testing.assert_array_equal(found, rows["k5+k3+z1+z2"].to_numpy())
 
 
-def test_without_a_first_stamp_time_counts_from_zero(case_folder: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "x.algid"
-    folder.mkdir()
-    shutil.copy(case_folder / "result.json", folder)
-    pl.read_parquet(case_folder / "torque.parquet").head(5).write_parquet(folder / "torque.parquet")
-    stamps = [message.message.log_time for message in read(export_mcap(folder))["/algid/predicted"]]
-    assert stamps == [0, 1_000_000, 2_000_000, 3_000_000, 4_000_000]
-
-
 def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ResultError, match=r"result\.json: cannot read it"):
         export_mcap(tmp_path)

@@ -8,10 +8,7 @@ from hypothesis import strategies as st
 
 from algid.base.text import (
     file_name,
-    interval,
-    joined,
     lines_of,
-    percent,
     resolved,
     significant,
     visible,
@@ -56,27 +53,11 @@ def test_the_standard_deviation_decides_how_many_digits_are_worth_writing() -> N
     assert resolved(1.0, 1e-30) == "1.0000000"
 
 
-def test_an_unbounded_interval_says_so() -> None:
-    assert interval(None, None, None) == "[−∞, ∞]"
-    assert interval(0.1, None, 0.01) == "[0.100, ∞]"
-    assert interval(-0.0055, 0.019, 0.006) == "[-0.0055, 0.0190]"
-
-
-def test_a_share_of_nothing_is_absent() -> None:
-    assert percent(1.0, 0.0) == "–"
-    assert percent(None, 1.0) == "–"
-    assert percent(0.5, -2.0) == "25"
-
-
 def test_what_cannot_be_seen_is_written_as_an_escape() -> None:
     assert visible("a\x1b[31mb\n\u202eé") == "a\\x1b[31mb\\x0a\\u202eé"
     assert visible("x" * 1000) == "x" * 300 + "…"
     assert file_name("C:\\logs\\a\tb.csv") == "a\\x09b.csv"
     assert file_name("/") == "/"
-
-
-def test_words_are_joined_as_in_a_sentence() -> None:
-    assert [joined([]), joined(["a"]), joined(["a", "b", "c"])] == ["", "a", "a, b and c"]
 
 
 def test_no_flag_parts_from_its_value_and_no_path_breaks() -> None:

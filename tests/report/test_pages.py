@@ -13,25 +13,22 @@ from importlib import resources
 from pathlib import Path
 
 import plotly.graph_objects as go
-import polars as pl
 import pytest
 
 from algid.base.errors import ResultError
 from algid.base.verdict import Verdict
 from algid.notices import Notice
 from algid.report.document import Document, Section, Table
-from algid.report.page import result_document, write_pages
-from algid.report.render import library, markdown, page, strict_json
+from algid.report.page import write_pages
+from algid.report.render import library, markdown, strict_json
 from algid.results import (
-    Estimate,
     Result,
     Status,
-    TermCriterion,
     read_result,
     write_result,
 )
 from algid.results.rows import rows_of
-from tests.report.folders import HOSTILE, estimate, hostile
+from tests.report.folders import HOSTILE, hostile
 from tests.report.pages import Page
 
 FIGURES = [
@@ -154,27 +151,6 @@ def test_a_page_is_light(folder: Path) -> None:
     assert len(written(folder).text.encode()) <= 1_100_000
 
 
-@pytest.mark.parametrize(
-    ("name", "figures"),
-    [
-        ("estimates", {"estimates"}), ("loaded", {"loaded"}), ("innovations", {"residual"}),
-        ("running", {"running"}), ("information", {"information"}),
-        ("torque", {"torque", "closeup", "signals", "coverage"}),
-    ],
-)  # fmt: skip
-def test_what_is_absent_or_broken_is_not_drawn(folder: Path, name: str, figures: set[str]) -> None:
-    path = folder / f"{name}.parquet"
-    path.write_bytes(b"PAR1 no parquet")
-    shown = written(folder)
-    assert set(FIGURES) - set(shown.figures) == figures
-    assert shown.text.count(f"{name}.parquet: cannot read it as Parquet") == 1
-    assert ("arm" in shown.figures) is (name != "torque")
-    path.unlink()
-    shown = written(folder)
-    assert set(FIGURES) - set(shown.figures) == figures
-    assert "Not shown" not in shown.text
-
-
 def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> None:
     bare = tmp_path / "bare.algid"
     shown = written(bare, result.model_copy(update={"fit": None, "more_logs": []}))
@@ -184,45 +160,6 @@ def test_a_bare_result_still_makes_a_page(tmp_path: Path, result: Result) -> Non
         write_pages(tmp_path)
 
 
-def test_torque_that_is_scored_stands_before_what_was_recorded(folder: Path) -> None:
-    raw = pl.read_parquet(folder / "torque.parquet")
-    scored = raw.select("log", "t", "tau1", "tau2", "tau1_predicted", "tau2_predicted")
-    scored.with_columns(pl.col("tau1") * 0.5).write_parquet(folder / "scored.parquet")
-    data = written(folder).figures["torque"]["data"]
-    recorded = [one for one in data if one["name"] == "residual as recorded"]
-    assert [one["visible"] for one in recorded] == ["legendonly"] * 2
-    assert [one["yaxis"] for one in recorded] == ["y2", "y4"]
-
-
-def test_the_papers_method_comes_first_where_it_was_asked_for(folder: Path, result: Result) -> None:
-    other = result_document(result, folder)
-    assert [part.folded for part in other.parts if part.key == "paper"] == [True]
-    of_paper = result.model_copy(update={"estimator": "paper", "fit": None})
-    document = result_document(of_paper, folder)
-    assert [part.key for part in document.parts[:2]] == ["numbers", "paper"]
-    assert not document.parts[1].folded
-    assert [plot.key for plot in document.plots[:2]] == ["estimates", "loaded"]
-
-
-def test_nuisance_terms_that_may_be_zero_are_folded(result: Result) -> None:
-    terms = {
-        "f1": estimate(0.2, 0.01, "N m"),
-        "o1": estimate(0.01, 0.02, "N m", Status.NOT_SIGNIFICANT),
-    }
-    document = result_document(
-        result.model_copy(update={"parameters": {**result.parameters, **terms}})
-    )
-    parts = {part.key: part for part in document.parts}
-    (other,) = [one for one in parts["terms"].shown if isinstance(one, Table)]
-    assert [row[0] for row in other.rows] == ["f1"]
-    (zero,) = parts["zero"].shown
-    assert isinstance(zero, Table)
-    assert [row[0] for row in zero.rows] == ["o1"]
-    assert parts["zero"].folded
-    assert parts["zero"].title == "1 term of the torque may be zero"
-    assert not parts["terms"].folded
-
-
 def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> None:
     poor = result.parameters["k1"].model_copy(update={"status": Status.NOT_CONVERGED})
     good = written(folder, result)
@@ -230,25 +167,6 @@ def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> N
     failed = written(folder, result.model_copy(update={"parameters": {"k1": poor}}))
     assert 'class="verdict failed"' in failed.text
     assert "whole ok" not in failed.text
-
-
-def test_terms_are_shown_with_what_they_gain(folder: Path, result: Result) -> None:
-    assert result.fit is not None
-    why = "left out: not significant"
-    terms = [
-        TermCriterion(term="coulomb", kept=True, gain_heldout=0.5, evidence=40.0, why="kept"),
-        TermCriterion(term="offset", kept=False, gain_heldout=-0.01, evidence=-4.0, why=why),
-        TermCriterion(term="rotor", kept=False, why=why),
-    ]
-    fit = result.fit.model_copy(update={"terms": terms})
-    shown = written(folder, result.model_copy(update={"fit": fit}))
-    heads, rows = shown.tables["Terms tried"]
-    assert heads == ["Term", "Held-out error, %", "Log odds", "Kept", "Why"]
-    assert rows == [
-        ["coulomb", "-50.00", "+40.0", "yes", "kept"],
-        ["offset", "+1.00", "-4.0", "no", why],
-        ["rotor", "–", "–", "no", why],
-    ]
 
 
 def document(**more: object) -> Document:
@@ -261,24 +179,6 @@ def document(**more: object) -> Document:
         Section("two", "Two", ("a sentence", ("first", "second"), table), folded=True),
     )
     return Document("Title", verdict, parts, "kicker", "name", "facts", "made", **more)  # type: ignore[arg-type]
-
-
-def test_three_reasons_are_shown_and_the_rest_and_the_notes_are_folded() -> None:
-    first, _, rest = page(document()).partition("<details>")
-    assert [place for place in range(5) if f"reason {place}" in first] == [0, 1, 2]
-    assert "2 more reasons" in rest
-    assert "1 data note" in rest
-    assert "a.csv: reason 4" in rest
-
-
-def test_sections_without_content_are_left_out_and_folded_ones_closed() -> None:
-    shown = Page(page(document()))
-    parts = {a["id"]: "open" in a for t, a in shown.tags if t == "details" and "id" in a}
-    assert parts == {"two": False}
-    assert "None" not in shown.prose
-    assert "<p>a sentence</p>" in shown.text
-    assert "<li>first</li><li>second</li>" in shown.text
-    assert shown.tables == {"T & Co": (["A", "N"], [["x|y", "1"]])}
 
 
 def test_markdown_has_every_table_and_a_command_that_can_be_copied() -> None:
@@ -313,12 +213,3 @@ def test_a_result_shows_itself_in_a_notebook(result: Result) -> None:
         result, result.parameters)[0].value]  # fmt: skip
     plot = algid.Result.of(result).plot()
     assert list(plot.data[0].y) == [*result.parameters, *result.payload]
-
-
-def test_what_cannot_be_estimated_is_a_dash_and_counts(result: Result) -> None:
-    lost = Estimate(estimate=None, ci95=(None, None), unit="m", status=Status.NOT_IDENTIFIABLE)
-    changed = result.model_copy(update={"parameters": {**result.parameters, "k5": lost}})
-    made = result_document(changed)
-    assert made.facts.startswith("6 of 7 constants identified")
-    row = rows_of(changed, {"k5": lost})[0]
-    assert (row.value, row.half, row.with_half, row.error) == ("–", "–", "–", "–")

@@ -14,7 +14,6 @@ import pytest
 
 from algid.identification.identify import identify
 from algid.log import Log, Origin
-from algid.report.progress import progress
 from algid.settings import Settings
 from algid.synth.cases import load_case
 from tests.processes import Outcome, begin
@@ -78,16 +77,6 @@ def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(
     assert "\x1b" not in after
 
 
-def test_no_color_is_honoured(path: Path, tmp_path: Path) -> None:
-    _, seen = on_a_terminal("identify", path, "-o", tmp_path, NO_COLOR="1")
-    assert "samples" in seen
-    assert not COLOUR.search(seen)
-
-
-def test_quiet_is_silent_on_a_terminal(path: Path, tmp_path: Path) -> None:
-    assert on_a_terminal("identify", path, "-o", tmp_path, "-q") == ("", "")
-
-
 @pytest.mark.parametrize("command", ["identify", "convert", "validate"])
 def test_a_pipe_gets_none_of_it(
     command: str, path: Path, tmp_path: Path, case_folder: Path
@@ -100,12 +89,6 @@ def test_a_pipe_gets_none_of_it(
     colour = {**os.environ, "FORCE_COLOR": "1"}  # asks for colour, not for a terminal's bars
     done = Outcome(command, *arguments[command], env=colour)
     assert (done.code, done.err) == (0, "")
-
-
-def test_nobody_is_told_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress("samples") as told:
-        assert told is None
-    assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("estimator", ["refined", "weak", "paper"])

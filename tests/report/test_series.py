@@ -58,19 +58,6 @@ def test_every_bucket_keeps_its_smallest_and_its_largest(
         assert short["t"][:2].tolist() == [0.0, 0.39]
 
 
-def test_short_series_are_left_as_they_are_and_logs_follow_one_another(tmp_path: Path) -> None:
-    frame = write(tmp_path / "a.parquet", (50, 60))
-    short = drawn(tmp_path / "a.parquet", points=1000)
-    known = np.isfinite(short["tau2"])
-    np.testing.assert_array_equal(short["tau2"][known], frame["tau2"].to_numpy())
-    assert np.count_nonzero(~known) == 1  # the line breaks between the logs
-    assert np.all(np.diff(short["x"]) >= 0)
-    starts = short.starts
-    assert starts[0] == 0.0
-    assert starts[1] == pytest.approx(1.01 * 0.49)
-    np.testing.assert_array_equal(short.samples["theta1"], frame["theta1"].to_numpy())
-
-
 def test_a_gap_breaks_the_line_and_is_counted(tmp_path: Path) -> None:
     frame = write(tmp_path / "a.parquet", (500,))
     frame.filter(~pl.col("t").is_between(1.0, 1.5)).write_parquet(tmp_path / "a.parquet")
@@ -94,13 +81,6 @@ def test_samples_are_whole_rows_and_never_in_step_with_the_motion(tmp_path: Path
     phase = np.sort(np.mod(samples["t"], 1.0))
     assert np.diff(phase).max() < 0.02
     assert np.unique(samples["t"]).size == 2000
-
-
-def test_progress_hears_every_sample(tmp_path: Path) -> None:
-    write(tmp_path / "a.parquet", (50, 60))
-    heard: list[tuple[str, int, int]] = []
-    drawn(tmp_path / "a.parquet", progress=lambda *told: heard.append(told))
-    assert heard == [("report", 50, 110), ("report", 110, 110)]
 
 
 def test_what_lies_between_two_moments_is_read_alone(tmp_path: Path) -> None:

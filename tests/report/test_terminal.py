@@ -50,19 +50,6 @@ def test_the_interval_and_the_status_stay_at_eighty_columns() -> None:
     assert "viscous" not in text
 
 
-def test_everything_stays_where_there_is_room() -> None:
-    text = printed(ESTIMATES, 140)
-    assert all(cell in text for row in (HEADS, *ROWS) for cell in row)
-
-
-def test_lines_break_between_words() -> None:
-    row = ("r1/monday", "left arm of the cell", "payload unlike its label", "+1.23", "[1.1, 1.4]")
-    kinds = dict(zip("ABCDE", ("name", "text", "text", "number", "number"), strict=True))
-    text = printed(Table("Logs", kinds, (row,)), 60)  # type: ignore[arg-type]
-    assert [word for cell in row for word in cell.split() if word not in text.split()] == []
-    assert "[1.1, 1.4]" in text  # numbers do not
-
-
 def test_a_path_that_fits_nowhere_breaks_and_numbers_do_not() -> None:
     path = "/a/very/long/path/" + "x" * 100 + ".mcap"
     table = Table("T", {"Log": "name", "Samples": "number"}, ((path, "1234567890"),), "a note")
