@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from algid.arm import FloatArray
 from algid.base.progress import Progress
 from algid.log import Log, Truth
 from algid.synth.cases import Case
@@ -14,6 +15,9 @@ from algid.synth.excitation import Hold, SampledTorque, Torque, no_torque, wide_
 from algid.synth.follow import Reference, follow
 from algid.synth.sensors import Sensors, record, sample_times
 from algid.synth.simulator import HANGING, SimulatedMotion, simulate
+
+Reached = Callable[[float], None] | None
+"""Called with each time in s that a simulation has come to."""
 
 EXCITATIONS = ("case", "wide", "none")
 
@@ -61,44 +65,44 @@ def synthesise(
     `progress` hears how far each is.
     """
     initial = np.array(recording.initial)
-    logs: list[Log] = []
-    for payload in (0.0, case.payload):
-        role = _role(payload)
-        sensors = replace(recording.sensors, seed=recording.sensors.seed + len(logs))
-        k = case.constants(payload)
-        t = sample_times(recording.rate, recording.duration, sensors)
-        motion = simulate(
-            k, torque, t, initial[:2], initial[2:], _counted(progress, role, recording)
-        )
-        logs.append(
-            record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
-        )
-    return logs[0], logs[1]
+
+    def move(payload: float, t: FloatArray, reached: Reached) -> SimulatedMotion:
+        return simulate(case.constants(payload), torque, t, initial[:2], initial[2:], reached)
+
+    unloaded, loaded = _recorded(case, (0.0, case.payload), move, recording, progress)
+    return unloaded, loaded
 
 
 def rehearse(
     case: Case, plan: Reference, recording: Acquisition, progress: Progress | None = None
 ) -> list[Log]:
     """Logs of a case whose controller follows a plan: unloaded and, with a payload, loaded."""
-    logs: list[Log] = []
     unloaded = case.constants(0.0)
-    for payload in dict.fromkeys((0.0, case.payload)):
-        role = _role(payload)
-        k = case.constants(payload)
-        sensors = replace(recording.sensors, seed=recording.sensors.seed + bool(payload))
+
+    def move(payload: float, t: FloatArray, reached: Reached) -> SimulatedMotion:
+        return follow(case.constants(payload), plan, t, unloaded, bool(payload), reached)
+
+    payloads = tuple(dict.fromkeys((0.0, case.payload)))
+    return _recorded(case, payloads, move, recording, progress)
+
+
+def _recorded(
+    case: Case,
+    payloads: Sequence[float],
+    move: Callable[[float, FloatArray, Reached], SimulatedMotion],
+    recording: Acquisition,
+    progress: Progress | None,
+) -> list[Log]:
+    """A log of each payload, whose noise is of a seed of its own."""
+    logs = []
+    for place, payload in enumerate(payloads):
+        role = "loaded" if payload else "unloaded"
+        sensors = replace(recording.sensors, seed=recording.sensors.seed + place)
         t = sample_times(recording.rate, recording.duration, sensors)
-        motion = follow(k, plan, t, unloaded, bool(payload), _counted(progress, role, recording))
-        logs.append(
-            record(motion, sensors, Truth(case.arm, payload, case.name), f"{case.name}-{role}")
-        )
+        motion = move(payload, t, _counted(progress, role, recording))
+        truth = Truth(case.arm, payload, case.name)
+        logs.append(record(motion, sensors, truth, f"{case.name}-{role}"))
     return logs
-
-
-def _role(payload: float) -> str:
-    """What a log of the arm with `payload` kg is called."""
-    if payload:
-        return "loaded"
-    return "unloaded"
 
 
 def with_schedule(
@@ -144,20 +148,15 @@ def with_schedule(
         parts.append(
             SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept])
         )
-    whole = SimulatedMotion(
-        np.concatenate([part.t for part in parts]),
-        np.concatenate([part.theta for part in parts], axis=1),
-        np.concatenate([part.omega for part in parts], axis=1),
-        np.concatenate([part.tau for part in parts], axis=1),
-    )
+    signals = ("t", "theta", "omega", "tau")
+    joined = [np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in signals]
+    whole = SimulatedMotion(*joined)
     changes = tuple((time, mass) for time, mass in table.tolist())
     truth = Truth(case.arm, 0.0, case.name, changes)
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")
 
 
-def _counted(
-    progress: Progress | None, stage: str, recording: Acquisition
-) -> Callable[[float], None] | None:
+def _counted(progress: Progress | None, stage: str, recording: Acquisition) -> Reached:
     """Reports in samples the time to which the simulation has come."""
     if progress is None:
         return None

@@ -5,7 +5,6 @@ Cases and their files.
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -13,24 +12,12 @@ import pytest
 
 from algid.arm import Arm
 from algid.base.errors import SettingError
-from algid.synth.cases import Case, case_names, load_case
-from algid.synth.excitation import Hold, MultiSine, SampledTorque, no_torque, wide_multi_sine
-from algid.synth.run import excitation, held
+from algid.synth.cases import case_names, load_case
+from algid.synth.excitation import Hold, MultiSine, SampledTorque, wide_multi_sine
+from algid.synth.run import held
 
 ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
 TIMES = np.array([0.0, 0.013, 0.7, 3.0])
-
-
-def test_a_multi_sine_is_the_sum_of_its_waves() -> None:
-    torque = MultiSine(((2.0, 0.5), (1.0,)), ((0.3, 4.0), (2.5,)), ((0.1, -1.0), (0.7,)))
-    expected = [
-        [
-            2 * math.sin(2 * math.pi * 0.3 * t + 0.1) + 0.5 * math.sin(8 * math.pi * t - 1)
-            for t in TIMES
-        ],
-        [math.sin(5 * math.pi * t + 0.7) for t in TIMES],
-    ]
-    np.testing.assert_allclose(torque(TIMES), expected, atol=1e-13)
 
 
 def test_the_wide_torque_scales_with_what_the_arm_asks_for() -> None:
@@ -77,17 +64,6 @@ def test_a_drive_is_commanded_at_its_rate(hold: Hold) -> None:
     middle = driven(np.array([0.25]))
     ends = wave(np.array([0.2, 0.3]))
     np.testing.assert_allclose(middle[:, 0], ends[:, 0] if hold == "zoh" else ends.mean(axis=1))
-
-
-def test_excitations_go_by_their_names() -> None:
-    case = load_case("case1")
-    assert excitation(case, "case") is case.torque
-    assert excitation(case, "wide") == wide_multi_sine(case.arm)
-    assert excitation(Case("it", ARM, 0.0, None, {}), "case") == wide_multi_sine(ARM)
-    np.testing.assert_array_equal(excitation(case, "none")(TIMES), np.zeros((2, 4)))
-    assert excitation(case, "none") is no_torque
-    with pytest.raises(ValueError, match=r"^excitation must be one of case, wide, none, got fast$"):
-        excitation(case, "fast")
 
 
 def test_the_cases_are_those_of_table_3() -> None:
@@ -190,14 +166,3 @@ def test_a_file_that_describes_no_arm_is_refused_with_its_line(
     assert str(refused.value).startswith(f"{file}: ")
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
-
-
-def test_a_name_that_is_nothing_is_refused(tmp_path: Path) -> None:
-    for name in ("case3", "arm.yaml", ""):
-        with pytest.raises(SettingError) as refused:
-            load_case(name)
-        told = "no such case; expected case1, case2 or a .toml file that describes an arm"
-        assert str(refused.value) == f"{name}: {told}"
-    missing = tmp_path / "none.toml"
-    with pytest.raises(SettingError, match="cannot read it"):
-        load_case(str(missing))

@@ -37,14 +37,6 @@ def recorded(**sensors: float | int | None) -> tuple[FloatArray, FloatArray, Flo
     return log.theta, log.tau, log.omega
 
 
-def test_exact_sensors_change_nothing() -> None:
-    theta, tau, omega = recorded()
-    np.testing.assert_array_equal(theta, motion().theta)
-    np.testing.assert_array_equal(tau, motion().tau)
-    assert omega is not None
-    np.testing.assert_array_equal(omega, motion().omega)
-
-
 @pytest.mark.parametrize(("position", "torque"), [(2e-3, 0.0), (0.0, 5e-2), (2e-3, 5e-2)])
 def test_noise_has_the_standard_deviation_asked_for_and_no_memory(
     position: float, torque: float
@@ -65,22 +57,6 @@ def test_noise_has_the_standard_deviation_asked_for_and_no_memory(
             assert abs(product.sum()) < 5 * std**2 * np.sqrt(product.size)
 
 
-def test_noise_of_angles_and_torques_is_not_the_same() -> None:
-    theta, tau, _ = recorded(position_noise=1.0, torque_noise=1.0, seed=4)
-    error = np.concatenate([theta - motion().theta, tau - motion().tau])
-    correlation = np.corrcoef(error) - np.eye(4)
-    assert np.abs(correlation).max() < 5 / np.sqrt(COUNT)
-
-
-def test_a_seed_gives_its_own_noise_and_the_same_each_time() -> None:
-    first, again, other = (recorded(torque_noise=1.0, seed=seed)[1] for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    assert (
-        np.abs(np.corrcoef((first - motion().tau).ravel(), (other - motion().tau).ravel())[0, 1])
-        < 0.03
-    )
-
-
 @pytest.mark.parametrize("bits", [4, 12, 20])
 def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
     theta, tau, omega = recorded(encoder_bits=bits)
@@ -98,25 +74,12 @@ def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
         assert abs(error.mean()) < 5 * np.sqrt(1 / 12 / error.size)
 
 
-def test_an_encoder_reads_the_noisy_angle() -> None:
-    theta, _, _ = recorded(encoder_bits=12, position_noise=0.01, seed=3)
-    step, plain = 2 * np.pi / 2**12, recorded(position_noise=0.01, seed=3)[0]
-    np.testing.assert_allclose(theta, step * np.round(plain / step), atol=1e-12)
-
-
 def test_stamps_are_whole_nanoseconds_from_the_start() -> None:
     log = record(motion(5), Sensors(start_ns=10**18), Truth(CASE.arm, 0.2, "case1"), "it")
     assert log.stamp_ns.dtype == np.int64
     np.testing.assert_array_equal(log.stamp_ns - 10**18, 10**6 * np.arange(5))
     assert log.origin.truth == Truth(CASE.arm, 0.2, "case1")
     assert (log.origin.path, log.origin.format) == ("it", "synthetic")
-
-
-def test_instants_are_uniform_and_end_with_the_duration() -> None:
-    t = sample_times(30.0, 2.0, Sensors())
-    assert t.size == 61
-    np.testing.assert_allclose(t, np.arange(61) / 30, atol=0.5e-9)
-    np.testing.assert_allclose(t * 1e9, np.round(t * 1e9), atol=1e-6)
 
 
 def test_jitter_is_as_large_as_asked_and_keeps_the_order() -> None:
@@ -155,12 +118,3 @@ def test_jitter_and_losses_leave_the_noise_alone() -> None:
     still = [SimulatedMotion(t, zero, zero, zero) for t in (plain, uneven)]
     logs = [record(one, short, Truth(CASE.arm, 0.0), "it").tau for one in still]
     np.testing.assert_array_equal(logs[0], logs[1])
-
-
-def test_one_sample_is_no_log() -> None:
-    with pytest.raises(
-        ValueError,
-        match=r"^rate and duration must give at least two samples, got 10.0 Hz for 0.04 s$",
-    ):
-        sample_times(10.0, 0.04, Sensors())
-    assert sample_times(10.0, 0.06, Sensors()).size == 2
