@@ -48,7 +48,7 @@ _ROUNDING = 1e-12  # of sums of squares, in comparisons that drop a start
 
 
 @dataclass(frozen=True)
-class Edges:
+class Segmentation:
     """Cells at which stretches begin, and the last one's end.
 
     How friction drifted, and the rows' variance that a change had to stand up to.
@@ -59,7 +59,7 @@ class Edges:
     variance: float
 
 
-def edges(cells: Cells) -> Edges:
+def first_segmentation(cells: Cells) -> Segmentation:
     """The changes of payload among `cells`.
 
     Before any change is known, errors are those of short blocks, of which few hold one. They are
@@ -83,7 +83,7 @@ def edges(cells: Cells) -> Edges:
         if places == before and spans is SPANS:
             break
         spans = SPANS
-    return Edges(places, drift, spread)
+    return Segmentation(places, drift, spread)
 
 
 def calm_parts(places: Sequence[int]) -> list[tuple[int, int]]:

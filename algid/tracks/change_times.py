@@ -42,7 +42,7 @@ _AT_ONCE = 32  # candidates whose columns are whitened together
 
 
 @dataclass(frozen=True)
-class Place:
+class ChangeTime:
     """Time of a change in s: the best one, its 95 % bracket, and the limits that it cannot pass.
 
     `gain` is what two masses explain beyond one, in squares of the rows' noise.
@@ -117,7 +117,7 @@ def rows_of(
     return replace(rows, e=rows.e + rows.whitened((mass * g)[None])[0])
 
 
-def place(rows: Rows, low: float, high: float, variance: float) -> Place:
+def place(rows: Rows, low: float, high: float, variance: float) -> ChangeTime:
     """When between `low` and `high` s the payload changed, a mass before it and another behind.
 
     `variance` is that of the rows, at least.
@@ -141,7 +141,7 @@ def place(rows: Rows, low: float, high: float, variance: float) -> Place:
         return float(likely[0]) - STEP, float(likely[-1]) + STEP
 
     worth = _worth(rows, left, a / np.sqrt(information), float(moments[best]))
-    return Place(float(moments[best]), within(LIKELY), within(SAFE), worth)
+    return ChangeTime(float(moments[best]), within(LIKELY), within(SAFE), worth)
 
 
 def _worth(rows: Rows, left: FloatArray, a: FloatArray, moment: float) -> float:
@@ -189,10 +189,10 @@ def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment 
 class Changes:
     """Changes of a log, and what it weighs between them: `masses` (kg) are one more."""
 
-    places: tuple[Place, ...]
+    places: tuple[ChangeTime, ...]
     masses: tuple[float, ...]
 
-    def merged(self, first: int, last: int, *places: Place) -> Changes:
+    def merged(self, first: int, last: int, *places: ChangeTime) -> Changes:
         """With these changes, one or none, for those from `first` to `last`.
 
         Of the masses between them only that before the first and that behind the last stay, and
@@ -224,7 +224,7 @@ class Confirmation:
     penalty: float
     variance: float
 
-    def of(self, changes: Changes) -> list[Place]:
+    def of(self, changes: Changes) -> list[ChangeTime]:
         """Those of the changes, as cells have them, that the rows bear out, each where they do."""
         count = None
         while changes.places and len(changes.places) != count:
@@ -271,7 +271,7 @@ class Confirmation:
         """Merge close changes where their rows need only one: a jolt is no change of payload."""
         times = np.array([one.time for one in changes.places])
         close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
-        places: dict[tuple[int, int], Place] = {}
+        places: dict[tuple[int, int], ChangeTime] = {}
         for (first, last), rows in self._rows(changes, close):
             low = max(times[first] - MARGIN, float(rows.t[0]) + MARGIN)
             high = min(times[last] + MARGIN, float(rows.t[-1]) - MARGIN)

@@ -29,12 +29,12 @@ from algid.tracks.change_points import (
     BEHIND,
     PENALTY,
     SHORTEST,
-    Edges,
-    edges,
+    Segmentation,
+    first_segmentation,
     rough_variance,
     variance,
 )
-from algid.tracks.change_times import Changes, Confirmation, Place, cut_to
+from algid.tracks.change_times import Changes, ChangeTime, Confirmation, cut_to
 from algid.tracks.drift import Drift, drift_of
 
 ROUNDS = 2  # of linearising each stretch at its own mass and looking for the changes again
@@ -62,7 +62,7 @@ class Stretch:
 
     @property
     def empty(self) -> bool:
-        """Whether the interval holds nothing, so that there may be no payload."""
+        """True if the 95 % interval contains zero."""
         low, high = self.ci95
         return low <= 0 <= high
 
@@ -113,11 +113,11 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     if not parts or sum(map(len, parts)) < 2 * SHORTEST:
         raise TooShortError(f"the log is too short: expected {2 * SHORTEST * CELL:g} s at least")
     cells = joined(parts)
-    segments = edges(cells)
+    segments = first_segmentation(cells)
     for _ in range(ROUNDS):
         rough = _cut(cells, segments.places)
         cells = joined(_settled(source, arm, rough, segments.drift))
-        segments = edges(cells)
+        segments = first_segmentation(cells)
     changes = _changes(source, arm, cells, segments)
     inner = _inner_parts(cells, changes)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
@@ -137,12 +137,14 @@ def _cut(cells: Cells, places: Sequence[int]) -> list[Cells]:
     return list(starmap(cells.part, pairwise(places)))
 
 
-def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, rough: Edges) -> list[Place]:
+def _changes(
+    source: Pass, arm: IdentifiedArm, cells: Cells, rough: Segmentation
+) -> list[ChangeTime]:
     """Changes of the payload: those that cells show, as far as their rows confirm them."""
     places = []
     for place in rough.places[1:-1]:
         safe = float(cells.start[place - AHEAD]), float(cells.start[place]) + BEHIND * CELL
-        places.append(Place(float(cells.start[place]), safe, safe, np.inf))
+        places.append(ChangeTime(float(cells.start[place]), safe, safe, np.inf))
     masses = _masses(_cut(cells, rough.places), rough.drift)
     changes = Changes(tuple(places), tuple(masses))
     ends = (float(cells.start[0]), float(cells.end[-1]))
@@ -154,7 +156,7 @@ def _changes(source: Pass, arm: IdentifiedArm, cells: Cells, rough: Edges) -> li
 
 def _weigh(
     cells: Cells,
-    changes: Sequence[Place],
+    changes: Sequence[ChangeTime],
     inner: Sequence[Cells],
     arm: IdentifiedArm,
     covariance: FloatArray,
@@ -268,7 +270,7 @@ def _by_part(
                     yield place, part
 
 
-def _inner_parts(cells: Cells, changes: Sequence[Place]) -> list[Cells]:
+def _inner_parts(cells: Cells, changes: Sequence[ChangeTime]) -> list[Cells]:
     """Cells of each stretch where its payload surely is constant, or some in its middle."""
     parts = []
     for place in range(len(changes) + 1):

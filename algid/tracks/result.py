@@ -66,7 +66,7 @@ class TrackResult:
 
     @property
     def complete(self) -> bool:
-        """Whether every stretch has status OK."""
+        """True if every stretch has status OK."""
         return set(self.statuses) <= {StretchStatus.OK}
 
     @property

@@ -15,8 +15,8 @@ from algid.signals.segments import Segment, segments
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.change_times import (
     Changes,
+    ChangeTime,
     Confirmation,
-    Place,
     Rows,
     cut_to,
     place,
@@ -36,12 +36,12 @@ ARM = IdentifiedArm(
 )
 
 
-def rough(*moments: float) -> tuple[Place, ...]:
+def rough(*moments: float) -> tuple[ChangeTime, ...]:
     """Changes as cells have them."""
-    return tuple(Place(one, (one, one), (one - 0.1, one + 0.1), np.inf) for one in moments)
+    return tuple(ChangeTime(one, (one, one), (one - 0.1, one + 0.1), np.inf) for one in moments)
 
 
-def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[Place]:
+def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[ChangeTime]:
     changes = Changes(rough(*moments), masses)
     evidence = Confirmation(lambda: segments([log]), ARM, None, (0.0, 4.5), 60.0, 1.0)
     return evidence.of(changes)
