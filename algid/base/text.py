@@ -152,10 +152,3 @@ def percent(part: float | None, whole: float | None, digits: int = 2) -> str:
     if part is None or not whole:
         return ABSENT
     return significant(100 * part / abs(whole), digits)
-
-
-def interval(low: float | None, high: float | None, std: float | None) -> str:
-    """An interval, as fine as the standard deviation; a missing end is unbounded."""
-    left = "−∞" if low is None else resolved(low, std)
-    right = "∞" if high is None else resolved(high, std)
-    return f"[{left}, {right}]"
