@@ -26,8 +26,9 @@ h       coefficients of the columns of a term              (n,)              par
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +53,34 @@ from algid.model import (
 )
 from algid.signals.filters import smoothed
 
-_SHAPES = (
-    "gears",
-    "saturation",
-    "drag",
-    *("once a turn",) * 2,
-    *("twice a turn",) * 2,
-    *("friction along a turn",) * 2,
-    *("the other joint",) * 3,
+
+class _Joint(NamedTuple):
+    """A joint's torque, angle, velocity and its smooth sign (n,), and the other joint's motion."""
+
+    T: FloatArray
+    theta: FloatArray
+    omega: FloatArray
+    sign: FloatArray
+    other_sign: FloatArray
+    other_omega: FloatArray
+    other_alpha: FloatArray
+
+
+_SHAPES: tuple[tuple[str, Callable[[_Joint], FloatArray]], ...] = (
+    ("gears", lambda j: np.abs(j.T) * j.sign),
+    ("saturation", lambda j: np.abs(j.T) * j.T),
+    ("drag", lambda j: np.abs(j.omega) * j.omega),
+    ("once a turn", lambda j: np.sin(j.theta)),
+    ("once a turn", lambda j: np.cos(j.theta)),
+    ("twice a turn", lambda j: np.sin(2 * j.theta)),
+    ("twice a turn", lambda j: np.cos(2 * j.theta)),
+    ("friction along a turn", lambda j: np.sin(j.theta) * j.sign),
+    ("friction along a turn", lambda j: np.cos(j.theta) * j.sign),
+    ("the other joint", lambda j: j.other_sign),
+    ("the other joint", lambda j: j.other_omega),
+    ("the other joint", lambda j: j.other_alpha),
 )
-"""What each of `_shapes` of a joint belongs to."""
+"""Torques of a joint in shapes that no term has, and what each belongs to."""
 _OWN = 1e-6
 """Share of a torque beside the parameters' columns: with less it is one of theirs."""
 _CANCELS = 0.02
@@ -138,26 +157,14 @@ def _whole(model: Model) -> Model:
 
 def _shapes(model: Model, modelled: FloatArray, motion: Motion) -> list[FloatArray]:
     """Torques (2, n) of one joint each, in shapes that no term has."""
+    signs = [smooth_sign(model, omega) for omega in motion.omega]
     made = []
-    for joint in range(2):
-        theta, omega, T = motion.theta[joint], motion.omega[joint], modelled[joint]
-        sign = smooth_sign(model, omega)
-        other = motion.omega[1 - joint], motion.alpha[1 - joint]
-        for shape in (
-            np.abs(T) * sign,
-            np.abs(T) * T,
-            np.abs(omega) * omega,
-            np.sin(theta),
-            np.cos(theta),
-            np.sin(2 * theta),
-            np.cos(2 * theta),
-            np.sin(theta) * sign,
-            np.cos(theta) * sign,
-            smooth_sign(model, other[0]),
-            *other,
-        ):
-            row = np.zeros((2, shape.size))
-            row[joint] = shape
+    for joint, other in ((0, 1), (1, 0)):
+        own = motion.theta[joint], motion.omega[joint], signs[joint]
+        seen = _Joint(modelled[joint], *own, signs[other], motion.omega[other], motion.alpha[other])
+        for _, shape in _SHAPES:
+            row = np.zeros_like(modelled)
+            row[joint] = shape(seen)
             made.append(row)
     return made
 
@@ -201,15 +208,16 @@ def misfit(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Misfit
     if fit.shared.delay:  # of which the slow part's is one already
         beside[[place for place, (term, _) in enumerate(pairs) if term in DELAYS]] = False
     freedom, statistic, _ = _score(M, b, np.flatnonzero(beside))
+    kinds = [kind for kind, _ in _SHAPES]
     places: dict[str, list[int]] = {}
-    for place, kind in enumerate([*(term for term, _ in pairs), *_SHAPES, *_SHAPES]):
+    for place, kind in enumerate([*(term for term, _ in pairs), *kinds, *kinds]):
         if beside[place]:
             places.setdefault(kind, []).append(place)
     overlooked, alone = [], [1.0]
     for kind, own in places.items():
         rank, wald, h = _score(M, b, np.array(own))
         alone.append(float(chi2_tail(rank, wald)))
-        if kind not in _SHAPES:
+        if kind not in kinds:
             values = {pairs[place][1]: float(value) for place, value in zip(own, h, strict=True)}
             overlooked.append(Overlooked(kind, alone[-1], values))
     together = float(chi2_tail(max(freedom, 1), statistic))

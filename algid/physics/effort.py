@@ -12,7 +12,6 @@ from typing import Literal
 
 from algid.base.names import outside, within
 from algid.physics.terms import ALWAYS, OPTIONAL
-from algid.physics.terms.viscous import VISCOUS
 
 Effort = Literal[
     "raw", "gravity-compensated", "friction-compensated", "external", "command", "current"
@@ -20,9 +19,10 @@ Effort = Literal[
 """The torque at the joint as measured; without the arm's weight; without friction; without all of
 the arm; as commanded; as a motor's current."""
 
-FRICTION = (VISCOUS.name, "coulomb", "stribeck", "asymmetry", "load")
-_OF_DRIVES = FRICTION + ("rotor", "gain")
 _EVERY = ALWAYS + OPTIONAL
+FRICTION = tuple(term.name for term in _EVERY if term.damping or term.shapes)
+"""Terms that damp a joint, or depend on a width of friction."""
+_OF_DRIVES = FRICTION + tuple(term.name for term in _EVERY if term.rotor or term.gains)
 
 
 def without_terms(effort: Effort | None, terms: Iterable[str]) -> tuple[str, ...]:
