@@ -657,6 +657,26 @@ def acceleration(
     return alpha
 
 
+def advanced(
+    model: Model, c: FloatArray, x: FloatArray, torques: FloatArray, step: FloatArray | float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Angles and velocities (4, N) a `step` s later, by the classical Runge-Kutta method.
+
+    `torques` (3, 2, N) are those at the step's beginning, middle and end. With them come the rates
+    (4, N) at both ends.
+    """
+
+    def rate(x: FloatArray, tau: FloatArray) -> FloatArray:
+        return np.concatenate([x[2:], acceleration(model, c, x[:2], x[2:], tau)])
+
+    begin, middle, end = torques
+    first = rate(x, begin)
+    second = rate(x + 0.5 * step * first, middle)
+    third = rate(x + 0.5 * step * second, middle)
+    last = rate(x + step * third, end)
+    return x + step / 6 * (first + 2 * (second + third) + last), first, last
+
+
 def _solved(matrix: Sequence[FloatArray | float], right: FloatArray) -> FloatArray:
     """X (2, N) with [[a, b], [c, d]] x = right, of a matrix a, b, c, d."""
     a, b, c, d = matrix

@@ -26,6 +26,7 @@ from algid.base.criteria import AT_REST
 from algid.base.names import outside
 from algid.estimators.conventions import Convention
 from algid.estimators.modulating_functions import OVERLAP, Windows
+from algid.estimators.weak import reweighted
 from algid.model import SINE_OF, SINES, Model
 from algid.physics.motion import Motion
 from algid.physics.terms.coulomb import COULOMB
@@ -45,7 +46,6 @@ for _name in ZEROED:
 _PLACES = list(map(MODEL.names.index, COLUMNS))
 WINDOW = 0.4  # s
 _BANDWIDTH = 40.0  # Hz, of the velocity beside k1
-_REWEIGHTINGS = 4
 _LEAST_POWER = 1e-280  # (N m)²: the square of a torque of denormal numbers is zero
 _FLOOR = 1e-9  # of a torque's power: a residual below it is rounding
 
@@ -182,9 +182,11 @@ def solved(
     if passive is not None:
         motorless = passive - 1
         power[:, motorless] = power[:, 1 - motorless]
-    weight = 1 / power
     ridge = 1e-12 * np.eye(T.shape[2])
-    for _ in range(_REWEIGHTINGS):
+
+    def solve(
+        weight: FloatArray, _: tuple[FloatArray, ...]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         normal = np.einsum("za,zaij->zij", weight, gram)
         size = np.sqrt(np.maximum(np.einsum("zii->zi", normal), 1e-140))
         scale = size[:, :, None] * size[:, None, :]
@@ -196,6 +198,11 @@ def solved(
             acting = np.einsum("zaii,zi->za", gram, c**2)[:, motorless]
             power[:, motorless] = np.maximum(acting, _LEAST_POWER)
             squares[:, motorless] = model[:, motorless]
-        squares = np.maximum(squares, _FLOOR * power)
-        weight = sums.independent / squares
+        return c, np.maximum(squares, _FLOOR * power), inverse
+
+    def weigh(state: tuple[FloatArray, ...]) -> FloatArray:
+        return sums.independent / state[1] if len(state) > 1 else 1 / power
+
+    start: tuple[FloatArray, ...] = ()
+    (c, squares, inverse), _ = reweighted(weigh, solve, start)
     return c, squares / power, inverse

@@ -49,7 +49,7 @@ from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.references import Following, followed
 from algid.estimators.weak import Source, WeakSettings
-from algid.model import Model, acceleration, inertia
+from algid.model import Model, advanced, inertia
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
 
@@ -386,44 +386,36 @@ def _simulated(model: Model, c: FloatArray, dt: FloatArray, cut: _Cut) -> _Simul
     stride = _stride(float(dt[0]))
     h = stride * dt
     inside = np.arange(stride) / stride
-    theta, omega, tau, measured = cut.theta, cut.omega, cut.tau, cut.measured
     # the torque where the method asks for it
-    acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))
-    starts, ends = [], []  # angles, velocities and their rates, a step each
+    acts = np.ascontiguousarray(np.moveaxis(cut.tau[:, :, :: stride // 2], 2, 0))
+    x = np.concatenate([cut.theta, cut.omega])
+    parts = []  # a step each: states at both ends, and their rates
     with np.errstate(
         divide="ignore", invalid="ignore", over="ignore"
     ):  # `_inert` judges afterwards
-        for step in range(0, 2 * (measured.shape[2] // stride), 2):
-            rates = []
-            x, v = theta, omega
-            for now, share in ((0, 0.5), (1, 0.5), (1, 1.0), (2, 0.0)):
-                rates.append((v, acceleration(model, c, x, v, acts[step + now])))
-                x, v = theta + share * h * rates[-1][0], omega + share * h * rates[-1][1]
-            (v1, a1), (v2, a2), (v3, a3), (v4, a4) = rates
-            ahead = theta + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
-            faster = omega + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-            starts.append((theta, omega, a1))
-            ends.append((ahead, faster, a4))
-            theta, omega = np.clip(ahead, -1e6, 1e6), np.clip(faster, -1e6, 1e6)
-    before, after = np.stack(starts, axis=-1), np.stack(ends, axis=-1)
-    h = h[:, None]
-    thetas = _cubic(before[0], after[0], h * before[1], h * after[1], inside)
-    omegas = _cubic(before[1], after[1], h * before[2], h * after[2], inside)
-    good = np.abs(thetas - measured).max(axis=(0, 2)) < _ASTRAY
+        for step in range(0, 2 * (cut.measured.shape[2] // stride), 2):
+            ahead, first, last = advanced(model, c, x, acts[step : step + 3], h)
+            # of the angles, the velocity at the end is nearer than the method's last rate
+            last = np.concatenate([ahead[2:], last[2:]])
+            parts.append((x, ahead, h * first, h * last))
+            x = np.clip(ahead, -1e6, 1e6)
+    states = _cubic(np.moveaxis(np.array(parts), 0, -1), inside)
+    thetas, omegas = states[:2], states[2:]
+    good = np.abs(thetas - cut.measured).max(axis=(0, 2)) < _ASTRAY
     moves = _inert(model, c, thetas[:, :, ::stride])
     # A window that ran away is left out; products of its velocities would overflow.
     thetas[:, ~good], omegas[:, ~good] = 0.0, 0.0
-    return _Simulated(thetas, omegas, tau[:, :, :-1], good, moves)
+    return _Simulated(thetas, omegas, cut.tau[:, :, :-1], good, moves)
 
 
-def _cubic(
-    start: FloatArray, end: FloatArray, rise: FloatArray, last: FloatArray, s: FloatArray
-) -> FloatArray:
-    """Cubic Hermite (2, R, K S) at shares `s` (S,) of K steps, from their ends (2, R, K)."""
+def _cubic(parts: FloatArray, s: FloatArray) -> FloatArray:
+    """Cubic Hermite (4, R, K S) at shares `s` (S,) of K steps.
+
+    `parts` (4, 4, R, K) are what the steps begin and end at, and how much both ends rise a step.
+    """
     rise_of_end = s**2 * (3 - 2 * s)
     weights = np.stack([1 - rise_of_end, rise_of_end, s * (1 - s) ** 2, s**2 * (s - 1)])
-    parts = np.stack([start, end, rise, last])
-    return np.einsum("wark,ws->arks", parts, weights).reshape(*start.shape[:2], -1)
+    return np.einsum("wark,ws->arks", parts, weights).reshape(*parts.shape[1:3], -1)
 
 
 def _started(

@@ -22,7 +22,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.prediction import PredictionFilter, motion_of
-from algid.model import Model, acceleration, damping, inertia
+from algid.model import Model, advanced, damping, inertia
 from algid.signals.filters import butterworth
 from algid.signals.segments import Segment, pieces_of
 from algid.signals.shift import AT_ONCE, TorqueShift
@@ -160,20 +160,12 @@ def _angles_at_horizons(
     model: Model, c: FloatArray, x: FloatArray, u: FloatArray, step: float
 ) -> list[FloatArray]:
     """Angles (2, S) at each horizon, by the classical Runge-Kutta method of fourth order."""
-
-    def rate(x: FloatArray, tau: FloatArray) -> FloatArray:
-        return np.concatenate([x[2:], acceleration(model, c, x[:2], x[2:], tau)])
-
     angles: list[FloatArray] = []
     ends = [round(horizon / step) for horizon in HORIZONS]
     # an arm far from the log's may run away: its error is infinite then
     with np.errstate(all="ignore"):
         for number in range(ends[-1]):
-            begin, middle, end = u[2 * number : 2 * number + 3]
-            a = rate(x, begin)
-            b = rate(x + 0.5 * step * a, middle)
-            d = rate(x + 0.5 * step * b, middle)
-            x = x + step / 6 * (a + 2 * (b + d) + rate(x + step * d, end))
+            x, _, _ = advanced(model, c, x, u[2 * number : 2 * number + 3], step)
             if number + 1 in ends:
                 angles.append(x[:2])
     return angles
