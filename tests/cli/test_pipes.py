@@ -91,7 +91,7 @@ def test_an_option_that_names_a_pipe_is_refused(command: str, option: str, place
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["design", "pipe.toml"],
+        ["design", "pipe.toml", "--range", "1", "--speed", "3", "--torque", "2"],
         ["synth", "pipe.toml", "-o", "synth"],
         ["synth", "case1", "--motion", "piped", "-o", "synth"],
         ["identify", "pipe"],
