@@ -102,6 +102,9 @@ class Model:
         0 for an arm that moves in a horizontal plane: parameters that weigh have no column then.
     coulomb_speed, stribeck_speed : float, rad/s
         Widths of friction: see `algid.physics.motion.Widths`.
+    by_torque : bool
+        Whether friction by load is in proportion to all other torque of the joint, and not to its
+        inertia and weight alone. Only the robust estimate is compared under both.
 
     Raises
     ------
@@ -113,6 +116,7 @@ class Model:
     gravity: float = 9.81
     coulomb_speed: float = 0.2
     stribeck_speed: float = 0.3
+    by_torque: bool = False
 
     def __post_init__(self) -> None:
         unknown = outside(self.terms, TERMS)
@@ -128,7 +132,7 @@ class Model:
     @property
     def compiled(self) -> Compiled:
         """Its columns and their derivatives."""
-        return _compiled(self.terms, self.gravity != 0)
+        return _compiled(self.terms, self.gravity != 0, self.by_torque)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -331,14 +335,15 @@ def terms_named(names: Iterable[str]) -> Iterator[Term]:
 
 
 @lru_cache(maxsize=256)
-def _compiled(terms: tuple[str, ...], gravity: bool) -> Compiled:
+def _compiled(terms: tuple[str, ...], gravity: bool, by_torque: bool) -> Compiled:
     names: list[str] = []
     columns: list[TorqueColumn] = []
     loads: list[int] = []
     for term in (*ALWAYS, *terms_named(terms)):
+        is_load = term.inertial or (by_torque and term.linear and not term.lags)
         for parameter in term.parameters:
             if gravity or not parameter.weighs:
-                if term.inertial:
+                if is_load:
                     loads.append(len(names))
                 names.append(parameter.name)
         for column in term.columns:
@@ -405,7 +410,8 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
 
 def loads_of(model: Model) -> tuple[str, ...]:
     """Names of the columns that are the joints' load, which a payload changes."""
-    return tuple(model.names[place] for place in model.compiled.loads)
+    own = _compiled(model.terms, model.gravity != 0, by_torque=False)
+    return tuple(own.names[place] for place in own.loads)
 
 
 def phasor(model: Model, c: FloatArray, name: str) -> complex:

@@ -51,6 +51,7 @@ class PlottingLibrary(BuildHookInterface[Any]):  # type: ignore[misc]
                 f"pages carry the whole of plotly: {PACKAGE} cannot be had ({error})"
             )
             return
+        target.parent.mkdir(exist_ok=True)
         target.write_bytes(gzip.compress(content, 9, mtime=0))
 
 

@@ -77,7 +77,7 @@ from algid.estimators.references import Following, followed
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.too_short import OF_A_WINDOW, TooShortError
 from algid.estimators.weak import Normal, Source, WeakSettings
-from algid.model import EVERY_TERM, K3, RIGID, SINES, TERMS
+from algid.model import EVERY_TERM, K3, RIGID, SINES, TERMS, attributes
 from algid.notices import Notice, Remedy
 
 _DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
@@ -130,7 +130,8 @@ def fit(
     """
     problem = RobustProblem.of(unloaded, loaded, settings or WeakSettings(), lengths, known)
     least = problem.least_squares()
-    return problem.with_window_scatter(problem.instruments_if_endogenous(least), least)
+    fit = problem.with_window_scatter(problem.instruments_if_endogenous(least), least)
+    return problem.with_load_scatter(fit, least)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +218,11 @@ class RobustProblem:
             sum(normal.samples for normal in normals) <= _MOST_KEPT,
         )
 
-    def least_squares(self, window: float = 1.0) -> Fit:
+    def least_squares(self, window: float = 1.0, *, by_torque: bool = False) -> Fit:
         """Every term shrunk, by windows of `window` times the settings' length."""
         shared, known = self.shared, self.known
-        settings = replace(self.settings, window=window * self.settings.window)
+        model = replace(self.settings.model, by_torque=by_torque)
+        settings = replace(self.settings, window=window * self.settings.window, model=model)
         memory: list[dict[Hashable, Known] | None] = [None] * len(self.unloaded + self.loaded)
         if self.keeps:
             memory = [{} for _ in memory]
@@ -335,6 +337,24 @@ class RobustProblem:
             return fit
         scatter = np.transpose(moved) @ np.array(moved) / len(moved)
         return replace(fit, covariance=fit.covariance + scatter)
+
+    def with_load_scatter(self, fit: Fit, least: Fit) -> Fit:
+        """The fit with what the convention of friction by load moves.
+
+        Gears rub in proportion to the torque that passes them: a joint's load L, or all other
+        torque, friction D of motor and bearings included, by their order along the drive. Between
+        both is e (|L + D| − |L|) tanh(ω / ω_s) ≈ e |D| sgn L, which looks like a gain common to
+        both joints: it moves all constants together, and no scatter from log to log or from window
+        to window shows it.
+
+            W = V + d dᵀ,   d = β_torque − β_load, by least squares
+        """
+        if not attributes(least.shared.model, "by_load"):
+            return fit
+        other = self.least_squares(by_torque=True)
+        determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
+        moved = np.where(determined, other.values - least.values, 0.0)
+        return replace(fit, covariance=fit.covariance + np.outer(moved, moved))
 
     def instruments_if_endogenous(self, least: Fit) -> Fit:
         """The fit by least squares, or by instruments where those differ and answer nothing.

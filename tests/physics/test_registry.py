@@ -103,10 +103,11 @@ from algid.settings import Settings
 
 here = algid.__file__
 listed = CHOICES
-assert "toy" in listed and not {"stribeck", "gain", "delay"} & set(listed), listed
+assert "toy" in listed and not {"stribeck", "gain", "asymmetry"} & set(listed), listed
 guide = text_of("estimators")
 assert "| `toy` |" in guide and "cogging" in guide, guide
-assert "| `stribeck` |" not in guide and "| `gain` |" not in guide and "| `delay` |" not in guide
+for left_out in ("stribeck", "gain", "asymmetry"):
+    assert f"| `{left_out}` |" not in guide
 try:
     Settings(model="stribeck,coulomb")
 except SettingError as error:
@@ -126,7 +127,7 @@ log = replace(log, origin=replace(log.origin, truth=None))
 result = identify(log)
 kept = [one.term for one in result.fit.terms if one.kept]
 assert "toy" in kept, result.fit.terms
-assert not {"stribeck", "gain", "delay"} & {one.term for one in result.fit.terms}
+assert not {"stribeck", "gain", "asymmetry"} & {one.term for one in result.fit.terms}
 assert abs(result.parameters["g6"].estimate - 0.05) < 5 * result.parameters["g6"].std < 0.005
 for to in ("python", "c"):
     text, _ = exported(result, "toy.algid", to, Knowns())
@@ -336,7 +337,7 @@ def test_entries_added_and_left_out_need_nothing_else_touched(tmp_path: Path) ->
     (folder / "toy.py").write_text(TOY)
     registry = folder / "__init__.py"
     text = registry.read_text()
-    for name in ("stribeck", "gain", "delay"):
+    for name in ("stribeck", "gain", "asymmetry"):
         (folder / f"{name}.py").unlink()
         text = text.replace(f"from algid.physics.terms.{name} import {name.upper()}\n", "")
         assert f"    {name.upper()},\n" in text
