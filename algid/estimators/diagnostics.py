@@ -250,17 +250,12 @@ def _named(bounds: Sequence[BrokenBound]) -> list[str]:
 _SINGULAR = 1e-9  # of the largest eigenvalue of a correlation matrix
 
 
-@dataclass(frozen=True)
-class JointsApart:
-    """A constant on which the equations of joints 1 and 2, each by itself, disagree (its unit)."""
-
-    name: str
-    first: float
-    second: float
+_RATIOS = np.geomspace(1e-3, 1e3, 1001)
+"""Between the constants of two joints' equations: steps of 1.4 %."""
 
 
-def joints_apart(normals: Sequence[Normal], model: Model, unlike: float) -> JointsApart | None:
-    """Whether the equations of the two joints contradict each other about the k1, k2 or k3 of both.
+def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> float | None:
+    """By what the k1, k2 and k3 of joint 1's equation are multiplied to give those of joint 2's.
 
     Parameters
     ----------
@@ -272,16 +267,23 @@ def joints_apart(normals: Sequence[Normal], model: Model, unlike: float) -> Join
 
     Returns
     -------
-    JointsApart or None
-        The constant whose difference has the most standard deviations, `FAR_BEYOND` at least,
-        among those that differ by more than `unlike`.
+    float or None
+        The ratio ρ, where it differs from one by more than `unlike` and by `FAR_BEYOND` standard
+        deviations at least; negative where the signs differ.
 
     Notes
     -----
+    With f and s the constants by joint 1's and by joint 2's equation alone and F and S their
+    sandwich covariances, ρ is where
+
+        χ²(ρ) = (s − ρ f)ᵀ (S + ρ² F)⁻¹ (s − ρ f)
+
+    is least, and (χ²(1) − χ²(ρ))^½ its distance from one. All constants decide together: a torque
+    constant that is wrong multiplies every one of them.
+
     Where one joint is hardly driven, what moves it is friction and play that the model lacks, and
     its equation is solved by constants near nothing. Its residual is small then, so that it
-    outweighs the joint that is driven. The standard deviations are those of the sandwich, as for a
-    fit.
+    outweighs the joint that is driven.
     """
     shared = Shared(model)
     for normal in normals:
@@ -290,23 +292,27 @@ def joints_apart(normals: Sequence[Normal], model: Model, unlike: float) -> Join
     both = np.flatnonzero(np.isin(model.names, (K1, K2, K3)))
 
     def of_joint(joint: int) -> tuple[FloatArray, FloatArray]:
-        """What one joint's equation gives for the constants of both, and their variances."""
+        """What one joint's equation gives for the constants of both, and their covariance."""
         nothing = np.zeros(len(model.names))
         logs = []
         for normal in normals:
             gram = normal.gram[:, joint]
             logs.append(LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]))
         c, covariance, _ = by_themselves(shared, logs)
-        return c[both], np.diag(covariance)[both]
+        return c[both], covariance[np.ix_(both, both)]
 
-    first, of_first = of_joint(0)
-    second, of_second = of_joint(1)
-    distance = np.abs(first - second) / np.sqrt(of_first + of_second + 1e-300)
-    differs = np.abs(first - second) > unlike * np.maximum(np.abs(first), np.abs(second))
-    worst = int(np.argmax(np.where(differs, distance, 0.0)))
-    if not differs[worst] or distance[worst] < FAR_BEYOND:
+    f, F = of_joint(0)
+    s, S = of_joint(1)
+
+    def chi2(ratio: float) -> float:
+        apart = s - ratio * f
+        return float(apart @ scaled_pinv(S + ratio**2 * F) @ apart)
+
+    ratio = min((*_RATIOS, *-_RATIOS), key=chi2)
+    differs = min(ratio, 1 / ratio) < 1 - unlike
+    if not differs or chi2(1.0) - chi2(ratio) < FAR_BEYOND**2:
         return None
-    return JointsApart(model.names[both[worst]], float(first[worst]), float(second[worst]))
+    return float(ratio)
 
 
 @dataclass(frozen=True)

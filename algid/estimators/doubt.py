@@ -14,11 +14,11 @@ import numpy as np
 from algid.base.criteria import STILL
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
-from algid.estimators.diagnostics import joints_apart
+from algid.estimators.diagnostics import ratio_of_joints
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import MOTORLESS
 from algid.estimators.weak import Normal, Source, WeakSettings
-from algid.model import K1, K2, K3, RIGID, UNITS
+from algid.model import K1, K2, K3, RIGID
 from algid.notices import Notice
 
 
@@ -31,7 +31,7 @@ def doubted(
     ----------
     fit : Fit
         With `FEWEST_LOGS` logs or more it is the joints' contradiction alone that is asked for, a
-        smaller one: see `joints_apart`.
+        smaller one: see `ratio_of_joints`.
     unloaded, loaded : sequences of callables
         Each gives a fresh iterable of `Segment`.
     settings : WeakSettings
@@ -43,7 +43,7 @@ def doubted(
     return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
 
 
-UNLIKE, UNLIKE_IN_MANY = 0.5, 0.25
+UNLIKE, UNLIKE_IN_MANY = 0.5, 0.2
 """Share of the larger of two values: more than what a model lacks makes in one run, and in many."""
 UNEXPLAINED = 0.1
 """Share of a torque's power: constants that leave more of it do not explain that joint."""
@@ -109,15 +109,9 @@ def _doubt(
         normals = weak.normals_of(sources, settings)
         if not normals:
             continue
-        apart = joints_apart(normals, settings.model, UNLIKE if few else UNLIKE_IN_MANY)
-        if apart is not None:
-            numbers = {
-                "name": apart.name,
-                "first": apart.first,
-                "second": apart.second,
-                "unit": UNITS[apart.name],
-            }
-            return Notice("JOINTS_CONTRADICT", numbers=numbers)
+        ratio = ratio_of_joints(normals, settings.model, UNLIKE if few else UNLIKE_IN_MANY)
+        if ratio is not None:
+            return Notice("JOINTS_CONTRADICT", numbers={"ratio": ratio})
         hardly = _hardly_driven(normals)
         if few and hardly and not _confirmed(fit, hardly, kind, sources, settings):
             return Notice(
