@@ -23,7 +23,7 @@ from algid.signals.segments import Segment
 ALIKE = 0.95  # of one: a tenth of the power may differ
 _RATE = 50.0  # Hz
 _LONGEST = 60.0  # s that are compared
-_SHIFT = 2.0  # s
+_SHIFT = 5.0  # s, by which two recordings of one motion are started apart by hand
 _LENGTHS = 0.8  # of the longer one: a log that is shorter is no repeat
 
 Source = Callable[[], Iterable[Segment]]

@@ -39,6 +39,11 @@ def test_repeats_are_found_by_their_motion() -> None:
     assert grouped(unloaded, [source(run(1))]) == ((0, 2, 3, 4), (1,), (5,), (6,))
 
 
+def test_a_repeat_may_be_recorded_some_seconds_later() -> None:
+    logs = [run(1, seconds=24.0), run(1, seconds=24.0, shift=4.0), run(2, seconds=24.0)]
+    assert grouped([source(log) for log in logs], []) == ((0, 1), (2,))
+
+
 def fitted(logs: list[Segment]) -> tuple[FloatArray, FloatArray]:
     found = robust.fit([source(log) for log in logs], (), WeakSettings(bandwidth=60.0))
     return found.values[:7], found.std[:7]
