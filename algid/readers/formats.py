@@ -1,16 +1,16 @@
 """The formats of logs, one entry each: how a file is recognised and opened, and what it holds.
 
-A format is known from a file's content: names lie, first bytes do not. Whatever must know the
-formats reads this table: opening and inspecting a log, the logs of a folder, the guide. Adding one
-is a module and an entry.
+Formats are recognised by their first bytes, not by suffix. All code that lists formats uses this
+table: opening and inspecting a log, the logs of a folder, the guide.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from algid.base.errors import LogError
 from algid.base.files import read_start
@@ -58,10 +58,11 @@ class FileFormat:
         What people call it.
     suffixes : tuple of str
         Ends of file names by which logs are looked for in a folder.
-    fits : callable
-        Whether a path, whose first bytes are given, is of this format; a folder has none.
+    magic : bytes
+        What its files begin with; empty for folders, and for text.
     open : callable
-        Opens a log of it; a profile may name columns that the file does not.
+        Opens a log of it, and imports what it needs; a profile may name columns that the file does
+        not.
     messages : bool
         Whether it holds messages on topics, not columns.
     """
@@ -69,155 +70,84 @@ class FileFormat:
     name: str
     title: str
     suffixes: tuple[str, ...]
-    fits: Callable[[Path, bytes], bool]
+    magic: bytes
     open: Opener
     messages: bool = False
 
 
-def begins(magic: bytes) -> Callable[[Path, bytes], bool]:
-    """Whether a file begins with these bytes."""
-    return lambda _, head: head.startswith(magic)
+def _reader(module: str) -> Any:
+    return import_module(f"algid.readers.{module}")
 
 
-def _is_npz(path: Path, head: bytes) -> bool:
-    return head.startswith(b"PK\x03\x04") and path.suffix.lower() == ".npz"  # any zip begins so
+def _bag(name: str, title: str, suffixes: tuple[str, ...], magic: bytes) -> FileFormat:
+    return FileFormat(
+        name, title, suffixes, magic, lambda path, _: _reader("bags").open_bag(path, name), True
+    )
 
 
-def _is_bag_folder(path: Path, head: bytes) -> bool:
-    return not head and path.is_dir()
-
-
-def _is_packed_text(magic: bytes, name: str) -> Callable[[Path, bytes], bool]:
-    """Whether a file packed in one way holds text."""
-
-    def fits(path: Path, head: bytes) -> bool:
-        if not head.startswith(magic):
-            return False
-        inside = head_of(path, name)
-        if inside.startswith(MCAP):
-            unpack = "zstd -d" if magic == ZSTD else "gunzip"
-            text = "an MCAP file compressed as a whole, which cannot be read by parts"
-            raise LogError(f"{path}: {text}; unpack it first: {unpack} {path.name}")
-        if not (inside and looks_like_text(inside)):
-            raise LogError(
-                f"{path}: compressed, but not a table of text; unpack it and name what is inside"
-            )
-        return True
-
-    return fits
-
-
-def _is_json_lines(_: Path, head: bytes) -> bool:
-    from algid.readers.arrays import is_json_lines
-
-    return is_json_lines(head)
-
-
-def _is_text(_: Path, head: bytes) -> bool:
-    text = head.rstrip(b"\0")  # of a log that breaks off
-    return bool(text) and looks_like_text(text)
-
-
-def _mcap(path: Path, _: Profile) -> MessageLog:
-    from algid.readers.mcap import open_mcap
-
-    return open_mcap([path])
-
-
-def _bag(kind: str) -> Opener:
-    def opened(path: Path, _: Profile) -> MessageLog:
-        from algid.readers.bags import open_bag
-
-        return open_bag(path, kind)
-
-    return opened
-
-
-def _parquet(path: Path, _: Profile) -> TableFile:
-    from algid.readers.arrow_files import open_parquet
-
-    return open_parquet(path)
-
-
-def _feather(path: Path, _: Profile) -> TableFile:
-    from algid.readers.arrow_files import open_feather
-
-    return open_feather(path)
-
-
-def _csv(kind: str) -> Opener:
+def _csv(name: str, title: str, magic: bytes) -> FileFormat:
     def opened(path: Path, profile: Profile) -> TableFile:
-        from algid.readers.csv import open_csv
+        table: TableFile = _reader("csv").open_csv(path, name, profile.columns)
+        return table
 
-        return open_csv(path, kind, profile.columns)
-
-    return opened
-
-
-def _whole(kind: str) -> Opener:
-    """What opens a file that is read as a whole."""
-
-    def opened(path: Path, _: Profile) -> TableFile:
-        from algid.readers import arrays
-
-        openers = {
-            "npz": arrays.open_npz,
-            "mat": arrays.open_matlab,
-            "hdf5": arrays.open_hdf5,
-            "jsonl": arrays.open_json_lines,
-        }
-        return openers[kind](path)
-
-    return opened
+    return FileFormat(name, title, (f".{name}",), magic, opened)
 
 
 FORMATS: tuple[FileFormat, ...] = (
-    FileFormat("mcap", "MCAP", (".mcap",), begins(MCAP), _mcap, messages=True),
-    FileFormat("rosbag2", "rosbag2 folder", (), _is_bag_folder, _bag("rosbag2"), messages=True),
     FileFormat(
-        "db3",
-        "rosbag2 SQLite file",
-        (".db3",),
-        begins(b"SQLite format 3\x00"),
-        _bag("db3"),
-        messages=True,
+        "mcap", "MCAP", (".mcap",), MCAP, lambda path, _: _reader("mcap").open_mcap([path]), True
     ),
-    FileFormat("bag", "ROS 1 bag", (".bag",), begins(b"#ROSBAG V"), _bag("bag"), messages=True),
-    FileFormat("parquet", "Parquet", (".parquet",), begins(b"PAR1"), _parquet),
-    FileFormat("feather", "Feather (Arrow)", (".feather", ".arrow"), begins(b"ARROW1"), _feather),
-    FileFormat("npz", "NumPy archive", (".npz",), _is_npz, _whole("npz")),
-    FileFormat("mat", "MATLAB", (".mat",), begins(b"MATLAB "), _whole("mat")),
+    _bag("rosbag2", "rosbag2 folder", (), b""),
+    _bag("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00"),
+    _bag("bag", "ROS 1 bag", (".bag",), b"#ROSBAG V"),
+    FileFormat(
+        "parquet",
+        "Parquet",
+        (".parquet",),
+        b"PAR1",
+        lambda path, _: _reader("arrow_files").open_parquet(path),
+    ),
+    FileFormat(
+        "feather",
+        "Feather (Arrow)",
+        (".feather", ".arrow"),
+        b"ARROW1",
+        lambda path, _: _reader("arrow_files").open_feather(path),
+    ),
+    FileFormat(
+        "npz",
+        "NumPy archive",
+        (".npz",),
+        b"PK\x03\x04",
+        lambda path, _: _reader("arrays").open_npz(path),
+    ),
+    FileFormat(
+        "mat", "MATLAB", (".mat",), b"MATLAB ", lambda path, _: _reader("arrays").open_matlab(path)
+    ),
     FileFormat(
         "hdf5",
         "HDF5 (`algid[hdf5]`)",
         (".h5", ".hdf5"),
-        begins(b"\x89HDF\r\n\x1a\n"),
-        _whole("hdf5"),
+        b"\x89HDF\r\n\x1a\n",
+        lambda path, _: _reader("arrays").open_hdf5(path),
     ),
+    _csv("csv.zst", "CSV packed with zstd", ZSTD),
+    _csv("csv.gz", "CSV packed with gzip", GZIP),
     FileFormat(
-        "csv.zst",
-        "CSV packed with zstd",
-        (".csv.zst",),
-        _is_packed_text(ZSTD, "csv.zst"),
-        _csv("csv.zst"),
+        "jsonl",
+        "JSON lines",
+        (".jsonl", ".ndjson"),
+        b"",
+        lambda path, _: _reader("arrays").open_json_lines(path),
     ),
-    FileFormat(
-        "csv.gz",
-        "CSV packed with gzip",
-        (".csv.gz",),
-        _is_packed_text(GZIP, "csv.gz"),
-        _csv("csv.gz"),
-    ),
-    FileFormat("jsonl", "JSON lines", (".jsonl", ".ndjson"), _is_json_lines, _whole("jsonl")),
-    FileFormat("csv", "CSV", (".csv",), _is_text, _csv("csv")),
+    _csv("csv", "CSV", b""),
 )
-"""In the order in which a file is held against them."""
-
 SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes)
+_BY_NAME = {form.name: form for form in FORMATS}
 
 
 def format_of(path: Path) -> FileFormat:
-    """The format of a log, by its content.
+    """The format of a log, by its first bytes; of a table of text by its first line.
 
     Raises
     ------
@@ -226,11 +156,31 @@ def format_of(path: Path) -> FileFormat:
     """
     head = _head(path)
     for form in FORMATS:
-        if form.fits(path, head):
+        if not (form.magic and head.startswith(form.magic)):
+            continue
+        if form.magic in (GZIP, ZSTD):
+            inside = head_of(path, form.name)
+            if inside.startswith(MCAP):
+                unpack = "zstd -d" if form.magic == ZSTD else "gunzip"
+                raise LogError(
+                    f"{path}: an MCAP file compressed as a whole, which cannot be read by parts; "
+                    f"unpack it first: {unpack} {path.name}"
+                )
+            if not (inside and looks_like_text(inside)):
+                raise LogError(
+                    f"{path}: compressed, but not a table of text; unpack it and name what is "
+                    "inside"
+                )
+        if form.name != "npz" or path.suffix.lower() == ".npz":  # any zip begins so
             return form
+    text = head.rstrip(b"\0")  # of a log that breaks off
+    if text and looks_like_text(text):
+        return _BY_NAME["jsonl" if _reader("arrays").is_json_lines(head) else "csv"]
+    if not head and path.is_dir():
+        return _BY_NAME["rosbag2"]
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
-    if not head.strip(b"\0"):
+    if not text:
         raise LogError(
             f"{path}: the file begins with NUL bytes alone, as a crash leaves them where nothing "
             "was written; look for another copy, and at the recorder"
@@ -280,17 +230,6 @@ def _head(path: Path) -> bytes:
         raise LogError(
             f"{str(path)!r}: the log cannot be read ({error}); check the name and rights"
         ) from error
-
-
-def sniff(path: Path) -> str:
-    """The name of a log's format.
-
-    Raises
-    ------
-    LogError
-        As `format_of`.
-    """
-    return format_of(path).name
 
 
 def entries_of(opened: TableFile | MessageLog) -> Entries:

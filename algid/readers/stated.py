@@ -166,7 +166,8 @@ def _stated(line: str) -> tuple[str, str]:
 
 def stated_rate(said: Iterable[str]) -> float | None:
     """Samples a second that a line states."""
-    for key, value in map(_stated, said):
+    for line in islice(said, LIMITS.stated_lines):
+        key, value = _stated(line[: LIMITS.stated_letters])
         if key in _RATES and re.fullmatch(r"\d+\.?\d*", value):
             return float(value)
     return None

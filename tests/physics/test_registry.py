@@ -55,7 +55,7 @@ FORMAT = """    FileFormat(
         "toy",
         "Toy log",
         (".toy",),
-        begins(b"TOYLOG"),
+        b"TOYLOG",
         lambda path, _: import_module("algid.readers.toy").opened(path),
     ),
 """
@@ -267,8 +267,7 @@ def add_toys(package: Path) -> None:
     )
     (package / "readers" / "toy.py").write_text(READER)
     formats = package / "readers" / "formats.py"
-    inserted(formats, '    FileFormat("mcap"', FORMAT)
-    inserted(formats, "from pathlib import Path\n", "from importlib import import_module\n")
+    inserted(formats, '    _bag("rosbag2"', FORMAT)
     (package / "inspection" / "toy.py").write_text(CHECK)
     checks = package / "inspection" / "checks.py"
     inserted(checks, "    every += rests(log, whole)\n", "    every += toys(log)\n")

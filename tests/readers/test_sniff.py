@@ -14,7 +14,7 @@ from algid.api.guide import text_of
 from algid.base.errors import LogError
 from algid.readers import read_log
 from algid.readers.dialect import Dialect, detect, split
-from algid.readers.formats import FORMATS, SUFFIXES, sniff
+from algid.readers.formats import FORMATS, SUFFIXES, format_of
 from algid.readers.text import looks_like_text
 
 CONTENT = {
@@ -28,7 +28,7 @@ CONTENT = {
 @pytest.mark.parametrize("kind", CONTENT)
 def test_a_format_is_told_by_its_content_whatever_its_name(kind: str, tmp_path: Path) -> None:
     (tmp_path / "log.dat").write_bytes(CONTENT[kind])
-    assert sniff(tmp_path / "log.dat") == kind
+    assert format_of(tmp_path / "log.dat").name == kind
 
 
 def test_a_zip_is_a_log_of_numpy_by_its_name_alone(tmp_path: Path) -> None:
@@ -38,13 +38,13 @@ def test_a_zip_is_a_log_of_numpy_by_its_name_alone(tmp_path: Path) -> None:
     for name, kind in (("log.NPZ", "npz"), ("log.docx", None)):
         (tmp_path / name).write_bytes(buffer.getvalue())
         if kind:
-            assert sniff(tmp_path / name) == kind
+            assert format_of(tmp_path / name).name == kind
         else:
             with pytest.raises(
                 LogError,
                 match=r"unknown format, it begins with b'PK\\x03\\x04.*MCAP, Parquet or CSV",
             ):
-                sniff(tmp_path / name)
+                format_of(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -64,21 +64,21 @@ def test_a_zip_is_a_log_of_numpy_by_its_name_alone(tmp_path: Path) -> None:
 def test_what_is_no_log_is_refused(content: bytes, words: str, tmp_path: Path) -> None:
     (tmp_path / "log.dat").write_bytes(content)
     with pytest.raises(LogError, match=words):
-        sniff(tmp_path / "log.dat")
+        format_of(tmp_path / "log.dat")
 
 
 def test_folders(tmp_path: Path) -> None:
     with pytest.raises(LogError, match=r"a folder without metadata.yaml or \*.mcap"):
-        sniff(tmp_path)
+        format_of(tmp_path)
     for name in ("log.mcap", "log.db3", "metadata.yaml"):
         folder = tmp_path / name.partition(".")[2]
         folder.mkdir()
         (folder / name).touch()
-        assert sniff(folder) == "rosbag2"
+        assert format_of(folder).name == "rosbag2"
     with pytest.raises(LogError, match="there is no such file; expected"):
-        sniff(tmp_path / "none.csv")
+        format_of(tmp_path / "none.csv")
     with pytest.raises(LogError, match=r"the log cannot be read .*check the name and rights"):
-        sniff(tmp_path / ("x" * 300))
+        format_of(tmp_path / ("x" * 300))
 
 
 def test_text_may_be_cut_within_a_letter_and_nowhere_else() -> None:

@@ -16,7 +16,7 @@ from algid.base.errors import LogError
 from algid.inspection.report import contents, inspect_log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.formats import sniff
+from algid.readers.formats import format_of
 from tests.readers.logs import EPOCH_NS, noise_log
 
 LOG = noise_log(60, start_ns=EPOCH_NS)
@@ -47,7 +47,7 @@ def nested() -> list[dict[str, Any]]:
 @pytest.mark.parametrize("name", ["a.jsonl", "a.txt"])
 def test_nested_json_lines_are_read(name: str, tmp_path: Path) -> None:
     path = lines(tmp_path / name, nested())
-    assert sniff(path) == "jsonl"
+    assert format_of(path).name == "jsonl"
     log = read_log(path)
     assert np.array_equal(log.theta, LOG.theta)
     assert np.array_equal(log.tau, LOG.tau)
@@ -165,7 +165,7 @@ def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["{\n}\n", "{1}\n{2}\n", '{"a": 1}'])
 def test_other_text_is_no_json_lines(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(text)
-    assert sniff(tmp_path / "a.jsonl") == "csv"
+    assert format_of(tmp_path / "a.jsonl").name == "csv"
 
 
 def written_hdf5(path: Path, userblock: int = 0) -> Path:
