@@ -2,7 +2,7 @@
 
     import algid
 
-    unloaded, loaded = algid.synthesise("case1", duration=3.0, excitation="wide")
+    unloaded, loaded = algid.synthesise("case1", duration=3.0, torque="wide")
     result = algid.identify(unloaded, loaded)
     print(result.parameters["k1"].estimate, result.payload["m_p"].ci95)
 

@@ -5,7 +5,7 @@ A flag that became a setting behind ``--set`` is not listed: `algid.options.BY_S
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from algid.base.errors import SettingError
 from algid.options import BY_SET, flag
@@ -24,6 +24,11 @@ MOVED: Mapping[str, str] = {
     "--to=yaml": "--to payload",
     "--save-plots": "the figure's own button saves it as SVG",
     "--plot-format": "the figure's own button saves it as SVG",
+    # keywords of Python
+    "synthesise(excitation=…)": "torque=, as the flag",
+    "synthesise(kind=…)": "format=, as the flag",
+    "design(wanted=…)": "for_=, as the flag --for",
+    "batch(profile_for=…)": "leave it out: keywords hold over each log's profile",
 }
 """By the old name what stands in its place."""
 
@@ -41,8 +46,18 @@ def refuse_moved(arguments: Sequence[str]) -> None:
     spaced = " ".join(arguments).replace("=", " ")
     names += [name for name in MOVED if "=" in name and name.replace("=", " ") in spaced]
     for name in names:
+        _refuse(name)
         setting = name.removeprefix("--").replace("-", "_")
-        if name in MOVED:
-            raise SettingError(f"{name} is not in this version; instead: {MOVED[name]}")
         if name.startswith("--") and setting in BY_SET:
             raise SettingError(f"{name} is not in this version; instead: {flag(setting)}=VALUE")
+
+
+def refuse_moved_keywords(verb: str, names: Iterable[str]) -> None:
+    """Raise `SettingError` at a keyword of a verb that has moved."""
+    for name in names:
+        _refuse(f"{verb}({name}=…)")
+
+
+def _refuse(name: str) -> None:
+    if name in MOVED:
+        raise SettingError(f"{name} is not in this version; instead: {MOVED[name]}")

@@ -50,7 +50,7 @@ TURNS = 3
 
 def logs(folder: Path, count: int) -> Path:
     """`count` logs of 10 s at 1 kHz with noise of their own."""
-    exact, _ = synthesise("case1", duration=10.0, excitation="wide")
+    exact, _ = synthesise("case1", duration=10.0, torque="wide")
     rng = np.random.default_rng(0)
     for number in range(count):
         theta = exact.theta + 1e-3 * rng.standard_normal(exact.theta.shape)

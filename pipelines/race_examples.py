@@ -35,7 +35,7 @@ def _constants(peer: str) -> float:
     import algid
     from algid.synth.cases import load_case
 
-    log, _ = algid.synthesise("case1", duration=10.0, rate=500.0, excitation="wide")
+    log, _ = algid.synthesise("case1", duration=10.0, rate=500.0, torque="wide")
     found = PEERS[peer][0]([log], L1_OF_EXAMPLE)
     return float(np.max(np.abs(found.values / load_case("case1").arm.constants() - 1)))
 
@@ -100,7 +100,7 @@ def _table4() -> float:
     """
     import algid
 
-    unloaded, loaded = algid.synthesise("case1", excitation="case", duration=1.0)
+    unloaded, loaded = algid.synthesise("case1", torque="case", duration=1.0)
     result = algid.identify(unloaded, loaded, estimator="paper", report=False)
     rows = [row for row in result.table4 if row.paper_error_percent]
     shares = [

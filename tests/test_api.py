@@ -69,7 +69,7 @@ def test_a_log_shows_no_arrays() -> None:
 
 
 def test_what_the_verbs_give_shows_itself_in_a_line() -> None:
-    unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide")
+    unloaded, loaded = algid.synthesise("case1", duration=2.0, torque="wide")
     result = algid.identify(unloaded, estimator="weak")
     given = [
         result.verdict,
@@ -255,7 +255,7 @@ def test_readings_of_other_words_for_the_same_numbers_do_not_differ() -> None:
 
 
 def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() -> None:
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide")
     weak = algid.Settings(estimator="weak")
     one = algid.identify(algid.Log.from_arrays(log.t, log.theta, log.tau), settings=weak)
     other = algid.identify(algid.Log.from_arrays(log.t, log.theta.T, log.tau.T), settings=weak)
@@ -300,7 +300,7 @@ def test_no_log_at_all_is_a_setting_that_lacks(logs: Any) -> None:
 
 
 def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> None:
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", torque_noise=1e-2)
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", torque_noise=1e-2)
     hanging = np.array([[np.pi / 2], [0.0]])
     other = algid.Log.from_arrays(log.t, np.degrees(-(log.theta + hanging)), -log.tau)
     said: dict[str, Any] = {
@@ -331,7 +331,7 @@ def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> 
 
 
 def test_a_design_and_a_comparison_take_results_in_memory(tmp_path: Path) -> None:
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", torque_noise=1e-2)
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", torque_noise=1e-2)
     result = algid.identify(log, model="plain")
     other = algid.identify(log, estimator="weak", model="plain")
     result_file = tmp_path / "result.json"
@@ -355,7 +355,7 @@ WEAK = algid.Settings(estimator="weak")
 @pytest.fixture(scope="module")
 def columns() -> dict[str, Any]:
     """The columns of a log whose angles are in degrees, one of which is a time."""
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide")
     angles = {f"theta{joint + 1} [deg]": np.degrees(log.theta[joint]) for joint in (0, 1)}
     return {"time": log.t, **angles, "tau1": log.tau[0], "tau2": log.tau[1]}
 

@@ -53,7 +53,7 @@ READERS: dict[str, Callable[[str], object]] = {
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with ``log.csv`` and its result."""
     folder = tmp_path_factory.mktemp("arm")
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", seed=0)
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", seed=0)
     algid.write_log(folder / "log.csv", log)
     algid.identify(
         folder / "log.csv", estimator="weak", model="plain", out=folder, report=False, name="arm"

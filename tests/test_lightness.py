@@ -25,7 +25,7 @@ print(json.dumps(sorted(sys.modules)))
 
 @pytest.mark.parametrize("report", [False, True])
 def test_a_short_parquet_log_needs_no_heavy_package(tmp_path: Path, report: bool) -> None:
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide")
     path = tmp_path / "log.parquet"
     write_log(path, log)
     command = [sys.executable, "-c", SCRIPT, str(path), str(tmp_path / "out"), json.dumps(report)]

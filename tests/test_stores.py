@@ -28,7 +28,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
 
 def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> None:
     unloaded, _ = algid.synthesise(
-        "case1", duration=1.5, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+        "case1", duration=1.5, torque="wide", sensors=Sensors(1e-4, 1e-3)
     )
     algid.write_log(tmp_path / "a.mcap", unloaded)
     store = open_store(served.url("logs"))

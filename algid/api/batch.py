@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from algid.api.answer import Answer
 from algid.api.given import opened
 from algid.api.options import OUT, AnyResult, Options, ProfileLike, profile_of, with_options
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.errors import AlgidError, SettingError
 from algid.base.exits import Exit
 from algid.base.text import visible
@@ -87,6 +87,7 @@ class Batched:
         return {end.value: counts[end] for end in JobStatus if end in counts}
 
 
+@verb
 def batch(
     sources: Annotated[str | Path | Sequence[str | Path], Option(kind=list[str])],
     out: Annotated[str | Path, Option(kind=str, flag=OUT)],
@@ -165,12 +166,11 @@ def batch(
     >>> import tempfile
     >>> import algid
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = algid.synthesise("case1", duration=3.0, excitation="wide", out=folder)
+    ...     _ = algid.synthesise("case1", duration=3.0, torque="wide", out=folder)
     ...     done = algid.batch(folder, f"{folder}/results", workers=1, report=False)
     >>> done.counts
     {'ok': 1}
     """
-    check(batch, locals())
     from algid.base.stores import absolute, open_store, shown
     from algid.batches.discover import jobs_of
     from algid.batches.lock import locked

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from algid.api.answer import Answer
 from algid.api.given import opened
 from algid.api.options import Force, Place
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing
 from algid.options import Option
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from algid.report.comparison import Comparison
 
 
+@verb
 def compare(
     *results: Annotated[
         Result | str | Path | Sequence[Result | str | Path], Option(kind=list[Path])
@@ -58,7 +60,7 @@ def compare(
     $ algid compare monday.algid friday.algid -o friday
 
     >>> import algid
-    >>> logs = algid.synthesise("case1", duration=3.0, excitation="wide", torque_noise=1e-2)
+    >>> logs = algid.synthesise("case1", duration=3.0, torque="wide", torque_noise=1e-2)
     >>> ways = [algid.identify(*logs, estimator=name) for name in ("refined", "weak")]
     >>> algid.compare(*ways, labels=["refined", "weak"]).largest_sigma < 4
     True

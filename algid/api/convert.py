@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.options import OUT, Force, LogOptions, ProfileLike, meaning
+from algid.api.signature import verb
 from algid.base.errors import OutputError
 from algid.base.exits import exit_of
 from algid.base.files import refuse_existing
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from algid.notices import Notice
 
 
+@verb
 def convert(
     source: str | Path,
     out: Annotated[str | Path, Option(kind=Path, flag=OUT)],
@@ -67,7 +69,7 @@ def convert(
     >>> import tempfile
     >>> import algid
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = algid.synthesise("case1", out=folder, kind="csv")
+    ...     _ = algid.synthesise("case1", out=folder, format="csv")
     ...     algid.convert(f"{folder}/case1-unloaded.csv", f"{folder}/arm.parquet")
     []
     """

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from algid.api.answer import Answer
 from algid.api.given import called, folder_or_none, parts_of
 from algid.api.options import AnyLog, Folder, Force, Length, cases, two_names
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
 from algid.base.files import refuse_existing
@@ -80,6 +80,7 @@ class Planned:
         return design_json(self.design, self.origin)
 
 
+@verb
 def design(
     prior: Annotated[Result | str | Path, Option(kind=str, words=cases)],
     *,
@@ -92,7 +93,7 @@ def design(
     duration: Annotated[float, Option(range=PLANNED["duration"])] | None = None,
     rate: Annotated[float, Option(range=PLANNED["rate"])] | None = None,
     runs: Annotated[tuple[int, int] | str, Option(kind=str)] | None = None,
-    wanted: Annotated[Sequence[str] | str, Option(kind=str, flag="--for")] | None = None,
+    for_: Annotated[Sequence[str] | str, Option(kind=str)] | None = None,
     position_noise: Annotated[float, Option(range=NOISE)] | None = None,
     torque_noise: Annotated[float, Option(range=NOISE)] | None = None,
     noise_from: AnyLog | None = None,
@@ -136,7 +137,7 @@ def design(
         Samples a second of its log, Hz; 1000 by default.
     runs : pair of int
         Runs without and with the payload, like 2,1.
-    wanted : names of parameters
+    for_ : names of parameters
         Parameters that matter, like k1,m_p; all by default.
     position_noise : float, rad
         Noise of the angles, rad (standard deviation).
@@ -198,7 +199,6 @@ def design(
     from algid.designs.request import request
     from algid.designs.write import Provenance, write_design
 
-    check(design, locals())
     asked_for = {
         "range": range,
         "speed": speed,
@@ -228,7 +228,7 @@ def design(
         PriorKnowledge(l1, l2, payload, prior_error),
     )
     noise = noise_of(known, position_noise, torque_noise, noise_from)
-    campaign = campaign_of(known, asked, noise, wanted, margin, seed)
+    campaign = campaign_of(known, asked, noise, for_, margin, seed)
     origin = Provenance(source, command, names, known.doubts)
     if progress is not None:
         progress("searching", 0, 0)

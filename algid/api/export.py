@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from algid.api.answer import Answer
-from algid.api.given import called, opened, parts_of
+from algid.api.given import called, numbers, opened
 from algid.api.options import AnyResult, Folder, Force, Length
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file, whole_folder
 from algid.base.limits import KNOWN_MASS
@@ -42,6 +41,7 @@ class Exported:
         return f"Exported(lines of text: {lines}, warnings: {codes}, path={self.path!r})"
 
 
+@verb
 def export(
     result: AnyResult,
     to: Annotated[
@@ -110,7 +110,7 @@ def export(
     $ algid export case1-unloaded.algid --to mjcf --l2 0.5
 
     >>> import algid
-    >>> log, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
+    >>> log, _ = algid.synthesise("case1", duration=3.0, torque="wide")
     >>> arm = algid.identify(log, estimator="weak", model="plain")
     >>> algid.export(arm, "urdf", l2=0.1667).text.count("<link ")
     4
@@ -118,7 +118,6 @@ def export(
     from algid.exports.formats import controller_call, exported
     from algid.exports.links import Knowns
 
-    check(export, locals())
     if to in ("csv", "parquet") and draws is None:
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
     knowns = Knowns(l1, l2, m1, m2, rotor1)
@@ -147,19 +146,11 @@ def export(
     return Exported(text, warnings, path, call=call)
 
 
-def _flange(given: Sequence[float] | str, to: str) -> tuple[float, float, float]:
+def _flange(given: Sequence[float] | str, to: str) -> Any:
     """A flange's place and direction out of three numbers, or of X,Y,ANGLE."""
     if to != "payload":
         raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
-    try:
-        x, y, angle = (float(part) for part in parts_of(given))
-    except (TypeError, ValueError):
-        x = y = angle = math.nan
-    if not (abs(x) <= 1e3 and abs(y) <= 1e3 and abs(angle) <= 360):
-        raise SettingError(
-            f"{flag('flange')}: expected metres and degrees like 0.12,0,-90, found {given!r:.60}"
-        )
-    return x, y, angle
+    return numbers("flange", given, (1e3, 1e3, 360.0), "metres and degrees like 0.12,0,-90")
 
 
 def file_of(result: Path, to: str, draws: int | None = None) -> Path:

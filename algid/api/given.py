@@ -7,7 +7,9 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from algid.base.errors import SettingError
 from algid.base.files import whole_folder
+from algid.options import flag
 
 if TYPE_CHECKING:
     from algid.identification.open_logs import LogLike
@@ -20,6 +22,23 @@ def parts_of(given: str | Iterable[Any]) -> Iterable[Any]:
     if isinstance(given, str):
         return given.split(",")
     return given
+
+
+def numbers(name: str, given: Any, most: Sequence[float], like: str) -> Any:
+    """As many numbers as `most`, each at most as large as that one, out of parts or text.
+
+    Raises
+    ------
+    SettingError
+        If they are none such; it says what they are `like`.
+    """
+    try:
+        found = tuple(float(part) for part in parts_of(given))
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != len(most) or not all(map(float.__le__, map(abs, found), most)):
+        raise SettingError(f"{flag(name)}: expected {like}, found {given!r:.60}")
+    return found
 
 
 def opened(given: Result | str | Path) -> Result:

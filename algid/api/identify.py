@@ -18,7 +18,7 @@ from algid.api.options import (
     ProfileLike,
     with_options,
 )
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
 from algid.base.text import visible
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from algid.settings import Settings
 
 
+@verb
 def identify(
     unloaded: Logs | None,
     loaded: Loaded | None = None,
@@ -102,7 +103,7 @@ def identify(
     $ algid identify run-unloaded.mcap --loaded run-loaded.mcap -o results
 
     >>> import algid
-    >>> logs = algid.synthesise("case1", duration=3.0, excitation="wide")
+    >>> logs = algid.synthesise("case1", duration=3.0, torque="wide")
     >>> result = algid.identify(*logs, estimator="weak")
     >>> round(result.payload["m_p"].estimate, 3)
     0.352
@@ -110,7 +111,6 @@ def identify(
     from algid.api.result import Result
     from algid.identification.identify import identify as run
 
-    check(identify, locals())
     asked, meaning = with_options(settings, profile, options)
     unloaded, loaded = meant(unloaded, meaning), meant(loaded, meaning)
     if export and not report:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from algid.api.answer import Answer
 from algid.api.given import meant
 from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meaning
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
 from algid.base.files import refuse_existing, whole_file
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 PROFILE = "algid.toml"
 
 
+@verb
 def inspect(
     log: AnyLog,
     *,
@@ -69,7 +71,7 @@ def inspect(
     $ algid inspect arm.mcap --joints shoulder,elbow --zero hanging
 
     >>> import algid
-    >>> log, _ = algid.synthesise("case1", duration=2.0, excitation="wide")
+    >>> log, _ = algid.synthesise("case1", duration=2.0, torque="wide")
     >>> found = algid.inspect(log)
     >>> found.refused is None, found.clock.rows
     (True, 2001)

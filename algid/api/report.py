@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
 from algid.api.options import Export, Place
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.options import Option, flag
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from algid.base.progress import Progress
 
 
+@verb
 def report(
     *results: Annotated[str | Path, Option(kind=list[Path])],
     out: Place | None = None,
@@ -61,7 +62,6 @@ def report(
     --------
     $ algid report case1-unloaded.algid --export mcap
     """
-    check(report, locals())
     from algid.tracks.result import is_track
 
     made = []

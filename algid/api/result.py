@@ -62,7 +62,7 @@ class Result(results.Result):  # noqa: D101
         Examples
         --------
         >>> import algid
-        >>> log, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
+        >>> log, _ = algid.synthesise("case1", duration=3.0, torque="wide")
         >>> found = algid.identify(log, estimator="weak").predict(log)
         >>> left = (found["tau1"] - found["tau1_predicted"]).fill_nan(None).drop_nulls()
         >>> bool(left.std() < 0.01 * found["tau1"].std())
@@ -84,7 +84,7 @@ class Result(results.Result):  # noqa: D101
         Examples
         --------
         >>> import algid
-        >>> log, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
+        >>> log, _ = algid.synthesise("case1", duration=3.0, torque="wide")
         >>> algid.identify(log, estimator="weak").plot().data[0].y[:3]
         ('k1', 'k2', 'k3')
         """
@@ -124,7 +124,7 @@ def read_result(path: str | Path) -> Result:
     --------
     >>> import tempfile
     >>> import algid
-    >>> log, _ = algid.synthesise("case1", duration=3.0, excitation="wide")
+    >>> log, _ = algid.synthesise("case1", duration=3.0, torque="wide")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     made = algid.identify(log, estimator="weak", out=folder, name="arm", report=False)
     ...     algid.read_result(f"{folder}/arm.algid") == made

@@ -13,16 +13,18 @@ import sys
 import types
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from algid.base.errors import SettingError
+from algid.moved import refuse_moved_keywords
 from algid.options import ADVANCED, Option, flag
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
 EMPTY = inspect.Parameter.empty
+Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
@@ -115,22 +117,21 @@ def fields(model: Any, kind: Any = None) -> dict[str, Keyword]:
     return found
 
 
-def check(verb: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Refuse numbers and words that a verb cannot take; None stands for what is not given.
+def verb(function: Verb) -> Verb:
+    """A function whose keywords are refused where they are none that it takes.
 
-    Parameters
-    ----------
-    verb : callable
-    given : mapping
-        By name; ``locals()`` at the beginning of the verb.
-
-    Raises
-    ------
-    SettingError
-        If a number is out of its bounds, or a word none of those that are known.
+    A number is out of its bounds, a word none of those that are known, a name has moved.
     """
-    for name, one in keywords(verb).items():
-        refuse(one, given[name])
+
+    @wraps(function)
+    def called(*args: Any, **given: Any) -> Any:
+        refuse_moved_keywords(function.__name__, given)
+        said = inspect.signature(function).bind(*args, **given).arguments
+        for name, one in keywords(function).items():
+            refuse(one, said.get(name))
+        return function(*args, **given)
+
+    return called  # type: ignore[return-value]  # it takes and gives the same
 
 
 def refuse(one: Keyword, value: Any) -> None:
@@ -153,12 +154,8 @@ def refuse_unknown(options: Iterable[str], known: Iterable[str]) -> None:
     """Raise `SettingError` at a name that is none of the known ones."""
     from difflib import get_close_matches
 
-    from algid.moved import MOVED
-
     names = list(dict.fromkeys(known))
     for name in options:
-        if f"{name}=" in MOVED:
-            raise SettingError(f"{name}= is not in this version; instead: {MOVED[f'{name}=']}")
         if name not in names:
             mend = f"known are {', '.join(names)}"
             for near in get_close_matches(name, names, n=1):

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import fields, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from algid.api.answer import Answer
-from algid.api.given import parts_of
+from algid.api.given import numbers
 from algid.api.options import Folder, Force, cases
-from algid.api.signature import check, keywords
+from algid.api.signature import keywords, verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing
 from algid.base.limits import PHYSICAL
@@ -30,45 +29,20 @@ if TYPE_CHECKING:
 
 FIRST_YEAR, LAST_YEAR = 1970, 2037
 """Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
+MOST = (PHYSICAL.angle[1], PHYSICAL.angle[1], PHYSICAL.speed[1], PHYSICAL.speed[1])
+"""Of a state: angles in rad and velocities in rad/s."""
 
 State = Sequence[float]
 Schedule = Sequence[tuple[float, float]]
 
 
-@overload
+@verb
 def synthesise(
-    case: str,
-    *,
-    duration: float | None = None,
-    rate: float = 1000.0,
-    excitation: str | Path | Log | None = None,
-    motion: str | Path | None = None,
-    torque_hold: Literal["exact", "zoh", "foh"] = "exact",
-    initial: State | str | None = None,
-    sensors: Sensors | None = None,
-    position_noise: float | None = None,
-    torque_noise: float | None = None,
-    encoder_bits: int | None = None,
-    jitter: float | None = None,
-    drop: float | None = None,
-    seed: int | None = None,
-    start_time: datetime | None = None,
-    payload_schedule: None = None,
-    out: str | Path | None = None,
-    kind: Literal["mcap", "parquet", "csv"] = "mcap",
-    force: bool = False,
-    progress: Progress | None = None,
-) -> tuple[Log, Log]: ...
-@overload
-def synthesise(case: str, *, payload_schedule: Schedule | str, **options: Any) -> tuple[Log]: ...
-def synthesise(  # type: ignore[misc]  # its options are the keywords of the other
     case: Annotated[str | Path, Option(kind=str, words=cases)],
     *,
     duration: Annotated[float, Option(range=PHYSICAL.duration)] | None = None,
     rate: Annotated[float, Option(range=PHYSICAL.rate)] = 1000.0,
-    excitation: Annotated[
-        str | Path | Log, Option(kind=str, flag="--torque", words=lambda: [*run.EXCITATIONS])
-    ]
+    torque: Annotated[str | Path | Log, Option(kind=str, words=lambda: [*run.EXCITATIONS])]
     | None = None,
     motion: str | Path | None = None,
     torque_hold: Literal["exact", "zoh", "foh"] = "exact",
@@ -83,10 +57,10 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
     start_time: Annotated[datetime | date | str, Option(kind=str)] | None = None,
     payload_schedule: Annotated[Schedule | str, Option(kind=str)] | None = None,
     out: Folder | None = None,
-    kind: Annotated[Literal["mcap", "parquet", "csv"], Option(flag="--format")] = "mcap",
+    format: Literal["mcap", "parquet", "csv"] = "mcap",  # noqa: A002  # as the flag
     force: Force = False,
     progress: Progress | None = None,
-) -> tuple[Log, ...]:
+) -> tuple[Log, Log]:
     """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
 
     Velocities are in the logs only where angles are exact: with noise or an encoder the arm
@@ -101,7 +75,7 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
         Length of each log, s; 1, or as long as the motion.
     rate : float, Hz
         Samples a second, Hz; 1000 by default.
-    excitation : 'case' (the default), 'wide', 'none', or a log whose torque is replayed
+    torque : 'case' (the default), 'wide', 'none', or a log whose torque is replayed
         case, wide (0.3 to 8 Hz), none, or a log to replay.
     motion : path
         Folder of a design to follow, instead of a torque.
@@ -129,7 +103,7 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
         One log, its payload changing: S=KG,…, like 2=0.05,4=0. Bare before the first time.
     out : Path
         Folder to write into. None writes nothing.
-    kind : 'mcap', 'parquet' or 'csv'
+    format : 'mcap', 'parquet' or 'csv'
         Format of the logs: mcap, parquet or csv.
     force : bool
         Replace what is there.
@@ -139,8 +113,8 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
     Returns
     -------
     tuple of Log
-        Each of them with its truth; of an arm without payload the first alone. The example's are
-        five, without their truth.
+        Each of them with its truth; of an arm without payload, or of a schedule, one alone. The
+        example's are five, without their truth.
 
     Raises
     ------
@@ -155,36 +129,66 @@ def synthesise(  # type: ignore[misc]  # its options are the keywords of the oth
     --torque wide
 
     >>> import algid
-    >>> unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide")
+    >>> unloaded, loaded = algid.synthesise("case1", duration=2.0, torque="wide")
     >>> unloaded.theta.shape, loaded.origin.truth.payload
     ((2, 2001), 0.3515)
     """
     own = locals()
-    check(synthesise, own)
     if case == "example":
-        return _example(own)
-    sensed = ("position_noise", "torque_noise", "encoder_bits", "jitter", "drop", "seed")
-    given = {name: own[name] for name in sensed}
-    described = load_case(str(case))
-    wished = {name: value for name, value in given.items() if value is not None}
-    measured = replace(sensors or Sensors(), **wished)
+        return _example(own)  # type: ignore[return-value]  # five
+    arm = load_case(str(case))
+    of_sensors = {one.name: own.get(one.name) for one in fields(Sensors)}
+    measured = replace(
+        sensors or Sensors(),
+        **{name: value for name, value in of_sensors.items() if value is not None},
+    )
     if start_time is not None:
         measured = replace(measured, start_ns=_start_ns(start_time))
-    asked = _Asked(described, rate, duration, measured, _Files(out, kind, force), progress)
+    plan = None
     if motion is not None:
-        _refuse_beside_motion(initial, payload_schedule, excitation)
-        logs = _followed(asked, Path(motion))
+        from algid.synth.follow import read_plan
+
+        for name in ("initial", "payload_schedule", "torque"):
+            if own[name] is not None:
+                raise SettingError(
+                    f"{flag(name)} {own[name]}: a motion starts where it was planned and carries "
+                    "one payload; leave it out"
+                )
+        plan = read_plan(Path(motion))
+        duration = duration or plan.duration
+    recording = _recording(rate, duration or 1.0, measured)
+    if initial is not None:
+        recording = replace(
+            recording, initial=numbers("initial", initial, MOST, "four numbers like -1.57,0,0,0")
+        )
+    drive = _drive(arm, "case" if torque is None else torque, torque_hold, recording)
+    roles, schedule = ["unloaded", "loaded"][: 1 + bool(arm.payload)], None
+    if payload_schedule is not None:
+        roles, schedule = ["schedule"], _schedule(payload_schedule)
+    files = []
+    if out is not None:
+        files = [Path(out) / f"{arm.name}-{role}.{format}" for role in roles]
+    for file in files:
+        refuse_existing(file, force)
+    if plan is not None:
+        logs = run.rehearse(arm, plan, recording, progress)
+    elif schedule is not None:
+        logs = [run.with_schedule(arm, drive, recording, schedule, progress)]
     else:
-        logs = _driven(asked, excitation, torque_hold, initial, payload_schedule)
-    asked.files.write(logs)
-    return tuple(logs)
+        logs = [*run.synthesise(arm, drive, recording, progress)][: len(roles)]
+    if files:
+        from algid.writers import write_log
+
+        for file, log in zip(files, logs, strict=True):
+            write_log(file, log, truth=log.origin.truth, force=force)
+    return tuple(logs)  # type: ignore[return-value]  # of a schedule one, as its docstring says
 
 
 def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     """The files."""
     from algid.api.example import PROFILE
 
-    names = [f"{log.origin.path}.{given['kind']}" for log in logs]
+    names = [f"{log.origin.path}.{given['format']}" for log in logs]
     if given["case"] == "example":
         names = [*(f"{log.origin.path}.csv" for log in logs), PROFILE]
     return Answer(lambda: [str(Path(given["out"]) / name) for name in names])
@@ -195,8 +199,7 @@ def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
     from algid.api.example import example_logs, write_example
 
     for name, one in keywords(synthesise).items():
-        default = inspect.signature(synthesise).parameters[name].default
-        if name not in ("case", "out", "force") and given[name] not in (None, default):
+        if name not in ("case", "out", "force") and given[name] not in (None, one.default):
             raise SettingError(f"{one.flag}: the example is always the same; leave it out")
     logs = example_logs()
     if given["out"] is not None:
@@ -204,119 +207,20 @@ def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
     return tuple(logs)
 
 
-@dataclass(frozen=True)
-class _Files:
-    """Where logs are written, if anywhere."""
-
-    out: str | Path | None
-    kind: str
-    force: bool
-
-    def path(self, name: str) -> Path:
-        return Path(self.out or "") / f"{name}.{self.kind}"
-
-    def refuse_existing(self, case: Case, roles: Sequence[str]) -> None:
-        if self.out is None:
-            return
-        for role in roles:
-            refuse_existing(self.path(f"{case.name}-{role}"), self.force)
-
-    def write(self, logs: Sequence[Log]) -> None:
-        if self.out is None:
-            return
-        from algid.writers import write_log
-
-        for log in logs:
-            path = self.path(log.origin.path)
-            write_log(path, log, truth=log.origin.truth, kind=self.kind, force=self.force)
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """What every way to a log needs."""
-
-    case: Case
-    rate: float
-    duration: float | None
-    sensors: Sensors
-    files: _Files
-    progress: Progress | None
-
-    @property
-    def roles(self) -> tuple[str, ...]:
-        if self.case.payload:
-            return "unloaded", "loaded"
-        return ("unloaded",)
-
-    def recording(self, duration: float) -> run.Acquisition:
-        """How it is recorded; raises `SettingError` for fewer than two samples, or too many."""
-        most = PHYSICAL.samples[1]
-        if self.rate * duration > most:
-            raise SettingError(
-                f"{flag('duration')}: {duration:g} s at {flag('rate')} {self.rate:g} Hz are "
-                f"{self.rate * duration:.3g} samples; expected at most {most:g}, more than a day "
-                "at 1 kHz"
-            )
-        if round(self.rate * duration) < 1:
-            raise SettingError(
-                f"{flag('duration')}: expected at least {1 / self.rate:g} s, two samples at "
-                f"{flag('rate')} {self.rate:g}, found {duration:g}"
-            )
-        return run.Acquisition(self.rate, duration, sensors=self.sensors)
-
-
-def _refuse_beside_motion(initial: object, schedule: object, excitation: object) -> None:
-    given = {
-        "initial": initial,
-        "payload_schedule": schedule,
-        "torque": excitation,
-    }
-    for option, value in given.items():
-        if value is not None:
-            raise SettingError(
-                f"{flag(option)} {value}: a motion starts where it was planned and carries one "
-                "payload; leave it out"
-            )
-
-
-def _followed(asked: _Asked, motion: Path) -> list[Log]:
-    """The logs of a controller that follows a plan."""
-    from algid.synth.follow import read_plan
-
-    plan = read_plan(motion)
-    recording = asked.recording(asked.duration or plan.duration)
-    asked.files.refuse_existing(asked.case, asked.roles)
-    return run.rehearse(asked.case, plan, recording, asked.progress)
-
-
-def _driven(
-    asked: _Asked,
-    excitation: str | Path | Log | None,
-    hold: str,
-    initial: State | str | None,
-    payload_schedule: Schedule | str | None,
-) -> list[Log]:
-    """The logs of an arm under a torque."""
-    duration = asked.duration
-    if duration is None:
-        duration = 1.0
-    recording = asked.recording(duration)
-    if initial is not None:
-        recording = replace(recording, initial=_state(initial))
-    if excitation is None:
-        excitation = "case"
-    drive = _torque(asked.case, excitation, hold)
-    if excitation in run.EXCITATIONS and hold == "zoh":
-        drive = run.held(drive, asked.rate, recording.duration, "zoh")
-    elif excitation in run.EXCITATIONS and hold == "foh":
-        drive = run.held(drive, asked.rate, recording.duration, "foh")
-    if payload_schedule is not None:
-        schedule = _schedule(payload_schedule)
-        asked.files.refuse_existing(asked.case, ("schedule",))
-        return [run.with_schedule(asked.case, drive, recording, schedule, asked.progress)]
-    asked.files.refuse_existing(asked.case, asked.roles)
-    logs = run.synthesise(asked.case, drive, recording, asked.progress)
-    return list(logs)[: len(asked.roles)]
+def _recording(rate: float, duration: float, sensors: Sensors) -> run.Acquisition:
+    """How it is recorded; raises `SettingError` for fewer than two samples, or too many."""
+    most, samples = PHYSICAL.samples[1], rate * duration
+    if samples > most:
+        raise SettingError(
+            f"{flag('duration')}: {duration:g} s at {flag('rate')} {rate:g} Hz are {samples:.3g} "
+            f"samples; expected at most {most:g}, more than a day at 1 kHz"
+        )
+    if round(samples) < 1:
+        raise SettingError(
+            f"{flag('duration')}: expected at least {1 / rate:g} s, two samples at "
+            f"{flag('rate')} {rate:g}, found {duration:g}"
+        )
+    return run.Acquisition(rate, duration, sensors=sensors)
 
 
 def _start_ns(given: datetime | date | str) -> int:
@@ -342,54 +246,33 @@ def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
     pairs: Sequence[Sequence[float | str]] | Schedule = given
     if isinstance(given, str):
         pairs = [part.split("=") for part in given.split(",")]
+    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
+    schedule, before = [], -math.inf
     try:
-        schedule = [(float(time), float(mass)) for time, mass in pairs]
+        for time, mass in ((float(time), float(mass)) for time, mass in pairs):
+            if not (before < time and 0 <= time <= longest and 0 <= mass <= heaviest):
+                raise ValueError
+            schedule.append((time, mass))
+            before = time
+        if not schedule:
+            raise ValueError
     except (TypeError, ValueError):
-        schedule = []
-    if not _is_schedule(schedule):
         raise SettingError(
             f"{flag('payload_schedule')}: expected increasing times and payloads of 0 or more like "
             f"2=0.05,4=0, found {given!r}"
-        )
+        ) from None
     return schedule
 
 
-def _is_schedule(schedule: Sequence[tuple[float, float]]) -> bool:
-    """Whether times increase, and times and payloads are such as a log and an arm may have."""
-    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
-    before = -math.inf
-    for time, mass in schedule:
-        if not (before < time and 0 <= time <= longest and 0 <= mass <= heaviest):
-            return False
-        before = time
-    return bool(schedule)
-
-
-def _state(given: State | str) -> tuple[float, float, float, float]:
-    """Two angles in rad and two velocities in rad/s out of four numbers, or of θ1,θ2,ω1,ω2."""
-    try:
-        first, second, third, fourth = (float(part) for part in parts_of(given))
-    except (TypeError, ValueError):
-        first = second = third = fourth = math.nan
-    if not math.isfinite(first + second + third + fourth):
-        raise SettingError(
-            f"{flag('initial')}: expected four numbers like -1.57,0,0,0, found {given!r}"
-        )
-    turned, fast = PHYSICAL.angle[1], PHYSICAL.speed[1]
-    if max(abs(first), abs(second)) > turned or max(abs(third), abs(fourth)) > fast:
-        raise SettingError(
-            f"{flag('initial')}: expected angles within {turned:g} rad and {fast:g} rad/s, found "
-            f"{given!r}"
-        )
-    return first, second, third, fourth
-
-
-def _torque(case: Case, given: str | Path | Log, hold: str) -> Torque:
-    """The excitation of that name, or the torque of a log."""
+def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquisition) -> Torque:
+    """The excitation of that name, or the torque of a log, between whose samples it is held."""
     from algid.synth.excitation import SampledTorque
 
     if isinstance(given, str) and given in run.EXCITATIONS:
-        return run.excitation(case, given)
+        torque = run.excitation(case, given)
+        if hold == "exact":
+            return torque
+        return run.held(torque, recording.rate, recording.duration, hold)
     if not isinstance(given, Log):
         from algid.readers import read_log
 
@@ -399,6 +282,4 @@ def _torque(case: Case, given: str | Path | Log, hold: str) -> Torque:
                 "neither"
             )
         given = read_log(given)
-    if hold == "foh":
-        return SampledTorque(given.t, given.tau, "foh")
-    return SampledTorque(given.t, given.tau, "zoh")
+    return SampledTorque(given.t, given.tau, "foh" if hold == "foh" else "zoh")

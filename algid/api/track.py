@@ -18,7 +18,7 @@ from algid.api.options import (
     ProfileLike,
     meaning,
 )
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.exits import exit_of
 from algid.options import Option
 
@@ -33,6 +33,7 @@ UNIT = "passes"
 """What progress counts."""
 
 
+@verb
 def track(
     log: AnyLog,
     parameters: Annotated[Result | str | Path, Option(kind=Path, flag="--parameters")],
@@ -95,9 +96,9 @@ def track(
     $ algid track picking.mcap --parameters case1-unloaded.algid -o tracks
 
     >>> import algid
-    >>> noise = {"duration": 6.0, "torque_noise": 1e-2, "excitation": "wide"}
+    >>> noise = {"duration": 6.0, "torque_noise": 1e-2, "torque": "wide"}
     >>> arm = algid.identify(*algid.synthesise("case1", **noise), model="plain")
-    >>> (picking,) = algid.synthesise("case1", payload_schedule=[(3.0, 0.1)], **noise)
+    >>> picking = algid.synthesise("case1", payload_schedule=[(3.0, 0.1)], **noise)[0]
     >>> found = algid.track(picking, arm)
     >>> len(found.track.stretches), round(found.track.stretches[1].m_p, 2)
     (2, 0.1)
@@ -105,7 +106,6 @@ def track(
     from algid.tracks.page import track_folder, write_track
     from algid.tracks.run import track_log
 
-    check(track, locals())
     own = meaning(profile, options)
     log = meant(log, own)
     folder = None

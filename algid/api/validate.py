@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from algid.api.answer import Answer
 from algid.api.given import called, meant, opened
 from algid.api.options import AnyResult, Loaded, LogOptions, Logs, ProfileLike, meaning
-from algid.api.signature import check
+from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
 from algid.check import Judged, judge
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from algid.report.document import Table
 
 
+@verb
 def validate(
     result: AnyResult,
     logs: Logs | None = None,
@@ -82,12 +83,11 @@ def validate(
     $ algid validate run1-unloaded.algid run2-unloaded.mcap --max-nrmse 0.3
 
     >>> import algid
-    >>> log, _ = algid.synthesise("case1", duration=4.0, excitation="wide")
+    >>> log, _ = algid.synthesise("case1", duration=4.0, torque="wide")
     >>> result = algid.identify(log.part(0, 2000), estimator="weak")
     >>> algid.validate(result, log.part(2000, 4001)).total.r2[0] > 0.999
     True
     """
-    check(validate, locals())
     from algid.identification.identify import reused
     from algid.identification.open_logs import open_sources, read_otherwise
     from algid.identification.recordings import Recordings

@@ -27,7 +27,7 @@ Table = Callable[[pl.DataFrame], pl.DataFrame]
 def write_refusals(folder: Path) -> dict[str, str]:
     """Write logs; by the name of each one's job, a pattern that its reason holds."""
     log, loaded = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+        "case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3)
     )
     log, loaded = replace(log, omega=None), replace(loaded, omega=None)
     said: dict[str, str] = {}

@@ -91,7 +91,7 @@ JOBS = 12
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
     unloaded, _ = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+        "case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3)
     )
     for number in range(JOBS):
         algid.write_log(folder / f"logs/d{number:02d}.mcap", unloaded)

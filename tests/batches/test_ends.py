@@ -53,7 +53,7 @@ def left(folder: Path) -> list[str]:
 
 def write_logs(folder: Path, count: int) -> Path:
     folder.mkdir()
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
     for number in range(count):
         algid.write_log(folder / f"d{number}-unloaded.csv", log)
     return folder

@@ -27,7 +27,7 @@ def served() -> Iterator[Served]:
 @pytest.mark.parametrize("name", ["joints.mcap", "a.csv", "a.parquet"])
 def test_a_log_is_fetched_whole_and_hashed(name: str, served: Served, tmp_path: Path) -> None:
     path = tmp_path / name
-    algid.write_log(path, algid.synthesise("case1", duration=2.0, excitation="wide")[0])
+    algid.write_log(path, algid.synthesise("case1", duration=2.0, torque="wide")[0])
     open_store(served.url("logs")).write(name, path.read_bytes())
     copy = staged(served.url(f"logs/{name}"), tmp_path / "copy")
     assert copy.whole

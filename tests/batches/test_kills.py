@@ -32,9 +32,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
-    exact, _ = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
-    )
+    exact, _ = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
     rng = np.random.default_rng(0)
     for number in range(JOBS):
         noisy = replace(exact, theta=exact.theta + rng.normal(0, 1e-3, exact.theta.shape))

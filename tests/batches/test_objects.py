@@ -64,7 +64,7 @@ def served(server: Served) -> Iterator[Served]:
 def log() -> bytes:
     """A second at 200 Hz as CSV."""
     unloaded, _ = algid.synthesise(
-        "case1", rate=200.0, duration=1.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+        "case1", rate=200.0, duration=1.0, torque="wide", sensors=Sensors(1e-4, 1e-3)
     )
     columns = {"t": unloaded.stamp_ns * 1e-9}
     columns |= {

@@ -54,7 +54,7 @@ class Here(Executor):
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("logs")
     unloaded, loaded = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+        "case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3)
     )
     for name in ("r1/a", "r1/b"):
         (folder / name).parent.mkdir(exist_ok=True)

@@ -27,7 +27,7 @@ HASTY = "from algid.batches import run; run.LOOK_EVERY = 1.0; from algid.cli imp
 def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     path = tmp_path_factory.mktemp("made") / "log.csv"
     unloaded, _ = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-4, 1e-3)
+        "case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3)
     )
     algid.write_log(path, unloaded)
     path.with_name("log.csv.truth.json").unlink(missing_ok=True)

@@ -20,7 +20,7 @@ from algid.synth.sensors import Sensors
 @pytest.fixture(scope="module")
 def result() -> Result:
     logs = algid.synthesise(
-        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+        "case1", duration=2.0, rate=500.0, torque="wide", sensors=Sensors(1e-3, 1e-2)
     )
     return algid.identify(*logs)
 
@@ -79,7 +79,7 @@ def test_an_impossible_arm_is_refused(result: Result, tmp_path: Path) -> None:
 
 def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_path: Path) -> None:
     logs = algid.synthesise(
-        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+        "case1", duration=2.0, rate=500.0, torque="wide", sensors=Sensors(1e-3, 1e-2)
     )
     settings = Settings(model="coulomb,offset")
     belief = prior_of(
@@ -96,7 +96,7 @@ def test_friction_of_a_real_arm_is_planned_for_and_what_cannot_be_is_said(tmp_pa
 def test_a_delay_that_was_estimated_is_planned_for_and_no_aim(tmp_path: Path) -> None:
     """It takes of the others' precision; nobody moves an arm to learn it unless it is asked for."""
     logs = algid.synthesise(
-        "case1", duration=2.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+        "case1", duration=2.0, rate=500.0, torque="wide", sensors=Sensors(1e-3, 1e-2)
     )
     found = algid.identify(*logs, Settings(model="delay"))
     belief = prior_of(saved(found, tmp_path), None, PriorKnowledge()).belief

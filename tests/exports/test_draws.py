@@ -126,7 +126,7 @@ def test_draws_cover_held_out_torques_as_often_as_stated() -> None:
         log, _ = algid.synthesise(
             "case1",
             duration=3.0,
-            excitation="wide",
+            torque="wide",
             position_noise=1e-3,
             torque_noise=1e-2,
             seed=seed,

@@ -42,7 +42,7 @@ class Case:
 def logs(name: str, duration: float = 4.0, exact: bool = False) -> tuple[Log, Log]:
     """The unloaded and the loaded log of a case, wide motion."""
     sensors = Sensors() if exact else NOISY
-    return algid.synthesise(name, duration=duration, excitation="wide", sensors=sensors)
+    return algid.synthesise(name, duration=duration, torque="wide", sensors=sensors)
 
 
 def summary(result: algid.Result) -> Summary:
@@ -145,7 +145,7 @@ def _several(count: int, **settings: Any) -> Callable[[Path], Summary]:
     def run(_folder: Path) -> Summary:
         unloaded = [
             algid.synthesise(
-                "case2", duration=2.0, excitation="wide", sensors=replace(NOISY, seed=seed)
+                "case2", duration=2.0, torque="wide", sensors=replace(NOISY, seed=seed)
             )[0]
             for seed in range(count)
         ]

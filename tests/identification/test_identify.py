@@ -39,13 +39,13 @@ WEAK = Settings(estimator="weak", model="plain")
 
 @pytest.fixture(scope="module")
 def wide() -> tuple[Log, Log]:
-    return algid.synthesise("case1", duration=3.0, excitation="wide")
+    return algid.synthesise("case1", duration=3.0, torque="wide")
 
 
 @pytest.fixture(scope="module")
 def noisy() -> tuple[Log, Log]:
     sensors = Sensors(position_noise=1e-3, torque_noise=1e-2, seed=3)
-    return algid.synthesise("case1", duration=5.0, excitation="wide", sensors=sensors)
+    return algid.synthesise("case1", duration=5.0, torque="wide", sensors=sensors)
 
 
 def test_paper_observer_and_poles_stay_within_the_paper_s_own_bound() -> None:
@@ -180,8 +180,8 @@ def test_swapped_logs_are_refused(wide: tuple[Log, Log]) -> None:
 def test_logs_of_two_arms_are_told() -> None:
     # of 2 s the windows are too few for seven coefficients: any body of a payload fits them then
     sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
-    first, _ = algid.synthesise("case1", duration=6.0, excitation="wide", sensors=sensors)
-    _, second = algid.synthesise("case2", duration=6.0, excitation="wide", sensors=sensors)
+    first, _ = algid.synthesise("case1", duration=6.0, torque="wide", sensors=sensors)
+    _, second = algid.synthesise("case2", duration=6.0, torque="wide", sensors=sensors)
     result = identify(first, second, Settings(model="plain"))
     assert any("another arm" in warning for warning in result.warnings)
     assert any("σ from belonging to one arm" in warning for warning in result.warnings)
@@ -189,7 +189,7 @@ def test_logs_of_two_arms_are_told() -> None:
 
 def test_weak_excitation_is_a_status_not_a_number() -> None:
     sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
-    still, _ = algid.synthesise("case1", duration=3.0, excitation="none", sensors=sensors)
+    still, _ = algid.synthesise("case1", duration=3.0, torque="none", sensors=sensors)
     result = identify(still, None, PAPER)
     weak = [found for found in result.parameters.values() if found.status is Status.WEAK_EXCITATION]
     assert weak
@@ -199,7 +199,7 @@ def test_weak_excitation_is_a_status_not_a_number() -> None:
 
 def test_weak_excitation_by_likelihood_names_what_is_missing() -> None:
     sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
-    still, _ = algid.synthesise("case1", duration=3.0, excitation="none", sensors=sensors)
+    still, _ = algid.synthesise("case1", duration=3.0, torque="none", sensors=sensors)
     result = identify(still)
     assert any(found.status is Status.NOT_IDENTIFIABLE for found in result.parameters.values())
     assert result.fit is not None
@@ -424,7 +424,7 @@ def test_a_bound_broken_by_chance_is_no_failure() -> None:
 
 
 def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:
-    log, _ = algid.synthesise("case1", duration=4.0, excitation="wide", sensors=Sensors(1e-4, 1e-3))
+    log, _ = algid.synthesise("case1", duration=4.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
     kept = np.random.default_rng(5).random(len(log)) > 0.05
     some = int(kept.sum())
     lost = replace(

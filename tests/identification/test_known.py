@@ -32,7 +32,7 @@ NAMES = [f"k{n}" for n in range(1, 8)]
 @pytest.fixture(scope="module")
 def weighed() -> Result:
     logs = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2, seed=1)
+        "case1", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2, seed=1)
     )
     return identify(*logs, Settings(model="coulomb"), report=False)
 

@@ -12,7 +12,7 @@ from algid.synth.sensors import Sensors
 
 
 def test_a_log_too_short_beside_a_good_one_still_gives_a_report(tmp_path: Path) -> None:
-    log, _ = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
     short = replace(
         log, stamp_ns=log.stamp_ns[:30], theta=log.theta[:, :30], tau=log.tau[:, :30], omega=None
     )

@@ -49,9 +49,7 @@ def uneven() -> Log:
     Long enough that the refined estimator leaves pieces out of its training.
     """
     sensors = Sensors(position_noise=1e-4, torque_noise=1e-2, jitter=1e-5, drop=1e-3, seed=1)
-    first, _ = algid.synthesise(
-        "case1", duration=8.0, rate=500.0, excitation="wide", sensors=sensors
-    )
+    first, _ = algid.synthesise("case1", duration=8.0, rate=500.0, torque="wide", sensors=sensors)
     stamps = np.concatenate([first.stamp_ns + 8_500_000_000 * n for n in range(12)])
     return Log(stamps, np.tile(first.theta, 12), np.tile(first.tau, 12), first.origin)
 

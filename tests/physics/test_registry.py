@@ -118,7 +118,7 @@ else:
 from dataclasses import replace
 from algid.synth.cases import load_case
 case = load_case("case1")
-unloaded, _ = algid.synthesise("case1", duration=4.0, rate=500.0, excitation="wide")
+unloaded, _ = algid.synthesise("case1", duration=4.0, rate=500.0, torque="wide")
 rng = np.random.default_rng(0)
 tau = unloaded.tau + rng.normal(0, 1e-3, unloaded.tau.shape)
 tau[1] += 0.05 * np.sin(6 * unloaded.theta[1])
@@ -216,7 +216,7 @@ assert "| `--toy-side` | Where the toy stands. |" in text_of("python")
 assert Remedy({"toy_side": "right"}).flags == ("--toy-side", "right")
 assert Remedy({"toy_level": 2.0}).flags == ("--toy-level", "2.0")
 # Python: keywords, and what is refused
-log = algid.synthesise("case1", duration=2.0, rate=500.0, excitation="wide")[0]
+log = algid.synthesise("case1", duration=2.0, rate=500.0, torque="wide")[0]
 algid.write_log(Path("arm.csv"), log)
 done = algid.identify(
     "arm.csv", estimator="weak", model="plain", toy_level=2.0, toy_side="right"

@@ -56,7 +56,7 @@ ONE, OTHER = (
         case,
         duration=3.0,
         rate=200,
-        excitation="wide",
+        torque="wide",
         position_noise=2e-4,
         torque_noise=1e-2,
         seed=seed,

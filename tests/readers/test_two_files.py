@@ -167,7 +167,7 @@ def test_one_file_of_torques_serves_one_log(tmp_path: Path) -> None:
 
 
 def test_an_earlier_result_lends_no_other_log_its_torques(tmp_path: Path) -> None:
-    unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide")
+    unloaded, loaded = algid.synthesise("case1", duration=2.0, torque="wide")
     stamps, q, tau = unloaded.stamp_ns, unloaded.theta, unloaded.tau
     pl.DataFrame({"stamp_ns": stamps, "q1": q[0], "q2": q[1]}).write_csv(tmp_path / "a.csv")
     pl.DataFrame({"stamp_ns": stamps, "tau1": tau[0], "tau2": tau[1]}).write_csv(tmp_path / "t.csv")

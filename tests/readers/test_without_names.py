@@ -15,7 +15,7 @@ from algid.writers import write_log
 
 @pytest.fixture(scope="module")
 def log() -> algid.Log:
-    return algid.synthesise("case1", duration=1.0, rate=200.0, excitation="wide")[0]
+    return algid.synthesise("case1", duration=1.0, rate=200.0, torque="wide")[0]
 
 
 def columns(log: algid.Log) -> dict[str, np.ndarray]:

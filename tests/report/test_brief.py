@@ -42,7 +42,7 @@ def test_verdict_reasons_estimates_and_fit_are_shown(result: Result) -> None:
 
 @pytest.mark.parametrize("estimator", ["weak", "paper"])
 def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
-    logs = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    logs = algid.synthesise("case1", duration=3.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
     text = shown(algid.identify(*logs, settings=Settings(estimator=estimator)))
     assert "gravity moment of link 1" in text  # the longest meaning breaks, and is not left out
     _, numbers = text.split("\n\n")
@@ -52,7 +52,7 @@ def test_a_simulated_log_shows_its_errors(estimator: str) -> None:
 
 
 def test_a_failed_log_says_what_to_run_first() -> None:
-    log, _ = algid.synthesise("case1", duration=3.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    log, _ = algid.synthesise("case1", duration=3.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
     log.theta[1] *= -1
     log = algid.Log.from_arrays(log.t, log.theta, log.tau, name="runs/of may/arm 1.csv")
     found = algid.identify(log, settings=Settings(estimator="weak"), zero="hanging", start=0.1)

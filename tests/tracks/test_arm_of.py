@@ -25,7 +25,7 @@ from tests.tracks.folders import CASE, noisy, without_coulomb
 def weighed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Result of an arm with its payload, which tells the lengths of its links."""
     folder = tmp_path_factory.mktemp("weighed")
-    logs = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2))
+    logs = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
     assert logs[1] is not None
     names = [folder / "bare.mcap", folder / "loaded.mcap"]
     for path, log in zip(names, logs, strict=True):

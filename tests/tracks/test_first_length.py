@@ -19,7 +19,7 @@ from tests.tracks.folders import without_coulomb
 @pytest.fixture(scope="module")
 def weighed() -> Result:
     logs = algid.synthesise(
-        "case1", duration=3.0, rate=500.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+        "case1", duration=3.0, rate=500.0, torque="wide", sensors=Sensors(1e-3, 1e-2)
     )
     return algid.identify(*logs, model="plain")
 

@@ -39,7 +39,7 @@ def files(picking: algid.Log, tmp_path_factory: pytest.TempPathFactory) -> tuple
     """A log with its schedule, and the result of its arm."""
     folder = tmp_path_factory.mktemp("track")
     unloaded, _ = algid.synthesise(
-        "case1", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
+        "case1", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2)
     )
     identify(unloaded, out=folder, name="arm", report=False)
     log = noisy(picking, np.random.default_rng(4))
@@ -74,9 +74,7 @@ def test_the_mcap_bears_the_stamps_of_the_log(result: TrackResult, tmp_path: Pat
 
 
 def test_the_arm_of_another_log_is_told(files: tuple[Path, Path], tmp_path: Path) -> None:
-    other, _ = algid.synthesise(
-        "case2", duration=2.0, excitation="wide", sensors=Sensors(1e-3, 1e-2)
-    )
+    other, _ = algid.synthesise("case2", duration=2.0, torque="wide", sensors=Sensors(1e-3, 1e-2))
     write_log(tmp_path / "other.mcap", other)
     judged = verdict(track_log(tmp_path / "other.mcap", files[1], l1=CASE.arm.l1, l2=CASE.arm.l2))
     assert judged.grade == "failed"
@@ -87,7 +85,7 @@ def test_lengths_that_contradict_the_arms_result_fail_whoever_takes_them(
     picking: algid.Log, knows: str
 ) -> None:
     arm, noise = CASE.arm, Sensors(1e-3, 1e-2)
-    unloaded, loaded = algid.synthesise("case1", duration=2.0, excitation="wide", sensors=noise)
+    unloaded, loaded = algid.synthesise("case1", duration=2.0, torque="wide", sensors=noise)
     lengths: dict[str, Any] = {"l1": arm.l1, "l2": arm.l2} if knows == "stated" else {}
     known = algid.identify(unloaded, loaded, **lengths)
     log = noisy(picking, np.random.default_rng(4))
