@@ -25,6 +25,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Metadata, Schema
+from mcap.summary import Summary
 from numpy.typing import NDArray
 
 from algid.base.errors import LogError
@@ -47,6 +48,8 @@ _HEAD = np.dtype(
     [("code", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_ns", "<i8")]
 )
 _DEFINITIONS = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata}
+_SUMMARY = (2, 3, 4, 8, 10, 11, 13, 14)
+"""Codes of the records that may stand behind the end of the data."""
 _LOOSE_BYTES = 1 << 23
 """Of records outside of chunks that are read at once."""
 _SMALL_BYTES = 1 << 13
@@ -112,10 +115,13 @@ def mcap_file(path: Path) -> MessageFile:
     """
     with _stream(path) as stream:
         size = stream.seek(0, io.SEEK_END)
-        found, why = None, []
+        found, promised, why = None, dict[int, int](), []
         numbers: dict[str, Any] = {"case": "none"}
         try:
-            found = _from_summary(stream, size)
+            summary = _summary(stream, size)
+            if summary is not None and summary.statistics is not None:
+                promised = summary.statistics.channel_message_counts
+                found = _from_summary(stream, summary)
         except Exception as error:  # what the package raises of bytes that are no records
             numbers = {"case": "summary", "why": str(error)}
             why = [f"its summary: {error}"]
@@ -123,6 +129,8 @@ def mcap_file(path: Path) -> MessageFile:
             found = _walked(stream, size)
             found.notices.insert(0, Notice("DAMAGED_INDEX", numbers=numbers))
             found.damage[:0] = why
+            for channel, count in promised.items():  # what is not there is lost
+                found.counts[channel] = max(count, found.counts.get(channel, 0))
     text = found.metadata.get(KEY, {}).get(KEY)
     try:
         truth = None if text is None else loads(text).truth
@@ -164,8 +172,8 @@ def _read(stream: IO[bytes], start: int, length: int) -> bytes:
     return content
 
 
-def _from_summary(stream: IO[bytes], size: int) -> FileIndex | None:
-    """What a summary says, None where it does not tell enough.
+def _summary(stream: IO[bytes], size: int) -> Summary | None:
+    """A file's summary, None where it has none.
 
     Raises
     ------
@@ -176,16 +184,24 @@ def _from_summary(stream: IO[bytes], size: int) -> FileIndex | None:
     if not tail.endswith(_MAGIC) or len(tail) < _FOOTER_BYTES:
         raise ValueError("the file has no end: it was cut off")
     stream.seek(0)
-    reader = SeekingReader(stream, record_size_limit=LIMITS.chunk_bytes)
-    summary = reader.get_summary()
-    if summary is None or summary.statistics is None:
-        return None
-    if not summary.chunk_indexes or not summary.channels:
-        return None
+    summary = SeekingReader(stream, record_size_limit=LIMITS.chunk_bytes).get_summary()
     start, checksum = struct.unpack_from("<Q8xI", tail, 9)
     content = _read(stream, start, size - _FOOTER_BYTES - start)
-    if checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
+    if summary is not None and checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
         raise ValueError("its checksum is wrong")
+    return summary
+
+
+def _from_summary(stream: IO[bytes], summary: Summary) -> FileIndex | None:
+    """What a summary with statistics says, None where it does not tell enough.
+
+    Raises
+    ------
+    ValueError
+        If it contradicts itself; the package raises more.
+    """
+    if not summary.chunk_indexes or not summary.channels or summary.statistics is None:
+        return None
     statistics, chunks = summary.statistics, []
     counts = {one: count for one, count in statistics.channel_message_counts.items() if count}
     entries = 0
@@ -202,8 +218,9 @@ def _from_summary(stream: IO[bytes], size: int) -> FileIndex | None:
         raise ValueError("its chunks overlap")
     found = FileIndex(summary.channels, summary.schemas, {}, chunks, counts)
     found.span_ns = statistics.message_start_time, statistics.message_end_time
-    if any(one.name == KEY for one in summary.metadata_indexes):
-        for record in reader.iter_metadata():
+    for one in summary.metadata_indexes:
+        if one.name == KEY:
+            record = _parsed(Metadata, _read(stream, one.offset + 9, one.length - 9))
             found.metadata.setdefault(record.name, record.metadata)
     return found
 
@@ -212,20 +229,23 @@ def _walked(stream: IO[bytes], size: int) -> FileIndex:
     """What stands in a file up to its end, or to its first break."""
     found, chunks = FileIndex(), list[ChunkRange]()
     place = begin = len(_MAGIC)  # of records outside of chunks that are in no range yet
-    ended = False
-    while True:
+    data_end = 0
+    whole = True
+    while whole:
         head = _read(stream, place, min(_FRAME.size, size - place))
         code, length = _FRAME.unpack(head.ljust(_FRAME.size, b"\0"))
         end = place + _FRAME.size + length
         known = 0 < code <= Opcode.DATA_END or code >= 0x80
         known &= length >= _HEAD_BYTES - 9 or code != Opcode.MESSAGE
         known &= length == 4 or code != Opcode.DATA_END
+        whole = known and end <= size
         apart = code in (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.DATA_END)
-        if not known or end > size or apart or place - begin >= _LOOSE_BYTES:
+        apart |= bool(data_end) and code != Opcode.MESSAGE  # what a summary repeats
+        if not whole or apart or place - begin >= _LOOSE_BYTES:
             if place > begin:
                 chunks.append(ChunkRange(begin, place - begin, loose=True))
             begin = place
-        if not known or end > size:
+        if not whole:
             break
         if code == Opcode.CHUNK:
             chunks.append(ChunkRange(place + _FRAME.size, length))
@@ -234,28 +254,31 @@ def _walked(stream: IO[bytes], size: int) -> FileIndex:
             chunks[-1] = replace(chunks[-1], index_length=index_length)
             apart = True
         elif code == Opcode.DATA_END:
-            ended = True
+            data_end = end
         place = end
+        begin = end if apart else begin
         if code == Opcode.FOOTER:
             break
-        if apart:  # what the summary repeats is in no range
-            begin = size if ended else end
     left = size - place
-    if ended and left > len(_MAGIC) and code == Opcode.FOOTER:
-        why = "its end stands there, and more behind it"
-    elif not ended and left and not known and len(head) == _FRAME.size:
-        why = "what stands there is no record"
-    else:
-        why = ""
+    # what breaks off behind the data is its summary if the footer says so, or is gone too
+    tail = _read(stream, max(0, size - 28), min(28, size))
+    summary = known and code in _SUMMARY
+    if tail.endswith(_MAGIC):
+        summary = struct.unpack("<Q20x", tail)[0] == data_end
+    ended = data_end and (left <= len(_MAGIC) or (summary and not whole))
+    why = "" if known or len(head) < _FRAME.size else "what stands there is no record"
+    why = "its end stands there, and more behind it" if whole and data_end else why
     numbers: dict[str, Any] = {"case": "end"}
-    if why:
+    if ended:
+        left = 0
+    elif why:
         numbers = {"case": "bytes", "bytes": left, "first": place, "why": why}
         found.notices.append(Notice("DAMAGED", numbers=numbers))
-    elif not ended:
+    else:
         if left:
             numbers = {"case": "chunk" if code == Opcode.CHUNK else "record", "bytes": left}
         found.notices.append(Notice("CUT_OFF", numbers=numbers))
-    if not ended and left:
+    if left:
         found.damage.append(f"it breaks off at byte {place}")
         if known and code == Opcode.CHUNK:
             chunks.append(ChunkRange(place + _FRAME.size, left - _FRAME.size, torn=True))

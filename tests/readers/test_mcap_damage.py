@@ -237,6 +237,50 @@ def test_two_files_behind_one_another_are_not_one(whole: bytes, tmp_path: Path) 
     assert f"from byte {len(whole) - 8} on" in lost(found)["DAMAGED"]
 
 
+@pytest.mark.parametrize("tail", [b"", b"\x89MCAP0\r\n"])
+@pytest.mark.parametrize("chunked", [True, False])
+def test_an_end_of_the_data_that_stands_too_early_hides_no_loss(
+    chunked: bool, tail: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    write_mcap(path, messages_of(LONG), use_chunking=chunked)
+    content = path.read_bytes()
+    start, _, _ = struct.unpack_from("<QQI", content, len(content) - 28)
+    end = content[start - 13 : start]
+    assert end[0] == 15
+    message = struct.pack("<BQ", 5, 22 + len(messages_of(LONG)[0][2]))
+    first, place = content.find(message), content.rfind(message)
+    if chunked:
+        first, place = (chunks_of(path)[number].chunk_start_offset for number in (0, 3))
+    path.write_bytes(content[:first] + end + content[first:start] + tail)
+    assert same(read_log(path), LONG)  # all of it, but for the summary
+    content = poked(content, place + 1, "<Q", 3)
+    path.write_bytes(content[:first] + end + content[first:start] + tail)
+    found = read_log(path)
+    assert same(found, LONG.part(0, len(found)))
+    assert len(found) < len(LONG)
+    assert lost(found).keys() & {"DAMAGED", "CUT_OFF"}
+
+
+def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(
+    whole: bytes, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(whole)
+    chunk = chunks_of(path)[1]
+    start = chunk.chunk_start_offset
+    end = start + chunk.chunk_length + chunk.message_index_length
+    summary, _ = struct.unpack_from("<QQ", whole, len(whole) - 28)
+    unlisted = summarised(whole, without(ChunkIndex), checksum=False)
+    unlisted = poked(unlisted, len(unlisted) - 28, "<Q", summary - (end - start))
+    path.write_bytes(unlisted[:start] + unlisted[end:])
+    found = read_log(path)
+    assert 0 < len(found) < len(LOG)
+    assert lost(found) == {
+        "DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"
+    }
+
+
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
 def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
     write_mcap(tmp_path / "whole.mcap", messages_of(LONG))
