@@ -218,9 +218,9 @@ def _from_summary(stream: IO[bytes], summary: Summary) -> FileIndex | None:
         raise ValueError("its chunks overlap")
     found = FileIndex(summary.channels, summary.schemas, {}, chunks, counts)
     found.span_ns = statistics.message_start_time, statistics.message_end_time
-    for one in summary.metadata_indexes:
-        if one.name == KEY:
-            record = _parsed(Metadata, _read(stream, one.offset + 9, one.length - 9))
+    for entry in summary.metadata_indexes:
+        if entry.name == KEY:
+            record = _parsed(Metadata, _read(stream, entry.offset + 9, entry.length - 9))
             found.metadata.setdefault(record.name, record.metadata)
     return found
 

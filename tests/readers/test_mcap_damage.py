@@ -276,9 +276,7 @@ def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(
     path.write_bytes(unlisted[:start] + unlisted[end:])
     found = read_log(path)
     assert 0 < len(found) < len(LOG)
-    assert lost(found) == {
-        "DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"
-    }
+    assert lost(found) == {"DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"}
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
