@@ -78,16 +78,10 @@ class ArmDrawing:
         return float(one), float(two)
 
     @property
-    def box(self) -> tuple[float, float, float, float]:
-        """Left, top, width and height that hold the arm all along its motion."""
-        one, reach = self.frames[1][0], self.l1 + self.l2
-        elbow = self.l1 * np.stack([np.cos(one), -np.sin(one)])
-        limit = [] if self.height is None else [[[0.0], [-self.height]]]
-        points = np.concatenate([np.zeros((2, 1)), elbow, self.tip, *limit], axis=1)
-        low, high = points.min(axis=1) - MARGIN * reach, points.max(axis=1) + MARGIN * reach
-        # at least as wide as the arm is long
-        left, right = min(float(low[0]), -reach / 2), max(float(high[0]), reach / 2)
-        return left, float(low[1]), right - left, float(high[1] - low[1])
+    def box(self) -> str:
+        """The view of the drawing: all that the arm can reach."""
+        reach = (1 + MARGIN) * (self.l1 + self.l2)
+        return f"{-reach} {-reach} {2 * reach} {2 * reach}"
 
 
 def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:

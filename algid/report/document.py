@@ -6,7 +6,7 @@ each. Terminal, Markdown and page set it, each in one way for all of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -38,15 +38,12 @@ class Table:
 
     def without_empty(self) -> Table:
         """The table less the columns that hold nothing."""
-        columns = zip(self.columns, zip(*self.rows, strict=True), strict=False)
-        return self.without([name for name, cells in columns if not set(cells) - {ABSENT, ""}])
-
-    def without(self, headings: Collection[str]) -> Table:
-        """The table less the columns of those headings."""
-        kept = {name: kind for name, kind in self.columns.items() if name not in headings}
-        places = [place for place, name in enumerate(self.columns) if name in kept]
-        rows = tuple(tuple(row[place] for place in places) for row in self.rows)
-        return replace(self, columns=kept, rows=rows)
+        if not self.rows:
+            return self
+        pairs = zip(self.columns.items(), zip(*self.rows, strict=True), strict=True)
+        full = [(column, cells) for column, cells in pairs if set(cells) - {ABSENT, ""}]
+        columns, cells = zip(*full, strict=True)
+        return replace(self, columns=dict(columns), rows=tuple(zip(*cells, strict=True)))
 
 
 Content = Table | Plot | str | tuple[str, ...]

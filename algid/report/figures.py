@@ -1,20 +1,18 @@
 """The figures of an identification's page, each drawn from its file of the result's folder.
 
-A method gives None where there is nothing to draw, and raises `ResultError` where it cannot.
+A function gives None where there is nothing to draw, and raises `ResultError` for a file that is
+damaged.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray, mass_matrix
-from algid.base.errors import ResultError
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
 from algid.model import K1, K3, K5
@@ -31,279 +29,34 @@ WIDEST = 100.0  # percent: an interval beyond holds zero
 CLEAR, STRONGLY = "rgba(59,130,196,0)", "rgba(59,130,196,.75)"
 
 
-@dataclass(frozen=True)
-class Figures:
-    """What the figures of a result are drawn from; a method draws one, if there is one."""
+def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Plot]:
+    """Every figure that the folder gives, in the page's order; `raw` are the torque's samples."""
+    made: list[Plot | None] = []
+    if raw is not None:
+        made += [torque(folder, result, raw), closeup(folder, result, raw)]
+    made += [residual(folder), running(folder, result)]
+    if raw is not None:
+        made += [signals(result, raw), coverage(raw)]
+    made += [correlation(result), information(folder), inertia(result, raw)]
+    return [plot for plot in made if plot is not None]
 
-    folder: Path
-    result: Result
-    raw: Drawn | None = None
-    """The torque's samples, as far as they are there."""
 
-    def __iter__(self) -> Iterator[Plot | str]:
-        """Every figure that the folder gives, in the page's order."""
-        for make in (
-            self.torque, self.closeup, self.residual, self.running, self.signals, self.coverage,
-            self.correlation, self.information, self.inertia,
-        ):  # fmt: skip
-            yield from _drawn(make)
+def figures_of_paper(folder: Path, result: Result) -> list[Plot]:
+    """The convergence of the paper's estimates, where it was written."""
+    loaded = result.payload | result.paper_payload | result.loaded
+    every = {"estimates": result.parameters, "loaded": loaded}
+    made = [convergence(folder, result, name, known) for name, known in every.items()]
+    return [plot for plot in made if plot is not None]
 
-    def of_paper(self) -> Iterator[Plot | str]:
-        """The convergence of the paper's estimates, where it was written."""
-        yield from _drawn(partial(self.convergence, "estimates", self.result.parameters))
-        loaded = self.result.payload | self.result.paper_payload | self.result.loaded
-        yield from _drawn(partial(self.convergence, "loaded", loaded))
 
-    def _name_logs(self, panels: Panels, rows: Drawn, count: int) -> None:
-        """Draw a line where each of several logs begins, and its name in the first panel."""
-        starts = rows.starts if len(rows.logs) > 1 else {}
-        for log, x in starts.items():
-            for place in range(count):
-                panels.line(place, x=x, dash="dot")
-            if len(starts) <= 6:  # more names would stand on one another
-                panels.text(0, file_name(self.result.logs[log].path), x)
-
-    def torque(self) -> Plot | None:
-        """Measured and predicted torque as scored, with the residual as recorded beside."""
-        if self.raw is None:
-            return None
-        titles = ("Joint 1: torque, N m", "residual, N m", "Joint 2: torque, N m", "residual, N m")
-        panels, scored = Panels(titles, height=190, together=True), self.folder / "scored.parquet"
-        shown = drawn(scored, POINTS // 2) if scored.is_file() else self.raw
-        for place, joint in ((0, 1), (2, 2)):
-            if shown is not self.raw:
-                recorded = self.raw["x"], self.raw[f"residual{joint}"], "residual as recorded"
-                panels.curve(place + 1, *recorded, "#e3a46f", 0.8, visible="legendonly")
-            _prediction(panels, (place, place, place + 1), shown["x"], shown, joint)
-        panels.axes(3, "time, s")
-        self._name_logs(panels, shown, 4)
-        fit = self.result.fit
-        band = "" if fit is None or fit.prediction is None else fit.prediction.band
-        reading = (
-            "Blue should cover grey; orange should look like noise, with no trace of the motion."
-        )
-        return Plot("torque", f"Measured and predicted torque{band}", panels, reading)
-
-    def closeup(self) -> Plot | None:
-        """One second about the largest residual of each joint, every sample."""
-        raw, titles, parts = self.raw, [], []
-        if raw is None:
-            return None
-        for joint in (1, 2):
-            (size, t), log = max((one.worst[joint - 1], log) for log, one in raw.logs.items())
-            if size > 0:
-                path = self.folder / "torque.parquet"
-                parts.append((joint, between(path, log, t - HALF, t + HALF)))
-                of = f" of {file_name(self.result.logs[log].path)}" if len(raw.logs) > 1 else ""
-                titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
-        if not parts:
-            return None
-        panels = Panels(titles, 2)
-        for place, (joint, rows) in enumerate(parts):
-            _prediction(panels, [place] * 3, rows["t"], rows, joint)
-            panels.axes(place, "time, s", "N m")
-        reading = (
-            "A residual that stands out once is an event, such as a knock; one like the rest is "
-            "the model's limit."
-        )
-        return Plot("closeup", "The largest residual, every sample", panels, reading)
-
-    def residual(self) -> Plot | None:
-        """Spectrum and autocorrelation of the residual, with the 95 % band of white noise."""
-        rows = table(self.folder / "innovations.parquet")
-        kinds = sorted(set(rows["quantity"]) - {"torque spectrum"}, reverse=True) if rows else []
-        if "autocorrelation" not in kinds:
-            return None
-        each = [(joint, kind) for joint in (1, 2) for kind in kinds]
-        panels, inside = Panels([f"Joint {j}: {kind}" for j, kind in each], len(kinds)), []
-
-        def curve(kind: str, joint: int) -> list[FloatArray]:
-            own = (rows["quantity"] == kind) & (rows["joint"] == joint)
-            return [rows[name][own].astype(np.float64) for name in ("x", "value", "low", "high")]
-
-        for place, (joint, kind) in enumerate(each):
-            x, y, low, high = curve(kind, joint)
-            panels.band(place, x, low, high, "95 % band of white noise")
-            if kind == "autocorrelation":
-                stems = np.stack([0 * y, y, np.nan * y], axis=1).ravel()
-                panels.curve(place, np.repeat(x, 3), stems, "residual", ORANGE, 4)
-                panels.axes(place, "lag, s")
-                inside.append(f"{np.count_nonzero((y >= low) & (y <= high))} of {y.size}")
-                continue
-            measured = curve("torque spectrum", joint)
-            if measured[0].size:
-                panels.curve(place, measured[0], measured[1], "measured torque", GREY, 2)
-            panels.curve(place, x, y, "residual", ORANGE)
-            unit = "share of white noise" if np.isfinite(low).any() else "(N m)²/Hz"
-            frequency = {"type": "log", "dtick": 1, "title": {"text": "frequency, Hz"}}
-            panels.axes(place, frequency, {"type": "log", "nticks": 5, "title": {"text": unit}})
-        note = f"Correlations of joints 1 and 2 inside the band: {joined(inside)}."
-        reading = (
-            "Of white noise 19 of 20 values lie in the blue band; a hump in the spectrum is motion "
-            "that the model misses, bars that start high and fall are slow errors."
-        )
-        return Plot("residual", "Residuals: spectrum and autocorrelation", panels, reading, note)
-
-    def running(self) -> Plot | None:
-        """What the estimator had found by each moment, and its 95 % band."""
-        path = self.folder / "running.parquet"
-        rows = drawn(path, 10_000) if path.is_file() else None
-        if rows is None:
-            return None
-        halves = [name for name in self.result.estimates if f"{name}_half" in rows.columns]
-        names = [name for name in halves if np.isfinite(rows[name]).any()]
-        titles = [f"{name}, {unit_text(self.result.estimates[name].unit)}" for name in names]
-        panels, x = Panels(titles, 2, 210, together=True), rows["x"]
-        for place, name in enumerate(names):
-            value, half = rows[name], rows[f"{name}_half"]
-            panels.band(place, x, value - half, value + half, "its 95 % interval")
-            panels.curve(place, x, value, "estimate from all samples so far")
-            final = float(value[np.isfinite(value)][-1])
-            panels.line(place, y=final)
-            sure = half[np.isfinite(half)]
-            if sure.size:  # most of the way, and the final interval several times over
-                reach = max(4 * float(sure[-1]), 2 * float(median(sure.tolist())))
-                panels.axes(place, y={"range": [final - reach, final + reach]})
-        self._name_logs(panels, rows, len(names))
-        reading = (
-            "The band must shrink and the line stay inside what the band was before; a line that "
-            "leaves it late shows a part of the logs that contradicts the rest."
-        )
-        return Plot("running", "Running estimate", panels, reading) if names else None
-
-    def signals(self) -> Plot | None:
-        """Angles, velocities and torques of all logs."""
-        if self.raw is None:
-            return None
-        quantities = {
-            "theta": "Angle, rad",
-            "omega": "Velocity, rad/s",
-            "tau": "Measured torque, N m",
-        }
-        panels = Panels(list(quantities.values()), height=200, together=True)
-        for place, name in enumerate(quantities):
-            for joint, colour, dash in ((1, BLUE, "solid"), (2, ORANGE, "5px,2px")):
-                y = self.raw[f"{name}{joint}"]
-                panels.curve(place, self.raw["x"], y, f"joint {joint}", colour, 1.2, dash)
-        panels.axes(2, "time, s")
-        self._name_logs(panels, self.raw, 3)
-        reading = "Look for jumps, flat stretches and clipped tops."
-        return Plot("signals", "Signals", panels, reading)
-
-    def coverage(self) -> Plot | None:
-        """Where the motion went: angles and speeds."""
-        if self.raw is None:
-            return None
-        panels = Panels(("Angles, °", "Speeds, rad/s"), 2, 320)
-        for place, (name, scale) in enumerate((("theta", 180 / np.pi), ("omega", 1.0))):
-            ways = [scale * self.raw.samples[f"{name}{joint}"] for joint in (1, 2)]
-            panels.dots(place, ways[0], ways[1], "samples", BLUE, 4, opacity=0.5)
-            panels.axes(place, "joint 1", "joint 2")
-        reading = (
-            "Dots spread over both planes inform; a line or a spot leaves parameters tied to each "
-            "other."
-        )
-        return Plot("coverage", "Coverage of the motion", panels, reading)
-
-    def correlation(self) -> Plot | None:
-        """Which estimates err together; what is not identifiable has no correlation."""
-        C = self.result.covariance
-        if C is None or not C.size:
-            return None
-        names = self.result.fit.covariance_names if self.result.fit is not None else []
-        scale = np.sqrt(np.where(np.diag(C) > 0, np.diag(C), np.nan))
-        R = C / np.outer(scale, scale)
-        panels = Panels([""])
-        orange = [[0, "rgba(217,119,43,.5)"], [0.5, "rgba(217,119,43,0)"]]
-        shades = [*orange, [0.5, CLEAR], [1, "rgba(59,130,196,.5)"]]  # pale enough to write on
-        numbers = {"texttemplate": "%{z:.2f}"} if len(names) <= MOST_WRITTEN else {}
-        panels.heat(names, list(names), R, zmin=-1, zmax=1, colorscale=shades, xgap=3, **numbers)
-        reading = "Two estimates of a strong colour err together: trust their combination first."
-        return Plot("correlation", "Correlation of the estimates", panels, reading)
-
-    def information(self) -> Plot | None:
-        """Which seconds determine each parameter."""
-        rows = table(self.folder / "information.parquet")
-        names = [name for name in rows if name not in ("log", "t")]
-        if not names or not rows["t"].size:
-            return None
-        gained = np.nan_to_num(np.stack([rows[name].astype(np.float64) for name in names]))
-        return shares_of_time(names, gained, 1.0)
-
-    def inertia(self) -> Plot | None:
-        """M11, M12 and M22 over one turn of joint 2, with their 95 % bands."""
-        names = (K1, K3, K5)
-        known = [
-            self.result.parameters[name].estimate
-            for name in names
-            if name in self.result.parameters
-        ]
-        if len(known) < len(names) or None in known:
-            return None
-        theta2 = np.linspace(-np.pi, np.pi, 181)
-        # M is linear in the constants: unit vectors give its derivatives (3, 3, n)
-        slopes = []
-        for k1, k3, k5 in np.eye(3):
-            k = np.array([k1, 0, k3, 0, k5, 0, 0])
-            slopes.append(np.stack(mass_matrix(k, np.stack([0 * theta2, theta2]))))
-        m = np.einsum("i,ipn->pn", np.array(known, dtype=np.float64), slopes)
-        C = (
-            np.full((3, 3), np.nan)
-            if self.result.fit is None
-            else self.result.fit.covariance_of(names)
-        )
-        variance = np.einsum("ipn,ij,jpn->pn", slopes, C, slopes)
-        half = self.result.quantile * np.sqrt(np.maximum(variance, 0))
-        panels, degrees = Panels(["kg m² over θ2"], height=320), np.degrees(theta2)
-        looks = (("M11", BLUE, "solid"), ("M12 = M21", ORANGE, "dash"), ("M22", GREEN, "dot"))
-        for place, (name, colour, dash) in enumerate(looks):
-            panels.band(0, degrees, m[place] - half[place], m[place] + half[place], "95 % interval")
-            panels.curve(0, degrees, m[place], name, colour, 2, dash)
-        if self.raw is not None:
-            reached = np.degrees(self.raw["theta2"])
-            panels.stretch(0, max(np.nanmin(reached), -180.0), min(np.nanmax(reached), 180.0))
-        panels.axes(0, {"range": [-180, 180], "dtick": 45, "title": {"text": "θ2, °"}})
-        smallest = float((0.5 * (m[0] + m[2]) - np.hypot(0.5 * (m[0] - m[2]), m[1])).min())
-        note = f"The smallest eigenvalue of M is {significant(smallest, 3)} kg m²."
-        reading = (
-            "M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
-        )
-        return Plot("inertia", "Mass matrix M(θ)", panels, reading, note)
-
-    def convergence(self, name: str, known: Mapping[str, Estimate]) -> Plot | None:
-        """The paper's Figure 2: each estimate over time, with final value, interval and truth."""
-        path = self.folder / f"{name}.parquet"
-        if not path.is_file():
-            return None
-        rows, truth = drawn(path, POINTS // 2), known_truth(self.result)
-        names = [one for one in rows.columns if one not in ("log", "t", "x", "k7_condition")]
-        panels = Panels(names, 2, 220, together=True)
-        for place, one in enumerate(names):
-            series = np.where(np.isfinite(rows[one]), rows[one], np.nan)
-            panels.curve(place, rows["x"], series, "the paper's estimate over time", width=1.2)
-            finite = series[np.isfinite(series)]
-            if one == "condition":
-                panels.axes(place, y={"type": "log"})
-            elif finite.size:
-                # spikes near singular instants start outside the view
-                ends = [quantile(finite[finite.size // 4 :], share) for share in (0.04, 0.96)]
-                final = known[one].estimate if one in known else None
-                for value, colour, dash in (
-                    (final, GREEN, "solid"), (truth.get(one), ORANGE, "dash")
-                ):  # fmt: skip
-                    if value is not None:
-                        ends.append(value)
-                        panels.line(place, y=value, colour=colour, dash=dash)
-                space = 0.25 * (max(ends) - min(ends)) or 0.05 * abs(ends[0]) or 1.0
-                panels.axes(place, y={"range": [min(ends) - space, max(ends) + space]})
-        reading = (
-            "From ε = 0.2 s on, blue should settle on the green line, the result; the dashed line "
-            "is the truth. Double-click shows the spikes that the frame cuts off."
-        )
-        title = "Convergence of the estimates (the paper's Figure 2)"
-        if name == "loaded":
-            title = "Convergence, loaded log"
-        return Plot(name, title, panels, reading)
+def _name_logs(panels: Panels, result: Result, rows: Drawn, count: int) -> None:
+    """Draw a line where each of several logs begins, and its name in the first panel."""
+    starts = rows.starts if len(rows.logs) > 1 else {}
+    for log, x in starts.items():
+        for place in range(count):
+            panels.line(place, x=x, dash="dot")
+        if len(starts) <= 6:  # more names would stand on one another
+            panels.text(0, file_name(result.logs[log].path), x)
 
 
 def _prediction(panels: Panels, places: Sequence[int], x: FloatArray, of: Any, joint: int) -> None:
@@ -314,15 +67,232 @@ def _prediction(panels: Panels, places: Sequence[int], x: FloatArray, of: Any, j
     panels.curve(places[2], x, of[f"residual{joint}"], "residual", ORANGE)
 
 
-def _drawn(make: Callable[[], Plot | None]) -> Iterator[Plot | str]:
-    """What `make` draws, or why it cannot; nothing where there is nothing to draw."""
-    try:
-        plot = make()
-    except ResultError as error:
-        yield f"Not shown: {error}."
-    else:
-        if plot is not None:
-            yield plot
+def torque(folder: Path, result: Result, raw: Drawn) -> Plot:
+    """Measured and predicted torque as scored, with the residual as recorded beside."""
+    titles = ("Joint 1: torque, N m", "residual, N m", "Joint 2: torque, N m", "residual, N m")
+    panels, band = Panels(titles, height=190, together=True), ""
+    shown = drawn(folder / "scored.parquet", POINTS // 2) or raw
+    for place, joint in ((0, 1), (2, 2)):
+        if shown is not raw:
+            recorded = raw["x"], raw[f"residual{joint}"], "residual as recorded"
+            panels.curve(place + 1, *recorded, "#e3a46f", 0.8, visible="legendonly")
+        _prediction(panels, (place, place, place + 1), shown["x"], shown, joint)
+    panels.axes(3, "time, s")
+    _name_logs(panels, result, shown, 4)
+    if result.fit is not None and result.fit.prediction is not None:
+        band = result.fit.prediction.band
+    reading = "Blue should cover grey; orange should look like noise, with no trace of the motion."
+    return Plot("torque", f"Measured and predicted torque{band}", panels, reading)
+
+
+def closeup(folder: Path, result: Result, raw: Drawn) -> Plot | None:
+    """One second about the largest residual of each joint, every sample."""
+    titles, parts = [], []
+    for joint in (1, 2):
+        (size, t), log = max((one.worst[joint - 1], log) for log, one in raw.logs.items())
+        if size > 0:
+            parts.append((joint, between(folder / "torque.parquet", log, t - HALF, t + HALF)))
+            of = f" of {file_name(result.logs[log].path)}" if len(raw.logs) > 1 else ""
+            titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
+    if not parts:
+        return None
+    panels = Panels(titles, 2)
+    for place, (joint, rows) in enumerate(parts):
+        _prediction(panels, [place] * 3, rows["t"], rows, joint)
+        panels.axes(place, "time, s", "N m")
+    reading = (
+        "A residual that stands out once is an event, such as a knock; one like the rest is "
+        "the model's limit."
+    )
+    return Plot("closeup", "The largest residual, every sample", panels, reading)
+
+
+def residual(folder: Path) -> Plot | None:
+    """Spectrum and autocorrelation of the residual, with the 95 % band of white noise."""
+    rows = table(folder / "innovations.parquet")
+    kinds = sorted(set(rows["quantity"]) - {"torque spectrum"}, reverse=True) if rows else []
+    if "autocorrelation" not in kinds:
+        return None
+    each = [(joint, kind) for joint in (1, 2) for kind in kinds]
+    panels, inside = Panels([f"Joint {j}: {kind}" for j, kind in each], len(kinds)), []
+
+    def curve(kind: str, joint: int) -> list[FloatArray]:
+        own = (rows["quantity"] == kind) & (rows["joint"] == joint)
+        return [rows[name][own].astype(np.float64) for name in ("x", "value", "low", "high")]
+
+    for place, (joint, kind) in enumerate(each):
+        x, y, low, high = curve(kind, joint)
+        panels.band(place, x, low, high, "95 % band of white noise")
+        if kind == "autocorrelation":
+            stems = np.stack([0 * y, y, np.nan * y], axis=1).ravel()
+            panels.curve(place, np.repeat(x, 3), stems, "residual", ORANGE, 4)
+            panels.axes(place, "lag, s")
+            inside.append(f"{np.count_nonzero((y >= low) & (y <= high))} of {y.size}")
+            continue
+        measured = curve("torque spectrum", joint)
+        if measured[0].size:
+            panels.curve(place, measured[0], measured[1], "measured torque", GREY, 2)
+        panels.curve(place, x, y, "residual", ORANGE)
+        unit = "share of white noise" if np.isfinite(low).any() else "(N m)²/Hz"
+        frequency = {"type": "log", "dtick": 1, "title": {"text": "frequency, Hz"}}
+        panels.axes(place, frequency, {"type": "log", "nticks": 5, "title": {"text": unit}})
+    note = f"Correlations of joints 1 and 2 inside the band: {joined(inside)}."
+    reading = (
+        "Of white noise 19 of 20 values lie in the blue band; a hump in the spectrum is motion "
+        "that the model misses, bars that start high and fall are slow errors."
+    )
+    return Plot("residual", "Residuals: spectrum and autocorrelation", panels, reading, note)
+
+
+def running(folder: Path, result: Result) -> Plot | None:
+    """What the estimator had found by each moment, and its 95 % band."""
+    rows = drawn(folder / "running.parquet", 10_000)
+    if rows is None:
+        return None
+    names = []
+    for name in result.estimates:
+        if f"{name}_half" in rows.columns and np.isfinite(rows[name]).any():
+            names.append(name)
+    titles = [f"{name}, {unit_text(result.estimates[name].unit)}" for name in names]
+    panels, x = Panels(titles, 2, 210, together=True), rows["x"]
+    for place, name in enumerate(names):
+        value, half = rows[name], rows[f"{name}_half"]
+        panels.band(place, x, value - half, value + half, "its 95 % interval")
+        panels.curve(place, x, value, "estimate from all samples so far")
+        final = float(value[np.isfinite(value)][-1])
+        panels.line(place, y=final)
+        sure = half[np.isfinite(half)]
+        if sure.size:  # most of the way, and the final interval several times over
+            reach = max(4 * float(sure[-1]), 2 * float(median(sure.tolist())))
+            panels.axes(place, y={"range": [final - reach, final + reach]})
+    _name_logs(panels, result, rows, len(names))
+    reading = (
+        "The band must shrink and the line stay inside what the band was before; a line that "
+        "leaves it late shows a part of the logs that contradicts the rest."
+    )
+    return Plot("running", "Running estimate", panels, reading) if names else None
+
+
+def signals(result: Result, raw: Drawn) -> Plot:
+    """Angles, velocities and torques of all logs."""
+    titles = ("Angle, rad", "Velocity, rad/s", "Measured torque, N m")
+    panels = Panels(titles, height=200, together=True)
+    for place, name in enumerate(("theta", "omega", "tau")):
+        for joint, colour, dash in ((1, BLUE, "solid"), (2, ORANGE, "5px,2px")):
+            y = raw[f"{name}{joint}"]
+            panels.curve(place, raw["x"], y, f"joint {joint}", colour, 1.2, dash)
+    panels.axes(2, "time, s")
+    _name_logs(panels, result, raw, 3)
+    reading = "Look for jumps, flat stretches and clipped tops."
+    return Plot("signals", "Signals", panels, reading)
+
+
+def coverage(raw: Drawn) -> Plot:
+    """Where the motion went: angles and speeds."""
+    panels = Panels(("Angles, °", "Speeds, rad/s"), 2, 320)
+    for place, (name, scale) in enumerate((("theta", 180 / np.pi), ("omega", 1.0))):
+        x, y = scale * raw.samples[f"{name}1"], scale * raw.samples[f"{name}2"]
+        panels.dots(place, x, y, "samples", BLUE, 4, opacity=0.5)
+        panels.axes(place, "joint 1", "joint 2")
+    reading = (
+        "Dots spread over both planes inform; a line or a spot leaves parameters tied to each "
+        "other."
+    )
+    return Plot("coverage", "Coverage of the motion", panels, reading)
+
+
+def correlation(result: Result) -> Plot | None:
+    """Which estimates err together; what is not identifiable has no correlation."""
+    names = result.fit.covariance_names if result.fit is not None else []
+    if not names:
+        return None
+    C = result.covariance
+    scale = np.sqrt(np.where(np.diag(C) > 0, np.diag(C), np.nan))
+    R = C / np.outer(scale, scale)
+    panels = Panels([""])
+    orange = [[0, "rgba(217,119,43,.5)"], [0.5, "rgba(217,119,43,0)"]]
+    shades = [*orange, [0.5, CLEAR], [1, "rgba(59,130,196,.5)"]]  # pale enough to write on
+    numbers = {"texttemplate": "%{z:.2f}"} if len(names) <= MOST_WRITTEN else {}
+    panels.heat(names, list(names), R, zmin=-1, zmax=1, colorscale=shades, xgap=3, **numbers)
+    reading = "Two estimates of a strong colour err together: trust their combination first."
+    return Plot("correlation", "Correlation of the estimates", panels, reading)
+
+
+def information(folder: Path) -> Plot | None:
+    """Which seconds determine each parameter."""
+    rows = table(folder / "information.parquet")
+    names = [name for name in rows if name not in ("log", "t")]
+    if not names or not rows["t"].size:
+        return None
+    gained = np.nan_to_num(np.stack([rows[name].astype(np.float64) for name in names]))
+    return shares_of_time(names, gained, 1.0)
+
+
+def inertia(result: Result, raw: Drawn | None) -> Plot | None:
+    """M11, M12 and M22 over one turn of joint 2, with their 95 % bands."""
+    names, known = (K1, K3, K5), result.parameters.items()
+    k = [one.estimate for name, one in known if name in names and one.estimate is not None]
+    if len(k) < len(names):
+        return None
+    theta2 = np.linspace(-np.pi, np.pi, 181)
+    # M is linear in the constants: unit vectors give its derivatives (3, 3, n)
+    units, angles = np.zeros((3, 7)), np.stack([0 * theta2, theta2])
+    units[range(3), (0, 2, 4)] = 1
+    slopes = np.stack([np.stack(mass_matrix(unit, angles)) for unit in units])
+    m = np.einsum("i,ipn->pn", np.array(k), slopes)
+    C = np.full((3, 3), np.nan) if result.fit is None else result.fit.covariance_of(names)
+    variance = np.einsum("ipn,ij,jpn->pn", slopes, C, slopes)
+    half = result.quantile * np.sqrt(np.maximum(variance, 0))
+    panels, degrees = Panels(["kg m² over θ2"], height=320), np.degrees(theta2)
+    looks = (("M11", BLUE, "solid"), ("M12 = M21", ORANGE, "dash"), ("M22", GREEN, "dot"))
+    for place, (name, colour, dash) in enumerate(looks):
+        panels.band(0, degrees, m[place] - half[place], m[place] + half[place], "95 % interval")
+        panels.curve(0, degrees, m[place], name, colour, 2, dash)
+    if raw is not None:
+        reached = np.degrees(raw["theta2"])
+        panels.stretch(0, max(np.nanmin(reached), -180.0), min(np.nanmax(reached), 180.0))
+    panels.axes(0, {"range": [-180, 180], "dtick": 45, "title": {"text": "θ2, °"}})
+    smallest = float((0.5 * (m[0] + m[2]) - np.hypot(0.5 * (m[0] - m[2]), m[1])).min())
+    note = f"The smallest eigenvalue of M is {significant(smallest, 3)} kg m²."
+    reading = "M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
+    return Plot("inertia", "Mass matrix M(θ)", panels, reading, note)
+
+
+def convergence(
+    folder: Path, result: Result, name: str, known: Mapping[str, Estimate]
+) -> Plot | None:
+    """The paper's Figure 2: each estimate over time, with final value, interval and truth."""
+    rows, truth = drawn(folder / f"{name}.parquet", POINTS // 2), known_truth(result)
+    if rows is None:
+        return None
+    names = [one for one in rows.columns if one not in ("log", "t", "x", "k7_condition")]
+    panels = Panels(names, 2, 220, together=True)
+    for place, one in enumerate(names):
+        series = np.where(np.isfinite(rows[one]), rows[one], np.nan)
+        panels.curve(place, rows["x"], series, "the paper's estimate over time", width=1.2)
+        finite = series[np.isfinite(series)]
+        if one == "condition":
+            panels.axes(place, y={"type": "log"})
+        elif finite.size:
+            # spikes near singular instants start outside the view
+            ends = [quantile(finite[finite.size // 4 :], share) for share in (0.04, 0.96)]
+            final = known[one].estimate if one in known else None
+            for value, colour, dash in (
+                (final, GREEN, "solid"), (truth.get(one), ORANGE, "dash")
+            ):  # fmt: skip
+                if value is not None:
+                    ends.append(value)
+                    panels.line(place, y=value, colour=colour, dash=dash)
+            space = 0.25 * (max(ends) - min(ends)) or 0.05 * abs(ends[0]) or 1.0
+            panels.axes(place, y={"range": [min(ends) - space, max(ends) + space]})
+    reading = (
+        "From ε = 0.2 s on, blue should settle on the green line, the result; the dashed line "
+        "is the truth. Double-click shows the spikes that the frame cuts off."
+    )
+    title = "Convergence of the estimates (the paper's Figure 2)"
+    if name == "loaded":
+        title = "Convergence, loaded log"
+    return Plot(name, title, panels, reading)
 
 
 def intervals(result: Result) -> Plot:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from algid.arm import CONSTANT_NAMES
-from algid.base.errors import ResultError
 from algid.base.progress import Progress
 from algid.base.text import file_name, significant
 from algid.base.words import counted
 from algid.methods import settles
 from algid.report.arm import arm_of
 from algid.report.document import Content, Document, Section
-from algid.report.figures import Figures, intervals
+from algid.report.figures import figures, figures_of_paper, intervals
 from algid.report.plot import Plot
 from algid.report.render import markdown, page, write_library, write_texts
-from algid.report.series import Drawn, drawn
+from algid.report.series import drawn
 from algid.report.tables import (
     arm_tables,
     fit_tables,
@@ -23,12 +22,12 @@ from algid.report.tables import (
     nuisance_tables,
     paper_tables,
     prediction_table,
-    result_provenance,
-    samples_table,
+    provenance_table,
+    result_settings,
     terms_table,
-    used_settings,
 )
 from algid.results import Result, read_result
+from algid.results.verdict import replaced_estimator
 
 
 def write_pages(
@@ -49,7 +48,7 @@ def write_pages(
     Raises
     ------
     ResultError
-        If `result.json` is missing or not a result of this version.
+        If `result.json` is missing or not a result of this version, or a series is damaged.
     OutputError
         If the pages cannot be written.
     """
@@ -69,27 +68,19 @@ def result_document(
     fit, leads = result.fit, settles(result.estimator)
     names = [file_name(log.path) for log in result.logs]
     first, fitted, terms = list[Content](arm_tables(result)), tuple[Content, ...](), list[Content]()
-    plots, samples, paper = list[Content](), list[Content](), list[Content]()
-    raw: Drawn | None = None
+    plots, paper, raw = list[Plot](), list[Content](), None
     other, zero = nuisance_tables(result)
     if folder is not None:
-        if (folder / "torque.parquet").is_file():
-            try:
-                raw = drawn(folder / "torque.parquet", progress=progress)
-                samples = [samples_table(raw.logs, names)]
-            except ResultError as error:
-                plots = [f"Not shown: {error}."]
-        drawings = Figures(folder, result, raw)
-        plots, paper = [*plots, *drawings], list(drawings.of_paper())
+        raw = drawn(folder / "torque.parquet", progress=progress)
+        plots, paper = figures(folder, result, raw), [*figures_of_paper(folder, result)]
     if fit is not None:
         first += [*([] if folder is None else [intervals(result)]), prediction_table(fit)]
         fitted, terms = fit_tables(fit), [terms_table(fit)]
-    parts = []
-    for place, one in enumerate(plots):
-        key, title = (one.key, one.title) if isinstance(one, Plot) else (f"lost-{place}", "Figure")
-        parts.append(Section(key, title, (one,)))
-    notes = tuple(one.sentence for one in result.verdict.notes)
-    quality, origin = (notes, *samples, *log_tables(result.logs)), result_provenance(result)
+    parts = [Section(plot.key, plot.title, (plot,)) for plot in plots]
+    notes, asked = tuple(one.sentence for one in result.verdict.notes), replaced_estimator(result)
+    estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
+    origin = [("algid", result.version), ("estimator", estimator)]
+    made_by = (result_settings(result), provenance_table(origin, result.logs))
     title = "The paper's figure and tables"
     of_paper = Section("paper", title, (*paper, *paper_tables(result)), not leads)
     may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
@@ -101,8 +92,8 @@ def result_document(
         Section("zero", may_be, (zero,), folded=True),
         *parts[1:],
         Section("fit", "Noise, whiteness and bounds", fitted, folded=True),
-        Section("data", "Data quality", quality, folded=True),
-        Section("settings", "Settings and provenance", (used_settings(result), origin), True),
+        Section("data", "Data quality", (notes, *log_tables(result.logs)), folded=True),
+        Section("settings", "Settings and provenance", made_by, folded=True),
         *([] if leads else [of_paper]),
     ]
     constants = [one.usable for name, one in result.parameters.items() if name in CONSTANT_NAMES]

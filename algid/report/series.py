@@ -105,25 +105,20 @@ def facts_of(path: Path) -> tuple[list[str], int, dict[bytes, bytes]]:
 
 @dataclass
 class LogFacts:
-    """One log: its times in s and samples, and each joint's largest residual with its time."""
+    """One log: first and last time and period in s, and each joint's largest residual and when."""
 
     first: float
     last: float
     samples: int = 0
     period: float = np.nan
-    largest_step: float = 0.0
-    gaps: int = 0
     worst: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)] * 2)
 
     def add(self, part: Block) -> None:
         """Take the next samples."""
         t = part["t"]
-        steps = np.diff(t, prepend=self.last)
         if np.isnan(self.period) and t.size > 1:
-            self.period = median(steps[1:])
+            self.period = median(np.diff(t))
         self.samples, self.last = self.samples + t.size, float(t[-1])
-        self.largest_step = max(self.largest_step, float(steps.max()))
-        self.gaps += int(np.count_nonzero(steps > CUT * self.period))
         for joint, worst in enumerate(self.worst, start=1):
             size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
             place = int(size.argmax())
@@ -155,16 +150,18 @@ class Drawn:
         return {int(self["log"][place]): float(self["x"][place]) for place in places}
 
 
-def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) -> Drawn:
+def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) -> Drawn | None:
     """Every column of `path` in at most about `points` rows, broken at gaps and between logs.
 
-    `progress` hears how many samples have been read.
+    None where there is no such file. `progress` hears how many samples have been read.
 
     Raises
     ------
     ResultError
         If the file cannot be read, or holds no rows.
     """
+    if not path.is_file():
+        return None
     total = facts_of(path)[1]
     size = max(1, -(-2 * total // points))
     step = max(1, total // SAMPLES)
@@ -218,14 +215,9 @@ def between(path: Path, log: int, low: float, high: float) -> Block:
     with _parquet(path) as file:
         names, wanted = file.schema_arrow.names, []
         for group in range(file.num_row_groups):
-            columns = [
-                file.metadata.row_group(group).column(names.index(of)) for of in ("log", "t")
-            ]
-            own = [column.statistics for column in columns]
-            ends = zip(own, (log, low), (log, high), strict=True)
-            if all(
-                one is None or (one.min <= last and one.max >= first) for one, first, last in ends
-            ):
+            columns = file.metadata.row_group(group)
+            logs, times = (columns.column(names.index(of)).statistics for of in ("log", "t"))
+            if logs.min <= log <= logs.max and times.min <= high and times.max >= low:
                 wanted.append(group)
         rows = file.read_row_groups(wanted)
         block = {name: numbers_of(rows[name].combine_chunks()) for name in rows.column_names}

@@ -20,15 +20,11 @@ from algid.base.text import (
     unit_text,
     yes_or_no,
 )
-from algid.methods import settles
-from algid.model import DELAYS
 from algid.notices import NAMED
 from algid.report.document import Table
 from algid.report.phasors import moments
-from algid.report.series import LogFacts
 from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
 from algid.results.rows import known_truth, rows_of
-from algid.results.verdict import replaced_estimator
 
 CONVENTIONS = ("zero", "second_angle", "drive", "signs", "offsets")
 """How the angles and torques of a log were taken."""
@@ -223,23 +219,6 @@ def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
     )  # fmt: skip
 
 
-def samples_table(logs: Mapping[int, LogFacts], names: Sequence[str]) -> Table:
-    """What the stamps and the samples of each log look like."""
-    rows = []
-    for log, one in sorted(logs.items()):
-        span = (f"{one.samples:,}", f"{one.first:.6g}", f"{one.last:.6g}")
-        steps = (f"{1e3 * one.period:.4g}", str(one.gaps), f"{1e3 * one.largest_step:.4g}")
-        rows.append((names[log], *span, *steps))
-    return Table(
-        "Samples that were used",
-        {
-            "Log": "name", "Samples used": "number", "From, s": "number", "To, s": "number",
-            "Period, ms": "number", "Gaps": "number", "Largest step, ms": "number",
-        },
-        tuple(rows),
-    )  # fmt: skip
-
-
 def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
     """`logs`, and from which channel each signal was taken, once for all logs that share it."""
     rows, taken = [], dict[tuple[str, str], list[str]]()
@@ -267,42 +246,29 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
     )  # fmt: skip
 
 
-def settings_table(used: Mapping[str, Any], asked: Mapping[str, str] | None = None) -> Table:
-    """Settings by dotted name, beside what was asked for where that is something else."""
-    rows = []
-    for name, value in flat_settings(used).items():
-        rows.append((name, value, (asked or {}).get(name, ABSENT)))
-    columns = {"Setting": "name", "Used": "text", "Asked for": "text"}
-    return Table("Settings", columns, tuple(rows)).without_empty()  # type: ignore[arg-type]
+def settings_table(settings: Mapping[str, Any]) -> Table:
+    """Settings by dotted name."""
+    rows = tuple(flat_settings(settings).items())
+    return Table("Settings", {"Setting": "name", "Value": "text"}, rows)
 
 
-def used_settings(result: Result) -> Table:
-    """The settings as they were used; below them how the first log of each kind was read."""
-    asked, decided = flat_settings(result.settings), {"estimator": result.estimator}
+def result_settings(result: Result) -> Table:
+    """What was asked for, what the logs decided, and how the first log of each kind was read."""
+    settings, decided = dict(result.settings), dict[str, Any]()
     model, delay, fit = result.torque_model, result.delay, result.fit
-    if settles(result.estimator):
-        decided["model"] = "plain"
     if model is not None:
-        terms = [*model.terms, *(DELAYS if delay is not None else ())]
-        decided["model"] = ", ".join(terms) or "plain"
-        if "coulomb" in terms:
-            speed = significant(model.coulomb_speed, 2)
-            decided["model"] += f" (Coulomb friction over {speed} rad/s)"
+        decided["terms"] = ", ".join(model.terms) or "plain"
+        if "coulomb" in model.terms:
+            decided["Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
     if delay is not None and delay.estimate is not None:
         decided["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
     if fit is not None and fit.torque_hold is not None:
         decided["torque_hold"] = fit.torque_hold.used
-        asked["torque_hold"] = fit.torque_hold.asked
-    read: dict[str, str] = {}
-    for role, reading in {log.role: log.reading for log in reversed(result.logs)}.items():
-        for name in CONVENTIONS if reading is not None else ():
-            words, value = name.replace("_", " "), setting_text(getattr(reading, name))
-            of = words if read.setdefault(words, value) == value else f"{words} of the {role} log"
-            read[of] = value
-    changed = {
-        name: asked.get(name, ABSENT) for name, one in decided.items() if one != asked.get(name)
-    }
-    return settings_table(asked | decided | read, changed)
+    for log in reversed(result.logs):
+        if log.reading is not None:
+            read = {name.replace("_", " "): getattr(log.reading, name) for name in CONVENTIONS}
+            settings[f"{log.role} log"] = read
+    return settings_table(settings | {"used": decided})
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -329,21 +295,10 @@ def setting_text(value: object) -> str:
     return str(value)
 
 
-def provenance_table(rows: Sequence[tuple[str, str]]) -> Table:
-    """What made a result, from what: `rows` of names and values."""
-    return Table("Provenance", {"What": "name", "Value": "text"}, tuple(rows))
-
-
-def result_provenance(result: Result) -> Table:
-    """What made the result, from what."""
-    asked, estimator = replaced_estimator(result), result.estimator
-    if asked is not None:
-        estimator += f", in place of {asked}"
-    rows = [("algid", result.version), ("estimator", estimator)]
-    for log in result.logs:
-        name = file_name(log.path)
-        rows += [
-            (f"sha256 of {name}", log.sha256 or "unknown, fetched in part"),
-            (f"path of {name}", log.path),
-        ]
-    return provenance_table(rows)
+def provenance_table(rows: Sequence[tuple[str, str]], logs: Sequence[LogSummary]) -> Table:
+    """What made a result: `rows` of names and values, and the files of its logs."""
+    every = list(rows)
+    for log in logs:
+        every.append((f"path of {file_name(log.path)}", log.path))
+        every.append((f"sha256 of {file_name(log.path)}", log.sha256 or "unknown, fetched in part"))
+    return Table("Provenance", {"What": "name", "Value": "text"}, tuple(every))

@@ -44,15 +44,9 @@ def track_document(result: TrackResult) -> Document:
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
     sentences = tuple(one.sentence for one in result.notices)
-    provenance = provenance_table(
-        [
-            ("algid", result.version),
-            ("arm's result", result.arm),
-            ("sha256 of the arm's result", result.arm_sha256),
-            ("path of the log", result.log.path),
-            (f"sha256 of {name}", result.log.sha256 or "unknown, fetched in part"),
-        ]
-    )
+    made = {"algid": result.version, "arm's result": result.arm}
+    made["sha256 of the arm's result"] = result.arm_sha256
+    provenance = provenance_table(list(made.items()), [result.log])
     return Document(
         title=f"Payload in time of {name}",
         verdict=verdict(result),
@@ -163,12 +157,10 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
         ("torque explained by arm and payload, noise aside", share_text(result.track.explained)),
         ("slow errors and noise over the sensors' noise", noise),
     )
-    log, channels = log_tables([result.log])
     holes = [(f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist()]
     return (
         Table("Fit", {"What": "name", "Value": "number"}, fit),
-        log.without(["Arm"]),
-        channels.without(["Log"]),
+        *log_tables([result.log]),
         Table("Times without samples", {"From, s": "name", "To, s": "number"}, tuple(holes)),
     )
 

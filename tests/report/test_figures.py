@@ -10,18 +10,32 @@ import numpy as np
 import polars as pl
 import pytest
 
+from algid.base.errors import ResultError
 from algid.base.significance import NORMAL
-from algid.report.figures import Figures, intervals, shares_of_time
+from algid.report.figures import (
+    closeup,
+    correlation,
+    figures,
+    figures_of_paper,
+    inertia,
+    intervals,
+    residual,
+    running,
+    shares_of_time,
+    torque,
+)
 from algid.report.plot import Panels, Plot, label, packed
-from algid.report.series import drawn
+from algid.report.series import Drawn, drawn
 from algid.results import Result
 from tests.report.folders import estimate
 from tests.report.pages import named, typed
 
 
 @pytest.fixture(scope="module")
-def figures(case_folder: Path, result: Result) -> Figures:
-    return Figures(case_folder, result, drawn(case_folder / "torque.parquet"))
+def raw(case_folder: Path) -> Drawn:
+    found = drawn(case_folder / "torque.parquet")
+    assert found is not None
+    return found
 
 
 def traces(plot: Plot | None, name: str) -> list[dict[str, Any]]:
@@ -54,11 +68,10 @@ def test_intervals_are_in_percent_of_the_estimate(result: Result) -> None:
 
 
 def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
-    figures: Figures, case_folder: Path
+    case_folder: Path, result: Result, raw: Drawn
 ) -> None:
     rows = pl.read_parquet(case_folder / "torque.parquet")
-    plot, near = figures.torque(), figures.closeup()
-    assert plot is not None
+    plot, near = torque(case_folder, result, raw), closeup(case_folder, result, raw)
     for joint, one in enumerate(traces(plot, "measured"), start=1):
         y = finite(typed(one["y"]))
         ends = rows[f"tau{joint}"].min(), rows[f"tau{joint}"].max()
@@ -77,11 +90,9 @@ def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
         assert (t[0], t[-1]) == pytest.approx(ends, abs=2e-3)
 
 
-def test_residuals_stand_against_the_band_of_white_noise(
-    figures: Figures, case_folder: Path
-) -> None:
+def test_residuals_stand_against_the_band_of_white_noise(case_folder: Path) -> None:
     rows = pl.read_parquet(case_folder / "innovations.parquet")
-    plot = figures.residual()
+    plot = residual(case_folder)
     assert plot is not None
     one = rows.filter((pl.col("quantity") == "autocorrelation") & (pl.col("joint") == 1))
     stems = traces(plot, "residual")[1]
@@ -94,23 +105,23 @@ def test_residuals_stand_against_the_band_of_white_noise(
     assert (band.min(), band.max()) == pytest.approx(ends, rel=1e-6)
 
 
-def test_the_running_estimate_ends_at_its_last_value(figures: Figures, case_folder: Path) -> None:
+def test_the_running_estimate_ends_at_its_last_value(case_folder: Path, result: Result) -> None:
     rows = pl.read_parquet(case_folder / "running.parquet")
-    plot = figures.running()
+    plot = running(case_folder, result)
     assert plot is not None
     for place, one in enumerate(traces(plot, "estimate from all samples so far")):
-        name = list(figures.result.estimates)[place]
+        name = list(result.estimates)[place]
         assert finite(typed(one["y"]))[-1] == pytest.approx(rows[name][-1], rel=1e-6)
         axis = "yaxis" if place == 0 else f"yaxis{place + 1}"
         low, high = plot.figure.layout[axis]["range"]
         assert low < rows[name][-1] - rows[f"{name}_half"][-1] < rows[name][-1] < high
 
 
-def test_maps_are_the_covariance_scaled_and_information_summed(figures: Figures) -> None:
-    plot = figures.correlation()
+def test_maps_are_the_covariance_scaled_and_information_summed(result: Result) -> None:
+    plot = correlation(result)
     assert plot is not None
     (trace,) = traces(plot, "map")
-    C = figures.result.covariance
+    C = result.covariance
     np.testing.assert_allclose(typed(trace["z"]), C / np.sqrt(np.outer(*[np.diag(C)] * 2)), 1e-5)
     gained = np.arange(2 * 1_500.0).reshape(2, -1)
     (trace,) = traces(shares_of_time(["a", "b"], gained, 0.5), "map")
@@ -120,11 +131,11 @@ def test_maps_are_the_covariance_scaled_and_information_summed(figures: Figures)
     assert typed(trace["x"])[1] == pytest.approx(1.5 * 3 * 0.5)
 
 
-def test_the_mass_matrix_has_the_spread_of_draws(figures: Figures) -> None:
+def test_the_mass_matrix_has_the_spread_of_draws(result: Result, raw: Drawn) -> None:
     """M11 = k5 + k3 + 2 k1 cos θ2 of draws from the covariance."""
-    plot = figures.inertia()
+    plot = inertia(result, raw)
     assert plot is not None
-    fit, value = figures.result.fit, figures.result.parameters
+    fit, value = result.fit, result.parameters
     assert fit is not None
     k = np.array([value[name].estimate for name in ("k1", "k3", "k5")])
     C = fit.covariance_of(("k1", "k3", "k5"))
@@ -138,37 +149,31 @@ def test_the_mass_matrix_has_the_spread_of_draws(figures: Figures) -> None:
     assert half == pytest.approx(NORMAL * (draws @ factors).std(), rel=0.03)
 
 
-def test_convergence_shows_result_and_truth(figures: Figures) -> None:
-    plots = list(figures.of_paper())
-    assert [one.key for one in plots if isinstance(one, Plot)] == ["estimates", "loaded"]
-    first = plots[0]
-    assert isinstance(first, Plot)
-    levels = [shape["y0"] for shape in first.figure.layout["shapes"] if shape["xref"] == "x domain"]
-    one = next(iter(figures.result.parameters.values()))
-    assert levels[0] == one.estimate
+def test_convergence_shows_result_and_truth(case_folder: Path, result: Result) -> None:
+    plots = figures_of_paper(case_folder, result)
+    assert [one.key for one in plots] == ["estimates", "loaded"]
+    shapes = plots[0].figure.layout["shapes"]
+    levels = [shape["y0"] for shape in shapes if shape["xref"] == "x domain"]
+    assert levels[0] == next(iter(result.parameters.values())).estimate
 
 
 @pytest.mark.parametrize(
     ("name", "lost"),
     [
         ("scored", set()), ("innovations", {"residual"}), ("running", {"running"}),
-        ("information", {"information"}), ("torque", {"torque", "closeup", "signals", "coverage"}),
+        ("information", {"information"}),
     ],
 )  # fmt: skip
-def test_what_is_absent_or_broken_is_not_drawn(
-    figures: Figures, name: str, lost: set[str], tmp_path: Path
+def test_what_is_absent_is_not_drawn_and_what_is_broken_is_refused(
+    case_folder: Path, result: Result, raw: Drawn, name: str, lost: set[str], tmp_path: Path
 ) -> None:
-    folder = Path(shutil.copytree(figures.folder, tmp_path / "a"))
-    every = {one.key for one in figures if isinstance(one, Plot)}
+    folder = Path(shutil.copytree(case_folder, tmp_path / "a"))
+    every = {one.key for one in figures(folder, result, raw)}
+    (folder / f"{name}.parquet").unlink(missing_ok=True)
+    assert {one.key for one in figures(folder, result, raw)} == every - lost
     (folder / f"{name}.parquet").write_bytes(b"PAR1")
-    raw = None if name == "torque" else figures.raw
-    shown = list(Figures(folder, figures.result, raw))
-    broken = {"torque"} if name == "scored" else lost
-    assert {one.key for one in shown if isinstance(one, Plot)} == every - broken
-    assert any("cannot read it as Parquet" in str(one) for one in shown) is (name != "torque")
-    (folder / f"{name}.parquet").unlink()
-    shown = list(Figures(folder, figures.result, raw))
-    assert {one.key for one in shown if isinstance(one, Plot)} == every - lost
+    with pytest.raises(ResultError, match=rf"{name}\.parquet: cannot read it as Parquet"):
+        figures(folder, result, raw)
 
 
 def test_panels_lie_beside_and_below_one_another() -> None:

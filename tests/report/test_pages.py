@@ -61,10 +61,7 @@ def test_the_page_leads_with_the_arm_and_its_tables_hold_the_estimates(
     heads, rows = shown.tables["Table 4"]
     assert [row[0] for row in rows] == ["k1", "k3", "k6", "k4", "k2"]
     assert rows[0][heads.index("Paper, %")] == "0.2449"
-    heads, rows = shown.tables["Samples that were used"]
-    assert [row[:2] for row in rows] == [
-        ["case1-unloaded.mcap", "4,000"], ["case1-loaded.mcap", "4,000"],
-    ]  # fmt: skip
+    assert ["velocity", "observer"] in shown.tables["Settings"][1]
     assert shown.tables["Torque prediction"][1][0][:2] == ["logs used", "1"]
     assert [row[1] for row in shown.tables["Whiteness of the residual"][1]] == ["yes", "yes"]
 

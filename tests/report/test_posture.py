@@ -14,7 +14,9 @@ from algid.results import Estimate, Result
 
 @pytest.fixture(scope="module")
 def raw(case_folder: Path) -> Drawn:
-    return drawn(case_folder / "torque.parquet")
+    found = drawn(case_folder / "torque.parquet")
+    assert found is not None
+    return found
 
 
 def arm(result: Result, raw: Drawn) -> ArmDrawing:
