@@ -47,20 +47,6 @@ def test_velocities_are_those_of_the_differential_equation(poles: tuple[complex,
     np.testing.assert_allclose(found, C_OBS @ exact, atol=2e-5)
 
 
-def test_steady_sine_meets_the_transfer_function() -> None:
-    frequency = 2 * np.pi * 1.0
-    t = DT * np.arange(4000)
-    found = LuenbergerObserver(DT).velocities(np.stack([np.sin(frequency * t), np.zeros_like(t)]))[
-        0, 2000:
-    ]
-    s = 1j * frequency
-    _, l1, l2, l3 = np.poly(PAPER_POLES[:3])
-    gain = (l2 * s + l3) * s / (s**3 + l1 * s**2 + l2 * s + l3)
-    expected = np.imag(gain * np.exp(s * t[2000:]))
-    # a sine is not linear between samples: (ω dt)²/12 of it is lost
-    np.testing.assert_allclose(found, expected, atol=frequency**3 * DT**2)
-
-
 def test_pieces_give_the_same_bits_as_the_whole() -> None:
     theta = np.random.default_rng(1).normal(size=(2, 1000)).cumsum(axis=1)
     whole = LuenbergerObserver(DT).velocities(theta)
@@ -68,19 +54,6 @@ def test_pieces_give_the_same_bits_as_the_whole() -> None:
     parts = [observer.velocities(part) for part in np.split(theta, [1, 17, 600], axis=1)]
     # the state is carried exactly; BLAS may sum in another order for another length
     np.testing.assert_allclose(np.concatenate(parts, axis=1), whole, rtol=1e-12, atol=1e-9)
-
-
-def test_an_arm_at_rest_has_no_velocity() -> None:
-    found = LuenbergerObserver(DT).velocities(np.full((2, 100), 1.3))
-    np.testing.assert_allclose(found, 0, atol=1e-8)  # rounding of gains up to 6e7
-
-
-@pytest.mark.parametrize(
-    "poles", [(-1.0,) * 5, (1.0, -1, -2, -3, -4, -5), (-1 + 1j, -2, -3, -1 - 1j, -4, -5)]
-)
-def test_poles_that_cannot_be_are_refused(poles: tuple[complex, ...]) -> None:
-    with pytest.raises(ValueError, match="poles"):
-        observer_gain(poles)
 
 
 @pytest.mark.parametrize("poles", [PAPER_POLES, (-30 + 40j, -30 - 40j, -50, -20, -25, -90)])
@@ -112,22 +85,9 @@ def test_after_a_reset_the_observer_starts_at_rest_where_it_is() -> None:
     assert np.all(np.abs(found[:, 0]) < 1e-6)
 
 
-def test_no_joint_disturbs_the_other() -> None:
-    theta = np.random.default_rng(4).normal(size=(2, 100)).cumsum(axis=1)
-    alone = LuenbergerObserver(DT).velocities(theta * np.array([[1.0], [0.0]]))
-    np.testing.assert_array_equal(alone[0], LuenbergerObserver(DT).velocities(theta)[0])
-    assert not alone[1].any()
-
-
-def test_a_ramp_ends_at_its_slope() -> None:
-    t = DT * np.arange(1000)
-    found = LuenbergerObserver(DT).velocities(np.stack([2.0 * t, -0.5 * t + 1.0]))
-    # type 1: the filter has no error of position
-    np.testing.assert_allclose(found[:, -1], [2.0, -0.5], rtol=1e-6)
-
-
 @pytest.mark.parametrize(
-    "poles", [(-1.0, -2, -3, -4, -5, 0.0), (-1.0,) * 7, (-1 + 1j, -1 - 2j, -3, -4, -5, -6)]
+    "poles",
+    [(-1.0, -2, -3, -4, -5, 0.0), (-1.0,) * 5, (-1.0,) * 7, (-1 + 1j, -2, -3, -1 - 1j, -4, -5)],
 )
 def test_poles_on_the_axis_too_many_or_not_conjugate_are_refused(
     poles: tuple[complex, ...],

@@ -6,12 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from algid.base.criteria import CUT
 from algid.log import Log, Origin
-from algid.signals.segments import Segment, pieces, segments
+from algid.signals.segments import segments
 
 
 def log_at(stamp_ns: np.ndarray) -> Log:
@@ -45,40 +42,9 @@ def test_segments_do_not_depend_on_the_blocks(stamps: np.ndarray, rows: int) -> 
     ]
 
 
-def test_even_stamps_pass_unchanged() -> None:
-    log = log_at(EVEN)
-    np.testing.assert_array_equal(
-        np.concatenate([s.theta for s in segments([log])], axis=1), log.theta
-    )
-
-
 def test_jittered_samples_are_put_on_the_time_base() -> None:
     for part in segments([log_at(JITTERED)]):
         t = part.t + JITTERED[0] * 1e-9
         # the cubic's error, (7 h)^4 / 24 with stamps up to 2 h apart
         np.testing.assert_allclose(part.theta[0], np.sin(7 * t), atol=1e-8)
         np.testing.assert_allclose(part.tau[1], t**3, atol=1e-9)
-
-
-def test_a_long_gap_cuts_and_a_short_one_does_not() -> None:
-    starts = [part.start for part in segments([log_at(HOLED)]) if not part.continues]
-    assert len(starts) == 2
-    assert starts[1] == pytest.approx(5.020, abs=1e-3 * CUT)
-
-
-@settings(max_examples=60, deadline=None)
-@given(lengths=st.lists(st.integers(1, 40), min_size=1, max_size=12), rows=st.integers(2, 25))
-def test_pieces_keep_every_sample_once(lengths: list[int], rows: int) -> None:
-    source, start = [], 0
-    for number, length in enumerate(lengths):
-        values = np.arange(start, start + length, dtype=float)
-        source.append(
-            Segment(
-                start * 0.1, 0.1, np.stack([values] * 2), np.stack([values] * 2), None, number > 0
-            )
-        )
-        start += length
-    cut = list(pieces(source, rows))
-    np.testing.assert_array_equal(np.concatenate([part.theta[0] for part in cut]), np.arange(start))
-    assert all(len(part) == rows for part in cut[:-1])
-    assert len(cut[-1]) < 1.5 * rows + 1

@@ -46,14 +46,6 @@ def test_a_log_without_samples_has_no_segments() -> None:
     assert list(segments([empty, empty])) == []
 
 
-def test_empty_blocks_between_others_do_not_show() -> None:
-    log = log_at([*range(40)])
-    blocks = [log.part(0, 0), log.part(0, 11), log.part(11, 11), log.part(11, 40), log.part(40, 40)]
-    np.testing.assert_array_equal(
-        np.concatenate([one.theta for one in segments(blocks)], axis=1), log.theta
-    )
-
-
 @pytest.mark.parametrize(("gap", "starts"), [(5.0, [0.0]), (5.1, [0.0, 0.0141])])
 def test_a_log_is_cut_where_more_than_five_periods_lack_samples(
     gap: float, starts: list[float]
@@ -78,12 +70,6 @@ def test_fewer_than_four_samples_between_gaps_are_left_out() -> None:
     stretches = found([*range(200), 240, 241, 242, *range(300, 400), 450, 451, 452, 453])
     assert [one.start for one in stretches] == pytest.approx([0.0, 0.300, 0.450], abs=1e-12)
     assert [len(one) for one in stretches] == [200, 100, 4]
-
-
-def test_times_are_counted_from_the_logs_first_sample() -> None:
-    (whole,) = found([1_000_000 + n for n in range(20)])
-    assert whole.start == 0.0
-    np.testing.assert_allclose(whole.t, np.arange(20) * 1e-3, atol=1e-15)
 
 
 @pytest.mark.parametrize(("off", "taken"), [(0.0009, True), (0.0011, False)])
@@ -234,9 +220,3 @@ def test_pieces_do_not_depend_on_how_a_stretch_came_in(parts: list[list[int]]) -
         np.testing.assert_array_equal(mine.theta, whole.theta)
         assert mine.continues == whole.continues
         assert mine.start == pytest.approx(whole.start, abs=1e-9)
-
-
-def test_pieces_of_one_segment_are_views_of_it() -> None:
-    whole = numbered(95)
-    for piece in pieces([whole], 10):
-        assert np.shares_memory(piece.theta, whole.theta)

@@ -11,7 +11,6 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.identification.identify import identify
-from algid.inspection.checks import examine
 from algid.log import Log, Origin, join, usual_period
 from algid.settings import Settings
 from algid.signals.segments import segments
@@ -125,13 +124,6 @@ def test_blocks_make_no_difference(
     assert np.array_equal(parts.tau, whole.tau)
 
 
-def test_logs_without_clusters_pass_as_they_are() -> None:
-    log = log_of(regular(), regular())
-    (*whole, last) = spaced([log], PERIOD)
-    assert sum(map(len, whole)) + len(last) == ROWS
-    assert np.shares_memory(whole[0].theta, log.theta)
-
-
 def test_the_period_of_bursts_is_their_mean_pace() -> None:
     assert usual_period(np.rint(batches()[1] * 1e9).astype(np.int64)) == pytest.approx(
         PERIOD, rel=0.01
@@ -139,13 +131,6 @@ def test_the_period_of_bursts_is_their_mean_pace() -> None:
     assert usual_period(np.rint(regular() * 1e9).astype(np.int64)) == pytest.approx(
         PERIOD, rel=1e-12
     )
-
-
-def test_how_many_are_near_is_told() -> None:
-    (found,) = [one for one in examine(log_of(*late_pairs())) if one.key == "UNEVEN_STAMPS:near"]
-    assert found.text.startswith("100 samples follow the one before")
-    assert not found.refuse
-    assert "GAPS" not in [one.code for one in examine(log_of(*bursts()))]
 
 
 def simulated(extra: FloatArray, late: FloatArray) -> Log:

@@ -81,19 +81,6 @@ def test_of_samples_at_once_at_the_begin_only_the_last_one_stays() -> None:
     assert found.theta[0].tolist() == [1, 2, 3]
 
 
-def test_a_cluster_may_end_the_log() -> None:
-    found = settled(log_of([0, 1000, 2000, 2004], [0.0, 1.0, 2.0, 4.0]))
-    assert (found.stamp_ns // US).tolist() == [0, 1000, 2002]
-    assert found.theta[0].tolist() == [0, 1, 3]
-
-
-def test_means_of_stamps_round_up_at_half_a_nanosecond() -> None:
-    log = log_of([0, 1000, 2000], [0.0, 1.0, 2.0])
-    stamps = np.array([0, 1_000_000, 1_000_001, 2_000_000])
-    twice = Log(stamps, np.zeros((2, 4)), np.zeros((2, 4)), log.origin)
-    assert settled(twice).stamp_ns.tolist() == [0, 1_000_001, 2_000_000]
-
-
 @pytest.mark.parametrize(("step", "count"), [(300, 0), (299, 1)])
 def test_near_is_less_than_three_tenths_of_a_period(step: int, count: int) -> None:
     stamps = np.array([0, 1000, 1000 + step, 2000]) * US
