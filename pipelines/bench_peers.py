@@ -1,8 +1,7 @@
 """What algid is timed against, one process a peer: `python -m pipelines.bench_peers NAME LOG`.
 
-A peer that estimates prints the seven constants; one that reads prints the seconds that reading
-took, imports excluded. Every estimating peer reads the log with polars and filters it as users of
-these tools do.
+A peer prints the seven constants that it estimates; it reads the log with polars and filters it as
+users of these tools do. `polars_processor` prints the processor seconds of reading alone.
 """
 
 from __future__ import annotations
@@ -115,68 +114,15 @@ def pysindy(path: Path) -> FloatArray:
     return np.asarray(np.linalg.lstsq(rows[:, :7], rows[:, 7], rcond=None)[0])
 
 
-def polars(path: Path) -> float:
-    """Seconds in which polars reads the five columns, once it is warm."""
-    import polars as pl
-
-    return _seconds(lambda: pl.read_parquet(path, columns=COLUMNS), 9)
-
-
 def polars_processor(path: Path) -> float:
-    """Processor seconds of the same, of all its threads."""
+    """Processor seconds in which polars reads the five columns, of all its threads, once warm."""
     import polars as pl
 
-    return _seconds(lambda: pl.read_parquet(path, columns=COLUMNS), 9, time.process_time)
-
-
-def algid_reader(path: Path) -> float:
-    """Seconds in which algid reads a log in blocks."""
-    from algid.readers import open_log
-
-    return _seconds(lambda: sum(len(block) for block in open_log(path).blocks()), 5)
-
-
-def mcap_ros2(path: Path) -> float:
-    """Seconds in which mcap-ros2-support decodes the joint states of a bag."""
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-
-    def read() -> None:
-        rows = []
-        with next(path.glob("*.mcap")).open("rb") as stream:
-            for _, _, message, state in make_reader(
-                stream, decoder_factories=[DecoderFactory()]
-            ).iter_decoded_messages():
-                rows.append((message.log_time, *state.position, *state.effort))
-        np.array(rows)
-
-    return _seconds(read, 1)
-
-
-def rosbags(path: Path) -> float:
-    """Seconds in which rosbags decodes the joint states of a bag."""
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
-
-    def read() -> None:
-        rows = []
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            for connection, stamp, raw in reader.messages():
-                state: Any = reader.deserialize(raw, connection.msgtype)
-                rows.append((stamp, *state.position, *state.effort))
-        np.array(rows)
-
-    return _seconds(read, 1)
-
-
-def _seconds(
-    work: Callable[[], object], times: int, clock: Callable[[], float] = time.perf_counter
-) -> float:
     found = []
-    for _ in range(times):
-        start = clock()
-        work()
-        found.append(clock() - start)
+    for _ in range(9):
+        start = time.process_time()
+        pl.read_parquet(path, columns=COLUMNS)
+        found.append(time.process_time() - start)
     return median(found)
 
 
@@ -186,11 +132,7 @@ PEERS: dict[str, Callable[[Path], Any]] = {
         least_squares,
         pinocchio,
         pysindy,
-        polars,
         polars_processor,
-        algid_reader,
-        mcap_ros2,
-        rosbags,
     )
 }
 
