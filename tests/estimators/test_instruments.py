@@ -18,20 +18,20 @@ from algid.model import Model, Motion, acceleration, torque
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.simulator import simulate
-from pipelines.accuracy_scenes import random_arm
-from pipelines.disturbance import logs
+from pipelines.disturbed import DT, scene
 
 from .conftest import Bench
 
 
 @pytest.mark.slow
 def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
-    arm = random_arm(1)[0]
-    sources: list[Source] = [partial(list, [log]) for log in logs(arm, 3, 21)]
+    made = scene(1, feedback=False)
+    logs = [Segment(0.0, DT, *log) for log in zip(made.theta, made.tau, strict=True)]
+    sources: list[Source] = [partial(list, [log]) for log in logs]
     least = weak.fit(sources)
     found = instruments.fit(sources, start=least)
     assert found.estimator == "instruments"
-    truth = arm.constants()
+    truth = made.arm.constants()
     inertias = [0, 2, 4]
     bias = (least.values / truth - 1)[inertias]
     assert np.all(bias < -0.05)  # attenuated
