@@ -119,12 +119,8 @@ class _TorqueTable(_Table):
 
     def multi_sine(self) -> MultiSine:
         """The torque of both joints."""
-        one, two = self.joint1, self.joint2
-        return MultiSine(
-            amplitude=(tuple(one.amplitude), tuple(two.amplitude)),
-            frequency=(tuple(one.frequency), tuple(two.frequency)),
-            phase=(tuple(one.phase), tuple(two.phase)),
-        )
+        one, two = self.joint1.model_dump(), self.joint2.model_dump()
+        return MultiSine(**{name: (tuple(one[name]), tuple(two[name])) for name in one})
 
 
 class _CaseFile(_Table):
@@ -165,15 +161,12 @@ def _folder() -> Any:
 
 def _read_case(path: Path) -> Case:
     content = read_toml(path, _CaseFile)
-    torque = None
-    if content.torque is not None:
-        torque = content.torque.multi_sine()
     return Case(
         name=path.stem,
         arm=content.arm.arm(),
         payload=content.payload.m_p,
         place=(content.payload.x, content.payload.y),
         inertia=content.payload.J,
-        torque=torque,
+        torque=None if content.torque is None else content.torque.multi_sine(),
         paper_error_percent=dict(content.paper_error_percent),
     )

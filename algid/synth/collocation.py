@@ -43,12 +43,13 @@ Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
 
 NODES = 16
 TOLERANCE = 1e-12
-LONGEST = 0.05  # s: nothing of interest changes unseen within it
+LONGEST = 0.05  # s, of a piece: nothing of interest changes unseen within it
 SHORTEST = 1e-9  # s
 TURNS = 10
 """What the iteration of a window may take: more, and it is too long."""
-MOST_PIECES = 50
-"""Pieces in a window: more cost more to carry on than they save in calls."""
+PIECES, MOST_PIECES = 3, 50
+"""Pieces in a window, and between breaks: more cost more turns, or more to carry on, than they
+save in calls."""
 _SLOPE = 1e-6  # rad and rad/s, for the derivatives of α: they only steer the iteration
 
 
@@ -144,11 +145,13 @@ def integrate(
     while done < t.size:
         # a window that is too long may leave all bounds
         with np.errstate(over="ignore", invalid="ignore"):
-            # the breaks ahead within its length, at most so many, or its own end before the first
+            # from break to break as far as a piece may reach, or whole pieces before the first one
             ahead = breaks[np.searchsorted(breaks, now, side="right") :][:MOST_PIECES]
-            within = ahead[ahead <= now + longest]
-            edges = np.concatenate([[now], within if within.size else [now + longest]])
-            window, turns = _solved(accelerate_at, state, edges)
+            ends = ahead[ahead <= now + longest]
+            if not ends.size:
+                count = min(PIECES, int((ahead[0] - now) / longest))
+                ends = now + longest * np.arange(1, count + 1)
+            window, turns = _solved(accelerate_at, state, np.append(now, ends))
         if window is None:
             longest *= 0.5
             if longest < SHORTEST:
@@ -179,14 +182,14 @@ def _solved(
     half = 0.5 * np.diff(edges)[:, None]
     times = edges[:-1, None] + half * (1 + _X)
     accelerate = accelerate_at(times.ravel())
-    own, carry = _newton(accelerate_at, edges, state)
+    inverse, by_start, ends, carry = _newton(accelerate_at, edges, state)
 
     def integral(start: FloatArray, rate: FloatArray) -> FloatArray:
         """`start` (n,) and ∫ `rate` from the window's start, (n, P, s)."""
         scaled = half * rate
-        ends = start[:, None] + np.cumsum(scaled @ _WEIGHTS, axis=1)
-        starts = np.concatenate([start[:, None], ends[:, :-1]], axis=1)
-        integrals: FloatArray = scaled @ _TO_NODES.T + starts[:, :, None]
+        reached = start[:, None] + np.cumsum(scaled @ _WEIGHTS, axis=1)
+        begins = np.concatenate([start[:, None], reached[:, :-1]], axis=1)
+        integrals: FloatArray = scaled @ _TO_NODES.T + begins[:, :, None]
         return integrals
 
     alpha = np.zeros((n, *times.shape))
@@ -196,8 +199,8 @@ def _solved(
         theta = integral(state[:n], omega)
         now = accelerate(theta.reshape(n, -1), omega.reshape(n, -1)).reshape(alpha.shape)
         rest = (now - alpha).transpose(1, 0, 2).reshape(half.size, -1)
-        starts = (carry @ (rest @ own.ends.T).ravel()).reshape(half.size, 2 * n)
-        change = rest @ own.inverse.T + starts @ own.by_start.T
+        starts = (carry @ (rest @ ends.T).ravel()).reshape(half.size, 2 * n)
+        change = rest @ inverse.T + starts @ by_start.T
         alpha = alpha + change.reshape(half.size, n, -1).transpose(1, 0, 2)
         size = float(np.abs(change).max()) * float(edges[-1] - edges[0])
         if not size < before:  # also where it is no number
@@ -212,24 +215,6 @@ def _solved(
     return None, TURNS
 
 
-@dataclass(frozen=True)
-class _Newton:
-    """What a piece makes of its defects r (ns,) and of a change of its start δx (2n,).
-
-    ==========  ===========================================  ========
-    attribute   what                                         shape
-    ==========  ===========================================  ========
-    inverse     N: δ from r                                  (ns, ns)
-    by_start    N C: δ from δx                               (ns, 2n)
-    ends        L N: the change of the next start from r     (2n, ns)
-    ==========  ===========================================  ========
-    """
-
-    inverse: FloatArray
-    by_start: FloatArray
-    ends: FloatArray
-
-
 def _kron(a: FloatArray, b: FloatArray) -> FloatArray:
     """A ⊗ B of (i, j) and (k, l): (ik, jl). NumPy's own takes longer than what it is for."""
     outer: FloatArray = a[:, None, :, None] * b[None, :, None, :]
@@ -238,10 +223,12 @@ def _kron(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _newton(
     accelerate_at: Callable[[FloatArray], Acceleration], edges: FloatArray, state: FloatArray
-) -> tuple[_Newton, FloatArray]:
-    """The matrices of each piece, and (P 2n, P 2n) which carries changes of starts on.
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """What a piece makes of its defects r (ns,) and of a change of its start δx (2n,).
 
-    They steer the iteration alone, so that all pieces may pass for equally long.
+    N (ns, ns): δ from r; N C (ns, 2n): δ from δx; L N (2n, ns): the change of the next start from
+    r; and (P 2n, P 2n), which carries changes of starts on. They steer the iteration alone, so
+    that all pieces may pass for equally long.
     """
     n, pieces = state.size // 2, edges.size - 1
     half = 0.5 * (edges[-1] - edges[0]) / pieces
@@ -263,4 +250,4 @@ def _newton(
         powers.append(step @ powers[-1])
     apart = np.subtract.outer(np.arange(pieces), np.arange(pieces)).clip(0)
     carry = np.array(powers)[apart].transpose(0, 2, 1, 3).reshape((2 * n * pieces,) * 2)
-    return _Newton(inverse, by_start, ends @ inverse), carry
+    return inverse, by_start, ends @ inverse, carry

@@ -32,7 +32,7 @@ from algid.synth.simulator import Driven, SimulatedMotion, steered
 STIFFNESS = 2 * np.pi * 10.0
 _KNOTS = 200.0  # a second, at most: a plan is smooth
 COLUMNS = ("t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2")
-LOADED_COLUMNS = ("loaded_tau1", "loaded_tau2")
+LOADED_COLUMN = "loaded_tau1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,7 @@ def read_plan(path: Path) -> Reference:
     SettingError
         If there is none, or it lacks a column.
     """
-    file = path
-    if path.is_dir():
-        file = path / "trajectory.csv"
+    file = path / "trajectory.csv" if path.is_dir() else path
     try:
         rows = csv.reader(read_text(file).splitlines())
         names = next(rows, [])
@@ -70,32 +68,24 @@ def read_plan(path: Path) -> Reference:
         raise SettingError(
             f"{file}: not the trajectory of a design ({error}); expected what algid design wrote"
         ) from error
-    problem = None
-    if values.ndim != 2 or values.shape[1] < 2:
-        problem = "no motion"
-    for name in reversed(COLUMNS):
-        if name not in names:
-            problem = f"no column {name}"
-    if problem is not None:
+    missing = [name for name in COLUMNS if name not in names]
+    if missing or values.ndim != 2 or values.shape[1] < 2:
+        problem = f"no column {missing[0]}" if missing else "no motion"
         raise SettingError(
             f"{file}: expected {', '.join(COLUMNS)}, found {problem}; give what algid design wrote"
         )
     column = dict(zip(names, values, strict=True))
-    tau = np.stack([column["tau1"], column["tau2"]])
-    loaded_tau = tau
-    if column.keys() >= set(LOADED_COLUMNS):
-        loaded_tau = np.stack([column[name] for name in LOADED_COLUMNS])
-    if not np.all(np.isfinite(values)) or np.any(np.diff(column["t"]) <= 0):
+    t = column["t"] - column["t"][0]
+    if not np.all(np.isfinite(values)) or np.any(np.diff(t) <= 0):
         raise SettingError(
             f"{file}: expected finite numbers at increasing times; write the design anew"
         )
-    return Reference(
-        t=column["t"] - column["t"][0],
-        theta=np.stack([column["theta1"], column["theta2"]]),
-        omega=np.stack([column["omega1"], column["omega2"]]),
-        tau=tau,
-        loaded_tau=loaded_tau,
-    )
+    signals = []
+    for name in ("theta", "omega", "tau", "loaded_tau"):
+        if name == "loaded_tau" and LOADED_COLUMN not in column:
+            name = "tau"
+        signals.append(np.stack([column[f"{name}1"], column[f"{name}2"]]))
+    return Reference(t, *signals)
 
 
 def follow(
@@ -120,9 +110,7 @@ def follow(
 
     every = max(1, round(plan.t.size / max(plan.duration * _KNOTS, 1)))
     kept = np.unique(np.append(np.arange(0, plan.t.size, every), plan.t.size - 1))
-    tau = plan.tau
-    if loaded:
-        tau = plan.loaded_tau
+    tau = plan.loaded_tau if loaded else plan.tau
     wanted = np.concatenate([plan.theta, plan.omega, tau])[:, kept]
     spline = make_interp_spline(plan.t[kept], wanted.T, k=min(5, kept.size - 1))
     end = plan.duration

@@ -129,28 +129,22 @@ def with_schedule(
             f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}"
         )
     t = sample_times(recording.rate, recording.duration, recording.sensors)
-    state = np.array(recording.initial)
-    parts = []
-    starts, ends = np.append(0.0, times), np.append(times, np.inf)
-    stretches = np.column_stack([starts, ends, np.append(0.0, masses)])
-    for start, end, mass in stretches.tolist():
-        own = t[(t >= start) & (t < end)]
-        close = min(end, t[-1])
-        if not own.size or close <= start:
+    state, parts = np.array(recording.initial), []
+    edges = np.clip(np.concatenate([[0.0], times, [np.inf]]), 0.0, t[-1])
+    for start, end, mass in zip(edges, edges[1:], np.append(0.0, masses), strict=False):
+        if end <= start:
             continue
-        k = case.constants(mass)
-        every = np.unique(np.concatenate([[start], own, [close]]))
-        motion = simulate(
-            k, torque, every, state[:2], state[2:], _counted(progress, "schedule", recording)
-        )
-        state = np.concatenate([motion.theta[:, -1], motion.omega[:, -1]])
-        kept = np.isin(every, own)
-        parts.append(
-            SimulatedMotion(own, motion.theta[:, kept], motion.omega[:, kept], motion.tau[:, kept])
-        )
-    signals = ("t", "theta", "omega", "tau")
-    joined = [np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in signals]
-    whole = SimulatedMotion(*joined)
+        every = np.unique(np.concatenate([[start], t[(t > start) & (t < end)], [end]]))
+        counted = _counted(progress, "schedule", recording)
+        k = case.constants(float(mass))
+        motion = simulate(k, torque, every, state[:2], state[2:], counted)
+        rows = np.concatenate([motion.theta, motion.omega, motion.tau])
+        state = rows[:4, -1]
+        # a sample at the change is the first one with the payload
+        own = np.isin(every, t) & ((every < end) | (end == t[-1]))
+        parts.append(rows[:, own])
+    signals = np.concatenate(parts, axis=1)
+    whole = SimulatedMotion(t, signals[:2], signals[2:4], signals[4:])
     changes = tuple((time, mass) for time, mass in table.tolist())
     truth = Truth(case.arm, 0.0, case.name, changes)
     return record(whole, recording.sensors, truth, f"{case.name}-schedule")

@@ -85,15 +85,13 @@ def simulate(
     """
     if t.size < 2 or np.any(np.diff(t) <= 0):
         raise ValueError(f"t must hold at least two increasing times, got {t.size}")
-    start = np.concatenate([theta0, np.zeros(2) if omega0 is None else omega0])
 
     def driven(times: FloatArray) -> Driven:
         tau = torque(times)
         return lambda _theta, _omega: tau
 
     corners = torque.t if isinstance(torque, SampledTorque) else None
-    states = _moved(k, driven, t, start, corners, reached)
-    return SimulatedMotion(t=t, theta=states[:2], omega=states[2:], tau=torque(t))
+    return steered(k, driven, t, theta0, corners, reached, omega0)
 
 
 def steered(
@@ -103,10 +101,11 @@ def steered(
     theta0: FloatArray,
     corners: FloatArray | None = None,
     reached: Callable[[float], None] | None = None,
+    omega0: FloatArray | None = None,
 ) -> SimulatedMotion:
-    """Move the arm `k` from rest at `theta0` (2,) rad by a torque that depends on time and state.
+    """Move the arm `k` by a torque that depends on time and state.
 
-    Parameters and results as for `simulate`, save
+    Parameters and errors as for `simulate`, save
 
     Parameters
     ----------
@@ -114,33 +113,25 @@ def steered(
         Takes times (M,) s, and gives what maps angles (2, M) rad and velocities (2, M) rad/s to
         torques (2, M) N m.
     corners : (C,) float64, s, increasing
-        Times at which a derivative of the torque jumps.
+        Times at which the torque or a derivative of it jumps.
+
+    Raises
+    ------
+    SettingError
+        If the motion grows without bound.
     """
-    states = _moved(k, controller, t, np.concatenate([theta0, np.zeros(2)]), corners, reached)
-    return SimulatedMotion(
-        t=t, theta=states[:2], omega=states[2:], tau=controller(t)(states[:2], states[2:])
-    )
-
-
-def _moved(
-    k: FloatArray,
-    driven: Callable[[FloatArray], Driven],
-    t: FloatArray,
-    start: FloatArray,
-    corners: FloatArray | None,
-    reached: Callable[[float], None] | None,
-) -> FloatArray:
-    """States (4, N) at `t` from `start` (4,)."""
+    start = np.concatenate([theta0, np.zeros(2) if omega0 is None else omega0])
     if not np.any(k[7:]):
         k = k[:7]  # a straight arm takes fewer operations
 
     def accelerate_at(times: FloatArray) -> Acceleration:
-        torque = driven(times)
+        torque = controller(times)
         return lambda theta, omega: forward_dynamics(k, theta, omega, torque(theta, omega))
 
     try:
-        return integrate(accelerate_at, start, t, corners, reached)
+        states = integrate(accelerate_at, start, t, corners, reached)
     except ArithmeticError as error:
         raise SettingError(
             f"{error}; expected an arm that moves: give a weaker torque or another initial state"
         ) from error
+    return SimulatedMotion(t, states[:2], states[2:], controller(t)(states[:2], states[2:]))
