@@ -34,11 +34,12 @@ def table_of_columns(columns: Mapping[str, object]) -> pyarrow.Table:
     """A table of columns by name: arrays of numbers, sequences of strings, or what Arrow takes."""
     import pyarrow
 
-    arrays = [_column(values) for values in columns.values()]
+    arrays = [column_of(values) for values in columns.values()]
     return pyarrow.Table.from_arrays(arrays, names=list(columns))
 
 
-def _column(values: Any) -> pyarrow.Array:
+def column_of(values: Any) -> pyarrow.Array:
+    """A column of an array of numbers, of strings, or of what Arrow takes."""
     import pyarrow
 
     if isinstance(values, np.ndarray) and values.dtype.kind in "iuf":

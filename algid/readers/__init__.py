@@ -1,4 +1,4 @@
-"""Readers of logs: one file a format, behind the `TableReader` of `algid.readers.assemble`."""
+"""Readers of logs: one file a format, behind the `TableReader` of `algid.readers.log_reader`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from algid.log import Log
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-    from algid.readers.assemble import TableReader
+    from algid.readers.log_reader import TableReader
     from algid.readers.memory import Columns
 
 
@@ -47,7 +47,8 @@ def open_log(path: str | Path | Columns, profile: Profile | None = None) -> Tabl
 
 def _open_one(path: str | Path | Columns, profile: Profile) -> TableReader:
     """Open a log that stands in one file, or in memory."""
-    from algid.readers.flat import TableFile, open_table
+    from algid.readers.flat import open_table
+    from algid.readers.table_cells import TableFile
 
     if isinstance(path, str | Path):
         from algid.readers.formats import format_of

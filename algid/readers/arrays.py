@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algid.base.arrow import table_of_columns
+from algid.base.arrow import column_of
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.words import counted, repeated
 from algid.notices import Notice
-from algid.readers.attributes import ATTRIBUTES
-from algid.readers.flat import BATCH_ROWS, TableFile, as_log_error
-from algid.readers.names import TIMES
+from algid.readers.column_names import TIMES
+from algid.readers.flat import as_log_error
+from algid.readers.table_cells import ATTRIBUTES, BATCH_ROWS, TableFile
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -186,58 +186,49 @@ def of_arrays(
         )
     columns: dict[str, NDArray[Any] | pa.Array] = {}
     fields, others = [], list[str]()
-
-    def take(name: str, values: NDArray[Any], said: Mapping[str, str] | None) -> None:
-        if values.dtype.kind in "iuf" and not np.ma.isMaskedArray(values):
-            columns[name] = values
-            kind = pa.from_numpy_dtype(values.dtype.newbyteorder("="))
-        else:
-            try:
-                columns[name] = made = _arrow(values)
-            except (pa.ArrowException, TypeError, ValueError, UnicodeError):
-                others.append(f"{name} (no numbers)")
-                return
-            kind = made.type
-        fields.append(pa.field(name, kind, metadata=said))
-
     for name, array in found.items():
-        said = of_columns.get(name)
-        if array.shape == (rows,):
-            take(name, array, said)
-        elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
-            upright = array if array.shape[0] == rows else array.T
-            for place, column in enumerate(upright.T):
-                take(f"{name}[{place}]", column, said)
-        elif array.dtype.kind in "OUS" or array.ndim == 0:
-            texts[name] = text_of(array)
-        else:
-            others.append(f"{name} ({' × '.join(map(str, array.shape))})")
+        if array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
+            array = array if array.shape[0] == rows else array.T
+        elif array.shape != (rows,):
+            if array.dtype.kind in "OUS" or array.ndim == 0:
+                texts[name] = text_of(array)
+            else:
+                others.append(f"{name} ({' × '.join(map(str, array.shape))})")
+            continue
+        try:
+            plain = array.dtype.kind in "iuf" and not np.ma.isMaskedArray(array)
+            made = _arrow(array[:1] if plain else array)
+        except (pa.ArrowException, TypeError, ValueError, UnicodeError):
+            others.append(f"{name} (no numbers)")
+            continue
+        columns[name] = array if plain else made
+        fields.append(pa.field(name, made.type, metadata=of_columns.get(name)))
 
     def batches(names: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
         end = rows if most is None else min(most, rows)
         for first in range(0, end, BATCH_ROWS):
-            part = {}
-            for name in names:  # Arrow knows this machine's byte order alone
-                values = columns[name][first : min(first + BATCH_ROWS, end)]
-                if isinstance(values, np.ndarray):
-                    values = np.ascontiguousarray(values, values.dtype.newbyteorder("="))
-                part[name] = values
-            yield from table_of_columns(part).to_batches()
+            parts = [columns[name][first : min(first + BATCH_ROWS, end)] for name in names]
+            made = [_arrow(one) if isinstance(one, np.ndarray) else one for one in parts]
+            yield pa.RecordBatch.from_arrays(made, names=list(names))
 
     schema = pa.schema(fields, metadata=texts or None)
     return TableFile(path, kind, schema, rows, batches, others=tuple(others))
 
 
 def _arrow(values: NDArray[Any]) -> pa.Array:
-    """A column that is no plain array of numbers: masked, of dates, texts or objects."""
+    """A column of Arrow, which knows this machine's byte order alone; lists of a matrix's rows."""
     import pyarrow as pa
 
-    if np.ma.isMaskedArray(values):
-        native = np.ascontiguousarray(values.data, values.dtype.newbyteorder("="))
-        return pa.array(native, mask=np.ma.getmaskarray(values))
-    if values.dtype.kind == "S":
-        values = np.char.decode(values, "utf-8")
-    return pa.array(values.tolist() if values.dtype.kind in "OU" else values)
+    flat = values.ravel()
+    if flat.dtype.kind in "iuf":
+        flat = flat.astype(flat.dtype.newbyteorder("="), copy=False)
+    if np.ma.isMaskedArray(flat):
+        made = pa.array(flat.data, mask=np.ma.getmaskarray(flat))
+    elif flat.dtype.kind == "S":
+        made = pa.array(np.char.decode(flat, "utf-8").tolist())
+    else:
+        made = column_of(flat.tolist() if flat.dtype.kind in "OU" else flat)
+    return made if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(made, values.shape[1])
 
 
 def text_of(value: Any) -> str:

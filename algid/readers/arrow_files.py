@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from algid.base.errors import LogError
 from algid.log import CANONICAL_COLUMNS, KEY, Companion, loads
 from algid.notices import Notice
-from algid.readers.flat import BATCH_ROWS, TableFile, as_log_error
+from algid.readers.flat import as_log_error
+from algid.readers.table_cells import BATCH_ROWS, TableFile
 
 if TYPE_CHECKING:
     import pyarrow as pa

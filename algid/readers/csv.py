@@ -13,7 +13,7 @@ from algid.base.files import read_whole
 from algid.log import Companion, loads
 from algid.notices import Notice
 from algid.readers.dialect import Dialect, detect
-from algid.readers.flat import TableFile
+from algid.readers.table_cells import TableFile
 from algid.readers.text import NUL_AMONG_ROWS, head_of, pieces
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ from algid.readers.text import GZIP, MCAP, NUL_AMONG_ROWS, ZSTD, head_of, looks_
 
 if TYPE_CHECKING:
     from algid.profile import Profile
-    from algid.readers.flat import TableFile
     from algid.readers.messages.message_file import MessageFile
     from algid.readers.messages.reader import MessageLog
+    from algid.readers.table_cells import TableFile
 
 _MOST_SHOWN = 64
 
@@ -240,12 +240,13 @@ def entries_of(opened: TableFile | MessageLog) -> Entries:
     LogError
         If not even that can be read.
     """
-    from algid.readers.flat import TableFile, cells_of
+    from algid.readers.table_cells import TableFile, cells_of
 
     if not isinstance(opened, TableFile):
         return tuple(_topics(opened.files[0]()))
     rows = opened.rows or None
-    entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells_of(opened).items()]
+    cells = cells_of(opened).by_name
+    entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells.items()]
     entries += [Entry(name, "of another length") for name in opened.others]
     return tuple(entries)
 

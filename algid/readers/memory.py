@@ -13,8 +13,7 @@ import numpy as np
 from algid.base.errors import LogError, SettingError
 from algid.log import Log
 from algid.readers.arrays import of_arrays, of_arrow
-from algid.readers.attributes import decoded
-from algid.readers.flat import TableFile
+from algid.readers.table_cells import TableFile, decoded
 
 if TYPE_CHECKING:
     from algid.profile import Profile

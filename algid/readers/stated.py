@@ -17,7 +17,7 @@ from algid.base.limits import LIMITS
 from algid.base.units import CURRENT, NANOSECONDS, TORQUE, is_foreign, unit_of
 from algid.log import KEY, IntArray, Reading, usual_period
 from algid.notices import Notice, Remedy
-from algid.readers.names import CURRENTS, STEMS, TIMES, take_apart, words
+from algid.readers.column_names import CURRENTS, STEMS, TIMES, take_apart, words
 from algid.readers.table import REFERENCES, VELOCITIES
 
 if TYPE_CHECKING:

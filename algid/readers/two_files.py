@@ -15,9 +15,9 @@ import numpy as np
 from algid.base.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice, Remedy
-from algid.readers.assemble import TableReader
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.formats import entries_at
+from algid.readers.log_reader import TableReader
 from algid.readers.table import BLOCK_ROWS, SampleTable, remark
 
 if TYPE_CHECKING:

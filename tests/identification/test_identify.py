@@ -227,7 +227,7 @@ def test_blocks_change_no_estimate(
     algid.write_log(tmp_path / "log.parquet", wide[0], truth=wide[0].origin.truth)
     settings = Settings(estimator="weak", model="plain")
     whole = identify(wide[0], None, settings)
-    from algid.readers.assemble import TableReader
+    from algid.readers.log_reader import TableReader
 
     blocks = TableReader.blocks
     monkeypatch.setattr(TableReader, "blocks", lambda self, _rows=0: blocks(self, 700))

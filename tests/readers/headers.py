@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from algid.profile import Profile, with_settings
 from algid.readers import open_log
-from algid.readers.assemble import TableReader as TableReader
+from algid.readers.log_reader import TableReader as TableReader
 
 
 def opened(

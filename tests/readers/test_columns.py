@@ -11,8 +11,8 @@ import pytest
 from algid.base.errors import LogError
 from algid.notices import Notice
 from algid.profile import Profile, with_settings
-from algid.readers.columns import assign
-from algid.readers.names import Name, on_motor_side, other_joints, take_apart
+from algid.readers.column_names import Name, on_motor_side, other_joints, take_apart
+from algid.readers.columns import choose_columns
 from tests.readers.headers import TableReader, opened
 
 PLAIN = "t q1 q2 tau1 tau2"
@@ -89,7 +89,7 @@ def test_columns_that_were_written_must_be_there() -> None:
     with pytest.raises(
         LogError, match="the columns tau2, omega1 that were written are not there: the file was"
     ):
-        assign("log.csv", PLAIN.split()[:-1], Profile(), {}, ["tau2", "tau1", "omega1"])
+        choose_columns("log.csv", PLAIN.split()[:-1], Profile(), {}, ["tau2", "tau1", "omega1"])
 
 
 @pytest.mark.parametrize("passive", [1, 2])
@@ -147,9 +147,8 @@ def test_the_unit_of_time(
     header: str, settings: dict[str, Any], unit: str | None, stated: bool
 ) -> None:
     """algid's own names mean seconds, and still are only taken to."""
-    found = assign("log.csv", header.split(), with_settings(Profile(), settings), {})
+    found = choose_columns("log.csv", header.split(), with_settings(Profile(), settings), {})
     assert (found.time_unit, found.time_stated) == (unit, stated)
-    assert (found.dated().time_unit, found.dated().time_stated) == ("ns", True)
 
 
 def said(found: TableReader) -> list[tuple[str, str]]:
@@ -211,6 +210,14 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
     ]
 
 
+def test_the_unit_in_the_name_of_a_column_that_a_user_names_is_used() -> None:
+    found = assigned("t q1 q2 a_deg tau1 tau2", {"theta1": {"source": "a_deg"}})
+    assert found.origin.reading.channels["theta1"].unit == "deg"
+    assert "is in 'v', which is no unit" in refusal(
+        "t q1 q2 x[V] tau1 tau2", {"tau1": {"source": "x[V]"}}
+    )
+
+
 def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     assert refusal("t q1_inch q2 tau1 tau2") == (
         "the column 'q1_inch' for theta1 is in 'inch', which is no unit of a joint; say its unit "
@@ -242,25 +249,25 @@ def test_motors_beside_joints_need_a_gear() -> None:
 
 
 @pytest.mark.parametrize(
-    ("column", "stem", "joint", "unit", "foreign"),
+    ("column", "stem", "joint", "unit"),
     [
-        (' "Q_02 [DEG]" ', "q", "2", "deg", None),
-        ("J3 Torque (N.m)", "torque", "3", "N m", None),
-        ("/arm/elbow/velocity", "velocity", "/arm/elbow", None, None),
-        ("/arm/position[05]", "position", "05", None, None),
-        ("/arm/effort.1", "effort", "1", None, None),
-        ("joint007_pos", "pos", "7", None, None),
-        ("joint000_pos", "pos", "0", None, None),
-        ("load [V]", "load", None, None, "v"),
-        ("motor2_speed_rpm", "speed", "2", "rpm", None),
-        ("millis", "millis", None, "ms", None),
-        ("[Nm]", "[nm]", None, None, None),
+        (' "Q_02 [DEG]" ', "q", "2", "deg"),
+        ("J3 Torque (N.m)", "torque", "3", "N m"),
+        ("q1_deg", "q", "1", "deg"),
+        ("q[0]", "q", "0", None),
+        ("/arm/elbow/velocity", "velocity", "/arm/elbow", None),
+        ("/arm/position[05]", "position", "05", None),
+        ("/arm/effort.1", "effort", "1", None),
+        ("joint007_pos", "pos", "7", None),
+        ("joint000_pos", "pos", "0", None),
+        ("load [V]", "load", None, "v"),
+        ("motor2_speed_rpm", "speed", "2", "rpm"),
+        ("millis", "millis", None, "ms"),
+        ("[Nm]", "[nm]", None, None),
     ],
 )
-def test_a_name_taken_apart(
-    column: str, stem: str, joint: str | None, unit: str | None, foreign: str | None
-) -> None:
-    assert take_apart(column) == Name(stem, joint, unit, foreign)
+def test_a_name_taken_apart(column: str, stem: str, joint: str | None, unit: str | None) -> None:
+    assert take_apart(column) == Name(stem, joint, unit)
 
 
 def test_a_name_that_holds_a_topic() -> None:

@@ -17,8 +17,8 @@ from algid.base.units import CURRENT, TORQUE, VELOCITY
 from algid.log import ChannelReading, Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from algid.readers.assemble import Unwrapper
 from algid.readers.convert import QUANTITIES, Conversion, SampleBuffer
+from algid.readers.log_reader import Unwrapper
 from algid.readers.table import CHANNELS, SampleTable
 from tests.readers.headers import opened
 

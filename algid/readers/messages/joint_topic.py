@@ -13,12 +13,12 @@ from algid.base.words import counted, repeated
 from algid.log import Reading
 from algid.notices import Notice, Remedy
 from algid.profile import Profile
+from algid.readers.column_names import COMMANDED, CURRENTS, STEMS, choose, units_in_names
 from algid.readers.joints import along_the_arm, reading_of
 from algid.readers.messages.codec import parser_for
 from algid.readers.messages.layout import MessageLayout, MisfitError, has
 from algid.readers.messages.message_file import MessageFile, channels_by_topic, listed
 from algid.readers.messages.topic import Topic
-from algid.readers.names import COMMANDED, CURRENTS, STEMS, choose, take_apart
 from algid.readers.stated import in_json_schema, lines_of, units_in
 from algid.readers.table import REFERENCES, VELOCITIES
 
@@ -320,14 +320,13 @@ def _joint_topic_in(
         choice = choose(_paths(layout, ()), profile.joints, needed=profile.needed)
     except LookupError:
         return None
-    paths, units = {}, dict(choice.units)
+    paths = {}
     for name, path in choice.columns.items():
         if name != "t" and layout.find(path):
             paths[name] = path
-            if take_apart(path).stem in CURRENTS:
-                units[name] = "A"
     if not set(profile.needed) <= paths.keys():
         return None
+    units = units_in_names(paths, {})
     return JointTopic(topic, choice.joints or ("1", "2"), choice.joints is not None, paths, units)
 
 

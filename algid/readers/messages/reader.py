@@ -9,9 +9,9 @@ from algid.base.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice
 from algid.profile import Profile
-from algid.readers.assemble import TableReader, make_reader
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.joints import moving_joints
+from algid.readers.log_reader import TableReader, make_reader
 from algid.readers.messages.joint_topic import NothingFoundError, plan
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Topic

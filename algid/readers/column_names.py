@@ -8,13 +8,13 @@ commanded torque last. Commanded angles are the reference, and never angles.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
 
 from algid.base.limits import LIMITS
-from algid.base.units import is_foreign, unit_of
+from algid.base.units import CURRENT, is_foreign, unit_of
 from algid.base.words import counted
 from algid.readers.joints import along_the_arm
 
@@ -90,8 +90,10 @@ _SUFFIX_UNIT = re.compile(
 )
 _JOINT_NAMED = re.compile(r"^(.*/[^/]+)/(position|velocity|effort)$")
 _JOINT_PLACED = re.compile(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$")
-_STATE_OF_JOINT = re.compile(r"^(?:\w+[./])*\w*state[./]?\[(\d{1,3})\][./](\w+)$")
-_STATE_OF_ALL = re.compile(r"^(?:\w+[./])*\w*state[./](\w+)\[(\d{1,3})\]$")
+_STATE = re.compile(
+    r"^(?:\w+[./])*\w*state[./]?(?:\[(?P<joint>\d{1,3})\][./](?P<stem>\w+)"
+    r"|(?<=[./])(?P<list>\w+)\[(?P<place>\d{1,3})\])$"
+)
 _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+)$")
 _NUMBERED = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})$")
 _COUNTED = re.compile(r"(?:^|_)(?:joint|axis|dof|actuator)(?=_|\d|$)")
@@ -103,13 +105,12 @@ _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 class Name:
     """A column's name taken apart; `joint` is a number as text, or the joint's own name.
 
-    `foreign` is a unit that the name states and that no joint's signal has, such as inch.
+    `unit` is in algid's writing; one that no joint's signal has, such as inch, as it stands.
     """
 
     stem: str
     joint: str | None
     unit: str | None
-    foreign: str | None = None
 
     @property
     def own(self) -> str:
@@ -124,50 +125,53 @@ class Name:
 
 @dataclass(frozen=True)
 class ChannelChoice:
-    """Columns chosen for a log: each canonical channel's column and, if the name has one, its unit.
-
-    `joints` are the joints' own names, where they have any; `foreign` units that names state and
-    algid does not know.
-    """
+    """Columns chosen for a log, by canonical channel; the joints' own names, if they have any."""
 
     columns: dict[str, str]
-    units: dict[str, str]
     joints: tuple[str, str] | None = None
-    foreign: dict[str, str] = field(default_factory=dict)
 
 
+@lru_cache(maxsize=1 << 13)
 def take_apart(column: str) -> Name:
     """Stem, joint and unit of a column's name; case and blanks do not matter.
 
     A name longer than any of a joint's is its own stem: the patterns' time grows with its square.
     """
-    text = column.strip().strip('"').strip().lower()
+    text, unit = column.strip().strip('"').strip().lower(), None
     if len(text) > LIMITS.name_letters:
         return Name(text, None, None)
-    return _taken_apart(text)
-
-
-@lru_cache(maxsize=1 << 13)
-def _taken_apart(text: str) -> Name:
-    unit = foreign = None
     for pattern in (_BRACKET_UNIT, _SUFFIX_UNIT):
         match = pattern.match(text)
         if match and (unit_of(match[2]) or is_foreign(match[2])):
-            text, unit = match[1].strip(), unit_of(match[2])
-            if unit is None:
-                foreign = match[2]
+            text, unit = match[1].strip(), unit_of(match[2]) or match[2]
             break
     if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
         unit = known
     if match := _JOINT_NAMED.match(text):
-        return Name(match[2], match[1], unit, foreign)
+        return Name(match[2], match[1], unit)
     if match := _JOINT_PLACED.match(text):
-        return Name(match[1], match[2], unit, foreign)
+        return Name(match[1], match[2], unit)
     for pattern, stem, joint in ((_JOINT_FIRST, 2, 1), (_JOINT_LAST, 1, 2)):
         if match := pattern.match(text):
             plain = match[stem].replace(" ", "_").replace(".", "_")
-            return Name(plain, match[joint].lstrip("0") or "0", unit, foreign)
-    return Name(text, None, unit, foreign)
+            return Name(plain, match[joint].lstrip("0") or "0", unit)
+    return Name(text, None, unit)
+
+
+def units_in_names(columns: Mapping[str, str], stated: Mapping[str, str]) -> dict[str, str]:
+    """By channel the unit of its column.
+
+    Its name says it, or what the file states beside it; a current without one is in amperes.
+    """
+    units = {}
+    for channel, column in columns.items():
+        name, beside = take_apart(column), stated.get(column)
+        unit = name.unit or (beside and (unit_of(beside) or beside))
+        if name.stem in CURRENTS and channel.startswith("tau") and unit not in CURRENT:
+            unit = unit if unit and unit_of(unit) is None else "A"
+        if unit:
+            units[channel] = unit
+    return units
 
 
 def on_motor_side(column: str) -> bool:
@@ -204,66 +208,48 @@ def choose(
         If a quantity stands there for more than two joints and `joints` does not choose, if there
         are no such joints, or if two columns have one name but for its writing.
     """
-    parts = _parts_of(columns)
-    chosen = _pairs(parts, joints)
-    if not set(needed) <= chosen.keys():
-        states = parts | _of_states(parts)
-        pairs = _pairs(states, joints)
-        if set(needed) <= pairs.keys():
-            chosen, parts = pairs, states
-    if not set(needed) <= chosen.keys():
-        worded = parts | _worded(parts)
-        pairs = _pairs(worded, joints)
-        own = _named_joints(pairs, worded)
-        if joints or (own and along_the_arm(own)[1] == "names"):
-            chosen, parts = pairs, worded
-        if joints and needed[0] not in chosen and needed[0] not in named:
-            there = ", ".join(_joints_of(worded)[:16]) or "none that their names show"
-            raise LookupError(
-                f"no columns of the joints {', '.join(joints)}; joints there are: {there}"
-            )
+    parts = {column: take_apart(column) for column in columns}
+    wanted = set(needed) - set(named)
+    plain = _pairs(parts, joints)
+    chosen, read = plain, parts
+    for others in (_of_states(parts), _worded(parts)):
+        if wanted <= chosen.keys():
+            break
+        read = parts | others
+        chosen = _pairs(read, joints)
+    else:
+        own = _named_joints(chosen, read)
+        if not (joints or (own and along_the_arm(own)[1] == "names")):
+            chosen, read = plain, parts
+    if joints and needed[0] in wanted - chosen.keys():
+        there = list(dict.fromkeys(name.own for name in read.values() if _is_joints(name)))
+        raise LookupError(
+            f"no columns of the joints {', '.join(joints)}; joints there are: "
+            f"{', '.join(there[:16]) or 'none that their names show'}"
+        )
     if passive and "tau1" not in chosen:
-        torque = _only_torque(parts, chosen.get(f"theta{3 - passive}"))
+        torque = _only_torque(read, chosen.get(f"theta{3 - passive}"))
         if torque is not None:
             chosen[f"tau{3 - passive}"] = torque
-    time = _time(parts)
+    time = _time(read)
     if time is not None:
         chosen["t"] = time
-    chosen = _of_one_pair(chosen, parts)
-    units, foreign = {}, {}
+    chosen = _of_one_pair(chosen, read)
     for channel, column in chosen.items():
-        if channel not in named and channel not in ("q_des1", "q_des2"):
-            _refuse_twin(column, parts)
-        unit, other = parts[column].unit, parts[column].foreign
-        if unit is not None:
-            units[channel] = unit
-        if other is not None:
-            foreign[channel] = other
-    return ChannelChoice(chosen, units, _named_joints(chosen, parts), foreign)
+        name = read[column]
+        if channel in (*named, "q_des1", "q_des2") or name.joint is None:
+            continue
+        for twin, other in read.items():
+            if twin != column and (other.stem, other.joint) == (name.stem, name.joint):
+                raise LookupError(
+                    f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}"
+                )
+    return ChannelChoice(chosen, _named_joints(chosen, read))
 
 
-def _joints_of(parts: dict[str, Name]) -> list[str]:
-    """The joints that columns of a known quantity name, each once."""
-    joints: list[str] = []
-    for name in parts.values():
-        if name.joint and name.stem in _STEMS and name.own not in joints:
-            joints.append(name.own)
-    return joints
-
-
-def _parts_of(columns: Iterable[str]) -> dict[str, Name]:
-    """The parts of each column's name."""
-    return {column: take_apart(column) for column in columns}
-
-
-def _refuse_twin(column: str, parts: dict[str, Name]) -> None:
-    """Raises `LookupError` for another column of the same name but for its writing or its unit."""
-    name = parts[column]
-    if name.joint is None:
-        return
-    for twin, other in parts.items():
-        if twin != column and (other.stem, other.joint) == (name.stem, name.joint):
-            raise LookupError(f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}")
+def _is_joints(name: Name) -> bool:
+    """Whether a name has a known quantity's stem and a joint."""
+    return bool(name.joint) and name.stem in _STEMS
 
 
 def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
@@ -323,10 +309,10 @@ def _called(joint: str) -> set[str]:
     """
     name = joint.strip().lower()
     names = {name, _COUNTED.sub("_", name).strip("_")}
-    column = _parts_of([name])
+    column = {name: take_apart(name)}
     for part in (*column.values(), *_worded(column).values()):
-        if part.joint and part.stem in _STEMS:
-            names.add(part.joint)
+        if _is_joints(part):
+            names.add(part.joint or "")
     numbered = _NUMBERED.match(name)
     if numbered:
         names.add(numbered[1].lstrip("0") or "0")
@@ -341,7 +327,7 @@ _NO_NAMES = frozenset(
 
 def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, str]:
     """Angle columns by joint of the joints that are not read, named alike those in `angles`."""
-    parts = _parts_of(columns)
+    parts = {column: take_apart(column) for column in columns}
     parts |= _worded(parts)
     kinds, joints = set(), set()
     for column in angles:
@@ -384,13 +370,10 @@ def _of_states(parts: dict[str, Name]) -> dict[str, Name]:
     """Parts of columns of state structures: ``state.q[0]`` (libfranka), ``motor_state[0].q``."""
     states = {}
     for column, name in parts.items():
-        text = column.strip().lower()
-        if len(text) > LIMITS.name_letters:
-            continue
-        if one := _STATE_OF_JOINT.match(text):
-            states[column] = replace(name, stem=one[2], joint=one[1])
-        elif one := _STATE_OF_ALL.match(text):
-            states[column] = replace(name, stem=one[1], joint=one[2])
+        one = len(column) <= LIMITS.name_letters and _STATE.match(column.strip().lower())
+        if one:
+            stem, joint = one["stem"] or one["list"], one["joint"] or one["place"]
+            states[column] = replace(name, stem=stem, joint=joint)
     return states
 
 
@@ -442,7 +425,7 @@ def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, st
 
 def has_a_time(columns: Iterable[str]) -> bool:
     """Whether a column is a time by its name."""
-    return _time(_parts_of(columns)) is not None
+    return _time({column: take_apart(column) for column in columns}) is not None
 
 
 def _time(parts: dict[str, Name]) -> str | None:

@@ -16,7 +16,7 @@ from algid.base.errors import LogError
 from algid.log import Log, Origin, join
 from algid.notices import Notice
 from algid.profile import Profile
-from algid.readers.assemble import TableReader, make_reader
+from algid.readers.log_reader import TableReader, make_reader
 from algid.readers.table import CHANNELS, SampleTable, cut
 
 MS = 1_000_000

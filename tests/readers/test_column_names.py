@@ -13,7 +13,6 @@ from algid.notices import Notice
 from algid.readers import read_log
 from algid.readers.clock import in_order
 from algid.readers.flat import time_unit, to_nanoseconds
-from algid.readers.names import take_apart
 from algid.readers.table import SampleTable
 from tests.readers.headers import opened
 
@@ -46,14 +45,6 @@ def test_names_of_the_field_are_recognised(header: str) -> None:
     chosen = opened(header.split(","), settings).origin.mapping
     wanted = FIELD[header].split("," if "," in FIELD[header] else " ")
     assert [chosen[name] for name in ("t", "theta1", "theta2", "tau1", "tau2")] == wanted
-
-
-def test_units_in_names() -> None:
-    assert take_apart("Joint 1 Position [deg]").unit == "deg"
-    assert take_apart("tau_1 (mNm)").unit == "mN m"
-    assert take_apart("q1_deg").unit == "deg"
-    assert take_apart("q[0]").unit is None
-    assert take_apart("velocity_rpm").unit == "rpm"
 
 
 @pytest.mark.parametrize(

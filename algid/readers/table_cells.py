@@ -1,0 +1,391 @@
+"""What a row of a table holds: a number a cell, and what the file says of it applied to it.
+
+``q[0]`` is a cell of a column of lists, ``q.x`` one of structures; beside joints' names each joint
+has its own. Attributes scale cells (CF: value = scale_factor · stored + add_offset) and mark
+missing values, and flags say which rows are no measurements. Columns that say whose a row is are
+told where they have several values.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from algid.base.arrow import numbers_of, whole_column
+from algid.base.errors import LogError
+from algid.base.limits import LIMITS
+from algid.base.words import repeated
+from algid.log import Companion
+from algid.notices import Notice
+from algid.readers.column_names import STEMS
+from algid.readers.stated import BAD, GOOD, GROUPS, several, units_in
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+BATCH_ROWS = 1 << 14
+"""Rows that are decoded at once: few enough to stay in a core's cache."""
+LABELS = ("name", "names", "joint_name", "joint_names")
+"""What a list of the joints' names is called: a column, or a key of metadata."""
+_FILLS = ("_fillvalue", "missing_value")
+_NO = ("false", "no", "0", "")
+ATTRIBUTES = ("unit", "units", "scale_factor", "add_offset", *_FILLS)
+"""Attributes of a column, in lower case."""
+_NO_UNIT = ("", "-", "1", "none", "null", "unknown", "dimensionless")
+
+
+@dataclass(frozen=True, eq=False)
+class TableFile:
+    """An opened file, or object in memory, of named columns.
+
+    Attributes
+    ----------
+    path, kind : str
+        What messages call it, and its format.
+    schema : pyarrow.Schema
+        Names and types of the columns; what the file states of them is in the metadata.
+    rows : int
+        0 where the file does not tell.
+    batches : callable
+        A fresh pass over some columns in record batches; over the first rows only if a number is
+        given. Whatever way of missing a value the format has is a null.
+    companion : Companion
+        Truth and sums that algid wrote with the columns.
+    notices : tuple of Notice
+        What is to be said of the file.
+    others : tuple of str
+        What else it holds, of another length.
+    expected : int
+        Rows to expect where `rows` is 0.
+    said : tuple of str
+        What it states in words, such as comments.
+    """
+
+    path: str
+    kind: str
+    schema: pa.Schema
+    rows: int
+    batches: Callable[[Sequence[str], int | None], Iterator[pa.RecordBatch]]
+    companion: Companion = field(default_factory=lambda: Companion(None, {}))
+    notices: tuple[Notice, ...] = ()
+    others: tuple[str, ...] = ()
+    expected: int = 0
+    said: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number of each row: a column's, or one within its lists and structures.
+
+    `label` is the column with the joints' names, if the number of `joint` stands beside its name;
+    `fills` are values that stand for a missing one.
+    """
+
+    column: str
+    type: pa.DataType
+    steps: tuple[int | str, ...] = ()
+    label: str = ""
+    joint: str = ""
+    fills: tuple[float, ...] = ()
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it holds integers, floats or decimals."""
+        import pyarrow as pa
+
+        kind = self.type.value_type if pa.types.is_dictionary(self.type) else self.type
+        return _is_plain(kind) or pa.types.is_decimal(kind)
+
+    @property
+    def is_clock(self) -> bool:
+        """Whether it holds dates, durations, or times of a day."""
+        import pyarrow as pa
+
+        kind = self.type
+        return pa.types.is_timestamp(kind) or pa.types.is_duration(kind) or pa.types.is_time(kind)
+
+    def of(self, batch: pa.RecordBatch) -> pa.Array:
+        """The numbers of a batch: integers, floats, or for a clock ticks of its type."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        column = batch.column(self.column)
+        marked = bool(self.fills) or (self.scale, self.offset) != (1.0, 0.0)
+        if self.steps or self.label or not _is_plain(self.type):
+            column = self._within(column, batch)
+        if not marked:
+            return column
+        values = column.cast(pa.float64())
+        for fill in self.fills:
+            missing = pc.is_nan(values) if np.isnan(fill) else pc.equal(values, fill)
+            values = pc.if_else(missing, pa.scalar(None, pa.float64()), values)
+        return pc.add(pc.multiply(values, self.scale), self.offset)
+
+    def _within(self, column: pa.Array, batch: pa.RecordBatch) -> pa.Array:
+        import pyarrow as pa
+
+        if pa.types.is_decimal256(self.type):  # polars has none
+            return column.cast(pa.float64())
+        if self.is_clock and not self.steps:
+            return column.view(pa.int32() if self.type.bit_width == 32 else pa.int64())
+        import polars as pl
+
+        if pa.types.is_dictionary(column.type):
+            column = column.dictionary_decode()
+        values = pl.Series(pl.from_arrow(column))
+        if self.label:
+            names = pl.from_arrow(batch.column(self.label))
+            frame = pl.DataFrame({"values": values, "names": names})
+            mine = pl.col("names").list.eval(pl.element() == self.joint)
+            first = pl.when(mine.list.any()).then(mine.list.arg_max())
+            number = pl.col("values").cast(pl.List(pl.Float64)).list.get(first, null_on_oob=True)
+            return frame.select(number).to_series().to_arrow()
+        for step in self.steps:
+            if isinstance(step, str):
+                values = values.struct.field(step)
+            elif isinstance(values.dtype, pl.Array):
+                values = values.arr.get(step, null_on_oob=True)
+            else:
+                values = values.list.get(step, null_on_oob=True)
+        if self.is_clock:
+            return values.to_physical().to_arrow()
+        return (values if _is_plain(self.type) else values.cast(pl.Float64)).to_arrow()
+
+
+@dataclass(frozen=True, eq=False)
+class TableCells:
+    """The cells of a table by name, and the columns of flags."""
+
+    table: TableFile
+    by_name: Mapping[str, Cell]
+    flags: tuple[str, ...]
+
+    def batches(self, names: Sequence[str], most: int | None) -> Iterator[list[pa.Array]]:
+        """Some cells of each batch of rows; of rows that a flag takes out each is null."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        cells = [self.by_name[name] for name in names]
+        columns = [one.column for one in cells] + [one.label for one in cells if one.label]
+        for batch in self.table.batches(list(dict.fromkeys((*columns, *self.flags))), most):
+            arrays = [cell.of(batch) for cell in cells]
+            flagged = np.zeros(batch.num_rows, np.bool_)
+            for name in self.flags:
+                flagged |= _flag(batch.column(name)) == (name.lower() not in GOOD)
+            if flagged.any():
+                mask = pa.array(flagged)
+                arrays = [pc.if_else(mask, pa.scalar(None, one.type), one) for one in arrays]
+            yield arrays
+
+
+def cells_of(table: TableFile) -> TableCells:
+    """Every cell of a row by name; the first rows tell how many cells the lists have.
+
+    Raises
+    ------
+    LogError
+        If a name stands there twice, there are more cells than any log has, or an attribute that
+        should be a number is none.
+    """
+    import pyarrow as pa
+
+    twice = repeated(filter(None, table.schema.names))
+    if twice:
+        raise LogError(
+            f"{table.path}: the column {twice[0][:80]!r} stands in the file twice; rename one"
+        )
+    nested = [one.name for one in table.schema if _holds_more(one.type)]
+    first = next(table.batches(nested, BATCH_ROWS), None) if nested else None
+    metadata = decoded(table.schema.metadata)
+    label, joints = _spoken(table)
+    cells: dict[str, Cell] = {}
+
+    def take(name: str, cell: Cell, values: pa.Array | None, said: Mapping[str, str]) -> None:
+        if len(cells) >= LIMITS.columns:
+            raise LogError(
+                f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
+            )
+        if pa.types.is_struct(cell.type):
+            for one in cell.type:
+                inner = replace(cell, steps=(*cell.steps, one.name), type=one.type)
+                within = None if values is None else values.field(one.name)
+                take(f"{name}.{one.name}", inner, within, said)
+        elif is_list(cell.type):
+            size = 0
+            if pa.types.is_fixed_size_list(cell.type):
+                size = cell.type.list_size
+            elif values is not None:
+                size = max(np.diff(whole_column(values.offsets)), default=0)
+            for place in range(min(size, LIMITS.list_cells)):
+                inner = replace(cell, steps=(*cell.steps, place), type=cell.type.value_type)
+                within = None if values is None else values.flatten()
+                take(f"{name}[{place}]", inner, within, said)
+        else:
+            cells[name] = _marked(table.path, cell, said)
+
+    for one in table.schema:
+        said = {key.lower(): value for key, value in metadata.items() if key.lower() in _FILLS}
+        own = decoded(one.metadata)
+        said |= {key.lower(): value for key, value in own.items()}
+        named = joints or next((_names(own[key]) for key in LABELS if key in own), [])
+        named = named or next((_names(metadata[key]) for key in LABELS if key in metadata), [])
+        if not (named and is_list(one.type) and one.name.lower().replace(".", "_") in _QUANTITIES):
+            if one.name != label:
+                values = first.column(one.name) if first and one.name in nested else None
+                take(one.name, Cell(one.name, one.type), values, said)
+            continue
+        for place, joint in enumerate(named[: LIMITS.joints]):
+            steps = () if label else (place,)
+            cell = Cell(one.name, one.type.value_type, steps, label, joint)
+            take(f"/{label or 'joint_names'}/{joint}/{one.name}", cell, None, said)
+    flags = [name for name in cells if name.lower() in GOOD | BAD and _is_flag(cells[name].type)]
+    return TableCells(table, cells, tuple(flags))
+
+
+_QUANTITIES = frozenset(stem for stems in STEMS.values() for stem in stems)
+
+
+def _spoken(table: TableFile) -> tuple[str, list[str]]:
+    """The column of lists of the joints' names, and those of the first row that has two.
+
+    Of another order later on the numbers follow the names, and rows that name none of them have
+    no value.
+    """
+    for one in table.schema:
+        if one.name.lower() in LABELS and is_list(one.type) and is_text(one.type.value_type):
+            for batch in table.batches([one.name], None):
+                for row in batch.column(0):
+                    if len(row.as_py() or ()) > 1:
+                        return one.name, row.as_py()
+            return one.name, []
+    return "", []
+
+
+def _names(text: str) -> list[str]:
+    """Names in a JSON list, or between commas."""
+    try:
+        names = json.loads(text)
+    except ValueError:
+        names = [one.strip() for one in text.split(",")]
+    if not (isinstance(names, list) and all(isinstance(one, str) and one for one in names)):
+        return []
+    return names if len(set(names)) == len(names) > 1 else []
+
+
+def _marked(path: str, cell: Cell, said: Mapping[str, str]) -> Cell:
+    """The cell with the scale, the offset and the marks of missing values that a file states."""
+    import pyarrow as pa
+
+    numbers = {}
+    for key in ("scale_factor", "add_offset", *_FILLS):
+        if key in said and _is_plain(cell.type):
+            try:
+                numbers[key] = float(said[key])
+            except ValueError as error:
+                raise LogError(
+                    f"{path}: {key} of the column {cell.column!r} is {said[key][:40]!r}; "
+                    "expected a number"
+                ) from error
+    if not numbers:
+        return cell
+    scale, offset = numbers.pop("scale_factor", 1.0), numbers.pop("add_offset", 0.0)
+    fills = tuple(numbers.values())
+    return replace(cell, type=pa.float64(), fills=fills, scale=scale, offset=offset)
+
+
+def units_of(cells: TableCells) -> dict[str, str]:
+    """By cell the unit that the file's metadata state of it, of its column, or of its quantity.
+
+    A column of texts such as ``torque_unit`` states one too, in its first row.
+    """
+    schema = cells.table.schema
+    metadata = decoded(schema.metadata)
+    for one in schema:
+        if one.name.lower().endswith(("_unit", "_units")) and is_text(one.type):
+            metadata[one.name] = next(_values(cells.table, one.name), "")
+    units = units_in(metadata, list(cells.by_name))
+    stated = {}
+    for one in schema:
+        for key, value in decoded(one.metadata).items():
+            if key.lower() in ("unit", "units") and value.strip().lower() not in _NO_UNIT:
+                stated[one.name] = value.strip()[: LIMITS.unit_letters]
+    for name, cell in cells.by_name.items():
+        if cell.column in stated:
+            units[name] = stated[cell.column]
+    return units
+
+
+def groups_in(table: TableFile) -> Iterator[Notice]:
+    """What to say of columns that say whose a row is, and have several values."""
+    import pyarrow as pa
+
+    for one in table.schema:
+        if one.name.lower() in GROUPS and not pa.types.is_nested(one.type):
+            found: set[object] = set()
+            for value in _values(table, one.name):
+                found.add(value)
+                if len(found) > LIMITS.joints:
+                    break
+            if len(found) > 1:
+                yield several(one.name, found)
+
+
+def decoded(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:
+    """Metadata of Arrow as text."""
+    texts = {}
+    for key, value in (metadata or {}).items():
+        texts[key.decode(errors="replace")] = value.decode(errors="replace")
+    return texts
+
+
+def is_text(kind: pa.DataType) -> bool:
+    """Whether a column holds texts."""
+    import pyarrow as pa
+
+    return "string" in str(kind) and not pa.types.is_nested(kind)
+
+
+def is_list(kind: pa.DataType) -> bool:
+    """Whether a column holds lists."""
+    import pyarrow as pa
+
+    types = pa.types
+    return types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
+
+
+def _holds_more(kind: pa.DataType) -> bool:
+    import pyarrow as pa
+
+    return is_list(kind) or pa.types.is_struct(kind)
+
+
+def _is_plain(kind: pa.DataType) -> bool:
+    """Whether NumPy has the type."""
+    import pyarrow as pa
+
+    return pa.types.is_integer(kind) or pa.types.is_floating(kind)
+
+
+def _is_flag(kind: pa.DataType) -> bool:
+    import pyarrow as pa
+
+    return pa.types.is_boolean(kind) or _is_plain(kind) or is_text(kind)
+
+
+def _flag(values: pa.Array) -> Any:
+    """Whether flags (N,) are set: numbers but zero, texts but a no; NaN where one is missing."""
+    if is_text(values.type):
+        return np.array([str(text).lower() not in _NO for text in values.to_pylist()])
+    return numbers_of(values) != 0
+
+
+def _values(table: TableFile, name: str) -> Iterator[Any]:
+    """The values of a column, each once a batch."""
+    for batch in table.batches([name], None):
+        yield from batch.column(0).drop_null().unique().to_pylist()
