@@ -18,15 +18,15 @@ two histories, tested for drift and for outliers apart.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
-from scipy.special import gammaincc
+from scipy.special import gammaincc, stdtrit
 
 from algid.base.significance import CERTAIN, sigmas
+from algid.fleet.outliers import MAD
 
 FloatArray = NDArray[np.float64]
 
@@ -34,21 +34,11 @@ ALPHA = CERTAIN  # in a robot's life
 FEWEST = 4  # logs before a change and after it
 CLEAR = sigmas(CERTAIN)  # of its step, for a parameter to be named
 _WILD = 6.0  # robust standard deviations, which a single log's estimate counts at most
-_MAD = 1.4826
 _LEAST = 1e-300
 
 
-@dataclass(frozen=True, eq=False)
-class Change:
-    """Between logs `place` - 1 and `place` of those that were given.
-
-    P, and by parameter its step and the step's error.
-    """
-
-    place: int
-    p: float
-    step: FloatArray
-    std: FloatArray
+Change = tuple[int, FloatArray, FloatArray]
+"""Between the logs before this place and from it on: the step of each parameter, and its error."""
 
 
 def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataFrame, pl.DataFrame]:
@@ -64,9 +54,10 @@ def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataF
     -------
     jobs : pl.DataFrame
     changes : pl.DataFrame
-        A row a change and parameter that changed clearly: robot, before and after (times of the
-        logs on either side), job (the first one after it), parameter, step and step_std (in the
-        parameter's unit), share (the step over the estimate before), p (of the change).
+        A row a change and parameter that changed clearly, columns as
+        `algid.fleet.outliers.outliers`: job and time are those of the first log after it, `before`
+        is the time of the last one before, the value is the step with `half` its 95 % interval,
+        expected the estimate before.
     """
     ordered = jobs.sort("robot", "time", nulls_last=False, maintain_order=True)
     y = ordered.select(parameters).fill_null(np.nan).to_numpy().T
@@ -78,33 +69,26 @@ def with_stints(jobs: pl.DataFrame, parameters: Sequence[str]) -> tuple[pl.DataF
     dated = np.flatnonzero(ordered["time"].is_not_null())
     robots = ordered["robot"].rle_id().to_numpy()[dated]
     stint = np.zeros(len(ordered), dtype=np.int32)
-    found: list[dict[str, object]] = []
+    found: list[tuple[object, ...]] = []
     for own in np.split(dated, np.flatnonzero(np.diff(robots)) + 1):
-        for change in _changes(t[own], y[:, own], w[:, own]):
-            before, at = own[change.place - 1 : change.place + 1].tolist()
-            stint[own[change.place :]] += 1
-            sizes = np.abs(change.step) / np.maximum(change.std, _LEAST)  # no std is infinite
-            for place in np.argsort(-sizes)[: max(1, np.count_nonzero(sizes >= CLEAR))].tolist():
-                step, level = change.step[place], abs(y[place, before]) or np.nan
-                found.append(
-                    {
-                        "robot": ordered["robot"][at],
-                        "before": ordered["time"][before],
-                        "after": ordered["time"][at],
-                        "job": ordered["job"][at],
-                        "parameter": parameters[place],
-                        "step": step,
-                        "step_std": change.std[place],
-                        "share": step / level,
-                        "p": change.p,
-                    }
-                )
+        quantile = float(stdtrit(max(own.size - 2, 1), 0.975))
+        for at, step, error in _changes(t[own], y[:, own], w[:, own]):
+            before, after = own[at - 1 : at + 1].tolist()
+            stint[own[at:]] += 1
+            sizes = step / np.maximum(error, _LEAST)  # no error is infinite
+            clear = np.argsort(-abs(sizes))[: max(1, np.count_nonzero(abs(sizes) >= CLEAR))]
+            for place in clear.tolist():
+                row = ordered["robot"][after], ordered["job"][after], parameters[place], "step"
+                times = ordered["time"][after], ordered["time"][before]
+                numbers = step[place], quantile * error[place], y[place, before], sizes[place]
+                found.append((*row, *times, *numbers))
     schema: dict[str, Any] = {
-        **dict.fromkeys(("robot", "job", "parameter"), pl.String),
-        **dict.fromkeys(("before", "after"), jobs.schema["time"]),
-        **dict.fromkeys(("step", "step_std", "share", "p"), pl.Float64),
+        **dict.fromkeys(("robot", "job", "parameter", "kind"), pl.String),
+        **dict.fromkeys(("time", "before"), jobs.schema["time"]),
+        **dict.fromkeys(("value", "half", "expected", "sigmas"), pl.Float64),
     }
-    return ordered.with_columns(stint=pl.Series(stint)), pl.DataFrame(found, schema=schema)
+    steps = pl.DataFrame(found, schema=schema, orient="row")
+    return ordered.with_columns(stint=pl.Series(stint)), steps
 
 
 def _changes(t: FloatArray, y: FloatArray, w: FloatArray) -> list[Change]:
@@ -112,10 +96,10 @@ def _changes(t: FloatArray, y: FloatArray, w: FloatArray) -> list[Change]:
     change = change_of(t, y, w)
     if change is None:
         return []
-    at = change.place
-    late = _changes(t[at:], y[:, at:], w[:, at:])
-    later = [replace(one, place=one.place + at) for one in late]
-    return [*_changes(t[:at], y[:, :at], w[:, :at]), change, *later]
+    at = change[0]
+    later = _changes(t[at:], y[:, at:], w[:, at:])
+    moved = [(at + place, by, std) for place, by, std in later]
+    return [*_changes(t[:at], y[:, :at], w[:, :at]), change, *moved]
 
 
 def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:
@@ -151,7 +135,7 @@ def change_of(t: FloatArray, y: FloatArray, w: FloatArray) -> Change | None:
     both, known = pooled[:, at] > 0, np.maximum(pooled[:, at], _LEAST)
     step = np.where(both, -sums[:, at] / known, 0.0)
     std = np.where(both, np.sqrt(scale[:, at] / known), np.inf)
-    return Change(place, p, step, std)
+    return place, step, std
 
 
 def _calmed(y: FloatArray, w: FloatArray) -> FloatArray:
@@ -160,7 +144,7 @@ def _calmed(y: FloatArray, w: FloatArray) -> FloatArray:
     estimated = (w > 0).any(axis=1, keepdims=True)
     known = np.where(estimated, known, 0.0)
     middle = np.nanmedian(known, axis=1, keepdims=True)
-    usual = _MAD * np.nanmedian(np.abs(known - middle), axis=1, keepdims=True)
+    usual = MAD * np.nanmedian(np.abs(known - middle), axis=1, keepdims=True)
     return np.where(w > 0, np.clip(y, middle - _WILD * usual, middle + _WILD * usual), 0.0)
 
 

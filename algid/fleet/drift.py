@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 import polars as pl
-from scipy.special import stdtr
+from scipy.special import stdtr, stdtrit
 
 from algid.base.significance import LEVEL
 
@@ -96,4 +96,25 @@ def windows(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)
         slope_std=pl.Series(np.where(tested, slope_std, np.nan)),
         p=pl.Series(p),
         drift=pl.Series(np.nan_to_num(p, nan=1.0) < ALPHA),
+    )
+
+
+def drifts(windows: pl.DataFrame) -> pl.DataFrame:
+    """The latest drifting window of each robot and parameter, the clearest first.
+
+    Columns as `algid.fleet.outliers.outliers`: the value is the slope, the parameter's unit a
+    month, with `half` its 95 % interval; expected is the window's mean.
+    """
+    last = windows.filter("drift").sort("month").group_by("robot", "parameter").last()
+    last = last.sort("p", "robot", "parameter")
+    quantiles = pl.Series(stdtrit(last["logs"].to_numpy() - 2.0, 0.975), dtype=pl.Float64)
+    return last.select(
+        "robot",
+        "parameter",
+        kind=pl.lit("drift"),
+        time="end",
+        value="slope",
+        half=pl.col("slope_std") * quantiles,
+        expected="mean",
+        sigmas=pl.col("slope") / pl.col("slope_std"),
     )

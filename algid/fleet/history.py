@@ -16,7 +16,7 @@ from algid.base.limits import LIMITS
 from algid.base.progress import Progress
 from algid.base.words import counted
 from algid.fleet.changes import with_stints
-from algid.fleet.drift import FEWEST, SPAN, windows
+from algid.fleet.drift import FEWEST, SPAN, drifts, windows
 from algid.fleet.outliers import mislabelled, outliers
 from algid.notices import Notice
 from algid.physics.terms import ALWAYS, OPTIONAL
@@ -36,6 +36,11 @@ PARAMETERS = tuple(_usual())
 MANY, FEW = 4, 2  # robots with so few logs each, which may be sessions of one
 HISTORY = ("robot", "stint")
 FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others
+FINDING = (
+    "kind", "robot", "job", "parameter", "time", "before", "value", "half", "expected", "sigmas"
+)  # fmt: skip
+"""Of a finding: drift, step, payload or outlier; its log and when; what it is, half its 95 %
+interval, what it is judged by, and its distance in standard deviations."""
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
@@ -91,11 +96,11 @@ class History:
     Parameters
     ----------
     windows : as `windows` gives them, of all parameters
-    findings : as `outliers` and `mislabelled` give them
+    findings : drifts, steps, and logs that stand out, of each kind the clearest first: see
+        `FINDING`
     roster : a row a robot: robot, logs, undated, first and last (times), latest (job), and
         tested (for drift of anything)
     jobs : every log, the latest of each robot first, as `read_jobs` gives them
-    changes : as `with_stints` gives them
     nameless : logs that name no robot, and are left out
     """
 
@@ -103,7 +108,6 @@ class History:
     findings: pl.DataFrame
     roster: pl.DataFrame
     jobs: pl.DataFrame
-    changes: pl.DataFrame
     nameless: int = 0
 
     @property
@@ -115,12 +119,6 @@ class History:
     def logs(self) -> int:
         """How many there are, of all robots."""
         return int(self.roster["logs"].sum())
-
-    @property
-    def drifts(self) -> pl.DataFrame:
-        """The latest drifting window of each robot and parameter, the clearest first."""
-        last = self.windows.filter("drift").sort("month").group_by("robot", "parameter").last()
-        return last.sort(pl.col("p"), "robot", "parameter")
 
     @property
     def untested(self) -> list[Notice]:
@@ -154,15 +152,9 @@ class History:
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""
-        frames = {
-            "robots": self.roster,
-            "drifts": self.drifts,
-            "findings": self.findings,
-            "changes": self.changes,
-        }
-        rows = {
-            name: json.loads(frame.fill_nan(None).write_json()) for name, frame in frames.items()
-        }
+        rows = {}
+        for name, frame in (("robots", self.roster), ("findings", self.findings)):
+            rows[name] = json.loads(frame.fill_nan(None).write_json())
         return {**rows, "untested": [one.text for one in self.untested]}
 
 
@@ -189,18 +181,21 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
             "robot's logs a folder "
             "of their own, or name robots in a manifest, and run algid batch again"
         )
-    followed, standing_out = [], [mislabelled(jobs)]
-    jobs, changes = with_stints(jobs, names)
+    jobs, steps = with_stints(jobs, names)
+    followed, far = [], [mislabelled(jobs)]
     for place, name in enumerate(names):
         if progress is not None:
             progress("following", place, len(names))
         followed.append(windows(jobs, name, HISTORY))
-        standing_out.append(outliers(jobs, name, HISTORY))
+        far.append(outliers(jobs, name, HISTORY))
     history = pl.concat(followed)
-    findings = pl.concat(standing_out).sort("kind", "robot", "time", "parameter")
+    roster = _roster(jobs, history)
+    drifting = drifts(history).join(roster.select("robot", job="latest"), on="robot", how="left")
+    standing_out = pl.concat(far).sort(pl.col("sigmas").abs(), descending=True)
+    findings = pl.concat([drifting, steps, standing_out], how="diagonal_relaxed")
     listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
     nameless = finished.height - jobs.height
-    return History(history, findings, _roster(jobs, history), listed, changes, nameless)
+    return History(history, findings.select(FINDING), roster, listed, nameless)
 
 
 def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:

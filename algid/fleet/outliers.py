@@ -8,7 +8,7 @@ from algid.base.significance import CERTAIN, sigmas
 
 OUTLYING = 6.0  # robust standard deviations
 MISLABELLED = sigmas(CERTAIN)  # one false alarm in a million logs
-_MAD = 1.4826  # from the median of absolute deviations to a standard deviation
+MAD = 1.4826  # from the median of absolute deviations to a standard deviation
 
 
 def outliers(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",)) -> pl.DataFrame:
@@ -30,14 +30,10 @@ def outliers(jobs: pl.DataFrame, parameter: str, by: tuple[str, ...] = ("robot",
     pl.DataFrame
         kind, robot, job, time, parameter, value, expected, sigmas.
     """
-    std = pl.col(f"{parameter}_std")
-    scaled = jobs.filter((std > 0) & pl.col(parameter).is_finite()).with_columns(
-        pl.col(parameter).median().over(*by).alias("expected")
-    )
-    scaled = scaled.with_columns(((pl.col(parameter) - pl.col("expected")) / std).alias("sigmas"))
-    scatter = (_MAD * pl.col("sigmas").abs().median().over(*by)).clip(lower_bound=1.0)
-    far = scaled.with_columns(pl.col("sigmas") / scatter).filter(pl.col("sigmas").abs() > OUTLYING)
-    return _as_findings(far, "outlier", parameter)
+    known = jobs.filter((pl.col(f"{parameter}_std") > 0) & pl.col(parameter).is_finite())
+    median = pl.col(parameter).median().over(*by)
+    distances = pl.col("sigmas").abs().median().over(*by)
+    return _far(known, parameter, median, distances, OUTLYING, "outlier")
 
 
 def mislabelled(jobs: pl.DataFrame) -> pl.DataFrame:
@@ -49,29 +45,25 @@ def mislabelled(jobs: pl.DataFrame) -> pl.DataFrame:
     scatter counts. Medians are the lower ones, so that of two logs the one that agrees with its
     label shows how well they can.
     """
-    labelled = jobs.filter(
-        (pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null()
-    ).with_columns(
-        pl.col("label_payload").alias("expected"),
-        ((pl.col("m_p") - pl.col("label_payload")) / pl.col("m_p_std")).alias("sigmas"),
-    )
-    middle = pl.col("sigmas").quantile(0.5, interpolation="lower").over("robot")
-    centred = (pl.col("sigmas") - middle).abs().quantile(0.5, interpolation="lower")
-    scatter = (_MAD * centred.over("robot")).clip(lower_bound=1.0)
-    wrong = labelled.with_columns(pl.col("sigmas") / scatter).filter(
-        pl.col("sigmas").abs() > MISLABELLED
-    )
-    return _as_findings(wrong, "payload", "m_p")
+    labelled = jobs.filter((pl.col("m_p_std") > 0) & pl.col("label_payload").is_not_null())
+    sigmas = pl.col("sigmas")
+    middle = sigmas.quantile(0.5, interpolation="lower").over("robot")
+    distances = (sigmas - middle).abs().quantile(0.5, interpolation="lower").over("robot")
+    return _far(labelled, "m_p", pl.col("label_payload"), distances, MISLABELLED, "payload")
 
 
-def _as_findings(rows: pl.DataFrame, kind: str, name: str) -> pl.DataFrame:
-    return rows.select(
-        pl.lit(kind).alias("kind"),
-        "robot",
-        "job",
-        "time",
-        pl.lit(name).alias("parameter"),
-        pl.col(name).alias("value"),
-        "expected",
-        "sigmas",
+def _far(
+    rows: pl.DataFrame, name: str, expected: pl.Expr, distances: pl.Expr, limit: float, kind: str
+) -> pl.DataFrame:
+    """Rows that are further than `limit` from what is `expected`.
+
+    Distances are in standard deviations of the estimate, times the usual of the `distances` where
+    that is above one.
+    """
+    away = rows.with_columns(expected=expected).with_columns(
+        sigmas=(pl.col(name) - pl.col("expected")) / pl.col(f"{name}_std")
     )
+    scaled = pl.col("sigmas") / (MAD * distances).clip(lower_bound=1.0)
+    far = away.with_columns(sigmas=scaled).filter(pl.col("sigmas").abs() > limit)
+    names = {"kind": pl.lit(kind), "parameter": pl.lit(name), "value": pl.col(name)}
+    return far.select("robot", "job", "time", "expected", "sigmas", **names)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 
 from algid import __version__
 from algid.arm import FloatArray
-from algid.base.compiled import student_quantile
 from algid.base.significance import NORMAL
 from algid.base.text import ABSENT, joined, significant, unit_text, visible
 from algid.base.verdict import Verdict, graded
@@ -26,6 +26,8 @@ from algid.notices import Notice
 from algid.report.document import Document, Section, Table
 from algid.report.plot import BLUE, GREY, ORANGE, RED, Panels, Plot
 
+KINDS = {"drift": "drift", "step": "step", "payload": "payload label", "outlier": "outlier"}
+"""Of findings, in words."""
 MOST_ROBOTS = 40  # whose table is printed
 MOST_ROWS = 200
 MOST_NAMED = 3  # in a reason of the verdict
@@ -72,36 +74,44 @@ def linked(table: Table, batch: Path, out: Path) -> Table:
 
 def verdict(history: History) -> Verdict:
     """Grade a fleet by what drifts, changed or stands out, and by what could not be tested."""
-    drifts, changes = history.drifts, history.changes
-    findings = history.findings.sort(pl.col("sigmas").abs(), descending=True)
-    steps = changes.n_unique(["robot", "after"]) if changes.height else 0
-    counts = [counted(drifts.height, "drift"), counted(findings.height, "finding")]
-    reasons = []
-    if drifts.height:
-        rows = drifts.select("robot", "parameter").rows()
-        names = [f"{parameter} of {visible(robot)}" for robot, parameter in rows]
+    found, reasons = history.findings, []
+    steps = found.filter(kind="step")
+    drifting = found.filter(kind="drift").select("parameter", "robot").rows()
+    if drifting:
+        names = [f"{parameter} of {visible(robot)}" for parameter, robot in drifting]
         reasons.append(_named("drift", names))
-    if steps:
-        counts.insert(1, counted(steps, "change"))
-        row = changes.row(0, named=True)
+    if steps.height:
+        row, count = steps.row(0, named=True), steps.n_unique(["robot", "time"])
         numbers = {
             "before": _day(row["before"]),
-            "after": _day(row["after"]),
+            "after": _day(row["time"]),
             "robot": visible(row["robot"]),
             "parameter": row["parameter"],
-            "percent": 100 * row["share"],
-            "count": steps if steps > 1 else 0,
+            "percent": _percent(row["value"], row),
+            "count": count if count > 1 else 0,
         }
         reasons.append(Notice("FLEET_CHANGE", numbers={"case": "step"} | numbers))
-    if findings.height:
-        names = []
-        for job, parameter, sigmas in findings.select("job", "parameter", "sigmas").iter_rows():
-            names.append(f"{visible(job)} ({parameter}, {significant(sigmas, 2)} σ)")
+    names = []
+    for row in found.filter(pl.col("kind").is_in(["payload", "outlier"])).iter_rows(named=True):
+        sigmas = significant(row["sigmas"], 2)
+        names.append(f"{visible(row['job'])} ({row['parameter']}, {sigmas} σ)")
+    if names:
         reasons.append(_named("log", names))
     if history.scattered is not None:
         reasons.append(history.scattered)
     fleet = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}"
-    return graded(f"{fleet}: {joined(counts)}", reasons + history.untested)
+    return graded(f"{fleet}: {_counts(found) or 'no findings'}", reasons + history.untested)
+
+
+def _counts(found: pl.DataFrame) -> str:
+    """How many findings there are of each kind, in words; empty of none."""
+    counts = dict(found["kind"].value_counts().iter_rows())
+    return joined([counted(counts[kind], what) for kind, what in KINDS.items() if kind in counts])
+
+
+def _percent(value: float, row: dict[str, Any]) -> float:
+    """A value of a finding in percent of what is expected."""
+    return 100 * value / abs(row["expected"]) if row["expected"] else np.nan
 
 
 def _named(case: str, names: list[str]) -> Notice:
@@ -114,24 +124,17 @@ def _named(case: str, names: list[str]) -> Notice:
 
 def robot_table(history: History) -> Table:
     """Every robot: its latest log, how many logs, what was found of it, and their dates."""
-    drifting = dict(history.drifts.group_by("robot").agg(pl.col("parameter").sort()).iter_rows())
-    outlying = dict(history.findings.group_by("robot").agg(pl.col("job").n_unique()).iter_rows())
-    changed: dict[str, list[str]] = {}
-    for robot, after in history.changes.select("robot", "after").unique().sort("after").rows():
-        changed.setdefault(robot, []).append(_day(after))
+    counts = {robot: _counts(own) for (robot,), own in history.findings.group_by("robot")}
     rows = []
     for row in history.roster.head(MOST_ROWS).iter_rows(named=True):
-        robot, none = row["robot"], "none" if row["tested"] else "not tested"
-        found = (joined(drifting.get(robot, [])) or none, joined(changed.get(robot, [])) or ABSENT)
-        dates = (_day(row["first"]), _day(row["last"]))
-        out = str(outlying.get(robot, 0))
-        latest = (visible(row["latest"]), visible(robot), str(row["logs"]))
-        rows.append((*latest, *found, out, *dates))
+        found = counts.get(row["robot"]) or ("none" if row["tested"] else "not tested")
+        latest = (visible(row["latest"]), visible(row["robot"]), str(row["logs"]))
+        rows.append((*latest, found, _day(row["first"]), _day(row["last"])))
     return Table(
         "Robots",
         {
-            "Latest log": "name", "Robot": "text", "Logs": "number", "Drift": "text",
-            "Changed": "text", "Stand out": "number", "From": "text", "To": "text",
+            "Latest log": "name", "Robot": "text", "Logs": "number", "Findings": "text",
+            "From": "text", "To": "text",
         },
         tuple(rows),
         _shown(history.robots, "robot"),
@@ -140,40 +143,34 @@ def robot_table(history: History) -> Table:
 
 def finding_table(history: History) -> Table:
     """Drifts, steps, payloads unlike their labels and outliers, of each the clearest first."""
-    roster = {row["robot"]: row for row in history.roster.iter_rows(named=True)}
     rows = []
-    for row in history.drifts.iter_rows(named=True):
-        percent = 100 / abs(row["mean"]) if row["mean"] else np.nan
-        half = significant(student_quantile(row["logs"] - 2) * percent * row["slope_std"], 2)
-        trend = f"{percent * row['slope']:+.3g} ± {half} % a month"
-        log = roster[row["robot"]]["latest"]
-        rows.append((log, row["robot"], row["parameter"], "drift", trend, _day(row["end"])))
-    for row in history.changes.iter_rows(named=True):
-        percent = 100 * abs(row["share"] / row["step"])
-        freedom = roster[row["robot"]]["logs"] - 2
-        half = significant(student_quantile(freedom) * percent * row["step_std"], 2)
-        step = f"{100 * row['share']:+.3g} ± {half} %"
-        between = f"{_day(row['before'])} to {_day(row['after'])}"
-        rows.append((row["job"], row["robot"], row["parameter"], "step", step, between))
-    for row in history.findings.sort(pl.col("sigmas").abs(), descending=True).iter_rows(named=True):
-        what = {"payload": "payload label", "outlier": "outlier"}[row["kind"]]
-        value, expected = significant(row["value"]), significant(row["expected"])
-        away = f"{row['sigmas']:+.1f} σ: {value} for {expected}"
-        rows.append((row["job"], row["robot"], row["parameter"], what, away, _day(row["time"])))
+    for row in history.findings.head(MOST_ROWS).iter_rows(named=True):
+        when, kind = _day(row["time"]), row["kind"]
+        if kind in ("drift", "step"):
+            half = significant(abs(_percent(row["half"], row)), 2)
+            by = f"{_percent(row['value'], row):+.3g} ± {half} %"
+            if kind == "drift":
+                by += " a month"
+            else:
+                when = f"{_day(row['before'])} to {when}"
+        else:
+            value, expected = significant(row["value"]), significant(row["expected"])
+            by = f"{row['sigmas']:+.1f} σ: {value} for {expected}"
+        own = (visible(row["job"]), visible(row["robot"]), row["parameter"])
+        rows.append((*own, KINDS[kind], by, when))
     note = (
         f"± is 95 %. A drift is a slope over {SPAN} months with p < {significant(ALPHA, 1)}; a "
         f"step, where an arm, a drive or a convention was replaced, has p < "
         f"{significant(CHANGED, 1)} in a robot's life: what comes before and after is tested apart."
     )
-    shown = tuple((visible(log), visible(robot), *rest) for log, robot, *rest in rows[:MOST_ROWS])
     return Table(
         "Findings",
         {
             "Log": "name", "Robot": "text", "Parameter": "text", "What": "text", "By": "text",
             "When": "text",
         },
-        shown,
-        f"{note} {_shown(len(rows), 'finding')}".rstrip(),
+        tuple(rows),
+        f"{note} {_shown(history.findings.height, 'finding')}".rstrip(),
     )  # fmt: skip
 
 
@@ -195,13 +192,8 @@ def overview(history: History) -> Plot | None:
     """
     if history.jobs["time"].null_count() == history.jobs.height:
         return None
-    outlying = history.findings.filter(kind="outlier")
-    marked = (
-        history.drifts,
-        history.changes,
-        outlying.sort(pl.col("sigmas").abs(), descending=True),
-    )
-    pairs = [pair for frame in marked for pair in frame.select("robot", "parameter").rows()]
+    found = history.findings.filter(pl.col("kind") != "payload")
+    pairs = found.select("robot", "parameter").rows()
     if not pairs:
         pairs = history.windows.sort("p", "parameter", "robot").select("robot", "parameter").rows()
     pairs = list(dict.fromkeys(pairs))[:MOST_PANELS]
@@ -217,7 +209,7 @@ def overview(history: History) -> Plot | None:
         bars = {"type": "data", "array": half, "thickness": 1, "width": 0}
         dots = _dates(logs["time"]), _numbers(logs[name])
         panels.dots(place, *dots, "log", BLUE, 5, error_y=bars)
-        days = history.changes.filter(pl.col("robot") == robot)["after"].unique().sort()
+        days = found.filter(robot=robot, kind="step")["time"].unique().sort()
         for day in _dates(days).tolist():
             panels.line(place, x=day, colour=RED)
         # a window that holds nothing at each change: no line leads across it
@@ -225,7 +217,8 @@ def overview(history: History) -> Plot | None:
         breaks = pl.DataFrame({"end": days}, schema={"end": windows.schema["end"]})
         windows = pl.concat([windows, breaks], how="diagonal").sort("end", "month")
         panels.curve(place, _dates(windows["end"]), _numbers(windows["mean"]), "mean", GREY, 2)
-        drifting, outliers = windows.filter("drift"), outlying.filter(own).drop_nulls("time")
+        drifting = windows.filter("drift")
+        outliers = found.filter(own, kind="outlier").drop_nulls("time")
         if drifting.height:
             dots = _dates(drifting["end"]), _numbers(drifting["mean"])
             panels.dots(place, *dots, "drift", ORANGE, 9, "diamond")

@@ -84,7 +84,7 @@ def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = START)
 def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["report", str(_batch(tmp_path)), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
-    assert "2 robots, 20 logs: 1 drift and 1 finding" in done.stdout
+    assert "2 robots, 20 logs: 1 drift and 1 payload label" in done.stdout
     assert "payload label" in done.stdout
     assert "1 log stands out: r0/0 (m_p, 400 σ)" in " ".join(done.stdout.split())
     assert "wrote" in done.stderr
@@ -105,10 +105,9 @@ def test_json_holds_what_was_found(tmp_path: Path) -> None:
         ("r0", 10, True),
         ("r1", 10, True),
     ]
-    assert [(row["robot"], row["parameter"]) for row in content["drifts"]] == [("r0", "k6")]
-    assert [(row["job"], row["kind"], row["expected"]) for row in content["findings"]] == [
-        ("r0/0", "payload", 0.5)
-    ]
+    drift, label = content["findings"]
+    assert (drift["kind"], drift["robot"], drift["parameter"]) == ("drift", "r0", "k6")
+    assert (label["kind"], label["job"], label["expected"]) == ("payload", "r0/0", 0.5)
     assert content["untested"] == []
 
 

@@ -226,11 +226,19 @@ def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_pa
     jobs = jobs.with_columns(k2=pl.lit(1.0), k2_std=pl.lit(0.01))
     jobs.write_parquet(tmp_path / "jobs.parquet")
     history = history_of(tmp_path / "jobs.parquet")
-    found = history.drifts
-    assert found.select("robot", "parameter", "month").rows() == [("s", "k1", 3), ("r", "k1", 3)]
-    assert found["p"][0] < found["p"][1] < 1e-3
+    found = history.findings
+    assert found.select("kind", "robot", "parameter").rows() == [
+        ("drift", "s", "k1"),
+        ("drift", "r", "k1"),
+    ]
+    assert abs(found["sigmas"][0]) > abs(found["sigmas"][1])
+    last = history.windows.filter(robot="s", parameter="k1").row(-1, named=True)
+    half = stats.t.ppf(0.975, last["logs"] - 2) * last["slope_std"]
+    assert found.select("value", "half", "expected", "time").row(0) == (
+        last["slope"], pytest.approx(half), last["mean"], last["end"],
+    )  # fmt: skip
     plain = history.as_dict()
-    assert [row["robot"] for row in plain["drifts"]] == ["s", "r"]
+    assert [row["robot"] for row in plain["findings"]] == ["s", "r"]
     assert plain["robots"][0]["first"].startswith("2026-01-01")
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
 

@@ -54,10 +54,10 @@ def _history(jobs: pl.DataFrame, folder: Path) -> History:
 
 def test_growth_of_a_percent_a_month_is_found_within_three_months(tmp_path: Path) -> None:
     history = _history(_jobs(20, 92, seed=1, growth=0.01), tmp_path)
-    found = history.drifts.filter(pl.col("parameter") == "k6")
+    found = history.findings.filter(kind="drift", parameter="k6")
     assert found["robot"].n_unique() == 20
-    assert found["slope"].to_numpy() == pytest.approx(
-        0.01, abs=5 * float(found["slope_std"].to_numpy().max())
+    assert found["value"].to_numpy() == pytest.approx(
+        0.01, abs=2.6 * float(found["half"].to_numpy().max())
     )
 
 
@@ -101,7 +101,7 @@ def test_a_wrong_label_is_found_however_few_the_logs(
     values: list[float], wrong: list[str], tmp_path: Path
 ) -> None:
     findings = _history(_payloads(values), tmp_path).findings
-    assert findings.filter(pl.col("kind") == "payload")["job"].to_list() == wrong
+    assert sorted(findings.filter(kind="payload")["job"]) == wrong
 
 
 def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
@@ -156,27 +156,27 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
         for name in ("k1", "k3")
     )
     history = _history(replaced, tmp_path)
-    assert sorted(history.changes.select("robot", "parameter").rows()) == [
-        ("r1", "k1"),
-        ("r1", "k3"),
+    found = history.findings  # the steps would be drifts of every window that holds them
+    assert sorted(found.select("kind", "robot", "parameter").rows()) == [
+        ("step", "r1", "k1"),
+        ("step", "r1", "k3"),
     ]
-    first = history.changes.row(0, named=True)
-    assert (first["before"], first["after"]) == tuple(START + timedelta(days=d) for d in (79, 80))
-    steps = history.changes["step"].to_numpy()
-    assert steps == pytest.approx(0.05, abs=5 * 0.005 * np.sqrt(1 / 80 + 1 / 40))
-    assert history.findings.height == 0
-    # the steps would be drifts of every window that holds them
-    assert history.drifts.filter(pl.col("parameter").is_in(["k1", "k3"])).height == 0
+    first = found.row(0, named=True)
+    assert (first["before"], first["time"]) == tuple(START + timedelta(days=d) for d in (79, 80))
+    assert first["job"] == "j200"
+    spread = 0.005 * np.sqrt(1 / 80 + 1 / 40)
+    assert found["value"].to_numpy() == pytest.approx(0.05, abs=5 * spread)
+    assert found["half"].to_numpy() == pytest.approx(student.ppf(0.975, 118) * spread, rel=0.2)
     assert "r1 changed at once between 2026-03-21 and 2026-03-22" in " ".join(
         one.text for one in verdict(history).reasons
     )
     (row,) = [row for row in finding_table(history).rows if row[2] == "k1"]
-    step = history.changes.filter(parameter="k1").row(0, named=True)
-    half = 1.96 * step["step_std"] * abs(step["share"] / step["step"]) * 100
-    by = f"{100 * step['share']:+.3g} ± {half:.2g} %"
+    step = found.filter(parameter="k1").row(0, named=True)
+    value, half = (100 * step[name] / step["expected"] for name in ("value", "half"))
+    by = f"{value:+.3g} ± {half:.2g} %"
     assert row[1:] == ("r1", "k1", "step", by, "2026-03-21 to 2026-03-22")
-    assert robot_table(history).rows[1][4] == "2026-03-22"
-    assert verdict(history).headline.startswith("2 robots, 240 logs: 0 drifts, 1 change and 0 ")
+    assert [row[3] for row in robot_table(history).rows] == ["none", "2 steps"]
+    assert verdict(history).headline == "2 robots, 240 logs: 2 steps"
     plot = overview(history)
     assert plot is not None
     panels = [one["text"] for one in plot.figure.layout["annotations"]]
@@ -192,18 +192,17 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
 def test_no_change_is_seen_where_there_is_none(tmp_path: Path, scatter: float) -> None:
     """200 lives of 90 logs: a share of 1e-6 of false ones is none of them."""
     history = _history(_jobs(200, 90, seed=21, scatter=scatter), tmp_path)
-    assert history.changes.height == 0
+    assert not history.findings.filter(kind="step").height
 
 
 def test_neither_a_drift_nor_a_wild_log_is_a_change(tmp_path: Path) -> None:
     growing = _history(_jobs(20, 365, seed=22, growth=0.01), tmp_path)
-    assert growing.changes.height == 0
+    assert not growing.findings.filter(kind="step").height
     jobs = _jobs(1, 365, seed=23)
     k3 = jobs["k3"].to_numpy().copy()
     k3[200] = 50.0
     wild = _history(jobs.with_columns(k3=pl.Series(k3)), tmp_path)
-    assert wild.changes.height == 0
-    assert wild.findings["job"].to_list() == ["j200"]
+    assert wild.findings.select("kind", "job").rows() == [("outlier", "j200")]
 
 
 def test_many_robots_of_a_log_each_may_be_one_in_many_folders(tmp_path: Path) -> None:
