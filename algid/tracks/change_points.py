@@ -55,7 +55,7 @@ class Segmentation:
     """
 
     places: list[int]
-    drift: Drift | None
+    drift: Drift
     variance: float
 
 
@@ -72,9 +72,7 @@ def first_segmentation(cells: Cells) -> Segmentation:
         # masses are free in short blocks, lest a change that is not found passes for friction
         blocks = np.union1d(np.arange(0, len(cells), BLOCK), np.ravel(calm)[:-1])
         drift = drift_of(cells, blocks, rough_variance(cells))
-        freed = cells
-        if drift is not None:
-            freed = drift.freed(cells)
+        freed = drift.freed(cells)
         # a change must stand up to slow errors whatever their reason, wrong constants of the arm
         # included
         spread = variance(freed, calm, spans)

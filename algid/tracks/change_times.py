@@ -97,7 +97,7 @@ def step_response(u: FloatArray) -> FloatArray:
 def rows_of(
     piece: Segment,
     arm: IdentifiedArm,
-    drift: Drift | None,
+    drift: Drift,
     moments: Sequence[float],
     masses: Sequence[float],
 ) -> Rows:
@@ -108,8 +108,7 @@ def rows_of(
     # Each row at its own mass and friction: the angles' noise passes through the torque's partial
     # derivatives, which are theirs.
     c = arm.k[:, None] + np.outer(arm.unit, mass)
-    if drift is not None:
-        c[arm.friction] += drift.at(t).T
+    c[arm.friction] += drift.at(t).T
     linear = arm.linearised(piece, c)
     J, _ = modelled(arm.model, c, linear.motion, piece.dt)
     g = np.einsum("q,aqn->an", arm.unit, J) / arm.noise.tau[:, None]
@@ -211,7 +210,7 @@ class Confirmation:
     source : callable
         Gives a fresh iterable of the log's `Segment`.
     arm : IdentifiedArm
-    drift : Drift or None
+    drift : Drift
     ends : s, of the log
     penalty : what a change has to explain, in squares of the rows' noise
     variance : of the rows, one at least
@@ -219,7 +218,7 @@ class Confirmation:
 
     source: Callable[[], Iterable[Segment]]
     arm: IdentifiedArm
-    drift: Drift | None
+    drift: Drift
     ends: tuple[float, float]
     penalty: float
     variance: float

@@ -40,7 +40,10 @@ _RIDGE = 1e-9  # of the diagonal: what a standing joint leaves open stays nothin
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """Change of friction φ (H, f) at `knots` (H,) in s; covariance (H f, H f) at unit variance."""
+    """Change of friction φ (H, f) at `knots` (H,) in s; covariance (H f, H f) at unit variance.
+
+    Both are zero where friction is as the arm's constants have it.
+    """
 
     knots: FloatArray
     phi: FloatArray
@@ -110,7 +113,13 @@ class _Normal:
         return self.N - by_mass.T @ self.G, self.D - by_mass.T @ self.B
 
 
-def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift | None:
+def no_drift(cells: Cells) -> Drift:
+    """Friction as the arm's constants have it."""
+    knots, f = knots_of(cells), len(cells.friction)
+    return Drift(knots, np.zeros((knots.size, f)), np.zeros((knots.size * f,) * 2))
+
+
+def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
     """How friction changed during a log.
 
     Parameters
@@ -121,11 +130,9 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift 
 
     Returns
     -------
-    Drift or None
-        None where friction explains no more than chance does.
+    Drift
+        Nothing where friction explains no more than chance does.
     """
-    if not cells.friction:
-        return None
     normal = _normal(cells, starts)
     information, score = normal.reduced
     scale = np.sqrt(np.maximum(np.diag(normal.N), 1e-300))
@@ -134,7 +141,7 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift 
     phi = inverse @ score
     chance = scale.size + SURE * np.sqrt(2 * scale.size)
     if not score @ phi > variance * chance:
-        return None
+        return no_drift(cells)
     return Drift(normal.knots, phi.reshape(normal.knots.size, -1), inverse)
 
 
@@ -177,6 +184,6 @@ def _normal(cells: Cells, starts: NDArray[np.int64], knots: FloatArray | None = 
         np.maximum(np.add.reduceat(cells.A, starts), 1e-300),
         np.add.reduceat(cells.B, starts),
         G.reshape(starts.size, -1),
-        NN.reshape(count * f, -1),
+        NN.reshape(count * f, count * f),
         D.ravel(),
     )

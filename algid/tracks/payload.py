@@ -125,10 +125,8 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     return _weigh(cells, changes, settled, arm, covariance)
 
 
-def _masses(parts: Sequence[Cells], drift: Drift | None) -> list[float]:
+def _masses(parts: Sequence[Cells], drift: Drift) -> list[float]:
     """What each part's payload weighs, friction's drift freed."""
-    if drift is None:
-        return [part.mass for part in parts]
     return [drift.freed(part).mass for part in parts]
 
 
@@ -167,39 +165,29 @@ def _weigh(
     starts = places[:-1]
     whole = joined(inner)
     drift = drift_of(whole, starts, rough_variance(whole))
-    calm = whole
-    if drift is not None:
-        calm = drift.freed(whole)
+    calm = drift.freed(whole)
     information = np.maximum(np.add.reduceat(calm.A, starts), 1e-300)
     weights = np.add.reduceat(calm.B, starts) / information
     masses = np.repeat(weights, counts)
-    T = calm.sensitivity(arm, masses)
-    if drift is not None:
-        T = drift.sensitivity(calm, starts, T, calm.friction_sensitivity(arm, masses))
+    V = calm.friction_sensitivity(arm, masses)
+    T = drift.sensitivity(calm, starts, calm.sensitivity(arm, masses), V)
     parts = list(pairwise(places.tolist()))
     colour = variance(calm, parts, known=(T, covariance), robust=False)
     squares = calm.squares(masses)
     own = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
     noise = np.maximum(own, colour)  # a stretch's own, or the log's where that is larger
     J = np.add.reduceat(T, starts) / information[:, None]
-    scatter = 1 / information
-    if drift is not None:
-        scatter = scatter + drift.variances(calm, starts)
+    scatter = 1 / information + drift.variances(calm, starts)
     stds = np.sqrt(noise * scatter + np.einsum("kx,xy,ky->k", J, covariance, J))
     curves = []
     for (first, last), one in zip(parts, noise, strict=True):
         curves.append(_band(calm.part(first, last), T[first:last], covariance, one, drift))
     t, m_p, std = np.concatenate(curves, axis=1)
     signal, left = calm.Q.sum() - calm.rows.sum(), max(squares.sum() - calm.rows.sum(), 0.0)
-    share = 0.0
-    if signal > 0:
-        share = float(1 - left / signal)
+    share = float(1 - left / signal) if signal > 0 else 0.0
     wide = np.flatnonzero(cells.start[1:] - cells.end[:-1] > HOLE)
-    times, brackets = [float(cells.start[0])], []
-    for change in changes:
-        times.append(change.time)
-        brackets.append((change.time, *change.bracket))
-    times.append(float(cells.end[-1]))
+    times = [float(cells.start[0]), *(one.time for one in changes), float(cells.end[-1])]
+    brackets = [(one.time, *one.bracket) for one in changes]
     stretches = []
     for (start, end), mass, one in zip(pairwise(times), weights, stds, strict=True):
         stretches.append(Stretch(start, end, float(mass), float(one)))
@@ -218,9 +206,7 @@ def _weigh(
     )
 
 
-def _settled(
-    source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Drift | None
-) -> list[Cells]:
+def _settled(source: Pass, arm: IdentifiedArm, rough: Sequence[Cells], drift: Drift) -> list[Cells]:
     """Each stretch's cells, linearised again at its own mass and friction, in one pass."""
     parts, about, counts = [], [], []
     for cells, mass in zip(rough, _masses(rough, drift), strict=True):
@@ -237,23 +223,22 @@ def _settled(
     return [joined(settled[first:last]) for first, last in pairwise(ends)]
 
 
-def _short(cells: Cells, drift: Drift | None) -> list[Cells]:
+def _short(cells: Cells, drift: Drift) -> list[Cells]:
     """Parts of a stretch so short that friction hardly changes in them."""
-    if drift is None:
+    if not drift.phi.any():
         return [cells]
     count = max(1, round(len(cells) * CELL / LASTING))
     return _cut(cells, np.linspace(0, len(cells), count + 1).astype(int).tolist())
 
 
-def _coefficients(arm: IdentifiedArm, mass: float, part: Cells, drift: Drift | None) -> FloatArray:
+def _coefficients(arm: IdentifiedArm, mass: float, part: Cells, drift: Drift) -> FloatArray:
     """The arm's coefficients (q,) with a payload of `mass` kg, and with friction as in the part.
 
     The angles' noise passes through the torque's partial derivatives, friction's among them: where
     these are of another friction, rows have not the noise that is reckoned with, and masses err.
     """
     c = arm.k + mass * arm.unit
-    if drift is not None:
-        c[arm.friction] += drift.at(part.middle).mean(axis=0)
+    c[arm.friction] += drift.at(part.middle).mean(axis=0)
     return c
 
 
@@ -293,7 +278,7 @@ def _inner_parts(cells: Cells, changes: Sequence[ChangeTime]) -> list[Cells]:
 
 
 def _band(
-    cells: Cells, T: FloatArray, covariance: FloatArray, noise: float, drift: Drift | None
+    cells: Cells, T: FloatArray, covariance: FloatArray, noise: float, drift: Drift
 ) -> FloatArray:
     """Times, masses and their standard deviations (3, C) along a stretch.
 
@@ -309,9 +294,7 @@ def _band(
         return np.asarray(total[high] - total[low])
 
     A = np.maximum(moving(cells.A), 1e-300)
-    J, scatter = moving(T) / A[:, None], 1 / A
-    if drift is not None:
-        by_friction = moving(cells.S[:, cells.friction]) / A[:, None]
-        scatter = scatter + drift.variance_at(cells.middle, by_friction)
+    J, by_friction = moving(T) / A[:, None], moving(cells.S[:, cells.friction]) / A[:, None]
+    scatter = 1 / A + drift.variance_at(cells.middle, by_friction)
     std = np.sqrt(noise * scatter + np.einsum("cx,xy,cy->c", J, covariance, J))
     return np.stack([cells.middle, moving(cells.B) / A, std])

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from algid.base.blocks import concatenated
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import ResultError
 from algid.base.files import first_misfit, read_text, whole_file
@@ -92,34 +93,21 @@ def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
 
 def track_json(result: TrackResult) -> str:
     """The text of `track.json`: times in s since the log's first sample, masses in kg."""
-    stretches: list[dict[str, Any]] = []
-    every = result.track.stretches
-    truth = result.truth or (None,) * len(every)
-    for stretch, status, mass in zip(every, result.statuses, truth, strict=True):
-        stretches.append(
-            {
-                "start": stretch.start,
-                "end": stretch.end,
-                "m_p": stretch.m_p,
-                "std": stretch.std,
-                "ci95": list(stretch.ci95),
-                "unit": "kg",
-                "status": status.value,
-                "truth": mass,
-            }
-        )
-    changes: list[dict[str, float]] = []
-    for time, before, after in result.track.changes.tolist():
-        changes.append({"t": time, "from": before, "to": after})
+    track, stretches = result.track, []
+    truth = result.truth or (None,) * len(track.stretches)
+    for one, status, mass in zip(track.stretches, result.statuses, truth, strict=True):
+        more = {"ci95": list(one.ci95), "unit": "kg", "status": status.value, "truth": mass}
+        stretches.append(asdict(one) | more)
+    changes = [dict(zip(("t", "from", "to"), row, strict=True)) for row in track.changes.tolist()]
     content = {
         "schema_version": SCHEMA_VERSION,
         "version": result.version,
         "stretches": stretches,
         "changes": changes,
-        "explained": result.track.explained,
-        "excess": result.track.colour,
-        "bare": result.track.tip_equivalent,
-        "holes": result.track.holes.tolist(),
+        "explained": track.explained,
+        "excess": track.colour,
+        "bare": track.tip_equivalent,
+        "holes": track.holes.tolist(),
         "schedule": result.schedule,
         "arm": {"path": result.arm, "sha256": result.arm_sha256},
         "settings": dict(result.settings),
@@ -177,10 +165,8 @@ def read_track(folder: Path) -> TrackResult:
     parts = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
     if not parts:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
-    t, m_p, high, stretch, left = (
-        np.concatenate([part[name] for part in parts]) for name in COLUMNS
-    )
-    changes = [[one["t"], one["from"], one["to"]] for one in file.changes]
+    t, m_p, high, stretch, left = (concatenated(parts)[name] for name in COLUMNS)
+    changes = [list(one.values()) for one in file.changes]
     return TrackResult(
         track=Track(
             stretches=file.stretches,

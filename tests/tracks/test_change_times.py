@@ -34,6 +34,7 @@ ARM = IdentifiedArm(
     CASE.arm.l2,
     NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2)),
 )
+STEADY = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), np.zeros((4, 4)))
 
 
 def rough(*moments: float) -> tuple[ChangeTime, ...]:
@@ -43,7 +44,7 @@ def rough(*moments: float) -> tuple[ChangeTime, ...]:
 
 def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[ChangeTime]:
     changes = Changes(rough(*moments), masses)
-    evidence = Confirmation(lambda: segments([log]), ARM, None, (0.0, 4.5), 60.0, 1.0)
+    evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 4.5), 60.0, 1.0)
     return evidence.of(changes)
 
 
@@ -86,7 +87,7 @@ def test_a_sliver_beside_a_change_is_made_one_with_it_and_a_change_of_nothing_go
 def test_a_window_too_short_for_candidates_leaves_a_change_where_it_was(picking: Log) -> None:
     log = noisy(picking.part(1460, 1530), np.random.default_rng(2))
     changes = Changes(rough(0.04), (0.0, 0.05))
-    evidence = Confirmation(lambda: segments([log]), ARM, None, (0.0, 0.07), 60.0, 1.0)
+    evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 0.07), 60.0, 1.0)
     assert evidence.of(changes) == list(changes.places)
 
 
@@ -108,7 +109,7 @@ def test_the_residual_of_the_arm_and_its_payload_is_white(picking: Log) -> None:
     """
     log = noisy(picking, np.random.default_rng(4))
     (piece,) = (piece for _, piece in windows(segments([log]), [(0.5, 2.5)], 0.0))
-    rows = rows_of(piece, ARM, None, [1.5], [0.0, 0.05])
+    rows = rows_of(piece, ARM, STEADY, [1.5], [0.0, 0.05])
     left = rows.e - 0.05 * rows.steps(np.array([1.5]))[0]
     assert np.mean(left**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / left.size))
     behind = left[np.repeat((rows.t > 1.45) & (rows.t < 1.7), 2)]
