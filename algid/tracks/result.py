@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from algid.base.blocks import concatenated
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import ResultError
 from algid.base.files import first_misfit, read_text, whole_file
@@ -165,7 +164,9 @@ def read_track(folder: Path) -> TrackResult:
     parts = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
     if not parts:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
-    t, m_p, high, stretch, left = (concatenated(parts)[name] for name in COLUMNS)
+    t, m_p, high, stretch, left = (
+        np.concatenate([part[name] for part in parts]) for name in COLUMNS
+    )
     changes = [list(one.values()) for one in file.changes]
     return TrackResult(
         track=Track(
