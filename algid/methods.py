@@ -130,6 +130,7 @@ ESTIMATORS: tuple[Estimator, ...] = (
             "constrain",
             "cross_validate",
             "gravity",
+            "prior",
         ),
     ),
 )

@@ -18,9 +18,10 @@ EVERYDAY, ADVANCED = "Options", "Advanced"
 BY_SET = frozenset(
     {
         *("acceleration", "bandwidth", "clock", "columns", "constrain", "delay", "drive", "drop"),
-        *("encoder_bits", "initial", "jitter", "m1", "m2", "margin", "observer", "offsets"),
-        *("noise_from", "passive", "poles", "prior_error", "rotor1", "segment", "shared_library"),
-        *("signs", "start_time", "time", "time_unit", "tip_height", "window"),
+        *("encoder_bits", "initial", "jitter", "m1", "m2", "margin", "noise_from"),
+        *("observer", "offsets", "passive", "poles", "prior_error", "rotor1", "segment"),
+        *("shared_library", "signs", "start_time", "time", "time_unit", "tip_height", "velocity"),
+        *("window",),
     }
 )
 """Settings without a flag of their own."""
@@ -30,7 +31,7 @@ VALUES: Mapping[str, str | tuple[str, ...]] = {
     **dict.fromkeys(("topic", "source", "q_des", "time"), "NAME"),
     **dict.fromkeys(("rate",), "HZ"),
     **dict.fromkeys(("start", "end"), "S"),
-    **dict.fromkeys(("torque_file",), "FILE"),
+    **dict.fromkeys(("torque_file", "prior"), "FILE"),
     **dict.fromkeys(("segment", "gear_ratio", "counts"), "N"),
     "offset": "RAD",
     "torque_constant": "K",

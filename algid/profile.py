@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 
 from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
-from algid.base.limits import PHYSICAL
+from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.base.units import names_of, unit_of
 from algid.options import EVERYDAY
 
@@ -98,6 +98,7 @@ def _number(text: object) -> object:
     return text
 
 
+PathText = Annotated[str | None, Field(min_length=1), BeforeValidator(_plain)]
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -225,9 +226,9 @@ class Profile(_Strict):
     end: Annotated[float | None, Field(gt=0)] = field(
         None, "Leave out what is after, s from the first sample."
     )
-    torque_file: Annotated[str | None, Field(min_length=1), BeforeValidator(_plain)] = field(
-        None, "File with the torques, joined on the stamps."
-    )
+    torque_file: PathText = field(None, "File with the torques, joined on the stamps.")
+    prior: PathText = field(None, "URDF file or result that says what k1 … k5 are.")
+    prior_error: float | None = field(None, "Per cent that it errs by.", bounds=PRIOR_ERROR)
     segment: Annotated[int | None, BeforeValidator(_number)] = field(
         None,
         "One run alone, 1 for the first, where the log's clock starts again.",

@@ -14,10 +14,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from algid.base.errors import SettingError
 from algid.base.files import misfit
-from algid.base.limits import PHYSICAL
+from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 from algid.options import EVERYDAY, flag
-from algid.profile import Effort, documented, field
+from algid.profile import Effort, PathText, documented, field
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
     from algid.signals.shift import TorqueShift
@@ -29,6 +29,8 @@ else:
 
 OF_BOTH = ("gravity", "effort")
 """Settings that a profile has too: there they are of its log's driver and arm."""
+OF_PRIOR = ("prior", "prior_error")
+"""The same of its arm alone: they do not say how a log is read."""
 EXTERNAL_GRAVITY = (
     f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
     f"{flag('gravity')} out, or say {flag('effort')} gravity-compensated"
@@ -121,6 +123,12 @@ class Settings(BaseModel):
     l2: float | None = field(None, "Length of link 2, m, where known.", bounds=PHYSICAL.length)
     payload_mass: float | None = field(
         None, "Known payload, kg: gives the torques' gain.", bounds=PHYSICAL.mass
+    )
+    prior: PathText = field(None, "URDF file or result that says what k1 … k5 are.")
+    prior_error: float | None = field(
+        None,
+        "Per cent that a URDF's masses, centres and inertias err by (1 σ); 20.",
+        bounds=PRIOR_ERROR,
     )
     constrain: bool = field(False, "Solve within the physical bounds.")
     cross_validate: bool = field(False, "Predict each log from the others.", panel=EVERYDAY)

@@ -17,3 +17,8 @@ passive: setup ## acrobots and pendubots with friction and cables: coverage of i
 
 misfit: setup ## errors of drives that no term is: said, or silent; into build/misfit
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.misfit -o build/misfit
+
+.PHONY: prior
+
+prior: setup ## a prior from CAD, true, off and wrong: coverage of intervals, what is measured; into build/prior
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.prior -o build/prior

@@ -76,7 +76,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "identification": room(
         "arm arrow check errors estimators files inspection log methods model names notices "
         "options physics profile progress readers report results runtime settings signals "
-        "significance table4 text units",
+        "significance table4 text units words",
         "numpy polars pyarrow",
     ),
     "batches": room(
@@ -96,8 +96,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy polars pydantic pydantic_core scipy",
     ),
     "exports": room(
-        "arm compiled errors estimators files identification model names notices options physics "
-        "results text words",
+        "arm compiled errors estimators identification model names notices options physics "
+        "results text",
         "jinja2 numpy polars scipy",
     ),
     "fleet": room("arm errors files limits model notices physics progress report "

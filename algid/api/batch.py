@@ -175,6 +175,7 @@ def batch(
     from algid.batches.discover import jobs_of
     from algid.batches.lock import locked
     from algid.batches.run import Batch, BatchConfig, stopped_by_signals, sweep
+    from algid.identification.prior import statement_of
 
     if isinstance(sources, str | Path):
         sources = [sources]
@@ -194,6 +195,9 @@ def batch(
     known, alone = None, "logs"
     if parameters is not None:
         known, alone = opened(parameters), "loaded"
+    statement_of(asked)  # what cannot be read is told once
+    if scheduler is not None and asked.prior is not None:
+        asked = asked.but(prior=absolute(asked.prior))
     if scheduler is not None:  # a worker's own folder is another
         names, place = [absolute(source) for source in names], absolute(place)
 

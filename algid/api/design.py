@@ -14,7 +14,7 @@ from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
 from algid.base.files import refuse_existing
-from algid.base.limits import KNOWN_MASS, PHYSICAL, PLANNED, Range
+from algid.base.limits import KNOWN_MASS, PHYSICAL, PLANNED, PRIOR_ERROR, Range
 from algid.options import Option, flag
 from algid.results import Result
 
@@ -97,7 +97,7 @@ def design(
     position_noise: Annotated[float, Option(range=NOISE)] | None = None,
     torque_noise: Annotated[float, Option(range=NOISE)] | None = None,
     noise_from: AnyLog | None = None,
-    prior_error: Annotated[float, Option(range=(0, 100))] | None = None,
+    prior_error: Annotated[float, Option(range=PRIOR_ERROR)] | None = None,
     payload: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
     l1: Length | None = None,
     l2: Length | None = None,
@@ -146,7 +146,7 @@ def design(
     noise_from : a log as `algid.identify` takes it
         A log of the arm whose noise is taken.
     prior_error : float
-        Share by which masses and friction may be wrong where no error bar tells; 0.2.
+        Per cent by which masses and friction may be wrong where no error bar tells; 20.
     payload : float, kg
         Payload of the loaded runs, kg.
     l1 : float, m
@@ -225,7 +225,7 @@ def design(
     known = prior_of(
         prior if isinstance(prior, Result) else source,
         loaded,
-        PriorKnowledge(l1, l2, payload, prior_error),
+        PriorKnowledge(l1, l2, payload, None if prior_error is None else prior_error / 100),
     )
     noise = noise_of(known, position_noise, torque_noise, noise_from)
     campaign = campaign_of(known, asked, noise, for_, margin, seed)

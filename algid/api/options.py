@@ -72,6 +72,8 @@ class _OfLogs(TypedDict, total=False):
     start: float | None
     end: float | None
     torque_file: str | Path | None
+    prior: str | Path | None
+    prior_error: float | None
     segment: int | None
     accept: Iterable[str] | str
     theta1: Mapping[str, Any]

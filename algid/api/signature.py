@@ -111,7 +111,7 @@ def fields(model: Any, kind: Any = None) -> dict[str, Keyword]:
     found = {}
     for name, one in model.model_fields.items():
         panel = (one.json_schema_extra or {}).get("panel") or ADVANCED
-        option = Option(kind=Path if name == "torque_file" else kind, panel=panel)
+        option = Option(kind=Path if name in ("torque_file", "prior") else kind, panel=panel)
         default = False if one.annotation is bool and kind is None else None
         found[name] = Keyword(name, one.annotation, default, one.description or "", option)
     return found

@@ -109,7 +109,7 @@ def validate(
         return Validated({}, None, judged=judged)
     logs, loaded = meant(logs, own), meant(loaded, own)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
-        from algid.exports.read_urdf import read_urdf
+        from algid.identification.urdf import read_urdf
 
         model = read_urdf(Path(result))
     else:

@@ -153,3 +153,5 @@ PLANNED: dict[str, Range] = {
 KNOWN_LENGTH: Range = (1e-3, 1e3)
 KNOWN_MASS: Range = (1e-6, 1e6)
 """A link's length in m and a mass in kg as a user knows them."""
+PRIOR_ERROR: Range = (1, 100)
+"""Per cent: what is known better is no drawing's."""

@@ -106,7 +106,7 @@ def _end(result: Result) -> tuple[JobStatus, str]:
     if result.data_lost:
         lacking.append("samples were lost")
     for name, one in result.estimates.items():
-        if not one.usable:
+        if not one.measured:
             lacking.append(f"{name} {one.status.value}")
     if lacking:
         return JobStatus.INCOMPLETE, "; ".join(lacking)

@@ -219,7 +219,7 @@ def _of_logs(verb: Callable[..., Any]) -> dict[str, Keyword]:
         return {}
     from algid.base.units import names_of
     from algid.profile import ALL_CHANNELS, CHANNELS_OF, Profile
-    from algid.settings import Settings
+    from algid.settings import OF_PRIOR, Settings
 
     found = {}
     for name, text in (
@@ -230,7 +230,7 @@ def _of_logs(verb: Callable[..., Any]) -> dict[str, Keyword]:
         hint = channel.model_fields["unit"].annotation  # type: ignore[union-attr]
         found[name] = Keyword(name, hint, None, f"{text}.", Option(str))
     of_profile = fields(Profile, str)
-    for name in (*ALL_CHANNELS, "velocity"):
+    for name in (*ALL_CHANNELS, "velocity", *OF_PRIOR):
         del of_profile[name]
     found |= of_profile
     if "Unpack[Options]" in str(last.annotation):

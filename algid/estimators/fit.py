@@ -38,7 +38,7 @@ from algid.estimators.whitening import NoiseLevels
 from algid.model import DELAYS
 from algid.notices import Notice, has_code
 
-Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"]
+Status = Literal["OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION", "FROM_PRIOR"]
 Intervals = Literal["likelihood", "sandwich", "jackknife"]
 
 
@@ -91,7 +91,7 @@ class Fit:
         the jackknife over four logs or more, in which what differs from run to run is.
     quantile : float
         Half width of a 95 % interval in standard deviations, normal or Student's.
-    status : Q of "OK", "NOT_IDENTIFIABLE", "NOT_CONVERGED", "WEAK_EXCITATION"
+    status : Q words of `Status`
     unidentifiable : what the logs leave open
     logs : each log's quadratic likelihood, unloaded ones first
     noise : each log's noise levels; None for the weak estimator

@@ -42,7 +42,8 @@ from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
 # known
 _DAMPING = 0.1
 _NOTHING = 1e-14  # of the largest eigenvalue: rounding
-_SHARE = 0.15  # of an eigenvector: below it a parameter has no part in the direction
+SHARE = 0.15
+"""Of an eigenvector: below it a parameter has no part in the direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +72,14 @@ def examine(
     Returns
     -------
     Identifiability
-        A parameter is open that has a share of `_SHARE` or more in an open direction. The
+        A parameter is open that has a share of `SHARE` or more in an open direction. The
         covariance is the inverse of S, as wide along open directions as S has it.
     """
     size = sizes(names, values)
     eigenvalues, vectors, lost = _spectrum(S, size)
     null = vectors[:, lost]
     part = np.sqrt(np.sum(null**2, axis=1))
-    determined = tuple((part < _SHARE).tolist())
+    determined = tuple((part < SHARE).tolist())
     # A direction of little information is as wide here as it is: what it mixes with is as unsure.
     inverse = (vectors / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1] + 1e-300)) @ vectors.T
     return Identifiability(
@@ -144,7 +145,7 @@ def _left_open(
     for group in _groups(null):
         part = null[group]
         together = [names[row] for row in group]
-        free = int(np.linalg.matrix_rank(part, tol=_SHARE))
+        free = int(np.linalg.matrix_rank(part, tol=SHARE))
         if free >= len(group):
             for name in together:
                 yield _open("alone", [name], why)
@@ -164,12 +165,12 @@ def _open(case: str, names: Sequence[str], why: str, **numbers: float) -> Notice
 def _groups(null: FloatArray) -> list[list[int]]:
     """Rows that share an undetermined direction."""
     projector = null @ null.T
-    rest = np.flatnonzero(np.sqrt(np.diag(projector)) >= _SHARE).tolist()
+    rest = np.flatnonzero(np.sqrt(np.diag(projector)) >= SHARE).tolist()
     groups: list[list[int]] = []
     while rest:
         group = [rest.pop(0)]
         for row in group:  # which grows as rows that are linked to it are found
-            linked = [other for other in rest if abs(projector[row, other]) >= _SHARE**2]
+            linked = [other for other in rest if abs(projector[row, other]) >= SHARE**2]
             for other in linked:
                 rest.remove(other)
             group += linked

@@ -179,7 +179,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         if by_payload is not None:
             length, _ = by_payload
     coefficients = coefficients_of(result, file, length)
-    numbers = _identified(coefficients)
+    numbers = _identified(coefficients, result)
     chosen = None
     if links:
         known = Knowns(**(knowns.given | given))
@@ -246,10 +246,13 @@ def _of_first_length(result: Result) -> str:
     return "identified, g k1 / k2"
 
 
-def _identified(coefficients: Coefficients) -> list[Number]:
+def _identified(coefficients: Coefficients, result: Result) -> list[Number]:
     numbers = []
     for name in coefficients.model.names:
         origin = "identified"
+        found = result.parameters.get(name)
+        if found is not None and found.status == "FROM_PRIOR":
+            origin = "from the prior, not measured"
         if name in coefficients.half:
             origin += f", ± {coefficients.half[name]:.2g} (95 %)"
         if coefficients.conditioned:

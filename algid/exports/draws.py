@@ -167,6 +167,7 @@ def drawn_files(
         "distribution": "normal" if freedom == inf else "Student's t",
         "degrees_of_freedom": None if freedom == inf else freedom,
         "names": names,
+        "from_prior": [name for name in names if result.estimates[name].status == "FROM_PRIOR"],
         "estimates": [result.estimates[name].estimate for name in names],
         "covariance": [] if result.fit is None else result.fit.covariance_of(names).tolist(),
         "draws": rows,

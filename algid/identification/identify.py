@@ -31,7 +31,7 @@ from algid.methods import estimator_of, settles
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.results import Result, read_result, write_result
-from algid.settings import DEFAULTS, OF_BOTH, Settings, refuse_contradictions
+from algid.settings import DEFAULTS, OF_BOTH, OF_PRIOR, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
     from algid.estimators.fit import Fit
@@ -175,16 +175,28 @@ def identify(
 def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier | None) -> Settings:
     """The settings, completed from the profile or an earlier result where they are not set."""
     stated: dict[str, Any] = {}
+    names: tuple[str, ...] = (*OF_BOTH, *OF_PRIOR)
     if earlier is not None:
+        if settings.prior is not None:
+            raise SettingError(
+                f"{flag('prior')}: the arm is known by {flag('parameters')}; leave one of them out"
+            )
+        names = OF_BOTH
         stated["effort"] = earlier.result.settings.get("effort")
     if meaning is not None:
-        own = {name: getattr(meaning, name) for name in OF_BOTH if name in meaning.model_fields_set}
+        own = {name: getattr(meaning, name) for name in names if name in meaning.model_fields_set}
         refuse_contradictions(own)
         stated |= own
     set_by_user = {name for name in stated if getattr(settings, name) != DEFAULTS[name]}
     for name in set_by_user:
         del stated[name]
-    return settings.but(**stated)
+    settings = settings.but(**stated)
+    if settings.prior_error is not None and settings.prior is None:
+        raise SettingError(
+            f"{flag('prior_error')}: expected a prior that errs by as much, found none; give "
+            f"{flag('prior')}"
+        )
+    return settings
 
 
 def reused(profile: Profile | None, earlier: Result) -> Profile | None:
@@ -267,7 +279,9 @@ def _by_likelihood(
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
     from algid.identification.phases import turn_note
+    from algid.identification.prior import statement_of, with_prior
 
+    said = statement_of(settings)
     asked = settings
     fit, predictions, chosen = _fitted(survey, settings, earlier)
     sure = with_doubt(fit, survey, settings, chosen)
@@ -278,6 +292,8 @@ def _by_likelihood(
     if settings != asked:
         fit, predictions, chosen = _fitted(survey, settings, earlier)
         sure = with_doubt(fit, survey, settings, chosen)
+    if said is not None:
+        sure = with_prior(sure, said)
     settings = settings.but(torque_hold=chosen.hold)
     survey.begin("prediction")
     outcome = outcome_of(sure, predictions, survey, settings, chosen)

@@ -93,7 +93,8 @@ def outcome_of(
         notices=notices + list(fit_notes(summary)),
     )
     accepted = {code for log in survey.logs for code in log.origin.reading.accepted}
-    if is_implausible(summary, bounds="BROKEN_BOUND" not in accepted):
+    torque = "FROM_PRIOR" not in fit.status  # a prior errs by as much as it says
+    if is_implausible(summary, bounds="BROKEN_BOUND" not in accepted, torque=torque):
         return outcome.distrusted()
     return outcome
 
@@ -102,12 +103,15 @@ def _loaded_rows(
     fit: Fit, rows: Mapping[str, float], stds: Mapping[str, float], gone: set[str]
 ) -> dict[str, Estimate]:
     """Estimates of the loaded arm's rows of Table 4, save those with a constant that is `gone`."""
-    status = "OK"
-    if not fit.converged:
-        status = "NOT_CONVERGED"
     combined = {}
+    status_of = dict(zip(fit.names, fit.status, strict=True))
     for name in LOADED_ROWS:
         unit = TABLE_UNITS[name]
+        status = "OK"
+        if not fit.converged:
+            status = "NOT_CONVERGED"
+        elif any(status_of.get(one) == "FROM_PRIOR" for one in _LOADED[name]):
+            status = "FROM_PRIOR"
         if not gone.isdisjoint(_LOADED[name]):
             continue
         if name in rows:
@@ -118,20 +122,22 @@ def _loaded_rows(
     return with_significance(combined)
 
 
-def is_implausible(summary: results.FitSummary, *, bounds: bool = True) -> bool:
+def is_implausible(
+    summary: results.FitSummary, *, bounds: bool = True, torque: bool = True
+) -> bool:
     """Whether physics or the torque contradict a fit.
 
     Its estimates come from one solution: where one of them breaks a bound by more than chance
     explains, or a joint's torque is predicted worse than its mean would, none can be trusted. A
     torque that hardly varies leaves R² nothing to explain, nor does a joint that is hardly driven;
-    there the residual has to be a tenth of what acts on the joint at least. Without `bounds`, by
-    the torque alone.
+    there the residual has to be a tenth of what acts on the joint at least. Without `bounds`, or
+    `torque`, by the other alone.
     """
     for bound in summary.broken_bounds:
         if bounds and bound.distance_sigma is not None and bound.distance_sigma > FAR_BEYOND:
             return True
     judged = summary.cross_validation or summary.residual
-    return judged is not None and bool(judged.unexplained(least=0.0))
+    return torque and judged is not None and bool(judged.unexplained(least=0.0))
 
 
 def distrusted(group: Mapping[str, Estimate]) -> dict[str, Estimate]:

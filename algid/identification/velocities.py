@@ -35,8 +35,8 @@ def with_velocities(
         if settings.velocity == "measured":
             if segment.omega is None:
                 raise LogError(
-                    f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')} "
-                    "measured, found none; leave the flag out to observe them"
+                    f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')}="
+                    "measured, found none; leave it out to observe them"
                 )
             yield segment
             continue

@@ -29,6 +29,8 @@ _HEAD = """\
 # start = 0.0                # s since the first sample: leave out what comes before
 # end = 60.0                 # s since the first sample: leave out what comes after
 # torque_file = "torques.csv"  # where the torques stand in another file
+# prior = "arm.urdf"         # what CAD says of the arm, and by how many per cent it errs:
+# prior_error = 20.0
 # segment = 1                # one run alone, where the log's time starts again
 # accept = ["DEGREES"]       # codes of checks that may warn, but not refuse
 """

@@ -43,11 +43,11 @@ def refuse_others(given: object) -> None:
 
 
 _OF_A_LOG = (
-    "accept", "drive", "effort", "end", "gravity", "offsets", "passive", "second_angle", "signs",
-    "start", "velocity", "zero",
+    "accept", "drive", "effort", "end", "gravity", "offsets", "passive", "prior", "prior_error",
+    "second_angle", "signs", "start", "velocity", "zero",
 )  # fmt: skip
 """What a profile may say of arrays: where they are from has been said by giving them."""
-_OF_ANY_LOG = ("accept", "effort", "end", "gravity", "start", "velocity")
+_OF_ANY_LOG = ("accept", "effort", "end", "gravity", "prior", "prior_error", "start", "velocity")
 """What it may say of a log that was read by a profile before."""
 _OF_A_CHANNEL = ("counts", "gear_ratio", "offset", "sign", "torque_constant", "unit", "unwrap")
 

@@ -96,7 +96,7 @@ def result_document(
         Section("settings", "Settings and provenance", made_by, folded=True),
         *([] if leads else [of_paper]),
     ]
-    constants = [one.usable for name, one in result.parameters.items() if name in CONSTANT_NAMES]
+    constants = [one.measured for name, one in result.parameters.items() if name in CONSTANT_NAMES]
     seconds = significant(sum(log.duration for log in result.logs), 4)
     return Document(
         title=f"Identification of {names[0]}",

@@ -37,15 +37,16 @@ class Status(StrEnum):
     NOT_SIGNIFICANT: the 95 % interval contains zero.
     IMPLAUSIBLE: the estimates together break a bound of physics by more than three standard
     deviations, or predict the torque worse than a constant does.
+    FROM_PRIOR: the logs leave it open, or tell less of it than the prior that was given.
     """
 
     OK = "OK"
     WEAK_EXCITATION = "WEAK_EXCITATION"
-    SINGULAR = "SINGULAR"
     NOT_IDENTIFIABLE = "NOT_IDENTIFIABLE"
     NOT_CONVERGED = "NOT_CONVERGED"
     IMPLAUSIBLE = "IMPLAUSIBLE"
     NOT_SIGNIFICANT = "NOT_SIGNIFICANT"
+    FROM_PRIOR = "FROM_PRIOR"
 
 
 class _Model(BaseModel):
@@ -62,9 +63,14 @@ class Estimate(_Model):
     status: Status = Status.OK
 
     @property
-    def usable(self) -> bool:
-        """Whether number and interval can be used: also where zero lies within it."""
+    def measured(self) -> bool:
+        """Whether logs determine number and interval: also where zero lies within it."""
         return self.status in (Status.OK, Status.NOT_SIGNIFICANT) and self.estimate is not None
+
+    @property
+    def usable(self) -> bool:
+        """Whether number and interval can be used, be they measured or what a prior says."""
+        return self.measured or (self.status is Status.FROM_PRIOR and self.estimate is not None)
 
     @property
     def half(self) -> float | None:
@@ -409,8 +415,8 @@ class Result(_Model):
 
     @property
     def complete(self) -> bool:
-        """Whether every estimate can be used: see `Estimate.usable`."""
-        return all(estimate.usable for estimate in self.estimates.values())
+        """Whether logs determine every estimate: see `Estimate.measured`."""
+        return all(estimate.measured for estimate in self.estimates.values())
 
     @property
     def covariance(self) -> Any:

@@ -28,8 +28,8 @@ WIDE = 0.2  # half an interval beyond a fifth of the estimate says little more t
 LONGEST_COMMAND = 4_000  # characters: a command is there to be copied
 
 STATUS_WORDS = {
+    "FROM_PRIOR": "from the prior",
     "WEAK_EXCITATION": "too weakly excited",
-    "SINGULAR": "singular",
     "NOT_IDENTIFIABLE": "not identifiable",
     "NOT_CONVERGED": "not converged",
     "NOT_SIGNIFICANT": "not significant",
@@ -84,8 +84,9 @@ def _failure(result: Result) -> str | None:
     if has_code(result.notices, "LENGTH_CONTRADICTED"):
         return "a link length contradicts the arm's result"
     usable = sum(one.usable for one in asked)
-    # a number whose interval is merely around zero is none to use
-    numbers = [one for one in result.estimates.values() if one.status != "NOT_SIGNIFICANT"]
+    # a number whose interval is merely around zero is none to use, nor has a prior measured one
+    vague = ("NOT_SIGNIFICANT", "FROM_PRIOR")
+    numbers = [one for one in result.estimates.values() if one.status not in vague]
     if not usable or all(one.estimate is None for one in numbers):
         why = {STATUS_WORDS.get(status, "absent") for status in statuses}
         return f"no parameter could be identified ({joined(sorted(why))})"

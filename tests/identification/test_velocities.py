@@ -111,8 +111,8 @@ def test_measured_velocities_are_the_logs_whatever_the_observer() -> None:
 def test_a_log_without_velocities_is_refused_in_one_line_that_says_what_to_do() -> None:
     with pytest.raises(
         LogError,
-        match=r"^walk\.csv: expected velocities omega1, omega2 for --velocity measured, found "
+        match=r"^walk\.csv: expected velocities omega1, omega2 for --set velocity=measured, found "
         r"none; "
-        r"leave the flag out to observe them$",
+        r"leave it out to observe them$",
     ):
         observed(log_at(np.arange(300.0)), 300, velocity="measured")

@@ -1,4 +1,4 @@
-"""A URDF file read back as an arm, so that one from CAD is judged on the same logs as a result.
+"""A URDF file read back as an arm: one from CAD is a prior, or is judged on logs as a result is.
 
 Two joints about one direction move; what is fixed to a link counts to it. θ1 is the angle of the
 line from joint 1 to joint 2 over the horizontal, θ2 that of link 2's line: to the tip, which is
@@ -27,8 +27,8 @@ _ROUNDING = 1e-12  # m: a link this long has no length
 _BESIDE = 1e-9  # rad: a centre of mass less off its link's line is on it
 
 
-def read_urdf(path: Path) -> Predictor:
-    """The model of a URDF file for logs of the arm without payload.
+def arm_of(path: Path) -> tuple[Arm, tuple[float, ...]]:
+    """The arm of a URDF file, and its joints' Coulomb friction in N m.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def read_urdf(path: Path) -> Predictor:
         If it is no URDF of an arm with two joints about one direction.
     """
     try:
-        arm, friction = _arm(ET.fromstring(read_text(path)))
+        return _arm(ET.fromstring(read_text(path)))
     except OSError as error:
         raise ResultError(
             f"{path}: cannot read it ({error.strerror}); expected a URDF file"
@@ -47,6 +47,11 @@ def read_urdf(path: Path) -> Predictor:
         raise ResultError(
             f"{path}: expected a URDF of an arm with two parallel joints: {error}; mend the file"
         ) from error
+
+
+def read_urdf(path: Path) -> Predictor:
+    """The model of a URDF file for logs of the arm without payload; raises as `arm_of`."""
+    arm, friction = arm_of(path)
     jump = next(term for term in TERMS.values() if term.friction)
     terms = [jump.name] if any(friction) else []
     if max(abs(arm.delta1), abs(arm.delta2)) > _BESIDE:

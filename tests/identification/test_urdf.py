@@ -11,7 +11,7 @@ from algid.arm import inverse_dynamics
 from algid.base.errors import ResultError
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
-from algid.exports.read_urdf import read_urdf
+from algid.identification.urdf import read_urdf
 from algid.model import Model, Motion, torque
 from tests.exports.arms import ODD, result_of, states, values_of
 

@@ -1,0 +1,229 @@
+"""A prior from CAD or an earlier result: what it adds, what stays its own, what contradicts it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import algid
+from algid.arm import Arm, FloatArray
+from algid.base.errors import AlgidError
+from algid.estimators.fit import Fit
+from algid.identification.prior import Statement, drawn_covariance, with_prior
+from algid.model import RIGID
+from algid.results import Status
+from algid.settings import Settings
+from pipelines.accuracy_scenes import random_arm
+from pipelines.prior import drawing, log_of, urdf
+from tests.identification.fits import K, fit_of
+
+ARM = random_arm(1)[0]
+SEED = 1
+
+
+@pytest.fixture
+def cad(tmp_path: Path) -> Path:
+    """The file of an arm that CAD has exactly."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(urdf(ARM))
+    return file
+
+
+def said(fit: Fit, share: float, off: float = 0.0) -> Statement:
+    """Says of each constant that it errs by a `share`, and is wrong by `off` of that."""
+    k = fit.values[: len(RIGID)]
+    return Statement("arm.urdf", RIGID, k * (1 + off * share), np.diag((share * k) ** 2))
+
+
+def test_a_drawing_errs_as_draws_of_its_numbers_do() -> None:
+    """Monte Carlo of small relative errors against the derivatives."""
+    error, rng = 1e-3, np.random.default_rng(1)
+    drawn = []
+    for _ in range(4000):
+        wrong = {}
+        for name in ("m1", "m2", "lc1", "lc2", "I1", "I2", "l1"):
+            size = 0.01 if name == "l1" else error
+            wrong[name] = getattr(ARM, name) * (1 + size * rng.standard_normal())
+        drawn.append(replace(ARM, **wrong).constants()[: len(RIGID)])
+    expected = drawn_covariance(ARM, error)
+    std = np.sqrt(np.diag(expected))
+    found = np.cov(np.transpose(drawn)) / np.outer(std, std)
+    np.testing.assert_allclose(found, expected / np.outer(std, std), atol=0.07)
+
+
+def test_of_a_balanced_link_the_centre_is_not_known_exactly() -> None:
+    std = np.sqrt(np.diag(drawn_covariance(replace(ARM, lc2=0.0), 0.2)))
+    assert std[:2].min() > 0
+
+
+def test_both_are_weighed_by_their_information() -> None:
+    """One constant, prior as sure as the log: the mean of both, and half the variance."""
+    fit = fit_of(payload=False)
+    fit = replace(fit, covariance=np.diag(np.full(len(fit.names), 1e-4**2)))
+    std = 2e-4
+    one = Statement("arm.urdf", ("k5",), np.array([K[4] + 3e-4]), np.array([[std**2]]))
+    both, place = with_prior(fit, one), fit.names.index("k5")
+    assert both.values[place] == pytest.approx(K[4] + 3e-4 / 5)
+    assert both.covariance[place, place] == pytest.approx(1 / (1e8 + 1 / std**2))
+    assert both.status == fit.status
+    others = np.delete(np.arange(len(fit.names)), place)
+    np.testing.assert_array_equal(both.values[others], fit.values[others])
+
+
+def test_what_correlates_with_a_constant_follows_it() -> None:
+    """k6 with correlation 0.6, as the conditional normal distribution has it."""
+    fit = fit_of(payload=False)
+    covariance = np.diag(np.full(len(fit.names), 1.0))
+    k5, k6 = fit.names.index("k5"), fit.names.index("k6")
+    covariance[k5, k6] = covariance[k6, k5] = 0.6
+    fit = replace(fit, covariance=covariance * 1e-8)
+    exact = Statement("arm.urdf", ("k5",), K[4:5] + 1e-4, np.array([[1e-20]]))
+    both = with_prior(fit, exact)
+    assert both.values[k6] - fit.values[k6] == pytest.approx(0.6e-4, rel=1e-6)
+    assert both.covariance[k6, k6] == pytest.approx(0.64e-8, rel=1e-6)
+
+
+@pytest.mark.parametrize(("share", "own"), [(1e-9, True), (0.2, False)])
+def test_what_the_prior_knows_better_is_its_own(share: float, own: bool) -> None:
+    fit = fit_of(payload=False)
+    both = with_prior(fit, said(fit, share))
+    assert (set(both.status[: len(RIGID)]) == {"FROM_PRIOR"}) is own
+    assert "FROM_PRIOR" not in both.status[len(RIGID) :]
+
+
+def test_what_logs_leave_open_or_doubt_is_the_priors() -> None:
+    fit = fit_of(payload=False)
+    for status in ("NOT_IDENTIFIABLE", "WEAK_EXCITATION"):
+        word = ("OK", "OK", status, "OK", "OK", "OK", "OK")
+        statement = said(fit, 0.2, 3.0)
+        statement = replace(statement, mean=np.where(np.arange(5) == 2, statement.mean, K[:5]))
+        both = with_prior(replace(fit, status=word), statement)  # type: ignore[arg-type]
+        assert both.status == ("OK", "OK", "FROM_PRIOR", "OK", "OK", "OK", "OK")
+        assert both.values[2] == pytest.approx(1.6 * K[2])
+        assert both.std[2] == pytest.approx(0.2 * K[2])
+
+
+@pytest.mark.parametrize(("off", "told"), [(3.0, False), (5.0, True)])
+def test_a_contradiction_beyond_chance_leaves_the_prior_out(off: float, told: bool) -> None:
+    fit = fit_of(payload=False)
+    both = with_prior(fit, said(fit, 0.2, off))
+    notices = [one for one in both.notes if one.code == "OTHER_ARM"]
+    assert bool(notices) is told
+    if told:
+        np.testing.assert_array_equal(both.values, fit.values)
+        assert notices[0].numbers["distance"] == pytest.approx(off, rel=5e-3)  # the log errs too
+        assert "arm.urdf k" in notices[0].text
+
+
+@pytest.mark.parametrize("estimator", ["refined", "weak", "instruments"])
+def test_a_log_that_excites_well_stays_as_it_is(cad: Path, estimator: str) -> None:
+    log = log_of(ARM, "rich", SEED)
+    settings = Settings(estimator=estimator)
+    alone = algid.identify(log, settings=settings)
+    both = algid.identify(log, settings=settings, prior=cad, prior_error=20)
+    assert both.complete is alone.complete
+    for name in RIGID:
+        one, other = alone.parameters[name], both.parameters[name]
+        assert one.estimate is not None
+        assert other.estimate is not None
+        assert one.std is not None
+        assert other.status is one.status
+        assert abs(other.estimate - one.estimate) < one.std
+        assert (other.std or 0) <= one.std
+
+
+@pytest.mark.parametrize("estimator", ["refined", "weak"])
+def test_a_log_that_excites_nothing_returns_the_prior_and_says_so(
+    cad: Path, estimator: str
+) -> None:
+    log, settings = log_of(ARM, "rest", SEED), Settings(estimator=estimator)
+    result = algid.identify(log, settings=settings, prior=cad)
+    assert not result.complete  # exit code 3
+    k, P = ARM.constants(), drawn_covariance(ARM, 0.2)
+    for place in (0, 2, 4):
+        one = result.parameters[RIGID[place]]
+        assert one.status is Status.FROM_PRIOR
+        assert one.estimate == pytest.approx(k[place], abs=0.3 * np.sqrt(P[place, place]))
+    assert "FROM_PRIOR" in [one.code for one in result.verdict.reasons]
+
+
+def test_a_wrong_prior_is_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "wrong.urdf"
+    file.write_text(urdf(replace(ARM, m2=ARM.m2 / 3, I2=ARM.I2 / 3)))
+    log = log_of(ARM, "rich", SEED)
+    alone, both = algid.identify(log), algid.identify(log, prior=file)
+    assert both.parameters == alone.parameters
+    (notice,) = [one for one in both.notices if one.code == "OTHER_ARM"]
+    assert notice.numbers["distance"] > 3
+    assert both.verdict.grade == "reservations"
+
+
+def test_an_earlier_result_is_a_prior_by_its_own_covariance(tmp_path: Path) -> None:
+    first = algid.identify(log_of(ARM, "rich", SEED), out=tmp_path, name="first")
+    folder = str(tmp_path / "first.algid")
+    result = algid.identify(log_of(ARM, "faint", SEED), prior=folder)
+    statuses = {result.parameters[name].status for name in RIGID}
+    assert Status.FROM_PRIOR in statuses
+    for name in RIGID:
+        assert (result.parameters[name].std or 1) <= 1.05 * (first.parameters[name].std or 0)
+
+
+def test_a_profile_names_it(cad: Path) -> None:
+    log = log_of(ARM, "faint", SEED)
+    columns = {"time": log.stamp_ns * 1e-9}
+    for place in range(2):
+        columns |= {f"theta{place + 1}": log.theta[place], f"tau{place + 1}": log.tau[place]}
+    profile = {"prior": str(cad), "prior_error": 30}
+    by_profile = algid.identify(columns, profile=profile)
+    assert by_profile.settings["prior"] == str(cad)
+    assert by_profile.parameters == algid.identify(columns, **profile).parameters  # type: ignore[arg-type]
+    other = algid.identify(columns, profile=profile, prior_error=1).parameters
+    assert other != by_profile.parameters
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"prior_error": 20}, "--set prior_error: expected a prior"),
+        ({"prior": "none.urdf"}, "none.urdf: cannot read it"),
+        ({"prior": "arm.urdf", "prior_error": 0.2}, "--set prior_error: expected a number from 1"),
+        ({"prior": "arm.urdf", "estimator": "paper"}, "--prior: the paper's method"),
+        ({"prior": "arm.urdf", "parameters": "first.algid"}, "--prior: .* leave one of them out"),
+        ({"prior": "first.algid", "prior_error": 20}, "first.algid is a result"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(
+    cad: Path, options: dict[str, object], message: str
+) -> None:
+    tmp_path = cad.parent
+    log = log_of(ARM, "rich", SEED)
+    if "first.algid" in options.values():
+        algid.identify(log, estimator="weak", out=tmp_path, name="first")
+    given = {
+        name: str(tmp_path / str(one)) if name in ("prior", "parameters") else one
+        for name, one in options.items()
+    }
+    with pytest.raises(AlgidError, match=message):
+        algid.identify(log, **given)  # type: ignore[arg-type]
+
+
+def test_a_horizontal_arm_has_no_weight_in_its_prior(cad: Path) -> None:
+    level: FloatArray = replace(ARM, g=0.0).constants()
+    log = log_of(replace(ARM, g=0.0), "rich", SEED)
+    result = algid.identify(log, gravity=0.0, prior=cad)
+    assert result.parameters["k5"].estimate == pytest.approx(level[4], rel=0.05)
+
+
+def test_an_export_says_what_is_from_the_prior(cad: Path) -> None:
+    result = algid.identify(log_of(ARM, "faint", SEED), prior=cad, prior_error=1)
+    assert not result.complete
+    assert "from the prior, not measured" in algid.export(result, to="urdf").text
+
+
+def test_drawings_err_as_they_are_asked_to() -> None:
+    assert drawing(ARM, "exact", 1) == ARM
+    off: Arm = drawing(ARM, "20 % off", 1)
+    assert abs(off.m1 / ARM.m1 - 1) == pytest.approx(0.2)
