@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from algid.base.errors import LogError
@@ -84,39 +84,74 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
         is not UTF-8.
     """
     lines = _lines(path, head)
-    comment = _comment_sign(lines)
-    data = _below_titles(list(_numbered(lines, comment)))
+    signs = (sign for sign in COMMENTS if any(line.startswith(sign) for line in lines))
+    comment = next(signs, None)
+    data = []
+    for number, line in enumerate(lines):
+        if line.strip() and not (comment and line.startswith(comment)):
+            data.append((number, line))
+    # above the header titles may stand
+    for first in range(min(len(data), LIMITS.title_lines)):
+        begin = [line for _, line in data[first : first + 5]]
+        if any(_begins_table(begin, separator) for separator in _SEPARATORS):
+            data = data[first:]
+            break
     if not data:
         raise LogError(f"{path}: no table in the text; expected a header and rows of numbers")
     number, header = data[0]
+    rows = [line for _, line in data[1:]]
+    separator = _separator(path, header, rows[:19])
+    cells, skip = split(header, separator), 1
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
-    separator = _separator(path, header, _texts(data[1:20]))
-    first_row = 1
-    if all(_is_number(cell) for cell in split(header, separator) if cell):
-        cells, first_row = split(header, separator), 0
+    if all(_is_number(cell) for cell in cells if cell):
+        skip, rows = 0, [header, *rows]
         if names is None:
-            header = _commented_header(path, above, cells, separator)
-    columns = _named(path, split(header, separator), None if first_row else names)
-    units: dict[str, str] = {}
-    if len(data) > first_row:
-        units = _units(columns, split(data[first_row][1], separator))
+            cells = _commented_header(path, above, cells, separator)
+        elif len(names) == len(cells):
+            cells = list(names)
+        else:
+            raise LogError(
+                f"{path}: {counted(len(cells), 'column')}, and {counted(len(names), 'name')} for "
+                f"them: {', '.join(names)[:200]}; name each: {flag('columns')}"
+            )
+    columns = tuple(cells)
+    units = _units(columns, split(rows[0], separator)) if rows else {}
     if units:
-        first_row += 1
-    if len(data) <= first_row:
+        skip, rows = skip + 1, rows[1:]
+    if not rows:
         raise LogError(f"{path}: a header and no rows below it; expected rows of numbers")
-    dialect = _checked(path, columns, separator, comment, data[first_row:])
+    found = [split(row, separator) for row in rows]
+    if len(found[0]) != len(columns):
+        raise LogError(
+            f"{path}: line {data[skip][0] + 1} has {counted(len(found[0]), 'cell')} under a header "
+            f"of {len(columns)}; mend the header"
+        )
+    behind = re.compile(rf"[ \t]{re.escape(separator)}|[ ]$")
+    whole, dates, texts = set(), set(), set()
+    for column, values in zip(
+        columns, zip(*(one for one in found if len(one) == len(columns)), strict=True), strict=True
+    ):
+        if all(map(_WHOLE.match, values)):
+            whole.add(column)
+        if all(map(_DATE.match, values)):
+            dates.add(column)
+        elif values[0] and not _is_number(values[0]):
+            texts.add(column)
     comments = [line for line in lines[number:] if comment and line.startswith(comment)]
-    said = (*filter(None, above), *(line.removeprefix(comment or "") for line in comments))
-    return replace(dialect, units=units, said=said)
-
-
-def _below_titles(data: list[tuple[int, str]]) -> list[tuple[int, str]]:
-    """Numbered lines from the header on, which has as many cells as the numbers below it."""
-    for first in range(min(len(data), LIMITS.title_lines)):
-        lines = _texts(data[first : first + 5])
-        if any(_begins_table(lines, separator) for separator in _SEPARATORS):
-            return data[first:]
-    return data
+    return Dialect(
+        columns,
+        separator,
+        decimal_comma=separator != ","
+        and any("," in cell and _is_number(cell) for one in found for cell in one),
+        skip=data[skip][0],
+        comment=comment,
+        whole=frozenset(whole),
+        padded=bool(separator) and any(behind.search(row.rstrip("\r")) for row in rows),
+        units=units,
+        dates=frozenset(dates),
+        texts=frozenset(texts),
+        said=(*filter(None, above), *(line.removeprefix(comment or "") for line in comments)),
+    )
 
 
 def _begins_table(lines: Sequence[str], separator: str) -> bool:
@@ -167,19 +202,6 @@ def split(line: str, separator: str) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
-def _cells_by_column(
-    columns: Sequence[str], lines: Iterable[str], separator: str
-) -> dict[str, list[str]]:
-    """The cells under each column, of the lines that have one for each."""
-    by_column: dict[str, list[str]] = {column: [] for column in columns}
-    for line in lines:
-        cells = split(line, separator)
-        if len(cells) == len(columns):
-            for column, cell in zip(columns, cells, strict=True):
-                by_column[column].append(cell)
-    return by_column
-
-
 def _lines(path: Path, head: bytes) -> list[str]:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise LogError(f"{path}: the text is UTF-16; save it as UTF-8")
@@ -202,26 +224,6 @@ def _lines(path: Path, head: bytes) -> list[str]:
     return lines
 
 
-def _comment_sign(lines: Sequence[str]) -> str | None:
-    """What the lines of comments begin with; None where there is none."""
-    for sign in COMMENTS:
-        if any(line.startswith(sign) for line in lines):
-            return sign
-    return None
-
-
-def _numbered(lines: Sequence[str], comment: str | None) -> Iterator[tuple[int, str]]:
-    """The lines that hold something and are no comments, with their numbers from 0."""
-    for number, line in enumerate(lines):
-        if line.strip() and (comment is None or not line.startswith(comment)):
-            yield number, line
-
-
-def _texts(numbered: Iterable[tuple[int, str]]) -> list[str]:
-    """Lines without their numbers."""
-    return [line for _, line in numbered]
-
-
 def _separator(path: Path, header: str, rows: list[str]) -> str:
     for separator in _SEPARATORS:
         wanted = len(split(header, separator))
@@ -235,74 +237,15 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     )
 
 
-def _named(path: Path, cells: list[str], names: Sequence[str] | None) -> tuple[str, ...]:
-    """The header's cells, or the names that a user gives the columns."""
-    if names is None:
-        return tuple(cells)
-    if len(names) != len(cells):
-        raise LogError(
-            f"{path}: {counted(len(cells), 'column')}, and {counted(len(names), 'name')} for them: "
-            f"{', '.join(names)[:200]}; name each: {flag('columns')}"
-        )
-    return tuple(names)
-
-
-def _commented_header(path: Path, above: list[str], cells: list[str], separator: str) -> str:
-    """The header among the comments `above` the table."""
+def _commented_header(path: Path, above: list[str], cells: list[str], separator: str) -> list[str]:
+    """The header's cells among the comments `above` the table."""
     for text in reversed(above):
         names = split(text, separator)
         if len(names) == len(cells) and not any(map(_is_number, names)):
-            return text
+            return names
     named = Remedy({"columns": ["t", "theta1", "theta2", "tau1", "tau2"]}, "name its columns")
     raise NoHeaderError(
         len(cells),
         f"{path}: the table has no header, its first line is {', '.join(cells)[:60]!r}; "
         f"put a line with the columns' names above it, or {named}",
     )
-
-
-def _checked(
-    path: Path,
-    columns: tuple[str, ...],
-    separator: str,
-    comment: str | None,
-    data: Sequence[tuple[int, str]],
-) -> Dialect:
-    """The dialect of a table with such columns and numbered rows."""
-    skip, first = data[0]
-    rows = _texts(data)
-    cells = split(first, separator)
-    if len(cells) != len(columns):
-        raise LogError(
-            f"{path}: line {skip + 1} has {counted(len(cells), 'cell')} under a header "
-            f"of {len(columns)}; mend the header"
-        )
-    comma = padded = False
-    if separator != ",":
-        comma = any(_has_decimal_comma(row, separator) for row in rows)
-    if separator:
-        behind = re.compile(rf"[ \t]{re.escape(separator)}|[ ]$")
-        padded = any(behind.search(row.rstrip("\r")) for row in rows)
-    whole, dates, texts = set(), set(), set()
-    for column, cells in _cells_by_column(columns, rows, separator).items():
-        if all(map(_WHOLE.match, cells)):
-            whole.add(column)
-        if all(map(_DATE.match, cells)):
-            dates.add(column)
-        elif cells and cells[0] and not _is_number(cells[0]):
-            texts.add(column)
-    return Dialect(
-        columns,
-        separator,
-        comma,
-        skip,
-        comment,
-        frozenset(whole),
-        padded,
-        dates=frozenset(dates),
-        texts=frozenset(texts),
-    )
-
-
-def _has_decimal_comma(row: str, separator: str) -> bool:
-    return any("," in cell and _is_number(cell) for cell in split(row, separator))
