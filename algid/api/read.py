@@ -9,11 +9,13 @@ from algid.api.options import LogOptions, ProfileLike, meaning
 
 if TYPE_CHECKING:
     from algid.log import Log
-    from algid.readers.memory import Columns
+    from algid.readers.memory import FrameOrArrays
 
 
 def read_log(
-    path: str | Path | Columns, profile: ProfileLike | None = None, **options: Unpack[LogOptions]
+    path: str | Path | FrameOrArrays,
+    profile: ProfileLike | None = None,
+    **options: Unpack[LogOptions],
 ) -> Log:
     """Read a whole log into memory.
 

@@ -17,7 +17,7 @@ from algid.identification.recordings import SHORT, Recording, Role
 from algid.log import Log
 from algid.notices import Notice
 from algid.readers.clock import check_step
-from algid.readers.memory import Columns, is_columns, refuse_others
+from algid.readers.memory import FrameOrArrays, is_columns, refuse_others
 from algid.results import LogSummary, Result
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Staged:
     whole: bool = True
 
 
-LogLike = str | Path | Log | Staged | Columns
+LogLike = str | Path | Log | Staged | FrameOrArrays
 
 
 def open_source(

@@ -11,10 +11,10 @@ from algid.log import Log
 if TYPE_CHECKING:
     from algid.profile import Profile
     from algid.readers.log_reader import TableReader
-    from algid.readers.memory import Columns
+    from algid.readers.memory import FrameOrArrays
 
 
-def open_log(path: str | Path | Columns, profile: Profile | None = None) -> TableReader:
+def open_log(path: str | Path | FrameOrArrays, profile: Profile | None = None) -> TableReader:
     """Open a log of any format, known from its content.
 
     Its samples are read by `TableReader.blocks`.
@@ -45,7 +45,7 @@ def open_log(path: str | Path | Columns, profile: Profile | None = None) -> Tabl
         return open_with_torque_file(path, known, _open_one)
 
 
-def _open_one(path: str | Path | Columns, profile: Profile) -> TableReader:
+def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader:
     """Open a log that stands in one file, or in memory."""
     from algid.readers.flat import open_table
     from algid.readers.table_cells import TableFile
@@ -65,7 +65,7 @@ def _open_one(path: str | Path | Columns, profile: Profile) -> TableReader:
     return open_table(found, profile)
 
 
-def read_log(path: str | Path | Columns, profile: Profile | None = None) -> Log:
+def read_log(path: str | Path | FrameOrArrays, profile: Profile | None = None) -> Log:
     """Read a whole log: see `open_log`.
 
     Parameters

@@ -11,6 +11,7 @@ import re
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,10 +30,36 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-def open_npz(path: Path) -> TableFile:
-    """Open a NumPy archive; raises `LogError` where it is damaged or too large."""
+Arrays = dict[str, NDArray[Any]]
+Read = tuple[Arrays, dict[str, dict[str, str]], dict[str, str]]
+"""Arrays, the attributes of each, and the file's."""
+
+
+def open_arrays(path: Path, kind: str) -> TableFile:
+    """Open arrays of NumPy ("npz"), MATLAB ("mat") or HDF5 ("hdf5").
+
+    Raises
+    ------
+    LogError
+        If the file is damaged or too large, or h5py is missing.
+    """
+    readers = {"npz": ("NumPy", _of_npz), "mat": ("MATLAB", _of_mat), "hdf5": ("HDF5", _of_hdf5)}
+    title, read = readers[kind]
     _refuse_large(path)
-    with as_log_error(path, "NumPy"), zipfile.ZipFile(path) as archive:
+    with as_log_error(path, title):
+        return of_arrays(str(path), kind, *read(path))
+
+
+def _refuse_large(path: Path) -> None:
+    if path.stat().st_size > LIMITS.whole_bytes:
+        raise LogError(
+            f"{path}: a file of more than 1 GiB is not read as a whole; save it as Parquet"
+        )
+
+
+def _of_npz(path: Path) -> Read:
+    arrays: Arrays = {}
+    with zipfile.ZipFile(path) as archive:
         claimed = sum(entry.file_size for entry in archive.infolist())
         twice = repeated(archive.namelist())
         if twice:
@@ -44,7 +71,6 @@ def open_npz(path: Path) -> TableFile:
                 f"{path}: the archive claims {counted(claimed, 'byte')} unpacked; save it as "
                 "Parquet"
             )
-        arrays: dict[str, NDArray[Any]] = {}
         for name in archive.namelist():
             with archive.open(name) as stream:
                 arrays[name.removesuffix(".npy")] = np.lib.format.read_array(
@@ -54,15 +80,13 @@ def open_npz(path: Path) -> TableFile:
                     raise LogError(
                         f"{path}: the array {name!r} is longer than its head says; save it again"
                     )
-    return of_arrays(str(path), "npz", arrays)
+    return arrays, {}, {}
 
 
-def open_matlab(path: Path) -> TableFile:
-    """Open a MATLAB file; raises `LogError` where it is damaged or too large."""
+def _of_mat(path: Path) -> Read:
     from scipy.io import loadmat
 
-    _refuse_large(path)
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: Arrays = {}
 
     def take(content: Mapping[str, Any], prefix: str) -> None:
         for name, value in content.items():
@@ -71,38 +95,21 @@ def open_matlab(path: Path) -> TableFile:
             elif not name.startswith("__"):
                 arrays[f"{prefix}{name}"] = np.asarray(value)
 
-    with as_log_error(path, "MATLAB"):
-        try:
-            take(loadmat(path, simplify_cells=True), "")
-        except NotImplementedError:  # version 7.3 is HDF5
-            return of_arrays(str(path), "mat", *_of_hdf5(path))
-    return of_arrays(str(path), "mat", arrays)
+    try:
+        take(loadmat(path, simplify_cells=True), "")
+    except NotImplementedError:  # version 7.3 is HDF5
+        return _of_hdf5(path)
+    return arrays, {}, {}
 
 
-def open_hdf5(path: Path) -> TableFile:
-    """Open an HDF5 file; raises `LogError` where it is damaged or too large, or h5py is missing."""
-    _refuse_large(path)
-    with as_log_error(path, "HDF5"):
-        return of_arrays(str(path), "hdf5", *_of_hdf5(path))
-
-
-def _refuse_large(path: Path) -> None:
-    if path.stat().st_size > LIMITS.whole_bytes:
-        raise LogError(
-            f"{path}: a file of more than 1 GiB is not read as a whole; save it as Parquet"
-        )
-
-
-def _of_hdf5(
-    path: Path,
-) -> tuple[dict[str, NDArray[Any]], dict[str, dict[str, str]], dict[str, str]]:
-    """Datasets by their paths with dots, their attributes, and the file's; none of another file."""
+def _of_hdf5(path: Path) -> Read:
+    """Datasets by their paths with dots, none of another file."""
     try:
         import h5py
     except ImportError as error:
         mend = "pip install 'algid[hdf5]', or in MATLAB save(FILE, '-v7')"
         raise LogError(f"{path}: an HDF5 file, for which h5py is needed: {mend}") from error
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: Arrays = {}
     attributes: dict[str, dict[str, str]] = {}
 
     def take(name: str, one: Any) -> None:
@@ -141,8 +148,8 @@ def of_arrays(
     path: str,
     kind: str,
     arrays: Mapping[str, NDArray[Any]],
-    attributes: Mapping[str, Mapping[str, str]] | None = None,
-    metadata: Mapping[str, str] | None = None,
+    attributes: Mapping[str, Mapping[str, str]] = MappingProxyType({}),
+    metadata: Mapping[str, str] = MappingProxyType({}),
 ) -> TableFile:
     """Columns as long as the time, or as the longest array; a matrix has ``q[0]``, ``q[1]``.
 
@@ -160,8 +167,8 @@ def of_arrays(
     last = {name: name.rpartition(".")[2] for name in arrays}
     twice = repeated(name for name in last.values())
     short = {name: name if last[name] in twice else last[name] for name in arrays}
-    of_columns = {short.get(name, name): dict(one) for name, one in (attributes or {}).items()}
-    found, texts = {}, dict(metadata or {})
+    of_columns = {short.get(name, name): dict(one) for name, one in attributes.items()}
+    found, texts = {}, dict(metadata)
     signals = [name for name, one in arrays.items() if one.dtype.kind in "iufbmM" and one.size > 1]
     for name, array in arrays.items():
         key, _, column = name.partition(".")

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 NAME = "log"
 """What a log in memory is called, as by `algid.Log.from_arrays`."""
 
-Columns = Any
+FrameOrArrays = Any
 """A pandas or polars frame, a pyarrow table, or a mapping of names to arrays."""
 
 
-def is_columns(given: object) -> TypeGuard[Columns]:
+def is_columns(given: object) -> TypeGuard[FrameOrArrays]:
     """Whether columns are given: a mapping, or an object that exports Arrow, as frames do."""
     return isinstance(given, Mapping) or any(
         hasattr(given, name) for name in ("__arrow_c_stream__", "__dataframe__")
@@ -139,7 +139,7 @@ def with_profile(log: Log, profile: Profile | None) -> Log:
     return replace(read, origin=origin, notices=log.notices + read.notices)
 
 
-def open_columns(given: Columns) -> TableFile:
+def open_columns(given: FrameOrArrays) -> TableFile:
     """Open a log of columns in memory.
 
     Parameters

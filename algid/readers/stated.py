@@ -93,27 +93,23 @@ def _object(text: str) -> dict[str, object]:
 
 
 def _called(name: str, columns: Sequence[str]) -> list[str]:
-    """The columns that a name stands for."""
+    """The columns that a name stands for: the one so called, or those of a joint or a quantity."""
     plain = name.strip().lower()
-    named = [column for column in columns if column.lower() == plain]
-    if named:
-        return named[:1]
+    for column in columns:
+        if column.lower() == plain:
+            return [column]
     part = take_apart(plain)
-    singular = {part.stem, part.stem.removesuffix("s"), part.stem.removeprefix("joint_")}
-    singular.add(part.stem.removeprefix("joint_").removesuffix("s"))
-    quantity = [stems for stems in (*STEMS.values(), TIMES) if not singular.isdisjoint(stems)]
+    stems = {part.stem, part.stem.removeprefix("joint_")}
+    stems |= {stem.removesuffix("s") for stem in stems}
+    for known in (*STEMS.values(), TIMES) if part.joint is None else ():
+        if not stems.isdisjoint(known):
+            stems |= {one for one in known if (one in CURRENTS) == (part.stem in CURRENTS)}
+    found = []
     for column in columns:
         own = take_apart(column)
-        if own.stem == part.stem:
-            if part.joint in (None, own.joint):
-                named.append(column)
-        elif (
-            part.joint is None
-            and (own.stem in CURRENTS) == (part.stem in CURRENTS)
-            and any(own.stem in stems for stems in quantity)
-        ):
-            named.append(column)
-    return named
+        if own.stem in stems and part.joint in (None, own.joint):
+            found.append(column)
+    return found
 
 
 def in_json_schema(text: str) -> tuple[dict[str, str], list[str]]:
