@@ -362,47 +362,45 @@ def indexed(index: Callable[[], Any]) -> Callable[[str, Path], Any]:
     return frame_in
 
 
-def groups(way: str, folder: Path) -> Any:
-    runs = []
-    for log in (ONE, OTHER):
-        runs.append({"time": T, "q": log.theta.T.copy(), "tau": log.tau.T.copy()})
-    flat = {f"run{k}.{name}": v for k, run in enumerate(runs, 1) for name, v in run.items()}
+def _arrays(way: str, folder: Path, content: dict[str, Any]) -> Any:
+    """Arrays of any length, those named with a dot in groups."""
     path = folder / f"log.{way}"
     match way:
         case "h5":
             with h5py.File(path, "w") as file:
-                for name, values in flat.items():
+                for name, values in content.items():
                     file[name.replace(".", "/")] = values
         case "mat":
-            scipy.io.savemat(path, {"run1": runs[0], "run2": runs[1]})
+            structs: dict[str, Any] = {}
+            for name, values in content.items():
+                group, dot, own = name.partition(".")
+                if dot:
+                    structs.setdefault(group, {})[own] = values
+                else:
+                    structs[name] = values
+            scipy.io.savemat(path, structs)
         case "npz":
-            np.savez(path, **flat)  # type: ignore[arg-type]
+            np.savez(path, **content)
         case "dict":
-            return flat
+            return content
         case _:
             raise CannotSayError
     return path
+
+
+def groups(way: str, folder: Path) -> Any:
+    runs: dict[str, Any] = {}
+    for k, log in enumerate((ONE, OTHER), start=1):
+        own = {"time": T, "q": log.theta.T.copy(), "tau": log.tau.T.copy()}
+        runs |= {f"run{k}.{name}": values for name, values in own.items()}
+    return _arrays(way, folder, runs)
 
 
 def own_stamps(way: str, folder: Path) -> Any:
     """Torques at a quarter of the rate, with a time of their own."""
     content = {"t": T, "q1": TH[0], "q2": TH[1], "t_tau": T[FOURTH]}
     content |= {"tau1": TA[0][FOURTH], "tau2": TA[1][FOURTH]}
-    path = folder / f"log.{way}"
-    match way:
-        case "dict":
-            return content
-        case "npz":
-            np.savez(path, **content)
-        case "mat":
-            scipy.io.savemat(path, content)
-        case "h5":
-            with h5py.File(path, "w") as file:
-                for name, values in content.items():
-                    file[name] = values
-        case _:
-            raise CannotSayError
-    return path
+    return _arrays(way, folder, content)
 
 
 def effort_elsewhere() -> list[Message]:

@@ -16,7 +16,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from algid.base.errors import LogError
-from algid.base.limits import LIMITS
 from algid.identification.identify import identify
 from algid.readers import read_log
 from algid.readers.column_names import Name, take_apart
@@ -85,17 +84,6 @@ def test_keys_of_metadata_are_looked_at_up_to_a_bound(limited: Limited) -> None:
     limited(metadata_keys=1)
     assert units_in({"units:a": "deg", "units:q1": "deg"}, ["q1"]) == {}
     assert units_in({"units": '{"a": "deg", "q1": "deg"}'}, ["q1"]) == {}
-
-
-def test_a_table_of_very_many_columns_is_refused(tmp_path: Path, limited: Limited) -> None:
-    limited(columns=5)
-    assert len(read_log(parquet(tmp_path))) == 300
-    for path in (
-        parquet(tmp_path, x=[0.0] * 300),
-        csv(tmp_path, f"{','.join(COLUMNS)},x", *(f"{r},0" for r in ROWS)),
-    ):
-        with pytest.raises(LogError, match=f"more than {LIMITS.columns} columns"):
-            read_log(path)
 
 
 @pytest.mark.parametrize("step", [1, 10, 999])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 import pytest
 
 from algid.base.errors import LogError
@@ -65,19 +64,6 @@ def test_units_of_time_in_names(name: str, unit: str | None) -> None:
     assert origin.reading.time_unit == unit
 
 
-def test_more_joints_than_two_need_a_choice() -> None:
-    columns = ["t", *(f"{name}{joint}" for name in ("q", "tau") for joint in range(7))]
-    with pytest.raises(LogError, match="7 joints"):
-        opened(columns)
-    chosen = opened(columns, {"joints": ["3", "5"]}).origin.mapping
-    assert [chosen[name] for name in ("theta1", "theta2", "tau1", "tau2")] == [
-        "q3",
-        "q5",
-        "tau3",
-        "tau5",
-    ]
-
-
 def test_torques_of_other_joints_are_not_taken() -> None:
     with pytest.raises(LogError, match="no column for tau2; found"):
         opened(["t", "q1", "q2", "tau2", "tau9"])
@@ -131,17 +117,6 @@ def test_dialects(text: str, tmp_path: Path) -> None:
     assert [one for one in found.notices if one.lossy] == (cut if text.endswith("2") else [])
 
 
-def test_list_columns_of_parquet(tmp_path: Path) -> None:
-    lists = {"position": [[0.1, 0.2], [0.3, 0.4]], "effort": [[1.0, 2.0], [3.0, 4.0]]}
-    stamps = pl.Series("timestamp", [1_700_000_000_000_000_000, 1_700_000_000_001_000_000])
-    frame = pl.DataFrame({**lists, "timestamp": stamps.cast(pl.Datetime("ns"))})
-    frame.write_parquet(tmp_path / "log.parquet")
-    found = read_log(tmp_path / "log.parquet")
-    assert found.theta.tolist() == [[0.1, 0.3], [0.2, 0.4]]
-    assert found.tau.tolist() == [[1, 3], [2, 4]]
-    assert found.stamp_ns.tolist() == stamps.to_list()
-
-
 def sorted_stamps(*tables: list[int]) -> tuple[list[int], list[str]]:
     made = [SampleTable(np.array(stamps), {"theta1": np.array(stamps, float)}) for stamps in tables]
     found = list(in_order("log", iter(made)))
@@ -166,13 +141,3 @@ def test_two_recordings_in_one_file_are_not_mixed() -> None:
         sorted_stamps([*range(0, 6000, 2), *range(1, 6000, 2)])
     with pytest.raises(LogError, match="time goes backwards"):
         sorted_stamps(list(range(0, 6000, 2)), list(range(1, 6000, 2)))
-
-
-@pytest.mark.parametrize("joints", [("2", "3"), ("Joint_2", "Joint_3"), ("joint2", "axis 03")])
-def test_joints_are_named_by_their_numbers_or_by_what_columns_begin_with(
-    joints: tuple[str, str],
-) -> None:
-    columns = [f"Joint_{n}_{what}" for n in (1, 2, 3) for what in ("pos", "torque")]
-    found = opened(["time", *columns], {"joints": list(joints)}).origin.mapping
-    assert found["theta1"] == "Joint_2_pos"
-    assert found["tau2"] == "Joint_3_torque"

@@ -4,7 +4,6 @@ log has.
 
 from __future__ import annotations
 
-import random
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ import pytest
 from algid.base.errors import LogError
 from algid.log import Log
 from algid.readers import read_log
-from pipelines.mutations import damage
 
 N = 300
 T = np.arange(N) / 100
@@ -84,24 +82,3 @@ def test_a_type_that_holds_no_numbers_is_refused_where_it_is_needed_alone(
 )
 def test_numbers_of_every_make_are_read(values: pa.Array, tmp_path: Path) -> None:
     assert right(read_log(write(tmp_path / "log.feather", {**LOG, "theta1": values})))
-
-
-@pytest.mark.parametrize("name", ["tau2", "x"])
-def test_two_columns_of_one_name_are_refused(name: str, tmp_path: Path) -> None:
-    columns = {**LOG, "a": T, "b": T}
-    with pytest.raises(LogError, match=f"the column '{name}' stands in the file twice; rename one"):
-        read_log(write(tmp_path / "log.feather", columns, [*list(LOG)[:4], "tau2", name, name]))
-
-
-@pytest.mark.parametrize("packing", [None, "lz4"])
-def test_damaged_bytes_are_refused_or_read(packing: str | None, tmp_path: Path) -> None:
-    content = write(tmp_path / "log.feather", LOG, compression=packing).read_bytes()
-    refused = []
-    for seed in range(150):
-        (tmp_path / "log.feather").write_bytes(damage(content, random.Random(seed)))
-        try:
-            read_log(tmp_path / "log.feather")
-        except LogError as error:
-            refused.append(str(error))
-    assert len(refused) > 30
-    assert not any("\n" in line for line in refused)

@@ -8,7 +8,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Callable
-from datetime import UTC, date, datetime, time, timedelta
+from datetime import UTC, datetime, time, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -153,14 +153,6 @@ def test_an_index_of_dates_without_a_name_is_the_time(name: str, form: str, tmp_
 
 
 @pytest.mark.parametrize("form", WRITERS)
-def test_days_are_no_clock(form: str, tmp_path: Path) -> None:
-    frame = arm(9, 2).with_columns(pl.Series("t", [date(2024, 3, day) for day in range(1, 10)]))
-    WRITERS[form](frame, tmp_path / f"log.{form}")
-    with pytest.raises(LogError, match=r"column 't' for t holds date32.*; expected numbers"):
-        read_log(tmp_path / f"log.{form}")
-
-
-@pytest.mark.parametrize("form", WRITERS)
 def test_a_date_is_no_angle(form: str, tmp_path: Path) -> None:
     frame = arm(9, 2).with_columns(pl.Series("q2", [START] * 9))
     WRITERS[form](frame, tmp_path / f"log.{form}")
@@ -261,57 +253,6 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
         )
         assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
         assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
-
-
-def test_a_look_at_other_joints_does_not_stand_for_the_check_of_all_pages(tmp_path: Path) -> None:
-    """A page of a joint that is read is checked to its last, though its first were looked at
-    before.
-    """
-    path, frame = tmp_path / "log.parquet", arm()
-    pq.write_table(
-        frame.to_arrow(), path, compression="none", use_dictionary=False, write_page_checksum=True
-    )
-    content = bytearray(path.read_bytes())
-    content[content.index(struct.pack("<d", frame["q1"][ROWS - 1]))] ^= 1
-    path.write_bytes(content)
-    reader = open_log(path, Profile(joints=("1", "2")))
-    assert [notice.code for notice in reader.notices] == ["OTHER_JOINTS"]
-    with pytest.raises(LogError, match="CRC checksum"):
-        reader.whole()
-
-
-def test_an_angle_that_is_a_date_holds_no_number(tmp_path: Path) -> None:
-    rows = [f"{row},2024-03-01 00:00:{row:02d},2,3,4" for row in range(10)]
-    (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
-    with pytest.raises(
-        LogError, match=r"column 'q1' for theta1 holds timestamp.*; expected numbers"
-    ):
-        read_log(tmp_path / "log.csv")
-
-
-@pytest.mark.parametrize("gaps", [[], [7], [ROWS - 1], [0, 5, 16_999, 17_000]])
-@pytest.mark.parametrize("kind", [pl.Float64, pl.Float32, pl.Int16])
-@pytest.mark.parametrize("clock", [pl.Float64, pl.Int64])
-def test_plain_columns_are_read_alike_without_polars(
-    gaps: list[int], kind: type[pl.DataType], clock: type[pl.DataType], tmp_path: Path
-) -> None:
-    """A column of lists beside them makes polars read the same numbers."""
-    frame = arm(joints=2).with_row_index()
-    whole = pl.when(~pl.col("index").is_in(gaps))
-    frame = frame.select(
-        (1000 * pl.col("t")).round().cast(clock).alias("t"),
-        whole.then(100 * pl.col("q1")).cast(kind).alias("q1"),
-        *(pl.col(name) for name in ("q2", "tau1", "tau2")),
-    )
-    frame.write_parquet(tmp_path / "plain.parquet", row_group_size=17_000)
-    lists = frame.with_columns(pl.concat_list("q2", "tau1").alias("more"))
-    lists.write_parquet(tmp_path / "lists.parquet", row_group_size=17_000)
-    plain, other = (read_log(tmp_path / f"{name}.parquet") for name in ("plain", "lists"))
-    assert len(plain) == ROWS - len(gaps)
-    np.testing.assert_array_equal(plain.stamp_ns, other.stamp_ns)
-    np.testing.assert_array_equal(plain.theta, other.theta)
-    np.testing.assert_array_equal(plain.tau, other.tau)
-    assert plain.notices == other.notices
 
 
 def test_polars_is_not_imported_for_plain_parquet(tmp_path: Path) -> None:

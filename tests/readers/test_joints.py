@@ -17,7 +17,6 @@ from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.readers.joints import moving_joints
 from algid.readers.table import SampleTable
-from tests.readers.headers import opened
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
 
@@ -55,6 +54,7 @@ IN_ORDER = [
         ("boom", "stick"),
         ("waist", "shoulder"),
     ),
+    *(("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")),
 ]
 UNKNOWN = [
     ("left", "right"),
@@ -112,12 +112,6 @@ def test_joint_states_in_alphabetical_order_are_put_along_the_arm(tmp_path: Path
     assert (reading.joints, reading.joints_told) == (("shoulder", "elbow"), "names")
     (text,) = told(log)
     assert "--joints elbow,shoulder" in text
-
-
-def test_joints_in_order_are_not_spoken_of(tmp_path: Path) -> None:
-    log = read_log(states(tmp_path / "log.mcap", ("shoulder", "elbow")))
-    assert told(log) == []
-    assert log.origin.reading.joints_told == "names"
 
 
 def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> None:
@@ -214,13 +208,6 @@ def test_a_raised_digit_is_no_number(tmp_path: Path) -> None:
     assert ordered(tmp_path, ("axis 3", "axis 2")) == (("axis 2", "axis 3"), "names")
 
 
-@pytest.mark.parametrize(
-    "names", [("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")]
-)
-def test_more_words_of_the_field_tell_the_order(names: tuple[str, str], tmp_path: Path) -> None:
-    assert ordered(tmp_path, names[::-1]) == (names, "names")
-
-
 def moving(unit: float = 1.0, rows: int = 3, **travel: float) -> str | None:
     """What is said of joints that go as far as this and back, with a gap in what was recorded."""
     asked: list[Mapping[str, str]] = []
@@ -267,19 +254,3 @@ def test_joints_that_cannot_be_read_or_were_not_recorded_tell_nothing() -> None:
         raise LogError("torn")
 
     assert moving_joints({"a": "q3"}, none) == moving_joints({"a": "q3"}, torn) == ()
-
-
-def test_a_user_who_says_the_joints_is_not_told_of_their_order() -> None:
-    def columns(*names: str) -> list[str]:
-        return ["t", *(f"/js/{name}/{part}" for name in names for part in ("position", "effort"))]
-
-    log = opened(columns("elbow", "shoulder"))
-    reading = log.origin.reading
-    assert (reading.joints, reading.joints_told) == (("shoulder", "elbow"), "names")
-    assert [(notice.code, notice.note) for notice in log.notices] == [("JOINT_ORDER", True)]
-    told = opened(columns("shoulder", "elbow"), {"joints": ["elbow", "shoulder"]})
-    reading = told.origin.reading
-    assert (reading.joints, reading.joints_told) == (("elbow", "shoulder"), "flag")
-    assert told.notices == ()
-    (unknown,) = opened(columns("left", "right")).notices
-    assert not unknown.note

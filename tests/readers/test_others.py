@@ -78,19 +78,3 @@ def test_joints_with_names_are_told_by_them(position: str, tmp_path: Path) -> No
     frame.write_csv(tmp_path / "log.csv")
     (text,) = _told(tmp_path / "log.csv", Profile(joints=("shoulder", "elbow")))
     assert "1 other joint moves meanwhile: wrist by 0.6 rad" in text
-
-
-def test_what_cannot_be_read_of_other_joints_takes_nothing_from_the_two(tmp_path: Path) -> None:
-    frame = _arm("q{}", "tau{}", ("1", "2", "3", "4")).with_columns(pl.lit("n/a").alias("q4"))
-    frame.write_ipc(tmp_path / "log.feather")
-    assert _told(tmp_path / "log.feather", Profile(joints=("2", "3"))) == []
-    frame.write_parquet(tmp_path / "log.parquet")
-    assert _told(tmp_path / "log.parquet", Profile(joints=("2", "3"))) == []
-
-
-def test_a_two_jointed_log_tells_nothing(tmp_path: Path) -> None:
-    frame = _arm("q{}", "tau{}", ("1", "2", "3", "4")).select("time", "q2", "q3", "tau2", "tau3")
-    frame.rename({"q2": "q1", "q3": "q2", "tau2": "tau1", "tau3": "tau2"}).write_csv(
-        tmp_path / "log.csv"
-    )
-    assert _told(tmp_path / "log.csv", Profile()) == []

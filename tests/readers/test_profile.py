@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from algid.base.errors import LogError, SettingError
+from algid.base.errors import SettingError
 from algid.base.ros2 import HEADER
 from algid.log import Log
 from algid.profile import Profile, load_profile
@@ -51,43 +51,6 @@ def test_units_signs_and_offsets(tmp_path: Path) -> None:
     assert np.allclose(found.tau[0], log.tau[0] * 1e-3, rtol=1e-15)
     assert np.allclose(found.tau[1], log.tau[1] * 0.45 + 0.1, rtol=1e-14)
     assert np.allclose(found.omega[0], -log.omega[0] * 2 * math.pi / 60, rtol=1e-15)
-
-
-def test_zero_and_reference(tmp_path: Path) -> None:
-    log, found = read_with(tmp_path, zero="hanging", second_angle="absolute")
-    assert np.allclose(found.theta[0], log.theta[0] - math.pi / 2, atol=1e-15)
-    assert np.allclose(found.theta[1], log.theta[1] - log.theta[0], atol=1e-15)
-
-
-def test_unwrapping_across_blocks(tmp_path: Path) -> None:
-    t = np.arange(300_000) * 1e-3
-    turning = 0.5 * t
-    log = noise_log(t.size)
-    wrapped = np.stack([np.angle(np.exp(1j * turning)), np.zeros_like(t)])
-    write_log(tmp_path / "log.parquet", Log(log.stamp_ns, wrapped, log.tau, log.origin))
-    found = read_log(tmp_path / "log.parquet", Profile.model_validate({"theta1": {"unwrap": True}}))
-    # the phase of a unit vector is good to a few units in the last place of π
-    assert np.abs(found.theta[0] - turning).max() < 1e-12
-
-
-def test_named_columns_and_time_unit(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("ms;a;b;c;d\n1;0,5;1;2;3\n2;0,25;1;2;3\n")
-    names = dict(zip(("theta1", "theta2", "tau1", "tau2"), "abcd", strict=True))
-    settings = {name: {"source": column} for name, column in names.items()}
-    profile = Profile.model_validate({"time": "ms", "time_unit": "ms", **settings})
-    found = read_log(tmp_path / "log.csv", profile)
-    assert found.stamp_ns.tolist() == [1_000_000, 2_000_000]
-    assert found.theta.tolist() == [[0.5, 0.25], [1, 1]]
-
-
-def test_currents_need_a_torque_constant(tmp_path: Path) -> None:
-    header = "timestamp,actual_q_0,actual_q_1,actual_current_0,actual_current_1\n"
-    (tmp_path / "log.csv").write_text(header + "0,0,1,2,3\n0.1,0,1,2,3\n")
-    with pytest.raises(LogError, match=r"current.*torque_constant"):
-        read_log(tmp_path / "log.csv")
-    settings = {name: {"torque_constant": 2.0} for name in ("tau1", "tau2")}
-    found = read_log(tmp_path / "log.csv", Profile.model_validate(settings))
-    assert found.tau.tolist() == [[4, 4], [6, 6]]
 
 
 def test_signals_on_several_topics_are_aligned(tmp_path: Path) -> None:

@@ -134,16 +134,6 @@ def test_times_beyond_int64_nanoseconds_are_refused(
         read_log(tmp_path / "log")
 
 
-@pytest.mark.parametrize("kind", WRITERS)
-@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
-def test_durations_and_dates_within_are_exact(kind: str, unit: str, tmp_path: Path) -> None:
-    ns = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}[unit]
-    for make, first in ((pa.duration, -7), (pa.timestamp, 1_700_000_000 * 10**9 // ns)):
-        whole = np.arange(N) * max(1, 10**7 // ns) + first
-        WRITERS[kind](pa.table({"t": pa.array(whole, make(unit)), **signals(T)}), tmp_path / "log")
-        assert np.array_equal(read_log(tmp_path / "log").stamp_ns, whole * ns)
-
-
 def test_numpy_times_beyond_int64_are_refused(tmp_path: Path) -> None:
     times = np.arange(N, dtype=np.uint64) * np.uint64(10**7) + np.uint64(1 << 63)
     arrays: dict[str, Any] = {"t": times, **signals(T)}

@@ -12,7 +12,6 @@ import zstandard
 
 from algid.api.guide import text_of
 from algid.base.errors import LogError
-from algid.readers import read_log
 from algid.readers.dialect import Dialect, detect, split
 from algid.readers.formats import FORMATS, SUFFIXES, format_of
 from algid.readers.text import looks_like_text
@@ -161,24 +160,6 @@ def test_a_row_of_units_and_comments_above_and_below_it() -> None:
 def test_cells_in_quotes() -> None:
     assert split('"a, b" , c,"d ""e"""', ",") == ["a, b", "c", 'd "e']
     assert split('"a" b', "") == ["a", "b"]
-
-
-def test_a_row_of_too_many_cells_is_told_by_its_number(tmp_path: Path) -> None:
-    rows = [f"{place},2,3,4,5" for place in range(40)]
-    (tmp_path / "log.csv").write_text(
-        "\n".join(["t,q1,q2,tau1,tau2", *rows, "1,2,3,4,5,6", *rows]) + "\n"
-    )
-    with pytest.raises(LogError, match="row 41 has more cells than the header's 5; mend that row"):
-        read_log(tmp_path / "log.csv")
-
-
-def test_a_cell_that_is_no_number_is_told_by_its_column(tmp_path: Path) -> None:
-    rows = [f"{place},2,3,{'off' if place == 30 else 4},5" for place in range(600)]
-    (tmp_path / "log.csv").write_text("\n".join(["t,q1,q2,tau1,tau2", *rows]) + "\n")
-    with pytest.raises(
-        LogError, match="column 'tau1', past row 0: expected a number, found 'off'; mend the file"
-    ):
-        read_log(tmp_path / "log.csv")
 
 
 def test_each_format_is_one_entry() -> None:

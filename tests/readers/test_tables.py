@@ -40,11 +40,6 @@ def test_a_row_of_units_under_the_header(units: str, tmp_path: Path) -> None:
     assert len(log) == 3
 
 
-def test_a_foreign_unit_under_the_header_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="'inch', which is no unit of a joint"):
-        read_log(written(tmp_path, text_of(ROWS, units="s,rad,rad,inch,Nm")))
-
-
 @pytest.mark.parametrize(
     "above",
     [
