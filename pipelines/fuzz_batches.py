@@ -34,7 +34,6 @@ from algid.base.errors import AlgidError
 from algid.base.files import refuse_links, whole_folder
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
-from algid.batches.job import failed_record
 from algid.batches.records import JobStatus, stat_of
 from algid.batches.run import Batch, BatchConfig, sweep
 from algid.settings import Settings
@@ -65,9 +64,9 @@ class AtOnce(Executor):
             inputs = tuple(
                 replace(stat_of(path), sha256="c") for path in (*task.job.logs, *task.job.loaded)
             )
-            future.set_result(failed_record(task, "as asked", status, inputs=inputs))
+            future.set_result(task.record(status, "as asked", inputs=inputs))
         except AlgidError as error:
-            future.set_result(failed_record(task, str(error)))
+            future.set_result(task.record(JobStatus.FAILED, str(error)))
         return future
 
 

@@ -269,7 +269,11 @@ def misfit(error: ValidationError) -> tuple[str, str]:
     else:  # a unit or a code keeps its capitals
         words = first["msg"].partition(", unable to parse")[0]
         said = f"{words[:1].lower()}{words[1:]}".replace("input should be", "expected", 1)
-    return place, f"{said}, found {reprlib.repr(first['input']):.60}{more}"
+    try:
+        found = reprlib.repr(first["input"])
+    except ValueError:  # Python prints no whole number of more than 4,300 digits
+        found = "a number of too many digits"
+    return place, f"{said}, found {found:.60}{more}"
 
 
 EXISTS = (

@@ -13,7 +13,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from urllib.parse import unquote
@@ -76,29 +76,27 @@ Found = tuple[str, str, str | None]
 
 def _logs(source: str, out: str, links: list[str]) -> list[Found]:
     """The logs of a source."""
-    logs: list[Found] = []
     if is_url(source):
         own = _written_by_batch(source, out)
-        for url, name in list_urls(source):
-            if _is_log(name) and not own(name):
-                logs.append((url, _stem(name), None))
-        return logs
-    path = Path(source)
+        below = list_urls(source)
+        logs = [(url, name) for url, name in below if name.lower().endswith(SUFFIXES)]
+        return [(url, _stem(name), None) for url, name in logs if not own(name)]
+    path, start = Path(source), None
     if path.is_dir() and not _is_bag(path):
-        for one in _walk(path, out, links):
-            if one.trouble or one.bag or _is_log(one.name):
-                logs.append(_below(path, one))
-        return logs
-    if path.exists():
-        matches = [_File(source, _is_bag(path))]
+        start = len(str(path)) + 1
+        found = [one for one in _walk(path, out, links) if one[1] or _is_log(one[0])]
+    elif path.exists():
+        found = [(source, None)]
     else:
-        matches = list(_matches(source, out, links))
-    if not matches:
-        raise SettingError(f"{source}: there is no such file, folder or match; check the name")
-    for one in matches:
-        if one.bag or not Path(one.path).is_dir():
-            logs.append((one.path, _stem(one.name), one.trouble))
-    return logs
+        found = list(_matches(source, out, links))
+        if not found:
+            raise SettingError(f"{source}: there is no such file, folder or match; check the name")
+        found = [one for one in found if _is_bag(Path(one[0])) or not Path(one[0]).is_dir()]
+    named: list[Found] = []
+    for one, trouble in found:
+        name = one.rpartition("/")[2] if start is None else one[start:]
+        named.append((one, name if trouble else _stem(name), trouble))
+    return named
 
 
 def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
@@ -121,30 +119,11 @@ def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
     return own
 
 
-@dataclass(frozen=True)
-class _File:
-    """A file or a bag that was come by, or a folder in which nobody may look, for its `trouble`."""
+def _walk(folder: Path, out: str, links: list[str]) -> Iterator[tuple[str, str | None]]:
+    """Files and bags below a folder, and folders in which nobody may look with the reason why.
 
-    path: str
-    bag: bool = False
-    trouble: str | None = None
-
-    @property
-    def name(self) -> str:
-        return self.path.rpartition("/")[2]
-
-
-def _below(folder: Path, one: _File) -> Found:
-    name = one.path[len(str(folder)) + 1 :]
-    if not one.trouble:
-        name = _stem(name)
-    return one.path, name, one.trouble
-
-
-def _walk(folder: Path, out: str, links: list[str]) -> Iterator[_File]:
-    """Files below a folder; hidden ones, results and what lies in `out` are passed over.
-
-    Links to folders are not entered, but added to `links`.
+    Hidden ones, results and what lies in `out` are passed over. Links to folders are not entered,
+    but added to `links`.
 
     Raises
     ------
@@ -155,24 +134,27 @@ def _walk(folder: Path, out: str, links: list[str]) -> Iterator[_File]:
     for place, folders, names in os.walk(folder, onerror=unreadable.append):
         if BAG in names and place != str(folder):
             folders.clear()
-            yield _File(place, bag=True)
+            yield place, None
             continue
         inner = list[str]()
         for name in folders:
             path = f"{place}/{name}"
             if name.startswith(".") or name.endswith(".algid") or _is_same(path, out):
                 continue
-            (links if os.path.islink(path) else inner).append(path)  # noqa: PTH114
-        folders[:] = [path.rpartition("/")[2] for path in inner]
+            if os.path.islink(path):  # noqa: PTH114
+                links.append(path)
+            else:
+                inner.append(name)
+        folders[:] = inner
         for name in sorted(names):
             if not name.startswith(".") and (name != TABLE or not _is_same(place, out)):
-                yield _File(f"{place}/{name}")
+                yield f"{place}/{name}", None
     for error in unreadable:
         place = str(error.filename)
         if place == str(folder):
             raise error
         trouble = f"{redacted_path(place)}: cannot look there ({error.strerror}); check its rights"
-        yield _File(place, trouble=trouble)
+        yield place, trouble
 
 
 def _is_same(folder: str, other: str) -> bool:
@@ -181,21 +163,18 @@ def _is_same(folder: str, other: str) -> bool:
     return False
 
 
-def _matches(pattern: str, out: str, links: list[str]) -> Iterator[_File]:
+def _matches(pattern: str, out: str, links: list[str]) -> Iterator[tuple[str, str | None]]:
     """Files and bags that a pattern names; ``**`` goes through folders as `_walk` does."""
     parts = Path(pattern).parts
     first = parts.index("**") if "**" in parts else len(parts)
     # a pattern may be absolute
-    paths = sorted(glob.glob(str(Path(*parts[:first]))))  # noqa: PTH207
-    for match in paths:
-        folder = Path(match)
+    for match in sorted(glob.glob(str(Path(*parts[:first])))):  # noqa: PTH207
         if first == len(parts):
-            yield _File(match, _is_bag(folder))
-        elif folder.is_dir():
-            for one in _walk(folder, out, links):
-                below = Path(one.path).relative_to(folder).parts
-                if not one.trouble and _fits(below, parts[first:]):
-                    yield one
+            yield match, None
+        elif Path(match).is_dir():
+            for path, trouble in _walk(Path(match), out, links):
+                if not trouble and _fits(Path(path).relative_to(match).parts, parts[first:]):
+                    yield path, None
 
 
 def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
@@ -211,8 +190,8 @@ def _is_bag(path: Path) -> bool:
     return path.is_dir() and (path / BAG).is_file()
 
 
-def _is_log(name: str) -> bool:
-    return name.lower().endswith(SUFFIXES)
+def _is_log(path: str) -> bool:
+    return path.lower().endswith(SUFFIXES) or _is_bag(Path(path))
 
 
 def _stem(name: str) -> str:
@@ -220,40 +199,30 @@ def _stem(name: str) -> str:
     return name[: len(name) - len(suffix)]
 
 
-def _paired(logs: Iterable[Found], alone: str) -> list[Job]:
-    """A job for each name of logs that differ in their role alone."""
+def _paired(found: Iterable[Found], alone: str) -> list[Job]:
+    """A job for each name of logs that differ in their role alone.
+
+    One whose name is unfit stands under another.
+    """
     jobs: dict[str, Job] = {}
-    for path, stem, trouble in logs:
-        name, role = stem, alone
+    for path, stem, trouble in found:
         match = _ROLE.fullmatch(stem)
-        if match:
-            name, role = match["base"], match["role"]
-        job = _job(name, path, loaded=role == "loaded", trouble=trouble)
-        if job.name in jobs:
-            job = _together(jobs[job.name], job)
-        jobs[job.name] = job
-    return list(jobs.values())
-
-
-def _job(name: str, path: str, *, loaded: bool, trouble: str | None) -> Job:
-    """The job of one log, under a name that can stand for its own where that is unfit."""
-    if not trouble:
-        fault = name_fault(name)
+        name, role = (match["base"], match["role"]) if match else (stem, alone)
+        fault = None if trouble else name_fault(name)
         if fault is not None:
             trouble = f"{redacted_path(path)}: a log's name becomes a folder's: {fault}; rename it"
-    if trouble:
-        return Job(safe_name(name), logs=(path,), trouble=trouble)
-    robot = name.rpartition("/")[0] or None
-    if loaded:
-        return Job(name, loaded=(path,), robot=robot)
-    return Job(name, logs=(path,), robot=robot)
-
-
-def _together(first: Job, second: Job) -> Job:
-    """One job of the arm's logs without and with payload."""
-    if first.trouble or (first.logs and second.logs) or (first.loaded and second.loaded):
-        return _of_one_name(first, second)
-    return replace(first, logs=first.logs + second.logs, loaded=first.loaded + second.loaded)
+        if trouble:
+            job = Job(safe_name(name), logs=(path,), trouble=trouble)
+        else:
+            logs, loaded = ((), (path,)) if role == "loaded" else ((path,), ())
+            job = Job(name, logs, loaded, robot=name.rpartition("/")[0] or None)
+        first = jobs.get(job.name)
+        if first and (first.trouble or (first.logs and job.logs) or (first.loaded and job.loaded)):
+            job = _of_one_name(first, job)
+        elif first:
+            job = replace(first, logs=first.logs + job.logs, loaded=first.loaded + job.loaded)
+        jobs[job.name] = job
+    return list(jobs.values())
 
 
 def _of_one_name(first: Job, second: Job) -> Job:

@@ -8,21 +8,21 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import shutil
 import time
-from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
-from algid.base.errors import AlgidError, chain_of, text_of
+from algid.base.errors import AlgidError, LogError, chain_of, text_of
 from algid.base.files import refuse_links, temporary_folder
 from algid.base.runtime import keep_freed, keep_to_one_core
-from algid.base.stores import is_url, open_store, put_folder
-from algid.batches.fetch import errors_name_url, staged
+from algid.base.stores import is_url, open_store, public, put_folder, reading
 from algid.batches.jobs import Job, redacted_path
-from algid.batches.records import Input, JobRecord, JobStatus, estimates_of, hash_of, stat_of
+from algid.batches.records import Input, JobRecord, JobStatus, hash_of, stat_of
 from algid.identification.identify import identify
 from algid.identification.open_logs import Staged
 from algid.options import flag
@@ -30,12 +30,12 @@ from algid.results import Result
 from algid.settings import Settings
 
 if TYPE_CHECKING:
-    from algid.base.verdict import Verdict
     from algid.profile import Profile
 
 NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
 NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own
 TOO_LARGE = f"it needs more memory than a worker has; raise {flag('memory_limit')}"
+_PIECE = 1 << 23
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,31 @@ class Task:
     """
 
     job: Job
-    basis: str
     settings: Settings
     profile: Profile | None
     parameters: Result | None
     out: str
     report: bool
+
+    @cached_property
+    def basis(self) -> str:
+        """A hash of everything but the logs that decides the job's outcome."""
+        models = {"profile": self.profile, "parameters": self.parameters}
+        content: dict[str, Any] = {
+            name: one and one.model_dump(mode="json") for name, one in models.items()
+        }
+        content |= {"settings": self.settings.as_json(), "report": self.report}
+        content["version"] = __version__
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def record(self, status: JobStatus, reason: str, **known: Any) -> JobRecord:
+        """The job's record; `known` are other fields of it."""
+        if "inputs" not in known:
+            known["inputs"] = inputs_of(self.job)
+        job, settings = redacted(self.job), self.settings.as_json()
+        return JobRecord(
+            job, status, reason, self.basis, settings=settings, version=__version__, **known
+        )
 
 
 def run_task(task: Task) -> JobRecord | DiskFull:
@@ -77,15 +96,24 @@ def run_task(task: Task) -> JobRecord | DiskFull:
             return DiskFull(text_of(error))
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
         inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
-        return failed_record(task, reason, inputs=inputs, seconds=time.perf_counter() - start)
-    judged = result.verdict
-    status, reason = _end(result)
-    hashes = {log.path: log.sha256 for log in result.logs}
-    return _record(
-        task,
+        seconds = time.perf_counter() - start
+        return task.record(JobStatus.FAILED, reason, inputs=inputs, seconds=seconds)
+    judged, hashes = result.verdict, {log.path: log.sha256 for log in result.logs}
+    status, reason = JobStatus.OK, ""
+    lacking = ["samples were lost"] if result.data_lost else []
+    for name, one in result.estimates.items():
+        if not one.measured:
+            lacking.append(f"{name} {one.status.value}")
+    if judged.failed:
+        status, reason = JobStatus.FAILED, judged.sentence
+        if judged.reasons and judged.reasons[0].text not in reason:
+            reason += f" {judged.reasons[0].text}"
+    elif lacking:
+        status, reason = JobStatus.INCOMPLETE, "; ".join(lacking)
+    return task.record(
+        status,
+        reason,
         inputs=tuple(replace(one, sha256=hashes.get(one.path)) for one in inputs),
-        status=status,
-        reason=reason,
         seconds=time.perf_counter() - start,
         start_ns=result.log.start_ns,
         log_seconds=sum(log.duration for log in result.logs),
@@ -94,31 +122,11 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         headline=judged.headline,
         reasons=tuple(f"{one.code}: {one.sentence}" for one in judged.reasons),
         command=judged.command,
-        estimates=estimates_of(result),
+        estimates={
+            name: (one.estimate, one.std, one.status.value)
+            for name, one in result.estimates.items()
+        },
     )
-
-
-def _end(result: Result) -> tuple[JobStatus, str]:
-    """How a job that gave a result ended, and why, where all is not well."""
-    if result.verdict.failed:
-        return JobStatus.FAILED, _first_reason(result.verdict)
-    lacking = []
-    if result.data_lost:
-        lacking.append("samples were lost")
-    for name, one in result.estimates.items():
-        if not one.measured:
-            lacking.append(f"{name} {one.status.value}")
-    if lacking:
-        return JobStatus.INCOMPLETE, "; ".join(lacking)
-    return JobStatus.OK, ""
-
-
-def _first_reason(judged: Verdict) -> str:
-    """Why a result must not be used."""
-    reason = judged.sentence
-    if judged.reasons and judged.reasons[0].text not in reason:
-        reason += f" {judged.reasons[0].text}"
-    return reason
 
 
 def is_full(error: BaseException) -> bool:
@@ -128,69 +136,44 @@ def is_full(error: BaseException) -> bool:
     return not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain)
 
 
-def failed_record(
-    task: Task, reason: str, status: JobStatus = JobStatus.FAILED, **known: Any
-) -> JobRecord:
-    """The record of a task without result; `known` are other fields of it."""
-    known.setdefault("inputs", inputs_of(task.job))
-    return _record(task, status=status, reason=reason, **known)
-
-
 def redacted(job: Job) -> Job:
     """A job as records hold it: its URLs without credentials."""
-    profile = job.profile
-    if profile is not None:
-        profile = redacted_path(profile)
-    return replace(
-        job,
-        logs=tuple(map(redacted_path, job.logs)),
-        loaded=tuple(map(redacted_path, job.loaded)),
-        profile=profile,
-    )
-
-
-def _record(task: Task, **known: Any) -> JobRecord:
-    return JobRecord(
-        job=redacted(task.job),
-        basis=task.basis,
-        settings=task.settings.as_json(),
-        version=__version__,
-        **known,
-    )
+    logs, loaded = (tuple(map(redacted_path, paths)) for paths in (job.logs, job.loaded))
+    profile = job.profile and redacted_path(job.profile)
+    return replace(job, logs=logs, loaded=loaded, profile=profile)
 
 
 def inputs_of(job: Job) -> tuple[Input, ...]:
-    """The job's logs as they are now, not hashed."""
-    return tuple(map(_looked_at, job.logs + job.loaded))
+    """The job's logs as they are now, not hashed.
 
-
-def _looked_at(path: str) -> Input:
-    """A log as it is now.
-
-    As one that is not there where it cannot be looked at: its reader says why.
+    One that cannot be looked at is as one that is not there: its reader says why.
     """
-    try:
-        return stat_of(path)
-    except AlgidError:
-        return Input(redacted_path(path), 0, 0)
+    found = []
+    for path in job.logs + job.loaded:
+        try:
+            found.append(stat_of(path))
+        except AlgidError:
+            found.append(Input(redacted_path(path), 0, 0))
+    return tuple(found)
 
 
 def _identified(task: Task) -> Result:
     """Identify; what lies in an object store is fetched before and put there after."""
-    paths = task.job.logs + task.job.loaded + (task.out,)
+    paths = task.job.logs + task.job.loaded
     away = is_url(task.out)
     if not away:
         refuse_links(Path(task.out), task.job.name)
-    with temporary_folder() if any(map(is_url, paths)) else nullcontext(Path()) as stage:
+    remote = any(map(is_url, (*paths, task.out)))
+    with temporary_folder() if remote else nullcontext(Path()) as stage:
         place = (stage if away else Path(task.out)) / task.job.name
-        logs = _fetched(task.job.logs, stage / "logs")
-        loaded = _fetched(task.job.loaded, stage / "loaded")
-        with errors_name_url(
-            {log.path: log.url for log in logs + loaded if isinstance(log, Staged)}
-        ):
+        logs: list[str | Staged] = []
+        for number, path in enumerate(paths):
+            logs.append(fetched(path, stage / f"logs/{number}") if is_url(path) else path)
+        first_loaded = len(task.job.logs)
+        try:
             result = identify(
-                logs,
-                loaded,
+                logs[:first_loaded],
+                logs[first_loaded:],
                 task.settings,
                 parameters=task.parameters,
                 profile=task.profile,
@@ -200,42 +183,40 @@ def _identified(task: Task) -> Result:
                 report=task.report,
                 shared_library=not away,
             )
+        except AlgidError as error:  # which names the copies
+            text = str(error)
+            for log in logs:
+                text = text.replace(str(log.path), log.url) if isinstance(log, Staged) else text
+            raise type(error)(text) from error
         if away:
-            put_folder(
-                open_store(task.out),
-                f"{task.job.name}.algid",
-                place.with_name(f"{place.name}.algid"),
-            )
+            name = f"{task.job.name}.algid"
+            put_folder(open_store(task.out), name, place.with_name(f"{place.name}.algid"))
         return result
 
 
-def _fetched(paths: Sequence[str], folder: Path) -> list[str | Staged]:
-    """Logs as they can be read on this machine."""
-    here: list[str | Staged] = []
-    for number, path in enumerate(paths):
-        if is_url(path):
-            here.append(staged(path, folder / str(number)))
-        else:
-            here.append(path)
-    return here
+def fetched(url: str, folder: Path) -> Staged:
+    """A copy of a log of an object store in `folder`.
 
+    Requests for parts of an object tell nothing of each other: where it was replaced between two
+    of them, what was fetched is of neither. Therefore it is looked at again.
 
-def basis_of(
-    settings: Mapping[str, Any], profile: Profile | None, parameters: Result | None, report: bool
-) -> str:
-    """A hash of everything but the logs that decides a job's outcome."""
-    content = {
-        "settings": settings,
-        "profile": _content(profile),
-        "parameters": _content(parameters),
-        "report": report,
-        "version": __version__,
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def _content(one: Profile | Result | None) -> dict[str, Any] | None:
-    """A profile or a result as JSON holds it."""
-    if one is None:
-        return None
-    return one.model_dump(mode="json")
+    Raises
+    ------
+    LogError
+        If there is no such object, it cannot be read, or another took its place meanwhile.
+    """
+    with reading(url) as (filesystem, path):
+        folder.mkdir(parents=True, exist_ok=True)
+        copy, failure = folder / path.rpartition("/")[2], None
+        with filesystem.open_input_file(path) as source, copy.open("wb") as target:
+            version = source.metadata()
+            try:
+                shutil.copyfileobj(source, target, _PIECE)
+            except OSError as error:
+                failure = error
+        with filesystem.open_input_file(path) as again:
+            if again.metadata() != version:
+                raise LogError(f"{url}: it was replaced while it was read; run again") from failure
+        if failure is not None:
+            raise failure
+    return Staged(copy, public(url))

@@ -10,7 +10,6 @@ from typing import Annotated
 
 from pydantic import Field
 
-from algid.base.errors import SettingError
 from algid.base.limits import LIMITS
 from algid.base.stores import public
 
@@ -20,24 +19,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Label = str | Finite | Int64 | bool
 TABLE = "jobs.parquet"
 """The table of all jobs, in OUT."""
-COLUMNS = frozenset(
-    {
-        *(
-            "job",
-            "robot",
-            "time",
-            "status",
-            "reason",
-            "seconds",
-            "log_seconds",
-            "estimator",
-            "version",
-            "settings",
-        ),
-        *("logs", "sha256", "size", "changed", "verdict", "headline", "reasons", "command"),
-    }
-)
-"""Columns that every table has."""
+_TAKEN = (".algid", ".json")
+"""Of results and records: as folders they would lie in one another."""
 
 
 @dataclass(frozen=True)
@@ -71,42 +54,16 @@ def name_fault(name: str) -> str | None:
 
     None where they can.
     """
-    *folders, _ = parts = name.split("/")
+    parts = name.split("/")
     for part in parts:
-        if (
-            not part
-            or part.startswith(".")
-            or not part.isprintable()
-            or "\\" in part
-            or _bytes(part) > 200
-        ):
+        odd = not part.isprintable() or part.startswith(".") or "\\" in part
+        if odd or not 0 < len(part.encode(errors="surrogatepass")) <= 200:
             return "expected parts of 1 to 200 printable characters, none starting with a dot"
-    if _bytes(name) > LIMITS.name_bytes:
+    if len(name.encode()) > LIMITS.name_bytes:
         return f"expected at most {LIMITS.name_bytes} bytes"
-    if any(part.lower().endswith(".algid") for part in folders) or folders[:1] == [TABLE]:
-        return (
-            f"expected no folder that ends in .algid, and none that is {TABLE}: these are results"
-        )
+    if parts[0] == TABLE or any(part.lower().endswith(_TAKEN) for part in parts[:-1]):
+        return f"expected no folder that is {TABLE} or ends in {' or '.join(_TAKEN)}: algid's own"
     return None
-
-
-def _bytes(name: str) -> int:
-    return len(name.encode(errors="surrogatepass"))
-
-
-def checked_name(name: str, place: str) -> str:
-    """`name`, once its file certainly lies within OUT and does not replace that of another job.
-
-    Raises
-    ------
-    SettingError
-        If a part of it is empty, starts with a dot, or holds what no file name should; if it is
-        too long, or lies within another job's result.
-    """
-    fault = name_fault(name)
-    if fault is not None:
-        raise SettingError(f"{place}: a job's name becomes a folder's: {fault}, found {name!r:.60}")
-    return name
 
 
 def safe_name(name: str) -> str:

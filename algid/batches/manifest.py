@@ -10,18 +10,20 @@ from __future__ import annotations
 import csv
 import io
 import math
-import reprlib
-from collections.abc import Mapping
 from datetime import date, datetime
 from datetime import time as clock
 from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
+from pydantic_core import PydanticCustomError
 
 from algid.base.errors import SettingError
-from algid.base.files import parsed_toml, read_start, read_text
+from algid.base.files import first_misfit, parsed_toml, read_start, read_text
 from algid.base.limits import LIMITS
 from algid.base.text import visible
 from algid.base.words import repeated
-from algid.batches.jobs import Job, Label, checked_name, utc_of
+from algid.batches.jobs import Job, Label, name_fault, utc_of
 
 
 def is_manifest(path: Path) -> bool:
@@ -44,11 +46,9 @@ def read_manifest(path: Path) -> list[Job]:
     SettingError
         If it cannot be read or a row is wrong.
     """
+    kind = "job" if path.suffix.lower() == ".toml" else "row"
     try:
-        if path.suffix.lower() == ".toml":
-            kind, rows = "job", _tables(path)
-        else:
-            kind, rows = "row", _rows(path)
+        rows = _tables(path) if kind == "job" else _cells(path)
     except (OSError, csv.Error, ValueError, RecursionError) as error:
         raise SettingError(
             f"{path}: the manifest cannot be read ({error!s:.200}); mend it"
@@ -60,27 +60,30 @@ def read_manifest(path: Path) -> list[Job]:
         )
     jobs = []
     for number, row in enumerate(rows, start=1):
-        jobs.append(_job(row, f"{path}: {kind} {number}", path.parent))
+        why = f"expected a name and logs, found {', '.join(row) or 'nothing'}"
+        if "name" in row and row.keys() & {"logs", "loaded"}:
+            try:
+                jobs.append(_Row.model_validate(row).job(path.parent))
+                continue
+            except ValidationError as error:
+                why = first_misfit(error)
+        raise SettingError(f"{path}: {kind} {number}: {visible(why, 300)}")
     return jobs
 
 
-def _tables(path: Path) -> list[dict[str, object]]:
+def _tables(path: Path) -> list[dict[str, Any]]:
     content = parsed_toml(read_text(path))
     rows = content.get("job")
-    if (
-        set(content) != {"job"}
-        or not isinstance(rows, list)
-        or not all(isinstance(row, dict) for row in rows)
-    ):
-        keys = ", ".join(content) or "nothing"
-        raise SettingError(f"{path}: expected tables [[job]] alone, found {visible(keys, 200)}")
-    return rows
+    tables = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
+    if set(content) != {"job"} or not tables:
+        keys = visible(", ".join(content) or "nothing", 200)
+        raise SettingError(f"{path}: expected tables [[job]] alone, found {keys}")
+    return rows  # type: ignore[return-value]
 
 
-def _rows(path: Path) -> list[dict[str, object]]:
+def _cells(path: Path) -> list[dict[str, Any]]:
     reader = csv.DictReader(io.StringIO(read_text(path, "utf-8-sig")))
-    header = reader.fieldnames or ()
-    twice = repeated(filter(None, header))
+    twice = repeated(filter(None, reader.fieldnames or ()))
     if twice:
         raise SettingError(f"{path}: two columns are named {twice[0]!r:.60}; rename one")
     cells = list(reader)
@@ -91,111 +94,76 @@ def _rows(path: Path) -> list[dict[str, object]]:
     return [{name: cell for name, cell in row.items() if cell} for row in cells]
 
 
-def _job(row: Mapping[str, object], place: str, folder: Path) -> Job:
-    logs, loaded = _paths(row, "logs", place, folder), _paths(row, "loaded", place, folder)
-    if "name" not in row or not (logs or loaded):
-        columns = ", ".join(row) or "nothing"
-        raise SettingError(f"{place}: expected a name and logs, found {visible(columns, 200)}")
-    profile = _paths(row, "profile", place, folder)
-    labels = {}
-    for name in row:
-        if name not in ("logs", "loaded", "profile"):
-            label = _label(row, name, place)
-            if name not in ("name", "robot", "time"):
-                labels[name] = label
-    own_name = checked_name(_text(row, "name", place), place)
-    time = None
-    if row.get("time") is not None:
-        time = _time(str(row["time"]), place)
-    robot = None
-    if row.get("robot") is not None:
-        robot = _text(row, "robot", place)
-    return Job(
-        name=own_name,
-        logs=logs,
-        loaded=loaded,
-        profile=profile[0] if profile else None,
-        robot=robot,
-        time=time,
-        labels=labels,
-    )
-
-
-def _text(row: Mapping[str, object], name: str, place: str) -> str:
-    """A cell's text as it stands, or that of what it means."""
-    cell = row[name]
-    if isinstance(cell, str):
-        return cell
-    return str(_label(row, name, place))
-
-
-def _time(text: str, place: str) -> str:
-    try:
-        utc_of(text)
-        return datetime.fromisoformat(text).isoformat()
-    except ValueError as error:
-        expected = "expected ISO 8601 like 2026-01-31T12:00:00Z, from 1970 to 2261"
-        raise SettingError(f"{place}: time: {expected}, found {text!r:.60}") from error
-
-
-def _label(row: Mapping[str, object], name: str, place: str) -> Label:
-    try:
-        return label_of(row[name])
-    except ValueError as error:
-        expected = "expected text, a date, true, false or a finite number, whole ones of 64 bits"
-        kind = type(row[name]).__name__
-        raise SettingError(
-            f"{place}: {repr(name)[1:-1]:.60}: {expected}, found another {kind}"
-        ) from error
-
-
 def label_of(value: object) -> Label:
     """A manifest's value: a number where it reads like a finite one, text otherwise.
 
     Raises
     ------
-    ValueError
+    PydanticCustomError
         If it is neither text, a date, a truth value nor a finite number, or a whole one beyond 64
         bits.
     """
     if isinstance(value, str):
-        return _number_in(value)
-    if isinstance(value, bool):
-        return value
+        try:
+            number = float(value)
+        except ValueError:
+            return value
+        return number if math.isfinite(number) else value
     if isinstance(value, date | clock):
         return str(value)
-    if isinstance(value, int) and -(2**63) <= value < 2**63:
-        return value
-    if isinstance(value, float) and math.isfinite(value):
-        return value
-    raise ValueError(type(value).__name__)
+    whole = isinstance(value, int) and -(2**63) <= value < 2**63
+    if whole or (isinstance(value, float) and math.isfinite(value)):
+        return value  # type: ignore[return-value]
+    expected = "text, a date, true, false or a finite number, whole ones of 64 bits"
+    raise PydanticCustomError("label", f"expected {expected}")
 
 
-def _number_in(text: str) -> str | float:
-    try:
-        number = float(text)
-    except ValueError:
-        return text
-    if not math.isfinite(number):
-        return text
-    return number
+def _name(name: str) -> str:
+    if fault := name_fault(name):
+        raise PydanticCustomError("name", f"a job's name becomes a folder's: {fault}")
+    return name
 
 
-def _paths(row: Mapping[str, object], name: str, place: str, folder: Path) -> tuple[str, ...]:
-    cell = row.get(name)
-    if cell is None:
-        return ()
+def _paths(cell: object) -> list[str]:
     parts = cell.split(";") if isinstance(cell, str) else cell
     if not isinstance(parts, list) or not all(map(_is_path, parts)):
-        raise SettingError(f"{place}: {name}: expected paths, found {reprlib.repr(cell):.60}")
-    paths = []
-    for part in parts:
-        path = part.strip()
-        if "://" not in path:
-            path = str(folder / path)
-        paths.append(path)
-    return tuple(paths)
+        raise PydanticCustomError("paths", "expected paths")
+    return [part.strip() for part in parts]
 
 
 def _is_path(part: object) -> bool:
     return isinstance(part, str) and bool(part.strip()) and "\0" not in part
+
+
+def _time(cell: object) -> str:
+    try:
+        utc_of(str(cell))
+        return datetime.fromisoformat(str(cell)).isoformat()
+    except ValueError as error:
+        expected = "expected ISO 8601 like 2026-01-31T12:00:00Z, from 1970 to 2261"
+        raise PydanticCustomError("time", expected) from error
+
+
+_Paths = Annotated[list[str], BeforeValidator(_paths)]
+
+
+class _Row(BaseModel, extra="allow", coerce_numbers_to_str=True):
+    """A job as a manifest states it; what stands beside its fields is a label."""
+
+    __pydantic_extra__: dict[str, Annotated[Any, BeforeValidator(label_of)]] = Field(init=False)
+    name: Annotated[str, AfterValidator(_name)]
+    logs: _Paths = []
+    loaded: _Paths = []
+    profile: _Paths = []
+    robot: str | None = None
+    time: Annotated[str, BeforeValidator(_time)] | None = None
+
+    def job(self, folder: Path) -> Job:
+        """The job, its paths as seen from `folder`."""
+
+        def placed(paths: list[str]) -> tuple[str, ...]:
+            return tuple(path if "://" in path else str(folder / path) for path in paths)
+
+        logs, loaded, profile = map(placed, (self.logs, self.loaded, self.profile))
+        own = {"profile": profile[0] if profile else None, "robot": self.robot, "time": self.time}
+        return Job(self.name, logs, loaded, labels=self.__pydantic_extra__, **own)

@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
+from pydantic import TypeAdapter, ValidationError
+
 from algid.base.errors import LogError, OutputError
-from algid.base.files import refuse_links, sha256_of, writing
+from algid.base.files import first_misfit, refuse_links, sha256_of, writing
 from algid.base.limits import LIMITS
 from algid.base.stores import Store, is_url, object_stat
-from algid.batches.jobs import (
-    COLUMNS,
-    TABLE,
-    Finite,
-    Int64,
-    Job,
-    name_fault,
-    redacted_path,
-    utc_of,
-)
+from algid.batches.jobs import TABLE, Finite, Int64, Job, name_fault, redacted_path, utc_of
 from algid.options import flag
-from algid.results import Result
 
 FOLDER = ".jobs"
+COLUMNS = (
+    *("job", "robot", "time", "status", "reason", "seconds"),
+    *("log_seconds", "verdict", "headline", "reasons", "command", "estimator"),
+    *("version", "settings", "logs", "sha256", "size", "changed"),
+)
+"""Columns that every table has."""
 
 
 class JobStatus(StrEnum):
@@ -46,19 +44,21 @@ FAILURES = (JobStatus.FAILED, JobStatus.KILLED)
 
 @dataclass(frozen=True)
 class Input:
-    """A log as it was when the job started: size in bytes, times of change in ns, and its hash.
+    """A log as it was when the job started: size in bytes, time of change in ns, and its hash.
 
-    A URL stands without the credentials that the job's own holds.
-
-    `ctime_ns` is the file system's own time of change, which no tool can set back; 0 for an object
-    in a store.
+    A URL stands without the credentials that the job's own holds. The hash is None where it is not
+    known: of an object, or of a log that could not be read.
     """
 
     path: str
     size: Int64
     mtime_ns: int
-    ctime_ns: int = 0
     sha256: str | None = None
+
+    def same_as(self, other: Input) -> bool:
+        """Whether both hold the same: by hashes if both are known, else by time of change."""
+        by = "mtime_ns" if self.sha256 is None or other.sha256 is None else "sha256"
+        return all(getattr(self, one) == getattr(other, one) for one in ("path", "size", by))
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,14 @@ class JobRecord:
     reasons: tuple[str, ...] = ()
     command: str | None = None
 
+    @property
+    def has_result(self) -> bool:
+        """Whether the job left a result, be it one that must not be used."""
+        return self.status not in FAILURES or self.verdict is not None
+
 
 def stat_of(path: str) -> Input:
-    """Size and times of change of a log; of a folder, its files' total and latest.
+    """Size and time of change of a log; of a folder, its files' total and latest.
 
     Zeros where there is none.
 
@@ -109,15 +114,13 @@ def stat_of(path: str) -> Input:
             files = [file for file in files[0].iterdir() if file.is_file()]
         stats = [file.stat() for file in files]
     except (FileNotFoundError, NotADirectoryError):
-        return Input(redacted_path(path), 0, 0)
+        stats = []
     except OSError as error:
         raise LogError(
             f"{path}: it cannot be looked at ({error.strerror}); check name and rights"
         ) from error
-    size = sum(one.st_size for one in stats)
-    mtime = max((one.st_mtime_ns for one in stats), default=0)
-    ctime = max((one.st_ctime_ns for one in stats), default=0)
-    return Input(redacted_path(path), size, mtime, ctime)
+    latest = max((one.st_mtime_ns for one in stats), default=0)
+    return Input(redacted_path(path), sum(one.st_size for one in stats), latest)
 
 
 def hash_of(path: str) -> str | None:
@@ -133,48 +136,22 @@ def hash_of(path: str) -> str | None:
 def unchanged(before: Input, path: str) -> Input | None:
     """The log at `path` as it is now, if it holds what it held, else None.
 
-    It does by its size and times of change, or by its hash where these moved.
+    It does by its size and time of change, or by its hash where the latter moved.
 
     Raises
     ------
     LogError
         If it may be there and cannot be looked at.
     """
-    now = replace(stat_of(path), sha256=before.sha256)
-    if now == before:
-        return before
-    if now.size != before.size or before.sha256 is None or hash_of(path) != before.sha256:
-        return None
-    return now
-
-
-def same_logs(before: Sequence[Input], now: Sequence[Input]) -> bool:
-    """Whether logs are unchanged: by hashes if both are known, else by size and time of change."""
-
-    def same(one: Input, other: Input) -> bool:
-        if (one.path, one.size) != (other.path, other.size):
-            return False
-        if one.sha256 is None or other.sha256 is None:
-            return one.mtime_ns == other.mtime_ns
-        return one.sha256 == other.sha256
-
-    return len(before) == len(now) and all(map(same, before, now))
-
-
-def estimates_of(result: Result) -> dict[str, tuple[float | None, float | None, str]]:
-    """Estimate, standard deviation and status by name."""
-    return {name: (e.estimate, e.std, e.status.value) for name, e in result.estimates.items()}
+    now = stat_of(path)
+    if not before.same_as(now) and before.sha256 is not None and now.size == before.size:
+        now = replace(now, sha256=hash_of(path))
+    return replace(now, sha256=before.sha256) if before.same_as(now) else None
 
 
 def record_name(job: str) -> str:
-    """Where the record of a job lies in OUT; no folder of one job's is the file of another's."""
-    parts = [FOLDER]
-    parts += job.split("/")
-    for place, folder in enumerate(parts[:-1]):
-        # x.json is the file of a job x: as a folder it is marked, and a marked one once more
-        if folder.rstrip("~").endswith(".json"):
-            parts[place] += "~"
-    return f"{'/'.join(parts)}.json"
+    """Where the record of a job lies in OUT."""
+    return f"{FOLDER}/{job}.json"
 
 
 def make_folders(store: Store) -> None:
@@ -222,39 +199,22 @@ def read_records(store: Store) -> StoredRecords:
         if not name.endswith(".json"):
             continue
         try:
-            record = _record_in(store.read(name) or b"", name)
+            # fields that this version does not know are left out
+            record = TypeAdapter(JobRecord).validate_json(store.read(name) or b"")
             named = columns | record.estimates.keys() | record.job.labels.keys()
             if len(named) > LIMITS.columns:
                 raise ValueError(
                     f"all records together name more than {LIMITS.columns} labels and estimates"
                 )
+            fault = _fault(record, name)
+            if fault is not None:
+                raise ValueError(fault)
             columns = named
             known.records[record.job.name] = record
         except (ValueError, LogError) as error:
-            known.unreadable[name] = str(error)
+            text = first_misfit(error) if isinstance(error, ValidationError) else str(error)
+            known.unreadable[name] = text
     return known
-
-
-def _record_in(content: bytes, place: str) -> JobRecord:
-    """The record that a file holds; fields that this version does not know are left out.
-
-    Raises
-    ------
-    ValueError
-        If it holds none, or one that no row of the table can hold.
-    """
-    from pydantic import TypeAdapter, ValidationError
-
-    from algid.base.files import first_misfit
-
-    try:
-        record = TypeAdapter(JobRecord).validate_json(content)
-    except ValidationError as error:
-        raise ValueError(first_misfit(error)) from error
-    fault = _fault(record, place)
-    if fault is not None:
-        raise ValueError(fault)
-    return record
 
 
 def _fault(record: JobRecord, place: str) -> str | None:
@@ -264,17 +224,12 @@ def _fault(record: JobRecord, place: str) -> str | None:
         return f"job.name: expected the job whose record lies here, found {job.name!r:.60}"
     if tuple(one.path for one in record.inputs) != job.logs + job.loaded:
         return "inputs: expected the job's own logs"
-    if not all(map(_is_estimates, record.estimates)):
-        return "estimates: expected the names of parameters"
-    if job.time is not None:
-        try:
-            utc_of(job.time)
-        except ValueError:
-            return f"job.time: expected ISO 8601 from 1970 to 2261, found {job.time!r:.60}"
+    for name in record.estimates:
+        taken = name in COLUMNS or name.startswith("label_") or name.endswith(("_std", "_status"))
+        if taken or not name.isprintable() or not 0 < len(name) <= LIMITS.estimate_letters:
+            return "estimates: expected the names of parameters"
+    try:
+        utc_of(job.time or "2000-01-01")
+    except ValueError:
+        return f"job.time: expected ISO 8601 from 1970 to 2261, found {job.time!r:.60}"
     return None
-
-
-def _is_estimates(name: str) -> bool:
-    """Whether a parameter's name is valid: its columns, with error and status, are no other's."""
-    others = name in COLUMNS or name.startswith("label_") or name.endswith(("_std", "_status"))
-    return 0 < len(name) <= LIMITS.estimate_letters and name.isprintable() and not others

@@ -7,10 +7,10 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -19,7 +19,7 @@ from algid import __version__
 from algid.base.errors import AlgidError, OutputError, SettingError, text_of
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store
-from algid.batches.job import DiskFull, Task, basis_of, failed_record, is_full, redacted, run_task
+from algid.batches.job import DiskFull, Task, is_full, redacted, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
     FAILURES,
@@ -29,7 +29,6 @@ from algid.batches.records import (
     make_folders,
     read_records,
     record_name,
-    same_logs,
     stat_of,
     unchanged,
     write_record,
@@ -57,105 +56,6 @@ class BatchConfig:
     profile: Callable[[str | None], Profile | None]
     parameters: Result | None = None
     report: bool = True
-
-    def task(self, job: Job) -> Task:
-        """The job with all that decides its outcome.
-
-        Raises
-        ------
-        SettingError
-            Where it cannot be run so.
-        """
-        if job.trouble is not None:
-            raise SettingError(job.trouble)
-        if not job.logs and self.parameters is None:
-            raise SettingError(
-                f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without payload, "
-                f"named {job.name}-unloaded.*, or give the arm's result as {flag('parameters')}"
-            )
-        return self._task(job, self.profile(job.profile))
-
-    def refused(self, job: Job, error: SettingError) -> JobRecord:
-        """The record of a job that cannot be run."""
-        return failed_record(self._task(job, None), str(error))
-
-    def _task(self, job: Job, profile: Profile | None) -> Task:
-        basis = basis_of(self.settings.as_json(), profile, self.parameters, self.report)
-        return Task(job, basis, self.settings, profile, self.parameters, self.out, self.report)
-
-
-@dataclass(frozen=True)
-class BatchPlan:
-    """Tasks to run, records of jobs that cannot even start, and records that stand as they are.
-
-    Of `unreachable` jobs an earlier end is known, and it cannot be looked at whether their logs and
-    results are as they were: they fail this time, and what is known of them stays. `anew` counts
-    jobs that have ended before, by why they are run again.
-    """
-
-    tasks: list[Task] = field(default_factory=list)
-    refused: list[JobRecord] = field(default_factory=list)
-    up_to_date: list[JobRecord] = field(default_factory=list)
-    unreachable: list[JobRecord] = field(default_factory=list)
-    anew: Counter[str] = field(default_factory=Counter)
-
-
-def plan(
-    jobs: Iterable[Job],
-    records: Mapping[str, JobRecord],
-    recipe: BatchConfig,
-    store: Store,
-    retry_failed: bool = False,
-) -> BatchPlan:
-    """Split jobs into those to run and those whose stored result is up to date."""
-    made = BatchPlan()
-    for job in jobs:
-        try:
-            task = recipe.task(job)
-        except SettingError as error:
-            made.refused.append(recipe.refused(job, error))
-            continue
-        record = records.get(job.name)
-        try:
-            up_to_date = None if record is None else _up_to_date(record, task, store, retry_failed)
-        except AlgidError as error:
-            made.unreachable.append(failed_record(task, str(error)))
-            continue
-        if isinstance(up_to_date, JobRecord):
-            made.up_to_date.append(up_to_date)
-            continue
-        made.tasks.append(task)
-        if up_to_date is not None:
-            made.anew[up_to_date] += 1
-    return made
-
-
-def _up_to_date(record: JobRecord, task: Task, store: Store, retry_failed: bool) -> JobRecord | str:
-    """The record with its job and logs as they are now, or why its job is run anew.
-
-    Times of change that moved while the content did not are stored, so that it is hashed once
-    for them.
-    """
-    job = redacted(task.job)
-    if retry_failed and record.status in FAILURES:
-        return "failed before"
-    if record.basis != task.basis:
-        other = record.version != __version__
-        return f"of algid {record.version}" if other else "of other settings"
-    if _has_result(record) and not store.exists(f"{task.job.name}.algid/result.json"):
-        return "without their result"
-    paths = (*task.job.logs, *task.job.loaded)
-    same = (record.job.logs, record.job.loaded) == (job.logs, job.loaded)
-    inputs = [unchanged(*pair) for pair in zip(record.inputs, paths, strict=True)] if same else []
-    found = tuple(one for one in inputs if one is not None)
-    if not found or len(found) < len(inputs):
-        return "of other logs"
-    return replace(record, job=job, inputs=found)
-
-
-def _has_result(record: JobRecord) -> bool:
-    """Whether the job left a result, be it one that must not be used."""
-    return record.status not in FAILURES or record.verdict is not None
 
 
 @dataclass(frozen=True)
@@ -223,32 +123,80 @@ class Batch:
         """Bring `jobs` to an end, and write ``jobs.parquet``.
 
         Labels, robot and time decide nothing about a job's outcome: a record that stands takes
-        over new ones. Jobs of earlier runs that are not among `jobs` keep their rows.
+        over new ones. Jobs of earlier runs that are not among `jobs` keep their rows, and one of
+        which it cannot be known whether its logs and results are as they were fails this time and
+        keeps what is known of it.
         """
-        made = plan(jobs, self.records, self._recipe, self._store, retry_failed)
-        self.anew += made.anew
-        unreachable = {record.job.name: record for record in made.unreachable}
-        for record in (*made.up_to_date, *made.refused):
-            if record != self.records.get(record.job.name):
-                self._keep(record)
-        left = self._work(deque(made.tasks))
-        self._write_table()
-        now = {**self.records, **unreachable}
-        return BatchOutcome(
-            [now[job.name] for job in jobs if job.name in now], self._ran, left, self._stopped
-        )
-
-    def _write_table(self) -> None:
-        """Write ``jobs.parquet`` where it is not that of the records."""
-        if self._written and self._store.exists(TABLE):
-            return
+        waiting, unreachable = deque[Task](), dict[str, JobRecord]()
+        for job in jobs:
+            before, trouble, of = self.records.get(job.name), job.trouble, self._recipe
+            profile = None
+            try:
+                if trouble is None:
+                    profile = of.profile(job.profile)
+            except SettingError as error:
+                trouble = str(error)
+            task = Task(job, of.settings, profile, of.parameters, of.out, of.report)
+            if not (job.logs or of.parameters or trouble):
+                trouble = (
+                    f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without "
+                    f"payload, named {job.name}-unloaded.*, or give the arm's result as "
+                    f"{flag('parameters')}"
+                )
+            if trouble is not None:
+                ended = task.record(JobStatus.FAILED, trouble)
+            elif before is None:
+                waiting.append(task)
+                continue
+            else:
+                try:
+                    known = self._up_to_date(before, task, retry_failed)
+                except AlgidError as error:
+                    unreachable[job.name] = task.record(JobStatus.FAILED, str(error))
+                    continue
+                if not isinstance(known, JobRecord):
+                    self.anew[known] += 1
+                    waiting.append(task)
+                    continue
+                ended = known
+            if ended != before:
+                self._keep(ended)
+        left = self._work(waiting)
         try:
-            if self._shared:  # the others have come further meanwhile
-                self.records |= read_records(self._store).records
-            write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
-            self._written = True
+            if not (self._written and self._store.exists(TABLE)):
+                if self._shared:  # the others have come further meanwhile
+                    self.records |= read_records(self._store).records
+                write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
+                self._written = True
         except OutputError as error:
             self._cannot_go_on(error)
+        now = {**self.records, **unreachable}
+        records = [now[job.name] for job in jobs if job.name in now]
+        return BatchOutcome(records, self._ran, left, self._stopped)
+
+    def _up_to_date(self, record: JobRecord, task: Task, retry_failed: bool) -> JobRecord | str:
+        """The record with its job and logs as they are now, or why its job is run anew.
+
+        Times of change that moved while the content did not are stored, so that it is hashed once
+        for them.
+        """
+        job = redacted(task.job)
+        if retry_failed and record.status in FAILURES:
+            return "failed before"
+        if record.basis != task.basis:
+            other = record.version != __version__
+            return f"of algid {record.version}" if other else "of other settings"
+        if record.has_result and not self._store.exists(f"{job.name}.algid/result.json"):
+            return "without their result"
+        if (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
+            return "of other logs"
+        found = list[Input]()
+        for before, path in zip(record.inputs, task.job.logs + task.job.loaded, strict=True):
+            now = unchanged(before, path)
+            if now is None:
+                return "of other logs"
+            found.append(now)
+        return replace(record, job=job, inputs=tuple(found))
 
     def _work(self, waiting: deque[Task]) -> int:
         """Run tasks; how many are left where the batch was stopped."""
@@ -278,9 +226,9 @@ class Batch:
             self._kills[task.job.name] += 1
             if self._kills[task.job.name] < MOST_KILLS:
                 return None
-            return failed_record(task, f"it took its worker with it: {died}", JobStatus.KILLED)
+            return task.record(JobStatus.KILLED, f"it took its worker with it: {died}")
         except CallFailedError as failed:
-            return failed_record(task, str(failed))
+            return task.record(JobStatus.FAILED, str(failed))
         except Exception as error:  # no job's fault: no process can be started, a cluster is lost
             self._stop_because(f"{text_of(error)}; {RUN_AGAIN}")
             return None
@@ -290,7 +238,17 @@ class Batch:
         return ended
 
     def _keep(self, record: JobRecord) -> bool:
-        record = self._without_old_result(record)
+        """Write a record; where its job failed on other logs than before, their result goes."""
+        before = self.records.get(record.job.name)
+        if before is not None and not record.has_result:
+            pairs = zip(before.inputs, record.inputs, strict=False)
+            same = len(before.inputs) == len(record.inputs)
+            try:
+                if not (same and all(one.same_as(other) for one, other in pairs)):
+                    self._store.remove(f"{record.job.name}.algid")
+            except OutputError as error:
+                stays = f"; the result of what its log held before stays: {error}"
+                record = replace(record, reason=record.reason + stays)
         try:
             write_record(self._store, record)
         except OutputError as error:
@@ -300,23 +258,6 @@ class Batch:
         self.unreadable.pop(record_name(record.job.name), None)
         self._written = False
         return True
-
-    def _without_old_result(self, record: JobRecord) -> JobRecord:
-        """The record of a job.
-
-        Where it failed and its logs are others than before, their result is removed.
-        """
-        before = self.records.get(record.job.name)
-        if _has_result(record) or before is None or same_logs(before.inputs, record.inputs):
-            return record
-        try:
-            self._store.remove(f"{record.job.name}.algid")
-        except OutputError as error:
-            return replace(
-                record,
-                reason=f"{record.reason}; the result of what its log held before stays: {error}",
-            )
-        return record
 
     def _cannot_go_on(self, error: OutputError) -> None:
         self._stop_because(f"{error}; {MAKE_ROOM if is_full(error) else RUN_AGAIN}")
@@ -330,29 +271,20 @@ class StableFiles:
     """Find jobs whose logs are unchanged since the last look: others are still being written."""
 
     def __init__(self) -> None:
-        self._before: dict[str, Input | None] = {}
+        self._before: dict[str, list[Input] | None] = {}
 
     def settled(self, jobs: Sequence[Job]) -> list[Job]:
         """Those of `jobs` whose logs are as the last call saw them, and hold something."""
-        now = {}
+        before, self._before, still = self._before, {}, []
         for job in jobs:
-            for path in (*job.logs, *job.loaded):
-                now[path] = _seen(path)
-        before, self._before = self._before, now
-        still = set()
-        for path, seen in now.items():
-            same = path in before and seen == before[path]
-            if same and (seen is None or seen.size > 0):
-                still.add(path)
-        return [job for job in jobs if still.issuperset((*job.logs, *job.loaded))]
-
-
-def _seen(path: str) -> Input | None:
-    """A log as it is now, or None where it cannot be looked at: whoever reads it says why."""
-    try:
-        return stat_of(path)
-    except AlgidError:
-        return None
+            now = None
+            with suppress(AlgidError):  # whoever reads it says why it cannot be looked at
+                now = list(map(stat_of, job.logs + job.loaded))
+            self._before[job.name] = now
+            held = now is None or all(one.size for one in now)
+            if held and job.name in before and before[job.name] == now:
+                still.append(job)
+        return still
 
 
 @contextmanager

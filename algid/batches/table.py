@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from algid.base.stores import Store
-from algid.batches.jobs import TABLE, Label, utc_of
-from algid.batches.records import Input, JobRecord
+from algid.batches.jobs import TABLE, utc_of
+from algid.batches.records import COLUMNS, JobRecord
 
 if TYPE_CHECKING:
     import polars as pl
 
+_OF_LOGS = {"logs": "path", "sha256": "sha256", "size": "size", "changed": "mtime_ns"}
+"""By column of lists the field of each log."""
 FIRST_EPOCH_NS = 10**17  # stamps before 1973 count from some start, not from 1970
 
 
@@ -28,76 +30,47 @@ def write_jobs(store: Store, records: Sequence[JobRecord]) -> None:
 def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     """A row a record.
 
-    Columns: job, robot, time, status, reason, seconds, log_seconds, estimator (whose numbers these
-    are; the one asked for stands in the settings), verdict (good, reservations or failed),
-    version, settings (JSON); logs, sha256, size in bytes and time of change (lists; a log that was
-    fetched in part has no sha256); ``label_X`` for each label, numbers where every one is, text
-    otherwise; ``k``, ``k_std`` and ``k_status`` for each estimate, null where there is none.
+    Columns: job, robot, time, status, reason, seconds, log_seconds, verdict (good, reservations or
+    failed), headline, reasons, command, estimator (whose numbers these are; the one asked for
+    stands in the settings), version, settings (JSON); logs, sha256, size in bytes and time of
+    change (lists); ``label_X`` for each label, numbers where every one is, text otherwise; ``k``,
+    ``k_std`` and ``k_status`` for each estimate, null where there is none.
     """
     import polars as pl
 
-    def column(
-        kind: pl.DataType | type[pl.DataType], value: Callable[[JobRecord], Any]
-    ) -> pl.Series:
-        return pl.Series([value(record) for record in records], dtype=kind)
-
-    def of_logs(kind: type[pl.DataType], value: Callable[[Input], Any]) -> pl.Series:
-        return column(pl.List(kind), lambda record: [value(log) for log in record.inputs])
-
+    rows = []
+    for one in records:
+        row: dict[str, Any] = {**vars(one), "status": one.status.value, "reasons": [*one.reasons]}
+        row |= {"job": one.job.name, "robot": one.job.robot, "time": time_of(one)}
+        row["settings"] = json.dumps(one.settings, sort_keys=True)
+        for column, name in _OF_LOGS.items():
+            row[column] = [getattr(log, name) for log in one.inputs]
+        # a file's time of change may be any
+        row["changed"] = [ns if abs(ns) < 2**63 else None for ns in row["changed"]]
+        rows.append(row)
+    texts, numbers, instant = pl.List(pl.String), pl.List(pl.Int64), pl.Datetime("ns", "UTC")
+    kinds: dict[str, Any] = dict.fromkeys(COLUMNS, pl.String)
+    kinds |= {"time": pl.Datetime("us", "UTC"), "seconds": pl.Float64, "log_seconds": pl.Float64}
+    kinds |= {"reasons": texts, "logs": texts, "sha256": texts, "size": numbers, "changed": numbers}
     columns = {
-        "job": column(pl.String, lambda record: record.job.name),
-        "robot": column(pl.String, lambda record: record.job.robot),
-        "time": column(pl.Datetime("us", "UTC"), time_of),
-        "status": column(pl.String, lambda record: record.status.value),
-        "reason": column(pl.String, lambda record: record.reason),
-        "seconds": column(pl.Float64, lambda record: record.seconds),
-        "log_seconds": column(pl.Float64, lambda record: record.log_seconds),
-        "verdict": column(pl.String, lambda record: record.verdict),
-        "headline": column(pl.String, lambda record: record.headline),
-        "reasons": column(pl.List(pl.String), lambda record: list(record.reasons)),
-        "command": column(pl.String, lambda record: record.command),
-        "estimator": column(pl.String, lambda record: record.estimator),
-        "version": column(pl.String, lambda record: record.version),
-        "settings": column(pl.String, lambda record: json.dumps(record.settings, sort_keys=True)),
-        "logs": of_logs(pl.String, lambda log: log.path),
-        "sha256": of_logs(pl.String, lambda log: log.sha256),
-        "size": of_logs(pl.Int64, lambda log: log.size),
-        "changed": of_logs(pl.Int64, lambda log: _in_int64(log.mtime_ns)).cast(
-            pl.List(pl.Datetime("ns", "UTC"))
-        ),
+        name: pl.Series([row[name] for row in rows], dtype=kind) for name, kind in kinds.items()
     }
-    for name in _names([record.job.labels for record in records]):
-        columns[f"label_{name}"] = _label_column(
-            [record.job.labels.get(name) for record in records]
+    columns["changed"] = columns["changed"].cast(pl.List(instant))
+    for name in sorted({name for one in records for name in one.job.labels}):
+        labels = [one.job.labels.get(name) for one in records]
+        if all(label is None or type(label) in (int, float) for label in labels):
+            columns[f"label_{name}"] = pl.Series(labels, dtype=pl.Float64, strict=False)
+        else:
+            words = [None if label is None else str(label) for label in labels]
+            columns[f"label_{name}"] = pl.Series(words, dtype=pl.String)
+    for name in sorted({name for one in records for name in one.estimates}):
+        values, errors, states = zip(
+            *(one.estimates.get(name, (None, None, None)) for one in records), strict=True
         )
-    for name in _names([record.estimates for record in records]):
-        values, stds, statuses = list[float | None](), list[float | None](), list[str | None]()
-        for record in records:
-            value, std, status = record.estimates.get(name, (None, None, None))
-            values.append(value)
-            stds.append(std)
-            statuses.append(status)
         columns[name] = pl.Series(values, dtype=pl.Float64)
-        columns[f"{name}_std"] = pl.Series(stds, dtype=pl.Float64)
-        columns[f"{name}_status"] = pl.Series(statuses, dtype=pl.String)
+        columns[f"{name}_std"] = pl.Series(errors, dtype=pl.Float64)
+        columns[f"{name}_status"] = pl.Series(states, dtype=pl.String)
     return pl.DataFrame(columns)
-
-
-def _label_column(labels: Sequence[Label | None]) -> pl.Series:
-    """Numbers where every label is one, else text."""
-    import polars as pl
-
-    if all(label is None or type(label) in (int, float) for label in labels):
-        return pl.Series(labels, dtype=pl.Float64, strict=False)
-    texts = [None if label is None else str(label) for label in labels]
-    return pl.Series(texts, dtype=pl.String)
-
-
-def _in_int64(number: int) -> int | None:
-    """A time in ns; None where it lies too far off, as file systems may say."""
-    if not -(2**63) <= number < 2**63:
-        return None
-    return number
 
 
 def time_of(record: JobRecord) -> datetime | None:
@@ -107,10 +80,3 @@ def time_of(record: JobRecord) -> datetime | None:
     if record.start_ns is None or record.start_ns < FIRST_EPOCH_NS:
         return None
     return datetime.fromtimestamp(record.start_ns * 1e-9, UTC)
-
-
-def _names(several: Sequence[Mapping[str, Any]]) -> list[str]:
-    names: set[str] = set()
-    for one in several:
-        names.update(one)
-    return sorted(names)

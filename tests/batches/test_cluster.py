@@ -77,7 +77,7 @@ def test_a_worker_runs_jobs_of_its_own_version_that_see_the_output(tmp_path: Pat
 def test_no_secret_is_in_what_dask_prints_of_a_call() -> None:
     """Keys are made of the function's name; a worker logs the arguments of one that raises."""
     place = "s3://KEY:SECRET@lab/a.csv"
-    task = Task(Job("a", (place,)), "", Settings(), None, None, place, False)
+    task = Task(Job("a", (place,)), Settings(), None, None, place, False)
     assert "SECRET" not in f"{task!r} {task}"
     told = job_of("0.1")(pickle.dumps((None, None, calls.add, (task,))))
     assert isinstance(told, Exception)

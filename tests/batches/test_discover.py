@@ -18,7 +18,7 @@ from algid.base.errors import SettingError
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.job import redacted
-from algid.batches.jobs import Job, checked_name, name_fault
+from algid.batches.jobs import Job, name_fault
 from algid.batches.manifest import is_manifest, label_of
 from algid.batches.run import sweep
 from algid.readers.formats import SUFFIXES
@@ -227,7 +227,7 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("name,logs\n../x,a.csv\n", "row 1: a job's name becomes a folder's"),
+        ("name,logs\n../x,a.csv\n", "row 1: name: a job's name becomes a folder's"),
         ("name,logs\nx,\n", "row 1: expected a name and logs"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1: time: expected ISO 8601"),
         (
@@ -239,9 +239,15 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
             "row 1: time: expected ISO 8601.* from 1970 to 2261",
         ),
         ("name,logs,time\nx,a.csv,1969-12-31T23:59:59Z\n", "row 1: time: expected ISO 8601"),
-        ("name,logs\na.algid/b,a.csv\n", "row 1: a job's name .* no folder that ends in .algid"),
-        ("name,logs\njobs.parquet/b,a.csv\n", "row 1: a job's name .* none that is jobs.parquet"),
-        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1: a job's name .* at most 1000 bytes"),
+        (
+            "name,logs\na.algid/b,a.csv\n",
+            "row 1: name: a job's name .* no folder .* ends in .algid",
+        ),
+        (
+            "name,logs\njobs.parquet/b,a.csv\n",
+            "row 1: name: a job's name .* no folder that is jobs.parquet",
+        ),
+        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1: name: a job's name .* at most 1000 bytes"),
         ("name,logs,logs\nx,a.csv,b.csv\n", "two columns are named 'logs'; rename one"),
         (
             "name,logs," + ",".join(map(str, range(5000))) + "\nx,a" + ",1" * 5000,
@@ -295,16 +301,16 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         ("[[job", "the manifest cannot be read"),
         (
             f"{JOB}payload = 1{'0' * 400}",
-            "job 1: payload: expected text, a date, true, .* 64 bits, found another int",
+            "job 1: payload: expected text, a date, true, .* 64 bits, found ",
         ),
         (f"{JOB}payload = 1{'0' * 5000}", "the manifest cannot be read"),
         (
             f"{JOB}payload = 0x1{'0' * 5000}",
-            "job 1: payload: expected text, a date, true, .* 64 bits, found another int",
+            "job 1: payload: expected text, a date, true, .* 64 bits, found ",
         ),
         (f"{JOB}payload = nan", "job 1: payload: .* finite number"),
-        (f"{JOB}payload = {{a = 1}}", "job 1: payload: .* found another dict"),
-        (f"{JOB}robot = [1]", "job 1: robot: .* found another list"),
+        (f"{JOB}payload = {{a = 1}}", "job 1: payload: .* found {'a': 1}"),
+        (f"{JOB}robot = [1]", r"job 1: robot: .* found \[1\]"),
         (f"{JOB}time = 9999-12-31T23:59:59-23:59", "job 1: time: expected ISO 8601"),
     ],
 )
@@ -376,13 +382,12 @@ def test_a_label_that_reads_like_a_finite_number_is_one(value: float) -> None:
     "name", ["", "/a", "a/", "a//b", "../a", "a/..", ".a", "a\\b", "a\nb", "a\x7f", "ä" * 101]
 )
 def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
-    with pytest.raises(SettingError, match=r"^here: a job's name becomes a folder's"):
-        checked_name(name, "here")
+    assert name_fault(name) is not None
 
 
 def test_a_name_may_hold_slashes_and_any_printable_character() -> None:
     for name in ("a", "r1/day 2/a.b", "ä" * 100, "…", "a" * 200 + "/" + "b" * 200):
-        assert checked_name(name, "here") == name
+        assert name_fault(name) is None
 
 
 def test_a_folder_where_nobody_may_look_fails_alone(

@@ -20,7 +20,7 @@ from algid.api.batch import watched
 from algid.base.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.base.stores import connect, list_urls, open_store, put_folder
 from algid.batches.discover import jobs_of
-from algid.batches.fetch import staged
+from algid.batches.job import fetched
 from algid.batches.records import JobStatus
 from algid.batches.run import Batch, BatchConfig, BatchOutcome
 from algid.settings import Settings
@@ -99,9 +99,9 @@ def test_keys_of_any_spelling_are_read_as_themselves(served: Served, tmp_path: P
     found = list_urls(served.url("logs"))
     assert sorted(name for _, name in found) == sorted(f"r 1/{key}" for key in ODD)
     for number, (url, name) in enumerate(found):
-        assert f"r 1/{staged(url, tmp_path / str(number)).path.read_text()}" == name
+        assert f"r 1/{fetched(url, tmp_path / str(number)).path.read_text()}" == name
     by_hand = served.url("logs/r 1/ü µ.csv")  # what no URL may hold needs no encoding by hand
-    assert staged(by_hand, tmp_path / "by hand").path.read_text() == "ü µ.csv"
+    assert fetched(by_hand, tmp_path / "by hand").path.read_text() == "ü µ.csv"
 
 
 def test_a_batch_over_odd_keys_has_a_result_for_each(served: Served, log: bytes) -> None:
@@ -379,7 +379,7 @@ def test_an_object_replaced_while_it_is_read_fails(
     served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, at: int
 ) -> None:
     """Whatever was fetched by then: its ends, the summary, a part of the whole."""
-    monkeypatch.setattr("algid.batches.fetch._PIECE", 1 << 17)
+    monkeypatch.setattr("algid.batches.job._PIECE", 1 << 17)
     arrays = np.random.default_rng(0).normal(size=(2, 40000, 2)).astype("<f8")
     first, second = (one.tobytes() for one in arrays)
     open_store(served.url("logs")).write("a.csv", first)
@@ -387,7 +387,7 @@ def test_an_object_replaced_while_it_is_read_fails(
     with pytest.raises(
         LogError, match=r"logs/a\.csv.*: it was replaced while it was read; run again"
     ):
-        staged(served.url("logs/a.csv"), tmp_path)
+        fetched(served.url("logs/a.csv"), tmp_path)
 
 
 def test_a_replaced_object_fails_its_job_and_is_done_by_the_next_run(

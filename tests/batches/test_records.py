@@ -17,7 +17,7 @@ import pytest
 from algid.base.errors import OutputError
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
-from algid.batches.jobs import Job
+from algid.batches.jobs import Job, name_fault
 from algid.batches.manifest import read_manifest
 from algid.batches.records import (
     Input,
@@ -160,7 +160,8 @@ def test_bytes_that_are_no_record_count_as_none(logs: Path, content: bytes) -> N
 def test_records_of_other_versions_keep_their_rows(logs: Path) -> None:
     out = logs.parent / "out"
     older, newer = _sound(), _sound()
-    del older["job"]["trouble"], older["start_ns"], older["inputs"][0]["ctime_ns"]
+    del older["job"]["trouble"], older["start_ns"]
+    older["inputs"][0]["ctime_ns"] = 5
     newer["job"]["name"] = "newer"
     newer |= {"colour": "red", "version": "99"}
     newer["job"]["mood"] = 1
@@ -195,17 +196,8 @@ def test_what_else_lies_among_the_records_does_no_harm(logs: Path, kind: str) ->
 
 
 def test_no_job_takes_another_ones_place(tmp_path: Path) -> None:
-    names = [
-        "x",
-        "x.json/y",
-        "x.json~/y",
-        "x.json~~/y",
-        "x.json",
-        "x.json~",
-        "x.json/y.json/z",
-        "é/x",
-        "x.jobs/y",
-    ]
+    assert "ends in .algid or .json" in (name_fault("x.json/y") or "")
+    names = ["x", "x.json", "é/x", "x.jobs/y"]
     store = open_store(str(tmp_path))
     for name in names:
         write_record(store, replace(_record(name), reason=name))
