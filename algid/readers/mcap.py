@@ -12,7 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
@@ -61,7 +61,7 @@ def open_mcap(paths: Sequence[Path]) -> MessageLog:
     return MessageLog(name, "mcap", [cache(partial(mcap_file, path)) for path in paths])
 
 
-@dataclass(frozen=True)
+@dataclass
 class ChunkRange:
     """Where a chunk's content lies in the file, or records outside of chunks (`loose`).
 
@@ -75,6 +75,11 @@ class ChunkRange:
     channels: frozenset[int] | None = None
     loose: bool = False
     torn: bool = False
+
+    @property
+    def end(self) -> int:
+        """The byte behind its content and indexes."""
+        return self.start + self.length + self.index_length
 
 
 @dataclass
@@ -228,48 +233,42 @@ def _from_summary(stream: IO[bytes], summary: Summary) -> FileIndex | None:
 def _walked(stream: IO[bytes], size: int) -> FileIndex:
     """What stands in a file up to its end, or to its first break."""
     found, chunks = FileIndex(), list[ChunkRange]()
-    place = begin = len(_MAGIC)  # of records outside of chunks that are in no range yet
-    data_end = 0
-    whole = True
-    while whole:
+    place, data_end = len(_MAGIC), 0
+    while True:
         head = _read(stream, place, min(_FRAME.size, size - place))
         code, length = _FRAME.unpack(head.ljust(_FRAME.size, b"\0"))
         end = place + _FRAME.size + length
         known = 0 < code <= Opcode.DATA_END or code >= 0x80
         known &= length >= _HEAD_BYTES - 9 or code != Opcode.MESSAGE
         known &= length == 4 or code != Opcode.DATA_END
-        whole = known and end <= size
-        apart = code in (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.DATA_END)
-        apart |= bool(data_end) and code != Opcode.MESSAGE  # what a summary repeats
-        if not whole or apart or place - begin >= _LOOSE_BYTES:
-            if place > begin:
-                chunks.append(ChunkRange(begin, place - begin, loose=True))
-            begin = place
-        if not whole:
+        if not known or end > size:
             break
+        last = chunks[-1] if chunks else ChunkRange(0, 0)
+        follows = last.end == place
         if code == Opcode.CHUNK:
             chunks.append(ChunkRange(place + _FRAME.size, length))
-        elif code == Opcode.MESSAGE_INDEX and begin == place and chunks:
-            index_length = chunks[-1].index_length + end - place
-            chunks[-1] = replace(chunks[-1], index_length=index_length)
-            apart = True
+        elif code == Opcode.MESSAGE_INDEX and follows and not last.loose:
+            last.index_length += end - place
+        elif code == Opcode.MESSAGE or (code in _DEFINITIONS and not data_end):
+            if follows and last.loose and last.length < _LOOSE_BYTES:
+                last.length += end - place
+            else:
+                chunks.append(ChunkRange(place, end - place, loose=True))
         elif code == Opcode.DATA_END:
             data_end = end
         place = end
-        begin = end if apart else begin
         if code == Opcode.FOOTER:
             break
-    left = size - place
+    broken, left = place < end, size - place
     # what breaks off behind the data is its summary if the footer says so, or is gone too
-    tail = _read(stream, max(0, size - 28), min(28, size))
     summary = known and code in _SUMMARY
-    if tail.endswith(_MAGIC):
+    if size > 28 and (tail := _read(stream, size - 28, 28)).endswith(_MAGIC):
         summary = struct.unpack("<Q20x", tail)[0] == data_end
-    ended = data_end and (left <= len(_MAGIC) or (summary and not whole))
     why = "" if known or len(head) < _FRAME.size else "what stands there is no record"
-    why = "its end stands there, and more behind it" if whole and data_end else why
+    if data_end and not broken:
+        why = "its end stands there, and more behind it"
     numbers: dict[str, Any] = {"case": "end"}
-    if ended:
+    if data_end and (left <= len(_MAGIC) or (summary and broken)):
         left = 0
     elif why:
         numbers = {"case": "bytes", "bytes": left, "first": place, "why": why}
@@ -282,15 +281,15 @@ def _walked(stream: IO[bytes], size: int) -> FileIndex:
         found.damage.append(f"it breaks off at byte {place}")
         if known and code == Opcode.CHUNK:
             chunks.append(ChunkRange(place + _FRAME.size, left - _FRAME.size, torn=True))
+    found.chunks = chunks
     for chunk in chunks:
         try:
             records = _records(stream, chunk)
             found.define(records.others, chunk.start)
             own, sizes = np.unique(records.heads["channel"], return_counts=True)
             counts = dict(zip(own.tolist(), sizes.tolist(), strict=True))
-            found.chunks.append(replace(chunk, channels=frozenset(counts)))
+            chunk.channels = frozenset(counts)
         except Exception as error:  # what the libraries raise; told when it is read
-            found.chunks.append(chunk)
             found.damage.append(f"{error} (at byte {chunk.start})")
             index = _read(stream, chunk.start + chunk.length, chunk.index_length)
             counts = {channel: offsets.size for channel, offsets in _listed(index).items()}

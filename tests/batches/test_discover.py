@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import math
 import os
-import subprocess
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from algid.base.errors import SettingError
-from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.job import redacted
 from algid.batches.jobs import Job, name_fault
 from algid.batches.manifest import is_manifest, label_of
-from algid.batches.run import sweep
 from algid.readers.formats import SUFFIXES
 from tests.processes import Outcome
 
@@ -154,48 +150,6 @@ def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
         assert [job.name for job in jobs_of([str(tmp_path / pattern)], "out")] == names, pattern
     with pytest.raises(SettingError, match="no such file, folder or match"):
         jobs_of([f"{tmp_path}/**/*.bag"], "out")
-
-
-def _nested(folder: Path, names: Sequence[str]) -> None:
-    """Make folders within each other, further than a path reaches, with an empty log in the last
-    one.
-    """
-    place = os.open(folder, os.O_RDONLY)
-    for name in names:
-        os.mkdir(name, dir_fd=place)
-        inner = os.open(name, os.O_RDONLY, dir_fd=place)
-        os.close(place)
-        place = inner
-    os.close(os.open("log.csv", os.O_CREAT, dir_fd=place))
-    os.close(place)
-
-
-@pytest.mark.parametrize(
-    ("names", "trouble"),
-    [
-        (["d"] * 100, None),
-        (["d" * 200] * 25, "cannot look there (File name too long); check its rights"),
-    ],
-)
-def test_folders_may_be_nested_as_deep_as_the_system_takes_them(
-    tmp_path: Path, names: Sequence[str], trouble: str | None
-) -> None:
-    _touch(tmp_path, "good.csv")
-    _nested(tmp_path, names)
-    try:
-        found = {job.name: job.trouble for job in jobs_of([str(tmp_path)], str(tmp_path))}
-        sweep(open_store(str(tmp_path)))
-        assert open_store(str(tmp_path)).names("")[-1] == "good.csv"
-    finally:
-        # shutil.rmtree ends at a thousand
-        subprocess.run(["rm", "-rf", tmp_path / names[0]], check=True)
-    assert found.pop("good") is None
-    ((name, told),) = found.items()
-    if trouble is None:
-        assert (name, told) == ("/".join([*names, "log"]), None)
-    else:
-        assert told is not None
-        assert told.endswith(trouble)
 
 
 def test_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
@@ -348,14 +302,6 @@ def test_a_csv_file_is_a_manifest_by_its_columns_whatever_ends_its_lines(
     assert [job.name for job in jobs_of([str(path)], "out")] == ["m"]
     path.write_bytes(f"name,logs{end}x,a.csv{end}y,b.csv{end}".encode())
     assert [job.name for job in jobs_of([str(path)], "out")] == ["x", "y"]
-
-
-def test_bytes_of_any_kind_in_a_csv_file_make_it_a_log(tmp_path: Path) -> None:
-    path = tmp_path / "random.csv"
-    for seed in range(64):
-        content = bytes((seed * 37 + 11 * n * n) % 256 for n in range(512))
-        path.write_bytes(content)
-        assert jobs_of([str(path)], "out") == [Job("random", logs=(str(path),))]
 
 
 def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:

@@ -104,16 +104,6 @@ def test_keys_of_any_spelling_are_read_as_themselves(served: Served, tmp_path: P
     assert fetched(by_hand, tmp_path / "by hand").path.read_text() == "ü µ.csv"
 
 
-def test_a_batch_over_odd_keys_has_a_result_for_each(served: Served, log: bytes) -> None:
-    keys = ("run%41", "runA", "a b", "[ü]", "q?#")
-    for key in keys:
-        open_store(served.url("logs")).write(f"{key}.csv", log)
-    assert _ends(_run(served)) == dict.fromkeys(sorted(keys), JobStatus.OK)
-    assert _run(served).ran == 0
-    for key in keys:
-        assert open_store(served.url("out")).exists(f"{key}.algid/result.json")
-
-
 def test_a_hash_sign_in_a_url_is_refused_and_no_host_is_asked(served: Served) -> None:
     """It would cut off the query, and with it the endpoint that the credentials are for."""
     for text in (served.url("logs/a#b.csv", USER), served.url("logs#", USER)):
@@ -388,15 +378,3 @@ def test_an_object_replaced_while_it_is_read_fails(
         LogError, match=r"logs/a\.csv.*: it was replaced while it was read; run again"
     ):
         fetched(served.url("logs/a.csv"), tmp_path)
-
-
-def test_a_replaced_object_fails_its_job_and_is_done_by_the_next_run(
-    served: Served, log: bytes
-) -> None:
-    for name in ("a", "b"):
-        open_store(served.url("logs")).write(f"{name}.csv", log)
-    served.after = _replacing(served, "a.csv", log + log.splitlines()[-1] + b"\n", 1)
-    ended = _run(served)
-    assert _ends(ended) == {"a": JobStatus.FAILED, "b": JobStatus.OK}
-    assert "replaced while it was read" in ended.records[0].reason
-    assert _run(served).ran == 1

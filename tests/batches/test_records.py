@@ -317,19 +317,3 @@ def test_touched_logs_are_hashed_once_and_the_table_is_written_for_changes_alone
     (out / "jobs.parquet").unlink()
     batch.run(jobs)
     assert pl.read_parquet(out / "jobs.parquet")["changed"].to_list()[0][0].year == 2001
-
-
-def test_odd_names_fail_alone_and_are_written_once(logs: Path) -> None:
-    out = logs.parent / "out"
-    for name in ("bad\nname.csv", "caf\udce9.csv", "a.mcap", "x" * 240 + ".csv"):
-        (logs / name).write_text("no log")
-    ended = _run(logs, out)
-    told = sorted(record.reason[-30:] for record in ended.records)
-    assert len(told) == 5
-    assert told.count("as asked") == 1
-    before = {path: path.stat().st_ino for path in (out / ".jobs").iterdir()}
-    again = Failing()
-    assert _run(logs, out, again).records == ended.records
-    assert again.ran == []
-    assert {path: path.stat().st_ino for path in (out / ".jobs").iterdir()} == before
-    assert pl.read_parquet(out / "jobs.parquet").height == 5

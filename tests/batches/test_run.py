@@ -106,6 +106,7 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
     result = algid.read_result(logs.parent / "out/r1/a.algid")
     row = table.row(1, named=True)
     assert row["k1"] == result.parameters["k1"].estimate
+    assert row["estimator"] == "weak"
     assert row["m_p_std"] == result.payload["m_p"].std
     assert row["sha256"] == [log.sha256 for log in result.logs]
     assert row["size"] == [Path(log.path).stat().st_size for log in result.logs]
@@ -113,43 +114,6 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
         Path(result.log.path).stat().st_mtime, abs=1e-5
     )
     assert "no column for t, theta1" in str(table["reason"][0])
-
-
-def test_the_table_names_the_estimator_whose_numbers_are_reported(
-    logs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def handed_back(*args: Any, **more: Any) -> Any:
-        return identify(*args, **more).model_copy(update={"estimator": "weak"})
-
-    monkeypatch.setattr("algid.batches.job.identify", handed_back)
-    _run(logs, recipe=replace(CONFIG, settings=Settings(estimator="refined", model="plain")))
-    table = pl.read_parquet(logs.parent / "out/jobs.parquet")
-    assert table["estimator"].to_list() == [None, "weak", "weak"]
-    assert '"estimator": "refined"' in table["settings"][1]
-
-
-def test_what_is_done_is_not_done_again(logs: Path) -> None:
-    _run(logs)
-    again = Here()
-    assert _run(logs, again).ran == 0
-    assert again.ran == []
-    assert _run(logs, again, retry_failed=True).ran == 1
-    assert again.ran == ["bad"]
-
-
-def test_changed_logs_settings_and_lost_results_run_again(logs: Path) -> None:
-    _run(logs)
-    executor = Here()
-    unloaded = logs / "r1/a-unloaded.parquet"
-    # the same bytes with another time of change
-    shutil.copy2(unloaded, logs / "r1/b-unloaded.parquet")
-    _run(logs, executor)
-    assert executor.ran == []
-    shutil.rmtree(logs.parent / "out/r1/b.algid")
-    _run(logs, executor)
-    assert executor.ran == ["r1/b"]
-    _run(logs, executor, replace(CONFIG, settings=WEAK.but(window=0.3)))
-    assert executor.ran == ["r1/b", "bad", "r1/a", "r1/b"]
 
 
 def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,14 +143,6 @@ def test_a_changed_log_of_equal_size_runs_again(logs: Path) -> None:
     executor = Here()
     _run(logs, executor)
     assert executor.ran == ["bad"]
-
-
-def test_a_log_of_other_rights_alone_does_not_run_again(logs: Path) -> None:
-    _run(logs)
-    (logs / "r1/a-unloaded.parquet").chmod(0o600)
-    executor = Here()
-    _run(logs, executor)
-    assert executor.ran == []
 
 
 def test_a_job_that_kills_three_workers_is_set_aside(logs: Path) -> None:
