@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -75,14 +74,6 @@ def two(folder: Path, topics: tuple[str, ...] = ("/joint_states",)) -> Log:
     return log
 
 
-def test_a_loose_file_and_a_folder_without_metadata(tmp_path: Path) -> None:
-    log = two(tmp_path / "bag")
-    (file,) = (tmp_path / "bag").glob("*.db3")
-    assert same(read_log(file), log)
-    (tmp_path / "bag" / "metadata.yaml").unlink()
-    assert same(read_log(tmp_path / "bag"), log)
-
-
 def test_topic_and_source_of_a_profile_are_honoured(tmp_path: Path) -> None:
     log = two(tmp_path / "bag", ("/one", "/two"))
     assert read_log(tmp_path / "bag", Profile(topic="/two")).origin.reading.topics == ("/two",)
@@ -105,37 +96,6 @@ def test_topic_and_source_of_a_profile_are_honoured(tmp_path: Path) -> None:
         read_log(tmp_path / "bag", Profile(topic="/three"))
     with pytest.raises(LogError, match=r"joint states on /one, /two; choose: --topic NAME"):
         read_log(tmp_path / "bag")
-
-
-def test_metadata_may_list_its_files_in_brackets(tmp_path: Path) -> None:
-    log = two(tmp_path / "bag")
-    metadata = tmp_path / "bag" / "metadata.yaml"
-    text = metadata.read_text()
-    flow = re.sub(r"relative_file_paths:\s*\n\s*-\s*(\S+)", r"relative_file_paths: [\1]", text)
-    assert flow != text
-    metadata.write_text(flow)
-    assert same(read_log(tmp_path / "bag"), log)
-
-
-def test_other_joints_of_a_bag_that_move_are_told(tmp_path: Path) -> None:
-    log = noise_log(50, start_ns=EPOCH_NS)
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    with Writer2(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        channel = writer.add_connection("/joint_states", TYPE, typestore=store)
-        for row, stamp in enumerate(log.stamp_ns.tolist()):
-            own = message(store, log, row, first=False)
-            more = {
-                "position": [0.1 * (row % 2), 0.0],
-                "velocity": [0.0, 0.0],
-                "effort": [0.0, 0.0],
-            }
-            values = {key: np.append(getattr(own, key), more[key]) for key in more}
-            long = store.types[TYPE](header=own.header, name=["j1", "j2", "j3", "j4"], **values)
-            writer.write(channel, stamp, store.serialize_cdr(long, TYPE))
-    found = read_log(tmp_path / "bag", Profile(joints=("j1", "j2")))
-    assert same(found, log)
-    (text,) = (notice.text for notice in found.notices if notice.code == "OTHER_JOINTS")
-    assert "1 other joint moves meanwhile: j3 by 0.1 rad" in text
 
 
 def described(folder: Path, names: list[str], more: str = "") -> Path:
@@ -285,21 +245,6 @@ def test_joint_states_that_do_not_fit_are_told(
     path = states(tmp_path / "bag", *[message] * 3)
     with pytest.raises(LogError, match=words):
         read_log(path)
-
-
-def test_a_search_for_joints_ends(tmp_path: Path) -> None:
-    """Among messages that all have other joints the first sixty-four tell enough."""
-    odd = [{"name": [f"j{row}"], "position": [1], "effort": [1]} for row in range(80)]
-    path = states(tmp_path / "bag", *odd, PAIR, PAIR)
-    with pytest.raises(
-        LogError, match="no topic holds positions and efforts of two joints"
-    ) as refused:
-        read_log(path)
-    assert str(refused.value).count("with the joints") == 4
-    with pytest.raises(
-        LogError, match=r"'/joint_states' has 64 joints \(j0, j1, .*, j11\); choose: --joints A,B"
-    ):
-        read_log(path, Profile(joints=("a", "b")))
 
 
 def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import signal
 import sqlite3
 import struct
-import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from algid.base.errors import LogError
@@ -27,7 +22,7 @@ from algid.readers import read_log
 from algid.readers.bags import ros1_file
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import write_mcap
-from tests.readers.test_bag import PAIR, TYPE, message, states, two
+from tests.readers.test_bag import TYPE, message, two
 
 LOG = noise_log(400, start_ns=EPOCH_NS)
 ROS1 = get_typestore(Stores.ROS1_NOETIC)
@@ -130,17 +125,6 @@ def test_a_bag_is_read_up_to_its_first_damaged_chunk(tmp_path: Path) -> None:
     (notice,) = found.notices
     assert (notice.code, notice.lossy) == ("DAMAGED", True)
     assert f"{len(LOG) - len(found)} messages are missing" in notice.text
-
-
-def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
-    counts = [b"conn_count=" + bytes(4), b"chunk_count=" + bytes(4)]
-    fields = [b"op=\x03", b"index_pos=" + bytes(8), *counts, b"encryptor=some/AesCbc"]
-    head = b"".join(struct.pack("<I", len(one)) + one for one in fields)
-    (tmp_path / "a.bag").write_bytes(
-        b"#ROSBAG V2.0\n" + struct.pack("<I", len(head)) + head + struct.pack("<I", 0)
-    )
-    with pytest.raises(LogError, match=r"Bag encryption 'some/AesCbc' is not supported"):
-        read_log(tmp_path / "a.bag")
 
 
 def test_times_durations_and_empty_parts_of_ros1_stand_where_the_library_has_them(
@@ -275,31 +259,6 @@ def test_what_is_not_in_the_database_yet_is_read_from_beside_it(tmp_path: Path) 
     assert len(log) == 200
 
 
-def lacking(count: int, each: int) -> list[dict[str, Any]]:
-    """Joint states of which all but each third, or so, have no effort."""
-    return [PAIR if row % each == 0 else {**PAIR, "effort": []} for row in range(count)]
-
-
-@pytest.mark.parametrize("form", ["db3", "bag"])
-def test_messages_without_effort_are_lost_and_counted(form: str, tmp_path: Path) -> None:
-    if form == "db3":
-        (path,) = states(tmp_path / "bag", *lacking(90, 3)).glob("*.db3")
-    else:
-        path = tmp_path / "a.bag"
-        with Writer(path) as writer:
-            channel = writer.add_connection("/joint_states", TYPE, typestore=ROS1)
-            for row in range(90):
-                one = message(ROS1, LOG, row, first=True)
-                one.effort = one.effort if row % 3 == 0 else np.empty(0)
-                one.velocity = np.empty(0)
-                writer.write(channel, int(LOG.stamp_ns[row]), ROS1.serialize_ros1(one, TYPE))
-    found = read_log(path)
-    assert len(found) == 30
-    (notice,) = (notice for notice in found.notices if notice.lossy)
-    assert notice.code == "MESSAGES_LEFT_OUT"
-    assert notice.text.startswith("60 messages on '/joint_states' left out for want of effort[")
-
-
 def test_a_type_whose_definition_the_file_lacks(tmp_path: Path) -> None:
     """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags
     package.
@@ -340,32 +299,6 @@ def test_a_type_of_every_file_needs_no_package(
     assert same(read_log(file), log)
 
 
-@pytest.mark.slow
-def test_a_database_that_asks_for_much_ends_by_a_signal(tmp_path: Path) -> None:
-    """A table of very many small rows of another topic: what SQLite does in one call is bounded."""
-    file, _ = database(tmp_path)
-    changed(
-        file,
-        f"INSERT INTO messages(topic_id, timestamp, data) {ENDLESS} SELECT 1, x, x'00' FROM c "
-        "LIMIT 3000000",
-    )
-    opens = "lambda event, _: event == 'sqlite3.connect' and print(event, flush=True)"
-    code = (
-        f"import sys; sys.addaudithook({opens}); from algid.cli import main; "
-        "sys.argv = ['algid', 'inspect', sys.argv[1]]; main()"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", code, str(file)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "sqlite3.connect\n"
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=20) == 128 + signal.SIGTERM
-
-
 def test_channels_of_bags_are_listed(tmp_path: Path) -> None:
     file = ros1_file(ros1(tmp_path / "a.bag", imu=True))
     counts = {one.topic: file.counts[number] for number, one in file.channels.items()}
@@ -397,19 +330,3 @@ def test_a_bag_that_is_damaged_anywhere_is_refused_told_or_harmless(
             lines = str(error).splitlines()
             if len(lines) != 1:
                 pytest.fail(str(error))
-
-
-def test_a_folder_of_two_files_is_read_as_one(tmp_path: Path) -> None:
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    log = noise_log(100, start_ns=EPOCH_NS)
-    for part, rows in (("a", range(60)), ("b", range(60, 100))):
-        with Writer2(tmp_path / part, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-            channel = writer.add_connection("/joint_states", TYPE, typestore=store)
-            for row in rows:
-                data = store.serialize_cdr(message(store, log, row, first=False), TYPE)
-                writer.write(channel, int(log.stamp_ns[row]), data)
-    folder = tmp_path / "whole"
-    folder.mkdir()
-    for number, part in enumerate("ab"):
-        (tmp_path / part / f"{part}.db3").rename(folder / f"whole_{number}.db3")
-    assert same(read_log(folder), log)

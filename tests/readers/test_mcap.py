@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import pytest
 import zstandard
-from mcap.writer import CompressionType, IndexType
+from mcap.writer import CompressionType
 
 from algid.base.errors import LogError
 from algid.base.ros2 import HEADER
 from algid.profile import Profile
-from algid.readers import mcap, open_log, read_log
+from algid.readers import read_log
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import (
@@ -25,7 +24,6 @@ from tests.readers.mcaps import (
     joint_state,
     messages_of,
     protobuf_schema,
-    small_chunks,
     write_mcap,
 )
 
@@ -237,53 +235,6 @@ def test_a_file_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:
     (tmp_path / "log.mcap.zstd").write_bytes(packed)
     with pytest.raises(LogError, match=r"compressed as a whole.*zstd -d"):
         read_log(tmp_path / "log.mcap.zstd")
-
-
-def test_splits_of_a_rosbag2_folder_are_one_log(tmp_path: Path) -> None:
-    log = noise_log(1000, start_ns=EPOCH_NS)
-    bag = tmp_path / "bag"
-    bag.mkdir()
-    for number in range(11):
-        write_log(bag / f"bag_{number}.mcap", log.part(number * 90, min(1000, number * 90 + 90)))
-    names = "".join(f"    - bag_{number}.mcap\n" for number in range(11))
-    (bag / "metadata.yaml").write_text(
-        f"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n{names}  "
-        "compression_mode: ''\n"
-    )
-    assert same(read_log(bag), log.part(0, 990))
-    (bag / "bag_3.mcap").unlink()
-    found = read_log(bag)
-    assert len(found) == 900
-    assert any(notice.lossy and "bag_3.mcap" in notice.text for notice in found.notices)
-
-
-def test_nan_in_a_message_is_refused(tmp_path: Path) -> None:
-    stamp = EPOCH_NS
-    messages = [
-        (TOPIC, stamp + row, joint_state(stamp + row, position=[0, 1], effort=[1, math.nan]).done())
-        for row in range(3)
-    ]
-    write_mcap(tmp_path / "log.mcap", messages)
-    with pytest.raises(LogError, match=r"tau2 .*effort\[joint2\].* sample 1"):
-        read_log(tmp_path / "log.mcap")
-
-
-def test_a_file_without_summary_is_walked_once_for_all_passes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    small_chunks(tmp_path / "a.mcap", index_types=IndexType.NONE)
-    walks: list[int] = []
-    walked = mcap._walked
-
-    def counted(stream: IO[bytes], size: int) -> Any:
-        walks.append(size)
-        return walked(stream, size)
-
-    monkeypatch.setattr(mcap, "_walked", counted)
-    reader = open_log(tmp_path / "a.mcap")
-    assert reader.rows == 1000
-    assert [sum(map(len, reader.blocks())) for _ in range(2)] == [1000, 1000]
-    assert len(walks) == 1
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])

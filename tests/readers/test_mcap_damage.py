@@ -13,12 +13,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, ChunkIndex, McapRecord, Schema, Statistics
 from mcap.stream_reader import StreamReader
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, Writer
 
 from algid.base.errors import LogError
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
@@ -32,7 +31,6 @@ from tests.readers.mcaps import (
     chunks_of,
     joint_state,
     messages_of,
-    small_chunks,
     write_mcap,
 )
 
@@ -184,31 +182,6 @@ def test_a_summary_that_agrees_is_used_and_one_that_says_too_little_is_no_damage
     assert [notice.code for notice in found.notices] == codes
 
 
-def test_a_summary_that_hides_the_joints_of_a_chunk_is_not_used(tmp_path: Path) -> None:
-    """The chunk holds another channel too, and the statistics are made to fit."""
-    path = tmp_path / "log.mcap"
-    messages = messages_of(LOG)
-    beside = [("/other", stamp, b"\0\1\0\0\7") for _, stamp, _ in messages[30:50]]
-    schema = {"/other": ("a/msg/B", "ros2msg", b"int8 x")}
-    write_mcap(path, [*messages[:30], *beside, *messages[30:]], schema, chunk_size=2000)
-
-    def hide(records: Records) -> Records:
-        (statistics,) = (one for one in records if isinstance(one, Statistics))
-        for chunk in (one for one in records if isinstance(one, ChunkIndex)):
-            if len(chunk.message_index_offsets) == 2:
-                end = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
-                places = sorted([*chunk.message_index_offsets.values(), end])
-                start = chunk.message_index_offsets.pop(1)
-                size = places[places.index(start) + 1] - start
-                statistics.channel_message_counts[1] -= (size - 15) // 16
-        return records
-
-    path.write_bytes(summarised(path.read_bytes(), hide))
-    found = read_log(path)
-    assert same(found, LOG)
-    assert [notice.code for notice in found.notices] == ["DAMAGED_INDEX"]
-
-
 @pytest.mark.parametrize(
     "damage",
     [
@@ -279,17 +252,6 @@ def test_what_the_statistics_promise_and_a_walk_does_not_find_is_told(
     assert lost(found) == {"DAMAGED": f"the file counts {len(LOG)} messages and holds {len(found)}"}
 
 
-@pytest.mark.parametrize("share", [0.3, 0.7, 0.95])
-def test_a_cut_file_yields_what_is_there(share: float, tmp_path: Path) -> None:
-    write_mcap(tmp_path / "whole.mcap", messages_of(LONG))
-    content = (tmp_path / "whole.mcap").read_bytes()
-    (tmp_path / "cut.mcap").write_bytes(content[: int(share * len(content))])
-    found = read_log(tmp_path / "cut.mcap")
-    assert share - 0.15 < len(found) / len(LONG) <= 1
-    assert same(found, LONG.part(0, len(found)))
-    assert "CUT_OFF" in lost(found)
-
-
 def test_a_file_cut_between_two_records_is_called_cut(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     write_mcap(path, messages_of(LONG))
@@ -336,19 +298,6 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     assert abs(int(count[1].replace(",", "")) - (len(log) - len(found))) < 200
 
 
-def test_a_torn_chunk_that_is_damaged_too_is_left_out(tmp_path: Path) -> None:
-    log = noise_log(3000, start_ns=EPOCH_NS)
-    write_mcap(tmp_path / "whole.mcap", messages_of(log), chunk_size=1 << 17)
-    content = bytearray((tmp_path / "whole.mcap").read_bytes())
-    last = chunks_of(tmp_path / "whole.mcap")[-1]
-    place = last.chunk_start_offset + 60  # within the frame's header and first block
-    content[place : place + 20] = b"\xff" * 20
-    (tmp_path / "cut.mcap").write_bytes(content[: last.chunk_start_offset + last.chunk_length // 2])
-    found = read_log(tmp_path / "cut.mcap")
-    assert same(found, log.part(0, len(found)))
-    assert lost(found).keys() == {"CUT_OFF", "DAMAGED"}
-
-
 @pytest.mark.parametrize("chunked", [True, False])
 @pytest.mark.parametrize("length", [0, 3, 1 << 20, (1 << 64) - 1])
 def test_a_file_is_read_up_to_its_first_broken_record(
@@ -391,30 +340,6 @@ def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
         assert lost(found).keys() == {"DAMAGED"}
         missing = f"{len(LONG) - len(found):,} messages are missing"
         assert missing in lost(found)["DAMAGED"]
-
-
-def test_one_damaged_chunk_among_many_small_ones_is_left_out_alone(tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    small_chunks(path, compression=PLAIN)
-    content = bytearray(path.read_bytes())
-    content[content.index(struct.pack("<d", np.sin(500 * 0.01)))] ^= 1
-    path.write_bytes(content)
-    log = read_log(path)
-    assert len(log) == 999
-    assert 500 * 10**6 not in log.stamp_ns
-    assert "1 message is missing" in lost(log)["DAMAGED"]
-
-
-@pytest.mark.parametrize("size", [0, 1 << 60])
-def test_a_chunk_that_claims_another_size_is_left_out(size: int, tmp_path: Path) -> None:
-    path = tmp_path / "a.mcap"
-    small_chunks(path, rows=50, index_types=IndexType.NONE)
-    content = path.read_bytes()
-    place = content.index(b"\x04\0\0\0zstd", content.index(b"\x04\0\0\0zstd") + 1) - 12
-    path.write_bytes(poked(content, place, "<Q", size))
-    log = read_log(path)
-    assert len(log) == 49
-    assert lost(log).keys() == {"DAMAGED"}
 
 
 @pytest.mark.parametrize("offset", [31, 1 << 40, -8])

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import Cdr, joint_state, write_mcap
+from tests.readers.mcaps import Cdr, write_mcap
 
 LINE = "=" * 80 + "\n"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -56,11 +53,6 @@ TIME = """\
 module builtin_interfaces { module msg { /* seconds
 and the rest */ struct Time { int32 sec; uint32 nanosec; }; }; };
 """
-STATE_TEXT = (
-    f"{LINE}IDL: sensor_msgs/msg/JointState\n{JOINT_STATE}\n{LINE}IDL: "
-    f"std_msgs/msg/Header\n{HEADER}\n"
-    f"{LINE}IDL: builtin_interfaces/msg/Time\n{TIME}"
-)
 IDL_NAMES = {
     "bool": "boolean",
     "byte": "octet",
@@ -113,44 +105,6 @@ def test_every_type_has_the_same_fields_as_in_ros2msg(package: str) -> None:
             for one, another in zip(fields, other, strict=True):
                 kind = {"char": "uint8"}.get(one.type, "/".join(_full(one.type)))
                 assert (another.name, another.type, another.count) == (one.name, kind, one.count)
-
-
-def without_includes(text: str) -> str:
-    """The text as rosbags can read it."""
-    return re.sub("(?m)^#include.*$", "", text)
-
-
-def decoded(path: Path) -> list[Any]:
-    """The messages of a file as rosbags reads them, by the file's own definitions."""
-    with AnyReader([path]) as reader:
-        return [
-            reader.deserialize(data, connection.msgtype)
-            for connection, _, data in reader.messages()
-        ]
-
-
-def test_joint_states_read_as_in_rosbags(tmp_path: Path) -> None:
-    log = noise_log(200, start_ns=EPOCH_NS)
-    assert log.omega is not None
-    rows = zip(
-        log.stamp_ns.tolist(),
-        log.theta.T.tolist(),
-        log.omega.T.tolist(),
-        log.tau.T.tolist(),
-        strict=True,
-    )
-    messages = [
-        ("/js", stamp, joint_state(stamp, ["a", "b"], *values, frame="base").done())
-        for stamp, *values in rows
-    ]
-    for name, text in (("log", STATE_TEXT), ("plain", without_includes(STATE_TEXT))):
-        schema = ("sensor_msgs/msg/JointState", "ros2idl", text.encode())
-        write_mcap(tmp_path / f"{name}.mcap", messages, {"/js": schema})
-    found = read_log(tmp_path / "log.mcap")
-    assert same(found, log)
-    theirs = decoded(tmp_path / "plain.mcap")
-    assert np.array_equal(np.array([one.position for one in theirs]).T, found.theta)
-    assert np.array_equal(np.array([one.effort for one in theirs]).T, found.tau)
 
 
 def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:

@@ -18,9 +18,9 @@ from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.messages import cdr, protobuf
+from algid.readers.messages import protobuf
 from algid.readers.messages.batch import Messages
-from algid.readers.messages.definitions import DefinitionError, parse_msg
+from algid.readers.messages.definitions import DefinitionError
 from algid.readers.messages.layout import ColumnDecoder, MisfitError
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import TOPIC, joint_state, messages_of, protobuf_schema, write_mcap
@@ -164,22 +164,6 @@ def side_by_side(payloads: list[bytes]) -> Messages:
     return Messages(content, np.cumsum(sizes + 8) - sizes, sizes, np.zeros(sizes.size, np.int64))
 
 
-def test_messages_each_of_another_layout_are_read() -> None:
-    rows = range(2000)
-    names = [["joint1", "joint2", f"{row:06d}"] for row in rows]
-    messages = [
-        joint_state(row, names[row], (row, 1.0, 0.0), (), (1.0, 2.0, 0.0)).done() for row in rows
-    ]
-    types = parse_msg(JOINT_STATE, JOINT_STATE_DEFINITION)
-    decoder = ColumnDecoder(
-        {"theta1": "position[joint1]"},
-        parse=lambda payload: cdr.parse_layout(payload, JOINT_STATE, types),
-    )
-    held, columns = decoder.columns(side_by_side(messages))
-    assert held.all()
-    assert columns["theta1"].tolist() == list(rows)
-
-
 def test_a_definition_that_cannot_be_read_on_another_topic_does_not_matter(tmp_path: Path) -> None:
     log = noise_log(50, start_ns=EPOCH_NS)
     schema = {"/bad": ("a/msg/B", "ros2msg", b"float64[" + b"9" * 5000 + b"] effort")}
@@ -211,22 +195,6 @@ def test_a_protobuf_type_that_is_missing_is_refused_where_it_is_needed() -> None
     for broken in (data[:-3], b"\xff" * 100):
         with pytest.raises(DefinitionError):
             protobuf.parse("a.State", broken)
-
-
-def test_protobuf_types_that_refer_to_themselves_are_followed_by_name_only() -> None:
-    types = protobuf.parse(
-        "a.T", descriptors(T=[*((f"f{number}", ".a.T") for number in range(1000)), ("x", "")])
-    )
-    shape = protobuf.parse_layout(b"\x12\x02\x1a\x00", "a.T", types)
-    assert shape.find("f1.f2.x") is not None
-    assert shape.find("f1.f2.f3.x") is None
-    assert shape.find("f1.f2.y") is None
-    assert shape.find("f1") is None
-    deep = b""
-    for _ in range(40):
-        deep = b"\x0a" + bytes([len(deep)]) + deep if len(deep) < 128 else deep
-    with pytest.raises(MisfitError, match="nested too deep"):
-        protobuf.parse_layout(deep, "a.T", types)
 
 
 @pytest.mark.parametrize("damage", ["cut", "wire", "varint", "width"])
