@@ -267,7 +267,7 @@ def misfit(error: ValidationError) -> tuple[str, str]:
     if first["type"] == "unexpected_keyword_argument":
         said = "extra inputs are not permitted"
     else:  # a unit or a code keeps its capitals
-        words = first["msg"].partition(", unable to parse")[0]
+        words = first["msg"].partition(", unable to parse")[0].removeprefix("Value error, ")
         said = f"{words[:1].lower()}{words[1:]}".replace("input should be", "expected", 1)
     try:
         found = reprlib.repr(first["input"])

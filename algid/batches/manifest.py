@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
-from pydantic_core import PydanticCustomError
 
 from algid.base.errors import SettingError
 from algid.base.files import first_misfit, parsed_toml, read_start, read_text
@@ -99,7 +98,7 @@ def label_of(value: object) -> Label:
 
     Raises
     ------
-    PydanticCustomError
+    ValueError
         If it is neither text, a date, a truth value nor a finite number, or a whole one beyond 64
         bits.
     """
@@ -115,19 +114,19 @@ def label_of(value: object) -> Label:
     if whole or (isinstance(value, float) and math.isfinite(value)):
         return value  # type: ignore[return-value]
     expected = "text, a date, true, false or a finite number, whole ones of 64 bits"
-    raise PydanticCustomError("label", f"expected {expected}")
+    raise ValueError(f"expected {expected}")
 
 
 def _name(name: str) -> str:
     if fault := name_fault(name):
-        raise PydanticCustomError("name", f"a job's name becomes a folder's: {fault}")
+        raise ValueError(f"a job's name becomes a folder's: {fault}")
     return name
 
 
 def _paths(cell: object) -> list[str]:
     parts = cell.split(";") if isinstance(cell, str) else cell
     if not isinstance(parts, list) or not all(map(_is_path, parts)):
-        raise PydanticCustomError("paths", "expected paths")
+        raise ValueError("expected paths")
     return [part.strip() for part in parts]
 
 
@@ -141,7 +140,7 @@ def _time(cell: object) -> str:
         return datetime.fromisoformat(str(cell)).isoformat()
     except ValueError as error:
         expected = "expected ISO 8601 like 2026-01-31T12:00:00Z, from 1970 to 2261"
-        raise PydanticCustomError("time", expected) from error
+        raise ValueError(expected) from error
 
 
 _Paths = Annotated[list[str], BeforeValidator(_paths)]
