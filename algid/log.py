@@ -41,6 +41,8 @@ IntArray = NDArray[np.int64]
 CANONICAL_COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
 VELOCITY_COLUMNS = ("omega1", "omega2")
 REFERENCE_COLUMNS = ("q_des1", "q_des2")
+SIGNALS = ("theta", "tau", "omega", "reference")
+"""Fields of a log (2, N)."""
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,7 @@ class Log:
 
     def __post_init__(self) -> None:
         rows = self.stamp_ns.size
-        for name in ("theta", "tau", "omega", "reference"):
+        for name in SIGNALS:
             channel = getattr(self, name)
             if channel is not None and channel.shape != (2, rows):
                 raise ValueError(f"{name} must have shape (2, {rows}), got {channel.shape}")
@@ -276,18 +278,14 @@ class Log:
         if step > SLOWEST:
             numbers = {"column": "t", "unit": "s", "rate": 1 / step}
             notices = (Notice("OTHER_UNIT", numbers={"case": "slow time"} | numbers),)
-        log = cls(
-            stamp_ns=np.round(times * 1e9).astype(np.int64),
-            theta=_two_rows(name, "theta", theta, times.size),
-            tau=_two_rows(name, "tau", tau, times.size),
-            origin=Origin(name, "arrays", {}),
-            notices=notices,
-        )
-        if omega is not None:
-            log = replace(log, omega=_two_rows(name, "omega", omega, times.size))
-        if reference is not None:
-            log = replace(log, reference=_two_rows(name, "reference", reference, times.size))
-        return log
+        given = {"theta": theta, "tau": tau, "omega": omega, "reference": reference}
+        signals: dict[str, Any] = {
+            signal: _two_rows(name, signal, values, times.size)
+            for signal, values in given.items()
+            if values is not None
+        }
+        stamp_ns = np.round(times * 1e9).astype(np.int64)
+        return cls(stamp_ns, origin=Origin(name, "arrays", {}), notices=notices, **signals)
 
     def __len__(self) -> int:
         return self.stamp_ns.size
@@ -309,19 +307,12 @@ class Log:
 
     def part(self, first: int, last: int) -> Log:
         """Samples `first` to `last` - 1 of this log, as views."""
-        omega, reference = self.omega, self.reference
-        if omega is not None:
-            omega = omega[:, first:last]
-        if reference is not None:
-            reference = reference[:, first:last]
-        return replace(
-            self,
-            stamp_ns=self.stamp_ns[first:last],
-            theta=self.theta[:, first:last],
-            tau=self.tau[:, first:last],
-            omega=omega,
-            reference=reference,
-        )
+        signals = {name: getattr(self, name) for name in SIGNALS}
+        cut: dict[str, Any] = {
+            name: signal if signal is None else signal[:, first:last]
+            for name, signal in signals.items()
+        }
+        return replace(self, stamp_ns=self.stamp_ns[first:last], **cut)
 
 
 def _numbers(log: str, name: str, values: ArrayLike) -> FloatArray:
@@ -383,18 +374,12 @@ def join(blocks: Iterable[Log]) -> Log:
         raise ValueError("a log needs at least one block, got none")
     if len(parts) == 1:
         return parts[0]
-    notices: list[Notice] = []
-    for part in parts:
-        notices += part.notices
-    return replace(
-        parts[0],
-        stamp_ns=np.concatenate([part.stamp_ns for part in parts]),
-        theta=np.concatenate([part.theta for part in parts], axis=1),
-        tau=np.concatenate([part.tau for part in parts], axis=1),
-        omega=joined([part.omega for part in parts]),
-        reference=joined([part.reference for part in parts]),
-        notices=tuple(notices),
-    )
+    signals: dict[str, Any] = {
+        name: joined([getattr(part, name) for part in parts]) for name in SIGNALS
+    }
+    stamps = np.concatenate([part.stamp_ns for part in parts])
+    notices = tuple(notice for part in parts for notice in part.notices)
+    return replace(parts[0], stamp_ns=stamps, notices=notices, **signals)
 
 
 def joined(parts: Sequence[FloatArray | None]) -> FloatArray | None:

@@ -220,16 +220,12 @@ def parsed_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If it is not TOML (`tomllib.TOMLDecodeError`), or larger or of longer dotted keys than
-        `LIMITS` allow.
+        If it is not TOML (`tomllib.TOMLDecodeError`), or larger than `LIMITS` allow.
     RecursionError
         If lists or tables lie too deep within one another.
     """
     if len(text) > LIMITS.toml_bytes:
         raise ValueError(f"more than {LIMITS.toml_bytes >> 20} MiB")
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.count(".") >= LIMITS.toml_key_parts and _longest_key(line) > LIMITS.toml_key_parts:
-            raise ValueError(f"line {number} has a key of more than {LIMITS.toml_key_parts} parts")
     try:
         return tomllib.loads(text)
     except ValueError as error:
@@ -237,18 +233,6 @@ def parsed_toml(text: str) -> dict[str, Any]:
             raise
         # Python reads no whole number of more than 4,300 digits, and says so to programmers
         raise ValueError("a whole number of too many digits") from error
-
-
-_QUOTED = re.compile(r"""\"[^\"]*\"|'[^']*'""")
-_BETWEEN_KEYS = re.compile(r"[=,#\[\]{}]")
-
-
-def _longest_key(line: str) -> int:
-    """Parts of the longest dotted key in a line, also with blanks around its dots."""
-    if line.lstrip().startswith("#"):
-        return 0
-    plain = "".join(_QUOTED.sub("q", line).split())
-    return max(sum(map(bool, run.split("."))) for run in _BETWEEN_KEYS.split(plain))
 
 
 def first_misfit(error: ValidationError) -> str:

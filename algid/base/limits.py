@@ -12,10 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class FileLimits:
-    """The bounds; sizes are in bytes where nothing else is said.
-
-    A pair ``free_…`` and ``…_a_byte`` bounds what a file of n bytes may ask for: free + n · a_byte.
-    """
+    """The bounds; sizes are in bytes where nothing else is said."""
 
     # settings, profiles, manifests, results
     text_bytes: int = 1 << 26
@@ -24,7 +21,7 @@ class FileLimits:
     toml_bytes: int = 1 << 22
     """Of a TOML file: a manifest of 60,000 jobs; tomllib takes up to three seconds a MiB."""
     toml_key_parts: int = 32
-    """Of a dotted key: tomllib takes time and memory with their square."""
+    """Of a dotted name that a flag sets."""
 
     # tables of every format
     columns: int = 4096
@@ -64,33 +61,20 @@ class FileLimits:
     """Of a cell that holds a number: the largest float64 has 309 digits before its point."""
     free_text_bytes: int = 256 << 20
     text_a_byte: int = 250
-    """Unpacked bytes a byte of a table: numbers pack 3 to 20 times, a log at rest 100 times."""
+    """What a table of n bytes may unpack to is the former and n times the latter: numbers pack 3
+    to 20 times, a log at rest 100 times."""
 
     # MCAP
-    summary_bytes: int = 1 << 28
     chunk_bytes: int = 1 << 28
     """Of a chunk, packed and unpacked: recorders close one at some MiB; more is not genuine."""
-    index_gaps: int = 256
-    """Gaps between messages of a chunk, beyond which its index is not followed."""
 
     # messages
     message_bytes: int = 1 << 24
     """Of one message; a joint state has some hundred."""
-    message_parts: int = 100_000
-    """Fields, structures and strings a message may be made of; a list of numbers is one."""
     layouts: int = 256
     """Past so many layouts of one size messages are walked one by one."""
-    layout_words: int = 1 << 22
-    """Words that all remembered layouts may fix together."""
-    definition_letters: int = 1 << 20
-    """Of a schema: a ROS 2 definition's letters, a Protobuf descriptor's bytes."""
-    definition_fields: int = 4096
     definition_depth: int = 32
     """Types, typedefs, modules and Protobuf messages within one another."""
-    length_digits: int = 10
-    """Of a length in a definition: 32 bits have so many."""
-    json_bytes: int = 1 << 20
-    """Of one JSON message."""
     json_depth: int = 8
     """Lists and objects within one another in a JSON line."""
     joints: int = 256
