@@ -81,7 +81,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "batches": room(
         "errors files guard identification limits options profile readers results "
-        "runtime settings staging stores text verdict words",
+        "runtime settings staging stores text words",
         "distributed polars pyarrow pydantic",
     ),
     "tracks": room(
