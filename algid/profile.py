@@ -17,7 +17,7 @@ from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
 from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.base.units import names_of, unit_of
-from algid.options import EVERYDAY
+from algid.options import EVERYDAY, Option, flag
 
 
 def _usual(unit: object) -> object:
@@ -63,7 +63,7 @@ CHANNELS_OF: Mapping[str, tuple[str, ...]] = {
     "angle_unit": ("theta1", "theta2", "omega1", "omega2"),
     "torque_unit": ("tau1", "tau2"),
 }
-"""Keywords that set the unit of several channels."""
+"""Settings that are the unit of each of several channels."""
 NO_BOUNDS = (None, None)
 OF_ONE_LOG = ("torque_file", "segment")
 """Settings that no other log shares."""
@@ -84,6 +84,15 @@ def _parts(text: object) -> object:
     return [part.strip() for part in text.split(",")]
 
 
+def _two_names(given: object) -> object:
+    """Two names, out of ``NAME,NAME`` too."""
+    parts = _parts(given)
+    pair = isinstance(parts, list | tuple) and len(parts) == 2 and all(parts)
+    if given is not None and not pair:
+        raise ValueError("expected two names like shoulder,elbow")
+    return parts
+
+
 def _plain(path: object) -> object:
     """A path as text."""
     if isinstance(path, Path):
@@ -98,7 +107,7 @@ def _number(text: object) -> object:
     return text
 
 
-PathText = Annotated[str | None, Field(min_length=1), BeforeValidator(_plain)]
+PathText = Annotated[str | None, Field(min_length=1), BeforeValidator(_plain), Option(kind=Path)]
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -189,7 +198,11 @@ class Profile(_Strict):
     """
 
     topic: str | None = field(None, "Topic with the joint states.")
-    joints: tuple[str, str] | None = field(None, "The two joints, as NAME,NAME.", EVERYDAY)
+    angle_unit: AngleUnit | None = field(None, f"{', '.join(names_of('angle'))}.", EVERYDAY)
+    torque_unit: TorqueUnit | None = field(None, "N m, mN m, A, mA, lbf in, ….", EVERYDAY)
+    joints: Annotated[tuple[str, str] | None, BeforeValidator(_two_names)] = field(
+        None, "The two joints, as NAME,NAME.", EVERYDAY
+    )
     clock: Literal["header", "log"] | None = field(
         None, "Stamps of the messages' own header, or of the log (the recorder)."
     )
@@ -283,24 +296,22 @@ class Profile(_Strict):
         return channel.topic or self.topic, channel.column
 
     def channel(self, name: str) -> Angle | Velocity | Torque:
-        """The profile of the canonical channel `name`."""
+        """The profile of the canonical channel `name`, its unit that of all such channels."""
         channel: Angle | Velocity | Torque = getattr(self, name)
+        for several, channels in CHANNELS_OF.items():
+            unit = getattr(self, several)
+            if name in channels and channel.unit is None and unit is not None:
+                return channel.model_copy(update={"unit": unit})
         return channel
 
 
-KEYWORDS = (*Profile.model_fields, *CHANNELS_OF)
-"""What verbs take that read logs."""
-
-
-def with_settings(
-    profile: Profile, settings: Mapping[str, Any], typed: str | None = None
-) -> Profile:
+def with_settings(profile: Profile, settings: Mapping[str, Any], *, typed: bool = False) -> Profile:
     """The profile with settings over it, channel by channel.
 
     Raises
     ------
     SettingError
-        If a setting or its value is not known; it names what was `typed`.
+        If a setting or its value is not known; it names the flag where settings are `typed`.
     """
     merged = profile.model_dump(exclude_unset=True)
     flags = set(profile._flags)
@@ -308,14 +319,21 @@ def with_settings(
         if isinstance(value, Mapping):  # settings of one channel
             merged[name] = merged.get(name, {}) | dict(value)
             flags |= {f"{name}.{inner}" for inner in value}
-        else:
-            merged[name] = value
-            flags.add(name)
+            continue
+        for channel in CHANNELS_OF.get(name, ()):
+            merged.get(channel, {}).pop("unit", None)
+            flags.add(f"{channel}.unit")
+        merged[name] = value
+        flags.add(name)
     try:
         changed = Profile.model_validate(merged)
     except ValidationError as error:
         place, why = misfit(error)
-        where = f"setting {place}" if typed is None else f"{typed} (profile: {place})"
+        name, where = place.partition(".")[0], f"setting {place}"
+        if typed:
+            behind_set = isinstance(settings.get(name), Mapping) or name == "velocity"
+            typed_as = flag("set" if behind_set else name).partition(" ")[0]
+            where = f"{typed_as} (profile: {place})"
         raise SettingError(f"{where}: {why}") from error
     changed._flags = frozenset(flags)
     return changed

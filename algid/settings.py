@@ -16,7 +16,7 @@ from algid.base.errors import SettingError
 from algid.base.files import misfit
 from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
-from algid.options import EVERYDAY, flag
+from algid.options import EVERYDAY, Option, flag
 from algid.profile import Effort, PathText, documented, field
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
@@ -78,6 +78,12 @@ def _poles(given: object) -> object:
     return poles
 
 
+def _terms() -> list[str]:
+    from algid.model import CHOICES
+
+    return ["auto", "plain", *CHOICES]
+
+
 @documented
 class Settings(BaseModel):
     """How to identify: each field's description says what it is.
@@ -112,7 +118,9 @@ class Settings(BaseModel):
         9.81, "m/s²; 0 for an arm in a horizontal plane [9.81].", bounds=PHYSICAL.gravity
     )
     effort: Effort | None = field(None, "Logged torque: raw, current, external, command, ….")
-    model: str = field("auto", "Torque terms: auto, plain, or coulomb,rotor,….")
+    model: Annotated[str, Option(words=_terms)] = field(
+        "auto", "Torque terms: auto, plain, or coulomb,rotor,…."
+    )
     torque_hold: Literal["auto", "foh", "zoh"] = field(
         "auto", "Torque between samples: auto, foh (linear), zoh."
     )

@@ -325,6 +325,7 @@ def test_settings_of_a_reading_hold_for_arrays_as_for_a_file(tmp_path: Path) -> 
     with pytest.raises(SettingError, match=r"^theta1\.source: log is a Log in memory"):
         algid.validate(found, [other], theta1={"source": "q1"})
     read = algid.read_log(tmp_path / "arm.csv", **said)
+    assert (algid.read_log(tmp_path / "arm.csv", said).theta == read.theta).all()  # a profile
     with pytest.raises(SettingError, match=r"^zero: .*arm\.csv has been read already"):
         algid.track(read, found, zero="hanging")
     assert algid.identify(read, estimator="weak", end=1.0).log.rows == 1001

@@ -109,8 +109,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy plotly polars",
     ),
     "cli": room(
-        "api errors exits faults guard model moved options profile report runtime settings text "
-        "units",
+        "api errors exits faults guard moved options profile report runtime settings text",
         "click rich",
     ),
 }  # fmt: skip

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.given import opened
-from algid.api.options import OUT, AnyResult, Options, ProfileLike, profile_of, with_options
+from algid.api.options import OUT, AnyResult, Options, ProfileLike, meant, settings_of
 from algid.api.signature import verb
 from algid.base.errors import AlgidError, SettingError
 from algid.base.exits import Exit
@@ -191,7 +191,8 @@ def batch(
             f"{flag('scheduler')}: workers and their memory are the cluster's; set them where it "
             "is started"
         )
-    asked, said = with_options(settings, profile, options)
+    asked, of_profile = settings_of(settings, profile, options)
+    said = meant(profile, of_profile)
     known, alone = None, "logs"
     if parameters is not None:
         known, alone = opened(parameters), "loaded"
@@ -201,16 +202,17 @@ def batch(
     if scheduler is not None:  # a worker's own folder is another
         names, place = [absolute(source) for source in names], absolute(place)
 
-    def meant(file: str | None) -> Profile | None:
+    def profile_of(file: str | None) -> Profile | None:
+        """That of a manifest's entry with the options over it."""
         if file is None:
             return said
-        return _over(file, options)
+        return meant(file, settings_of(None, file, options)[1])
 
     def ended_job(job: JobProgress) -> None:
         if progress is not None:
             progress(f"{job.last.job.name[:50]}: {job.last.status.value}", job.done, job.total)
 
-    recipe = BatchConfig(place, asked, cache(meant), known, report)  # each file once
+    recipe = BatchConfig(place, asked, cache(profile_of), known, report)  # each file once
     recipe.profile(None)
     jobs, links = [], list[str]()
     if not watch:
@@ -279,11 +281,6 @@ def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
     elif ended.interrupted:
         ended_as = Exit.STOPPED
     return Answer(lambda: lines, complaints=complaints, exit=ended_as)
-
-
-def _over(file: str, options: Mapping[str, Any]) -> Profile | None:
-    """The profile of a manifest's entry with the options over it."""
-    return with_options(None, profile_of(file), options)[1]
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.options import OUT, Force, LogOptions, ProfileLike, meaning
+from algid.api.options import OUT, Force, LogOptions, ProfileLike, meant
 from algid.api.signature import verb
 from algid.base.errors import OutputError
 from algid.base.exits import exit_of
@@ -80,7 +80,7 @@ def convert(
     if target.suffix.lstrip(".").lower() not in FORMATS:
         raise OutputError(f"{target}: expected a name that ends in .{', .'.join(FORMATS)}")
     refuse_existing(target, force)
-    reader = open_log(source, meaning(profile, options))
+    reader = open_log(source, meant(profile, options))
     notices: list[Notice] = []
 
     def noted() -> Iterator[Log]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
 from algid.api.given import called, folder_or_none, parts_of
-from algid.api.options import AnyLog, Folder, Force, Length, cases, two_names
+from algid.api.options import AnyLog, Folder, Force, Length, cases, meant
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
@@ -213,7 +213,7 @@ def design(
     if limits is not None:
         file = Path(limits)
     asked = request(file, asked_for)
-    names = two_names("joints", joints)
+    names = meant(None, {"joints": joints}).joints
     source = called(prior)
     folder = None
     if out is not None:

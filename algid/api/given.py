@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,8 +12,6 @@ from algid.base.files import whole_folder
 from algid.options import flag
 
 if TYPE_CHECKING:
-    from algid.identification.open_logs import LogLike
-    from algid.profile import Profile
     from algid.results import Result
 
 
@@ -55,26 +53,6 @@ def called(given: Result | str | Path) -> str:
     if isinstance(given, str | Path):
         return str(given)
     return given.log.path
-
-
-def meant(given: LogLike | Iterable[LogLike] | None, profile: Profile | None) -> Any:
-    """Logs as they are given, those in memory as the profile has them.
-
-    Raises
-    ------
-    LogError
-        If arrays of one are not such as `Log` promises.
-    SettingError
-        If the profile says of one what only holds of a file.
-    """
-    from algid.log import Log
-    from algid.readers.memory import with_profile
-
-    if isinstance(given, Log):
-        return with_profile(given, profile)
-    if isinstance(given, Sequence | Iterator) and not isinstance(given, str):
-        return [meant(one, profile) for one in given]
-    return given
 
 
 def folder_or_none(folder: Path | None, force: bool) -> AbstractContextManager[Path | None]:

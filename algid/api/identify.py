@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.given import meant
 from algid.api.options import (
     AnyResult,
     Export,
@@ -16,7 +15,8 @@ from algid.api.options import (
     Logs,
     Options,
     ProfileLike,
-    with_options,
+    meant,
+    settings_of,
 )
 from algid.api.signature import verb
 from algid.base.errors import SettingError
@@ -111,8 +111,8 @@ def identify(
     from algid.api.result import Result
     from algid.identification.identify import identify as run
 
-    asked, meaning = with_options(settings, profile, options)
-    unloaded, loaded = meant(unloaded, meaning), meant(loaded, meaning)
+    asked, of_profile = settings_of(settings, profile, options)
+    own, unloaded, loaded = meant(profile, of_profile, unloaded, loaded)
     if export and not report:
         raise SettingError(
             f"{flag('export')}: the log is made from the time series; leave "
@@ -123,7 +123,7 @@ def identify(
         loaded,
         asked,
         parameters=parameters,
-        profile=meaning,
+        profile=own,
         out=out,
         name=name,
         force=force,

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.given import meant
-from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meaning
+from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meant
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
@@ -78,7 +77,7 @@ def inspect(
     """
     from algid.inspection.report import inspect_log
 
-    own = meaning(profile, options)
+    own, log = meant(profile, options, log)
     if write_profile is not None:
         from algid.inspection.draft import draft_profile
 
@@ -89,7 +88,7 @@ def inspect(
         text = draft_profile(Path(log))
         with whole_file(file, force=force) as temporary:
             temporary.write_text(text, encoding="utf-8")
-    return inspect_log(meant(log, own), own)
+    return inspect_log(log, own)
 
 
 def profile_file(place: str | Path) -> Path:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
@@ -11,15 +11,7 @@ from algid.base.errors import SettingError
 from algid.base.files import parsed_toml
 from algid.base.limits import KNOWN_LENGTH, LIMITS
 from algid.options import ADVANCED, Option, flag
-from algid.profile import (
-    CHANNELS_OF,
-    KEYWORDS,
-    Effort,
-    Profile,
-    load_profile,
-    over,
-    with_settings,
-)
+from algid.profile import Effort, Profile, load_profile, over, with_settings
 from algid.settings import OF_BOTH, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
@@ -111,82 +103,77 @@ class Options(_OfLogs, total=False):
     cross_validate: bool
 
 
-def with_options(
+def settings_of(
     settings: Settings | None, profile: ProfileLike | None, options: Mapping[str, Any]
-) -> tuple[Settings, Profile | None]:
-    """Settings and profile with single settings of either over them, as flags are over a file.
+) -> tuple[Settings, dict[str, Any]]:
+    """The settings with options over them, as flags are over a file; and the profile's options.
+
+    Raises
+    ------
+    SettingError
+        If an option is none of `Settings` or of `Profile`, or a setting's value is wrong.
+    """
+    refuse_unknown(options, (*Settings.model_fields, *Profile.model_fields))
+    refuse_contradictions(options)
+    own, of_profile = dict[str, Any](), dict[str, Any]()
+    for name, value in options.items():
+        # a profile's velocity is true or false
+        of_run = name in Settings.model_fields and not (
+            name == "velocity" and isinstance(value, bool)
+        )
+        (own if of_run else of_profile)[name] = value
+    of_both = {name: own[name] for name in OF_BOTH if name in own}
+    # a driver's effort says how its torques are read, gravity alone says nothing of a log
+    if profile is not None or of_profile or "effort" in of_both:
+        of_profile |= of_both
+    return (settings or Settings()).but(**own), of_profile
+
+
+def meant(profile: ProfileLike | None, options: Mapping[str, Any], *logs: Any) -> Any:
+    """The profile with single settings over it; and the logs, those in memory as it has them.
 
     Parameters
     ----------
-    settings : Settings or None
     profile : Profile, path of one, mapping or None
     options : mapping
-        By the names of the fields of `Settings`, and of `Profile`'s that `Settings` does not have.
+        By the names of the fields of `Profile`.
+    *logs : as a verb takes them
 
     Raises
     ------
+    LogError
+        If arrays of a log are not such as `Log` promises.
     SettingError
-        If an option is not known, or a value is wrong.
+        If an option is not known or wrong, the profile's file cannot be read, or the profile says
+        of a log in memory what only holds of a file.
     """
-    refuse_unknown(options, (*Settings.model_fields, *KEYWORDS))
-    refuse_contradictions(options)
-    of_settings, of_profile = {}, {}
-    for name, value in options.items():
-        # a profile's velocity is true or false
-        if name in Settings.model_fields and not (name == "velocity" and isinstance(value, bool)):
-            of_settings[name] = value
-        else:
-            of_profile[name] = value
-    asked = (settings or Settings()).but(**of_settings)
-    known = profile_of(profile)
-    of_both = {name: of_settings[name] for name in OF_BOTH if name in of_settings}
-    # a driver's effort says how its torques are read, gravity alone says nothing of a log
-    if known is not None or of_profile or "effort" in of_both:
-        of_profile |= of_both
-    return asked, _over(known, of_profile)
-
-
-def meaning(profile: ProfileLike | None, options: Mapping[str, Any]) -> Profile | None:
-    """The profile with single settings of it over it; for verbs that have no `Settings`.
-
-    Raises
-    ------
-    SettingError
-        If an option is not known, or a value is wrong.
-    """
-    refuse_unknown(options, KEYWORDS)
-    return _over(profile_of(profile), options)
-
-
-def profile_of(given: ProfileLike | None) -> Profile | None:
-    """The profile that is given in any form.
-
-    Raises
-    ------
-    SettingError
-        If its file cannot be read, or a setting of it is wrong.
-    """
-    if given is None or isinstance(given, Profile):
-        return given
-    if isinstance(given, str | Path):
-        return load_profile(Path(given))
-    if not isinstance(given, Mapping):
+    refuse_unknown(options, Profile.model_fields)
+    own: Any = profile
+    if isinstance(profile, str | Path):
+        own = load_profile(Path(profile))
+    elif isinstance(profile, Mapping):
+        own = over(None, profile)
+    elif not isinstance(profile, Profile | None):
         raise SettingError(
-            f"profile: expected a path, a dict or a Profile, found {type(given).__name__}"
+            f"profile: expected a path, a dict or a Profile, found {type(profile).__name__}"
         )
-    return over(None, given)
+    if options:
+        own = with_settings(own or Profile(), options, typed=True)
+    if not logs:
+        return own
+    return own, *(_in_memory(one, own) for one in logs)
 
 
-def two_names(name: str, given: object) -> tuple[str, str]:
-    """The names in ``NAME,NAME`` or a pair; raises `SettingError` where there are not two."""
-    parts = given
-    if isinstance(given, str):
-        parts = given.split(",")
-    if isinstance(parts, list | tuple) and len(parts) == 2:
-        first, second = str(parts[0]).strip(), str(parts[1]).strip()
-        if first and second:
-            return first, second
-    raise SettingError(f"{flag(name)}: expected two names like shoulder,elbow, found {given!r:.60}")
+def _in_memory(given: Any, profile: Profile | None) -> Any:
+    """A log or several, those in memory as the profile has them."""
+    from algid.log import Log
+    from algid.readers.memory import with_profile
+
+    if isinstance(given, Log):
+        return with_profile(given, profile)
+    if isinstance(given, Sequence | Iterator) and not isinstance(given, str):
+        return [_in_memory(one, profile) for one in given]
+    return given
 
 
 def setting_of(line: str) -> dict[str, Any]:
@@ -210,16 +197,3 @@ def setting_of(line: str) -> dict[str, Any]:
         for part in reversed(key.split(".")):
             setting = {part.strip(): setting}
         return dict(setting)
-
-
-def _over(profile: Profile | None, options: Mapping[str, Any]) -> Profile | None:
-    """The profile with options over it, one after another."""
-    for name, value in options.items():
-        settings = {name: value}
-        if name in CHANNELS_OF:
-            settings = {channel: {"unit": value} for channel in CHANNELS_OF[name]}
-        elif name == "joints" and value is not None:
-            settings = {name: two_names(name, value)}
-        typed = "set" if isinstance(value, Mapping) or name == "velocity" else name
-        profile = with_settings(profile or Profile(), settings, flag(typed).partition(" ")[0])
-    return profile

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from algid.api.options import LogOptions, ProfileLike, meaning
+from algid.api.options import LogOptions, ProfileLike, meant
 
 if TYPE_CHECKING:
     from algid.log import Log
@@ -52,4 +52,4 @@ def read_log(
     """
     from algid.readers import read_log as read
 
-    return read(path, meaning(profile, options))
+    return read(path, meant(profile, options))

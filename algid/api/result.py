@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from algid import results
-from algid.api.given import meant
-from algid.api.options import LogOptions, ProfileLike, meaning
+from algid.api.options import LogOptions, ProfileLike, meant
 
 if TYPE_CHECKING:
     import polars as pl
@@ -70,8 +69,8 @@ class Result(results.Result):  # noqa: D101
         """
         from algid.identification.predicting import predicted
 
-        own = meaning(profile, options)
-        return predicted(self, meant(log, own), "loaded" if loaded else "unloaded", own)
+        own, log = meant(profile, options, log)
+        return predicted(self, log, "loaded" if loaded else "unloaded", own)
 
     def plot(self) -> Figure:
         """The page's figure of every estimate with its 95 % interval, in percent of the estimate.

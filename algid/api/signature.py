@@ -12,7 +12,7 @@ import re
 import sys
 import types
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
@@ -111,7 +111,8 @@ def fields(model: Any, kind: Any = None) -> dict[str, Keyword]:
     found = {}
     for name, one in model.model_fields.items():
         panel = (one.json_schema_extra or {}).get("panel") or ADVANCED
-        option = Option(kind=Path if name in ("torque_file", "prior") else kind, panel=panel)
+        option = next((part for part in one.metadata if isinstance(part, Option)), Option(kind))
+        option = replace(option, panel=panel)
         default = False if one.annotation is bool and kind is None else None
         found[name] = Keyword(name, one.annotation, default, one.description or "", option)
     return found

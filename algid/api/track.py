@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.given import folder_or_none, meant
+from algid.api.given import folder_or_none
 from algid.api.options import (
     AnyLog,
     Export,
@@ -16,7 +16,7 @@ from algid.api.options import (
     Length,
     LogOptions,
     ProfileLike,
-    meaning,
+    meant,
 )
 from algid.api.signature import verb
 from algid.base.exits import exit_of
@@ -106,8 +106,7 @@ def track(
     from algid.tracks.page import track_folder, write_track
     from algid.tracks.run import track_log
 
-    own = meaning(profile, options)
-    log = meant(log, own)
+    own, log = meant(profile, options, log)
     folder = None
     if out is not None:
         folder = track_folder(_name(log), Path(out))

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.given import called, meant, opened
-from algid.api.options import AnyResult, Loaded, LogOptions, Logs, ProfileLike, meaning
+from algid.api.given import called, opened
+from algid.api.options import AnyResult, Loaded, LogOptions, Logs, ProfileLike, meant
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
@@ -96,8 +96,8 @@ def validate(
     from algid.identification.validate import validate as predicted
     from algid.identification.validated import Validated
 
-    known, own = None, meaning(profile, options)
-    file = called(result)
+    known, file = None, called(result)
+    own, logs, loaded = meant(profile, options, logs, loaded)
     judged: tuple[Judged, ...] = ()
     if max_error is not None:
         judged = tuple(judge(opened(result), max_error))
@@ -107,7 +107,6 @@ def validate(
                 f"validate: expected a log, found none; give one, or {flag('max_error')}"
             )
         return Validated({}, None, judged=judged)
-    logs, loaded = meant(logs, own), meant(loaded, own)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
         from algid.identification.urdf import read_urdf
 

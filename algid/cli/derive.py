@@ -11,7 +11,6 @@ import inspect
 import shlex
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -217,33 +216,15 @@ def _of_logs(verb: Callable[..., Any]) -> dict[str, Keyword]:
     *_, last = inspect.signature(verb).parameters.values()
     if "Options" not in str(last.annotation):
         return {}
-    from algid.base.units import names_of
-    from algid.profile import ALL_CHANNELS, CHANNELS_OF, Profile
+    from algid.profile import ALL_CHANNELS, Profile
     from algid.settings import OF_PRIOR, Settings
 
-    found = {}
-    for name, text in (
-        ("angle_unit", ", ".join(names_of("angle"))),
-        ("torque_unit", "N m, mN m, A, mA, lbf in, …"),
-    ):
-        channel = Profile.model_fields[CHANNELS_OF[name][0]].annotation
-        hint = channel.model_fields["unit"].annotation  # type: ignore[union-attr]
-        found[name] = Keyword(name, hint, None, f"{text}.", Option(str))
-    of_profile = fields(Profile, str)
+    found = fields(Profile, str)
     for name in (*ALL_CHANNELS, "velocity", *OF_PRIOR):
-        del of_profile[name]
-    found |= of_profile
+        del found[name]
     if "Unpack[Options]" in str(last.annotation):
         found |= fields(Settings)
-        option = replace(found["model"].option, words=_terms)
-        found["model"] = replace(found["model"], option=option)
     return found
-
-
-def _terms() -> list[str]:
-    from algid.model import CHOICES
-
-    return ["auto", "plain", *CHOICES]
 
 
 def _lines(by_set: list[Keyword], of_logs: bool) -> list[str]:

@@ -103,7 +103,7 @@ def open_table(table: TableFile, profile: Profile) -> TableReader:
         looked = replace(columns, sources={"t": columns.sources["t"], **others})
         return samples(rows, looked, {}, _LOOKED)
 
-    unit = profile.theta1.unit or columns.units.get("theta1", "rad")
+    unit = profile.channel("theta1").unit or columns.units.get("theta1", "rad")
     # of counts nobody knows how far they are
     beside = moving_joints(columns.others, look, ANGLE[unit]) if unit in ANGLE else ()
     return make_reader(

@@ -43,8 +43,8 @@ def refuse_others(given: object) -> None:
 
 
 _OF_A_LOG = (
-    "accept", "drive", "effort", "end", "gravity", "offsets", "passive", "prior", "prior_error",
-    "second_angle", "signs", "start", "velocity", "zero",
+    "accept", "angle_unit", "drive", "effort", "end", "gravity", "offsets", "passive", "prior",
+    "prior_error", "second_angle", "signs", "start", "torque_unit", "velocity", "zero",
 )  # fmt: skip
 """What a profile may say of arrays: where they are from has been said by giving them."""
 _OF_ANY_LOG = ("accept", "effort", "end", "gravity", "prior", "prior_error", "start", "velocity")
@@ -128,7 +128,7 @@ def with_profile(log: Log, profile: Profile | None) -> Log:
         if values is not None:
             columns |= zip(names, values, strict=True)
     accept = set(profile.accept) | set(reading.accepted)
-    if profile.theta1.unit is None and profile.theta2.unit is None:
+    if not (profile.channel("theta1").unit or profile.channel("theta2").unit):
         accept.add("DEGREES")  # a log's angles are in rad, however far joints turn
     settings = {"time": "t", "time_unit": "ns", "accept": sorted(accept)}
     read = open_log(columns, with_settings(profile, settings)).whole()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from algid.api.options import meaning
+from algid.api.options import meant
 from algid.cli import run
 from algid.cli.app import app
 from algid.cli.derive import take
@@ -43,4 +43,4 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
     options = {name: value for name, value in flags.items() if name != "set"}
     for line in flags.get("set", []):
         take(options, line, None)
-    return meaning(None, options)
+    return meant(None, options)

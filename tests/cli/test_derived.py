@@ -22,7 +22,7 @@ from algid.cli.derive import COMMANDS, Command, command, listed
 from algid.methods import ESTIMATORS
 from algid.moved import MOVED
 from algid.options import BY_SET
-from algid.profile import CHANNELS_OF, Profile
+from algid.profile import Profile
 from algid.settings import Settings
 from tests.cli.commands import call
 
@@ -250,7 +250,7 @@ def test_identify_shows_ten_everyday_options_and_a_line_each() -> None:
 
 
 def test_a_type_checker_knows_every_setting() -> None:
-    known = set(Profile.model_fields) | set(CHANNELS_OF)
+    known = set(Profile.model_fields)
     assert set(LogOptions.__annotations__) == known
     assert set(Options.__annotations__) == known | set(Settings.model_fields)
 
