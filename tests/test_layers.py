@@ -97,7 +97,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "exports": room(
         "arm compiled errors estimators identification model names notices options physics "
-        "results text",
+        "results",
         "jinja2 numpy polars scipy",
     ),
     "fleet": room("arm errors files limits model notices physics progress report "

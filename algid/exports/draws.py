@@ -98,11 +98,8 @@ def draws_of(
         if why is not None:
             refused += 1
             continue
-        origins = []
-        for number in one.numbers:
-            origins.append(replace(number, origin=number.origin.replace("identified", "drawn")))
         numbers |= {name: one.coefficients.value[name] for name in arm}  # as l1 moved them
-        yield numbers, replace(one, numbers=tuple(origins), warnings=best.warnings), refused
+        yield numbers, replace(one, word="drawn", warnings=best.warnings), refused
         refused = 0
     raise ResultError(
         f"{file}: {_HOPELESS} draws in a row are no arm ({why}); identify it from more "
@@ -141,7 +138,7 @@ def drawn_files(
     if to not in (*FORMATS, *TABLES):
         raise SettingError(f"{flag('draws')}: {to} has no draws; leave it out")
     table = to in TABLES
-    takes(to, frozenset({"l1"}) if table else FORMATS[to].takes, knowns)
+    takes(to, knowns)
     files: dict[str, bytes] = {"manifest.json": b""}
     rows: list[dict[str, Any]] = []
     refused, warnings = 0, tuple[Notice, ...]()

@@ -1,13 +1,17 @@
-"""Export formats by name, each a template with what it is made of, and the payload for planners."""
+"""Export formats by name, each a template with what it is made of, and the payload for planners.
+
+URDF (ROS, MoveIt, Pinocchio, Drake), SDF (Gazebo) and MJCF (MuJoCo) hold links. There the arm moves
+in the world's x-z plane: a turn about -y is counterclockwise, so that the joints' angles are θ1 and
+θ2 themselves and gravity pulls along -z. Without gravity it moves in the x-y plane about z.
+"""
 
 from __future__ import annotations
 
 import cmath
 import json
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache, partial
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +19,25 @@ import numpy as np
 
 from algid.base.errors import ResultError, SettingError
 from algid.exports.description import Description, describe
-from algid.exports.links import Knowns
+from algid.exports.links import Knowns, Link
 from algid.exports.programs import program
-from algid.exports.robots import numbers, robot
 from algid.identification.known import contradictions, covariance_of
+from algid.model import EVERY_TERM, SINES, TERMS, UNITS
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
 
+TIMESTEP = 5e-4  # s: Runge-Kutta of fourth order errs far below 1e-5 rad a second with it
+LOSSES = ("damping", "friction")
+
 
 @dataclass(frozen=True)
 class Format:
-    """A format: its template, what that is made of, whether it needs links, and its flags."""
+    """A format: its template, and of links whether their joints have rotors; a program has none."""
 
     template: str
-    content: Callable[[Description], dict[str, Any]]
-    links: bool
-    takes: frozenset[str]
+    links: bool = False
+    rotors: bool = False
 
     @property
     def suffix(self) -> str:
@@ -39,13 +45,12 @@ class Format:
         return Path(self.template).suffix
 
 
-_LINKS = frozenset({"l1", "l2", "m1", "m2", "rotor1"})
 FORMATS = {
-    "urdf": Format("arm.urdf", partial(robot, rotors=False), True, _LINKS),
-    "mjcf": Format("arm.xml", partial(robot, rotors=True), True, _LINKS),
-    "sdf": Format("arm.sdf", partial(robot, rotors=False), True, _LINKS),
-    "python": Format("arm.py", partial(program, before=""), False, frozenset({"l1"})),
-    "c": Format("arm.c", partial(program, before=" * "), False, frozenset({"l1"})),
+    "urdf": Format("arm.urdf", links=True),
+    "mjcf": Format("arm.xml", links=True, rotors=True),
+    "sdf": Format("arm.sdf", links=True),
+    "python": Format("arm.py"),
+    "c": Format("arm.c"),
 }
 PAYLOAD = "payload"
 
@@ -70,7 +75,7 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
         If what is known leaves no positive mass or inertia, is no positive number, or has no place
         in the format.
     """
-    takes(to, frozenset({"l2"}) if to == PAYLOAD else FORMATS[to].takes, knowns)
+    takes(to, knowns)
     if to == PAYLOAD:
         content = _payload(result, file, knowns)
         return _template("payload.yaml").render(content), contradictions(result, knowns.given)
@@ -78,18 +83,32 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     return written(arm, to), arm.warnings
 
 
-def takes(to: str, names: frozenset[str], knowns: Knowns) -> None:
-    """Raise `SettingError` where what is known is no positive number, or none of `names`."""
+def takes(to: str, knowns: Knowns) -> None:
+    """Raise `SettingError` where what is known is no positive number, or has no place in `to`."""
+    taken = {"l2" if to == PAYLOAD else "l1"}
+    if to in FORMATS and FORMATS[to].links:
+        taken = set(vars(knowns))
     for name, value in knowns.given.items():
         if not 0 < value < float("inf") and not (name == "rotor1" and value == 0):
             raise SettingError(f"{flag(name)}: expected a positive number, found {value:g}")
-        if name not in names:
+        if name not in taken:
             raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
 
 
 def written(arm: Description, to: str) -> str:
     """The text of an arm in the format `to`."""
-    return _template(FORMATS[to].template).render(FORMATS[to].content(arm))
+    form = FORMATS[to]
+    content = _robot(arm, rotors=form.rotors) if form.links else program(arm)
+    content |= {"arm": arm, "units": UNITS, "bent": set(SINES) & set(arm.coefficients.model.names)}
+    header = _template("header").render(content).rstrip()
+    # nothing in it ends a comment of C or a string of Python
+    header = header.replace("*/", "* /").replace("\\", "/").replace('"""', "'''")
+
+    def comment(before: str) -> str:
+        """What a file says of itself, with something before each line."""
+        return "\n".join(f"{before}{line}".rstrip() for line in header.split("\n"))
+
+    return _template(form.template).render(content | {"comment": comment})
 
 
 @cache
@@ -104,8 +123,63 @@ def _template(name: str) -> Any:
         keep_trailing_newline=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["n"] = numbers
+    environment.filters |= {"n": _numbers, "repr": repr}
     return environment.get_template(f"{name}.j2")
+
+
+def _numbers(values: float | tuple[float, ...] | None) -> str:
+    """Numbers that read back as they are; null for what is not known."""
+    if values is None:
+        return "null"
+    each = values if isinstance(values, tuple) else (values,)
+    return " ".join(repr(float(value) + 0.0) for value in each)  # + 0.0: no -0.0
+
+
+def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
+    """What the templates of robots are made of.
+
+    Without `rotors` that of joint 1 is in link 1's inertia, which turns about the same axis.
+    """
+    assert arm.links is not None
+    (first, second), value = arm.links, arm.coefficients.value
+    model, rotor_within = arm.coefficients.model, bool(arm.rotor1 and not rotors)
+    if rotor_within:
+        first = replace(first, inertia=first.inertia + arm.rotor1)
+    kinds = (*LOSSES, "rotor") if rotors else LOSSES
+    # of a joint damping N m s/rad, Coulomb friction N m, rotor inertia kg m^2; none is negative
+    joints = [
+        {"name": f"joint{joint}"} | dict.fromkeys((*LOSSES, "rotor"), 0.0) for joint in (1, 2)
+    ]
+    lacking, negative = [], []
+    for term in EVERY_TERM.values():
+        held = [(kind, *one) for kind in kinds for one in getattr(term, kind)]
+        for kind, name, joint in held:
+            if value[name] < 0:
+                negative.append(name)
+            joints[joint][kind] = max(value[name], 0.0)
+        if term.name in model.terms and not (held or term.sines):  # sines: the links' centres
+            lacking.append(term)
+    joints[0]["rotor"] = arm.rotor1
+
+    def centre(link: Link) -> str:
+        """A link's centre of mass in its frame: to the left of its line is up, or on the plane."""
+        x, y = link.centre, link.aside
+        return _numbers((x, 0, y) if model.gravity else (x, y, 0))
+
+    return {
+        "axis": "0 -1 0" if model.gravity else "0 0 1",
+        "centre": centre,
+        "first": first,
+        "gravity": model.gravity,
+        "joints": joints,
+        "jump": any(TERMS[name].friction for name in model.terms),
+        "lacking": lacking,
+        "negative": negative,
+        "rotor_within": rotor_within,
+        "second": second,
+        "timestep": TIMESTEP,
+        "turned": (math.cos(0.5 * arm.turn), 0, -math.sin(0.5 * arm.turn), 0),
+    }
 
 
 def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
@@ -139,9 +213,6 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
             return 0.0, 0.0
         return estimate.estimate, estimate.std
 
-    def number(value: float | None) -> str:
-        return "null" if value is None else repr(float(value))
-
     (y, y_std), (J, J_std) = body("y_p"), body("J_p")
     # nothing is shared with what is given or not determined
     shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
@@ -149,15 +220,15 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
     return {
         "file": json.dumps(file),
         "estimator": result.estimator,
-        "where": "given" if given else "identified",
+        "given": bool(given),
         "mass": mass.estimate,
-        "mass_std": number(mass.std),
+        "mass_std": mass.std,
         "x": length,
-        "x_std": number(0.0 if given or identified is None else identified.std),
+        "x_std": 0.0 if given or identified is None else identified.std,
         "y": y,
-        "y_std": number(y_std),
+        "y_std": y_std,
         "J": J,
-        "J_std": number(J_std),
+        "J_std": J_std,
         "covariance": covariance.tolist(),
     }
 
@@ -183,23 +254,9 @@ def controller_call(
     """
     payload = _payload(result, file, knowns)
     x, y = "FLANGE_X", "FLANGE_Y"
-    blanks = f"FLANGE_X, FLANGE_Y: give {flag('flange')}; FLANGE_Z: measure,"
     if flange is not None:
         apart = complex(payload["x"] - flange[0], payload["y"] - flange[1])
         centre = apart * cmath.exp(-1j * math.radians(flange[2]))
-        x, y, blanks = (
-            f"{round(centre.real, 5) + 0.0:.5f}",
-            f"{round(centre.imag, 5) + 0.0:.5f}",
-            "FLANGE_Z: measure,",
-        )
-    mass = f"{payload['mass']:.5f}"
-    return (
-        "# kg, and m in the flange's frame; the mass is what the loaded log has more than the\n"
-        "# unloaded one: a gripper that both had is to be added.\n"
-        f"# {blanks} a log of a planar arm does not tell what lies across its plane.\n"
-        "# URScript, PolyScope 5.10 or later:\n"
-        f"set_target_payload({mass}, [{x}, {y}, FLANGE_Z])\n"
-        "# ROS 2, ur_robot_driver:\n"
-        "ros2 service call /io_and_status_controller/set_payload ur_msgs/srv/SetPayload "
-        f'"{{mass: {mass}, center_of_gravity: {{x: {x}, y: {y}, z: FLANGE_Z}}}}"\n'
-    )
+        x, y = (f"{round(one, 5) + 0.0:.5f}" for one in (centre.real, centre.imag))
+    numbers = {"mass": f"{payload['mass']:.5f}", "x": x, "y": y, "flag": flag("flange")}
+    return str(_template("controller.txt").render(numbers))

@@ -13,17 +13,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
-from algid.exports.description import Description, comment, lacking
+from algid.exports.description import Description
 from algid.model import TERMS, Model, Weighted, attributes
 from algid.physics.expressions import Atom
 from algid.physics.motion import Widths
 
-HELD = frozenset(name for name, term in TERMS.items() if term.timing is None)
 _FUNCTIONS = ("cos", "exp", "sin", "tanh")
 
 
-def program(arm: Description, before: str) -> dict[str, Any]:
-    """What the templates of programs are made of; the header's lines have `before` before them."""
+def program(arm: Description) -> dict[str, Any]:
+    """What the templates of programs are made of."""
     model = arm.coefficients.model
     compiled, loads = model.compiled, list(model.compiled.loads)
     others = sorted(set(range(len(compiled.names))) - set(loads))
@@ -58,7 +57,10 @@ def program(arm: Description, before: str) -> dict[str, Any]:
     extra = [[_source(model, weighted, "") for weighted in row] for row in X]
     body = " ".join([*(line for lines in atoms.values() for line in lines), *share])
     return {
-        "comment": comment(arm, lacking(arm, HELD), before),
+        "lacking": [TERMS[name] for name in model.terms if TERMS[name].timing is not None],
+        "jump": False,
+        "negative": (),
+        "rotor_within": False,
         "constants": _constants(arm),
         "functions": [name for name in _FUNCTIONS if re.search(rf"\b{name}\(", body)],
         "atoms": atoms,
