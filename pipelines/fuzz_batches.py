@@ -153,7 +153,7 @@ def _run(jobs: list[Any], out: Path, executor: AtOnce) -> tuple[set[str], str | 
     store = open_store(str(out))
     sweep(store)
     recipe = BatchConfig(str(out), Settings(), lambda _file: None)
-    ended = Batch(store, recipe, executor, 1, lambda _progress: None).run(jobs)
+    ended = Batch(store, recipe, executor, 1, lambda *_: None).run(jobs)
     if ended.stopped is not None:
         return set(), ended.stopped
     return set(pl.read_parquet(out / "jobs.parquet")["job"]), None

@@ -37,12 +37,12 @@ def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> Non
     out = served.url("out")
     recipe = BatchConfig(out, Settings(estimator="weak"), lambda _file: None, report=False)
     jobs = jobs_of([served.url("logs")], out)
-    ended = Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs)
+    ended = Batch(open_store(out), recipe, Here(), 1, lambda *_: None).run(jobs)
     assert [(record.job.name, record.status) for record in ended.records] == [
         ("bad", JobStatus.FAILED),
         ("r1/a", JobStatus.OK),
     ]
-    assert Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran == 0
+    assert Batch(open_store(out), recipe, Here(), 1, lambda *_: None).run(jobs).ran == 0
     (tmp_path / "result.json").write_bytes(open_store(out).read("r1/a.algid/result.json") or b"")
     assert algid.read_result(tmp_path / "result.json").log.path.startswith(
         f"s3://{served.bucket}/logs/r1/a.mcap"
@@ -125,7 +125,7 @@ def test_a_changed_object_is_done_again(served: Served, tmp_path: Path) -> None:
     recipe = BatchConfig(out, Settings(estimator="weak"), lambda _file: None, report=False)
 
     def ran() -> int:
-        return Batch(open_store(out), recipe, Here(), 1, lambda _progress: None).run(jobs).ran
+        return Batch(open_store(out), recipe, Here(), 1, lambda *_: None).run(jobs).ran
 
     assert (ran(), ran()) == (1, 0)
     store.write("bad.csv", b"more junk")

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from algid.batches.jobs import Job
     from algid.batches.records import JobRecord
     from algid.batches.run import Batch, BatchOutcome
-    from algid.batches.run import Progress as JobProgress
     from algid.profile import Profile
     from algid.settings import Settings
 
@@ -208,9 +207,9 @@ def batch(
             return said
         return meant(file, settings_of(None, file, options)[1])
 
-    def ended_job(job: JobProgress) -> None:
+    def ended_job(last: JobRecord, done: int, total: int) -> None:
         if progress is not None:
-            progress(f"{job.last.job.name[:50]}: {job.last.status.value}", job.done, job.total)
+            progress(f"{last.job.name[:50]}: {last.status.value}", done, total)
 
     recipe = BatchConfig(place, asked, cache(profile_of), known, report)  # each file once
     recipe.profile(None)

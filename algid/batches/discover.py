@@ -11,7 +11,7 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fnmatch import fnmatchcase
@@ -77,10 +77,18 @@ Found = tuple[str, str, str | None]
 def _logs(source: str, out: str, links: list[str]) -> list[Found]:
     """The logs of a source."""
     if is_url(source):
-        own = _written_by_batch(source, out)
-        below = list_urls(source)
-        logs = [(url, name) for url, name in below if name.lower().endswith(SUFFIXES)]
-        return [(url, _stem(name), None) for url, name in logs if not own(name)]
+        place, below = f"{shown(out)}/", f"{shown(source)}/"
+        inside = place.removeprefix(below) if is_url(out) and place.startswith(below) else None
+        named: list[Found] = []
+        for url, name in list_urls(source):
+            parts = name.split("/")
+            hidden = any(part.startswith(".") for part in parts)
+            own = any(part.endswith(".algid") for part in parts[:-1])
+            if inside is not None:  # what this batch has written there
+                own |= name.startswith(unquote(inside)) if inside else name == TABLE
+            if name.lower().endswith(SUFFIXES) and not (hidden or own):
+                named.append((url, _stem(name), None))
+        return named
     path, start = Path(source), None
     if path.is_dir() and not _is_bag(path):
         start = len(str(path)) + 1
@@ -92,31 +100,11 @@ def _logs(source: str, out: str, links: list[str]) -> list[Found]:
         if not found:
             raise SettingError(f"{source}: there is no such file, folder or match; check the name")
         found = [one for one in found if _is_bag(Path(one[0])) or not Path(one[0]).is_dir()]
-    named: list[Found] = []
+    named = []
     for one, trouble in found:
         name = one.rpartition("/")[2] if start is None else one[start:]
         named.append((one, name if trouble else _stem(name), trouble))
     return named
-
-
-def _written_by_batch(source: str, out: str) -> Callable[[str], bool]:
-    """Whether an object's name below `source` is hidden, part of a result, or in `out`."""
-    below, place = f"{shown(source)}/", f"{shown(out)}/"
-    inside = None
-    if is_url(out) and place.startswith(below):
-        inside = unquote(place.removeprefix(below))
-
-    def own(name: str) -> bool:
-        parts = name.split("/")
-        if any(part.startswith(".") for part in parts):
-            return True
-        if any(part.endswith(".algid") for part in parts[:-1]):
-            return True
-        if inside == "":
-            return name == TABLE
-        return inside is not None and name.startswith(inside)
-
-    return own
 
 
 def _walk(folder: Path, out: str, links: list[str]) -> Iterator[tuple[str, str | None]]:

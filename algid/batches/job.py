@@ -38,13 +38,6 @@ TOO_LARGE = f"it needs more memory than a worker has; raise {flag('memory_limit'
 _PIECE = 1 << 23
 
 
-@dataclass(frozen=True)
-class DiskFull:
-    """There is no space left where results go: no job's fault, and reason to stop."""
-
-    reason: str
-
-
 @dataclass(frozen=True, repr=False)
 class Task:
     """A job with all that decides its outcome; travels to the worker.
@@ -80,10 +73,11 @@ class Task:
         )
 
 
-def run_task(task: Task) -> JobRecord | DiskFull:
+def run_task(task: Task) -> JobRecord | str:
     """Identify one job and write its result folder.
 
-    Whatever is raised on the way is the job's end: libraries panic by exceptions of any base.
+    Whatever is raised on the way is the job's end: libraries panic by exceptions of any base. A
+    full disk where results go is no job's fault: what is said of it is given then.
     """
     keep_freed()
     keep_to_one_core()
@@ -93,7 +87,7 @@ def run_task(task: Task) -> JobRecord | DiskFull:
         result = _identified(task)
     except BaseException as error:
         if is_full(error):
-            return DiskFull(text_of(error))
+            return text_of(error)
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
         inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
         seconds = time.perf_counter() - start

@@ -183,38 +183,31 @@ def write_record(store: Store, record: JobRecord) -> None:
     store.write(record_name(record.job.name), text.encode())
 
 
-@dataclass(frozen=True)
-class StoredRecords:
-    """Records of earlier jobs, and why some of them cannot be read, by their places."""
+def read_records(store: Store) -> tuple[dict[str, JobRecord], dict[str, str]]:
+    """All records by job, and by its place why one cannot be read.
 
-    records: dict[str, JobRecord]
-    unreadable: dict[str, str]
-
-
-def read_records(store: Store) -> StoredRecords:
-    """All records by job; one that cannot be read counts as none, so that its job runs again."""
-    known = StoredRecords({}, {})
-    columns: set[str] = set()
+    The latter count as none, so that their jobs run again.
+    """
+    records, unreadable, columns = dict[str, JobRecord](), dict[str, str](), set[str]()
     for name in store.names(FOLDER):
         if not name.endswith(".json"):
             continue
         try:
             # fields that this version does not know are left out
             record = TypeAdapter(JobRecord).validate_json(store.read(name) or b"")
-            named = columns | record.estimates.keys() | record.job.labels.keys()
-            if len(named) > LIMITS.columns:
-                raise ValueError(
-                    f"all records together name more than {LIMITS.columns} labels and estimates"
-                )
-            fault = _fault(record, name)
-            if fault is not None:
-                raise ValueError(fault)
-            columns = named
-            known.records[record.job.name] = record
-        except (ValueError, LogError) as error:
+        except (ValidationError, LogError) as error:
             text = first_misfit(error) if isinstance(error, ValidationError) else str(error)
-            known.unreadable[name] = text
-    return known
+            unreadable[name] = text
+            continue
+        named = columns | record.estimates.keys() | record.job.labels.keys()
+        fault = _fault(record, name)
+        if len(named) > LIMITS.columns:
+            fault = f"all records together name more than {LIMITS.columns} labels and estimates"
+        if fault is not None:
+            unreadable[name] = fault
+            continue
+        columns, records[record.job.name] = named, record
+    return records, unreadable
 
 
 def _fault(record: JobRecord, place: str) -> str | None:

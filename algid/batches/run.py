@@ -19,7 +19,7 @@ from algid import __version__
 from algid.base.errors import AlgidError, OutputError, SettingError, text_of
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store
-from algid.batches.job import DiskFull, Task, is_full, redacted, run_task
+from algid.batches.job import Task, is_full, redacted, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
     FAILURES,
@@ -59,15 +59,6 @@ class BatchConfig:
 
 
 @dataclass(frozen=True)
-class Progress:
-    """Where a batch stands: how many jobs are done of how many, and the record that came last."""
-
-    done: int
-    total: int
-    last: JobRecord
-
-
-@dataclass(frozen=True)
 class BatchOutcome:
     """Outcome of a batch: its jobs' records, the number run now, and the number left when stopped.
 
@@ -89,7 +80,7 @@ class Batch:
     recipe : what its jobs share
     executor : who runs them
     slots : how many are handed out at once
-    progress : called with each job that ends
+    progress : called with the record of each job that ends, and how many of how many have
     shared : whether other batches do other jobs of the same OUT
     """
 
@@ -99,7 +90,7 @@ class Batch:
         recipe: BatchConfig,
         executor: Executor,
         slots: int,
-        progress: Callable[[Progress], None],
+        progress: Callable[[JobRecord, int, int], object],
         shared: bool = False,
     ) -> None:
         self._shared = shared
@@ -114,9 +105,7 @@ class Batch:
         make_folders(store)
         self.anew = Counter[str]()
         """Jobs that had ended and were run again, by why."""
-        known = read_records(store)
-        self.records = known.records
-        self.unreadable = known.unreadable
+        self.records, self.unreadable = read_records(store)
         """Why records that are there cannot be read, by their places."""
 
     def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> BatchOutcome:
@@ -165,7 +154,7 @@ class Batch:
         try:
             if not (self._written and self._store.exists(TABLE)):
                 if self._shared:  # the others have come further meanwhile
-                    self.records |= read_records(self._store).records
+                    self.records |= read_records(self._store)[0]
                 write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
                 self._written = True
         except OutputError as error:
@@ -213,7 +202,7 @@ class Batch:
                     waiting.append(task)
                 else:
                     self._ran += 1
-                    self._progress(Progress(total - len(waiting) - len(running), total, record))
+                    self._progress(record, total - len(waiting) - len(running), total)
         for future in running:
             future.cancel()
         return len(waiting) + len(running)
@@ -221,7 +210,7 @@ class Batch:
     def _record(self, task: Task, future: Future[Any]) -> JobRecord | None:
         """How the task ended, or None where it is to be run again."""
         try:
-            ended: JobRecord | DiskFull = future.result()
+            ended: JobRecord | str = future.result()
         except WorkerDiedError as died:
             self._kills[task.job.name] += 1
             if self._kills[task.job.name] < MOST_KILLS:
@@ -232,10 +221,10 @@ class Batch:
         except Exception as error:  # no job's fault: no process can be started, a cluster is lost
             self._stop_because(f"{text_of(error)}; {RUN_AGAIN}")
             return None
-        if isinstance(ended, DiskFull):
-            self._stop_because(f"{ended.reason}; {MAKE_ROOM}")
-            return None
-        return ended
+        if isinstance(ended, JobRecord):
+            return ended
+        self._stop_because(f"{ended}; {MAKE_ROOM}")
+        return None
 
     def _keep(self, record: JobRecord) -> bool:
         """Write a record; where its job failed on other logs than before, their result goes."""

@@ -23,8 +23,7 @@ from algid.base.limits import LIMITS
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.notices import Notice
 from algid.readers.mcap import open_mcap
-from algid.readers.messages.batch import MessageBatch, Messages
-from algid.readers.messages.message_file import MessageChannel, MessageFile
+from algid.readers.messages.message_file import MessageBatch, MessageChannel, MessageFile, Messages
 from algid.readers.messages.reader import MessageLog
 
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14

@@ -34,8 +34,13 @@ from algid.base.runtime import ahead
 from algid.base.words import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
-from algid.readers.messages.batch import MessageBatch, Messages, gather
-from algid.readers.messages.message_file import MessageChannel, MessageFile
+from algid.readers.messages.message_file import (
+    MessageBatch,
+    MessageChannel,
+    MessageFile,
+    Messages,
+    gather,
+)
 from algid.readers.messages.reader import MessageLog
 
 _MAGIC = b"\x89MCAP0\r\n"

@@ -84,7 +84,7 @@ def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any
     out = served.url("out", user) if place is None else place
     jobs = jobs_of([served.url("logs", user)], out)
     return Batch(
-        open_store(out), replace(CONFIG, out=out, **recipe), Here(), 1, lambda _progress: None
+        open_store(out), replace(CONFIG, out=out, **recipe), Here(), 1, lambda *_: None
     ).run(jobs)
 
 
@@ -264,7 +264,7 @@ def test_what_a_batch_wrote_below_its_source_is_no_log(
             replace(CONFIG, out=out, report=True),
             Here(),
             1,
-            lambda _progress: None,
+            lambda *_: None,
         ).run(jobs)
 
 
@@ -276,7 +276,7 @@ def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
     monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
     open_store(served.url("logs")).write("bad.csv", b"junk")
     out, looks = str(tmp_path / "out"), 0
-    batch = Batch(open_store(out), replace(CONFIG, out=out), Here(), 1, lambda _progress: None)
+    batch = Batch(open_store(out), replace(CONFIG, out=out), Here(), 1, lambda *_: None)
 
     def denied(_method: str, path: str) -> bool:
         """Listings 1 and 2 are refused; the batch is stopped once the log is done."""

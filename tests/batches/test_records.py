@@ -61,7 +61,7 @@ def _batch(out: Path, executor: Executor | None = None) -> Batch:
         replace(CONFIG, out=str(out)),
         executor or Failing(),
         1,
-        lambda _: None,
+        lambda *_: None,
     )
 
 
@@ -201,9 +201,9 @@ def test_no_job_takes_another_ones_place(tmp_path: Path) -> None:
     store = open_store(str(tmp_path))
     for name in names:
         write_record(store, replace(_record(name), reason=name))
-    known = read_records(store)
-    assert known.unreadable == {}
-    assert {name: record.reason for name, record in known.records.items()} == {
+    records, unreadable = read_records(store)
+    assert unreadable == {}
+    assert {name: record.reason for name, record in records.items()} == {
         name: name for name in names
     }
     assert len({record_name(name) for name in names}) == len(names)

@@ -78,9 +78,7 @@ def _run(
 ) -> BatchOutcome:
     out = logs.parent / "out"
     store = open_store(str(out))
-    batch = Batch(
-        store, replace(recipe, out=str(out)), executor or Here(), 1, lambda _progress: None
-    )
+    batch = Batch(store, replace(recipe, out=str(out)), executor or Here(), 1, lambda *_: None)
     return batch.run(jobs_of([str(logs)], str(out)), **more)
 
 
@@ -200,9 +198,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
 def test_a_stopped_batch_hands_out_no_more_jobs(logs: Path) -> None:
     out = logs.parent / "out"
     store = open_store(str(out))
-    batch = Batch(
-        store, replace(CONFIG, out=str(out)), Here(), 1, lambda _progress: batch.stop.set()
-    )
+    batch = Batch(store, replace(CONFIG, out=str(out)), Here(), 1, lambda *_: batch.stop.set())
     ended = batch.run(jobs_of([str(logs)], str(out)))
     assert (ended.ran, ended.left) == (1, 2)
 

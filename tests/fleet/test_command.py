@@ -62,7 +62,7 @@ def _written(folder: Path, known: Mapping[str, StoredRecords]) -> Path:
     (folder / "manifest.csv").write_text("\n".join(lines))
     jobs = jobs_of([str(folder / "manifest.csv")], str(folder))
     recipe = BatchConfig(str(folder), Settings(), lambda _file: None)
-    ended = Batch(open_store(str(folder)), recipe, Finished(known), 1, lambda _: None).run(jobs)
+    ended = Batch(open_store(str(folder)), recipe, Finished(known), 1, lambda *_: None).run(jobs)
     assert [record.status for record in ended.records] == [JobStatus.OK] * len(known)
     return folder
 

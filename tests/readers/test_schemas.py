@@ -19,9 +19,9 @@ from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.messages import protobuf
-from algid.readers.messages.batch import Messages
 from algid.readers.messages.definitions import DefinitionError
 from algid.readers.messages.layout import ColumnDecoder, MisfitError
+from algid.readers.messages.message_file import Messages
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import TOPIC, joint_state, messages_of, protobuf_schema, write_mcap
 

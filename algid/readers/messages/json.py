@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from algid.base.limits import LIMITS
 from algid.base.words import counted, repeated
-from algid.readers.messages.batch import Messages
 from algid.readers.messages.layout import Columns, Decoder, MessageLayout, MisfitError, Numbers
+from algid.readers.messages.message_file import Messages
 from algid.readers.stated import BAD, GOOD, GROUPS
 
 _PART = re.compile(r"\[[^\]]*\]|[^.\[\]]+")

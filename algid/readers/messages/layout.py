@@ -19,7 +19,7 @@ from algid.base.blocks import concatenated, rows_of
 from algid.base.limits import LIMITS
 from algid.base.words import counted
 from algid.log import IntArray
-from algid.readers.messages.batch import Messages, gather, padding
+from algid.readers.messages.message_file import Messages, gather, padding
 
 
 class MisfitError(Exception):

@@ -1,17 +1,124 @@
-"""The opened file of messages that every format makes: channels, counts, batches of messages.
+"""Files of messages as every format opens them: channels, counts, and messages as bytes.
 
 MCAP files, ROS 1 bags and rosbag2's SQLite files differ in how they hold messages; what is in a
-message is read alike.
+message is read alike, and what is lost of them is counted alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from algid.log import Truth
+import numpy as np
+from numpy.typing import NDArray
+
+from algid.log import IntArray, Truth
 from algid.notices import Notice
-from algid.readers.messages.batch import MessageBatch
+
+
+@dataclass(frozen=True, eq=False)
+class Messages:
+    """Messages in unpacked bytes (M,): each payload's start (N,), size, and log time in ns."""
+
+    content: NDArray[np.uint8]
+    starts: IntArray
+    sizes: IntArray
+    log_ns: IntArray
+
+    def __len__(self) -> int:
+        return int(self.starts.size)
+
+    def compacted(self) -> Messages:
+        """Copy messages of equal size into an aligned array, so that their chunk can be freed.
+
+        A row of whole words (8 bytes) each; messages of several sizes stay as they are.
+        """
+        if not len(self) or np.any(self.sizes != self.sizes[0]):
+            return self
+        size = int(self.sizes[0])
+        lead = padding(size)
+        rows = gather(self.content, self.starts - lead, f"V{lead + size}").view(np.uint8)
+        starts = lead + (lead + size) * np.arange(len(self), dtype=np.int64)
+        return Messages(rows, starts, self.sizes, self.log_ns)
+
+
+def padding(size: int) -> int:
+    """Bytes to take before a payload of `size` bytes: whole words (8 bytes), one at least."""
+    return -size % 8 if size else 8
+
+
+def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
+    """The numbers of type `kind` at byte `places` (N,), aligned or not."""
+    width = np.dtype(kind).itemsize
+    window: NDArray[np.generic] = np.ndarray(
+        max(0, octets.size - width + 1), np.dtype(kind), octets.data, strides=(1,)
+    )
+    return window[places]
+
+
+@dataclass(frozen=True)
+class MessageBatch:
+    """Messages of one span or of many small ones, or None and why those of one are lost.
+
+    Of a torn chunk also how much is there.
+    """
+
+    messages: Messages | None
+    checked: bool
+    reason: str = ""
+    torn: tuple[int, int] | None = None
+    """Bytes of a torn chunk's records, unpacked: what is there, and what there should be."""
+    rows: int = 0
+    """Damaged rows of one message each, where it is not a chunk that is damaged."""
+
+
+@dataclass
+class Losses:
+    """What was lost on the way, for the notices at the end."""
+
+    spans: int = 0
+    rows: int = 0
+    reason: str = ""
+    unchecked: bool = False
+    found: int = 0
+    torn: tuple[int, int, int] | None = None
+    """Of a torn chunk: messages taken, and bytes of its records present and expected."""
+
+    def add(self, batch: MessageBatch) -> None:
+        """Count one batch."""
+        if batch.messages is None:
+            self.spans += not batch.rows
+            self.rows += batch.rows
+            self.reason = self.reason or batch.reason
+        else:
+            self.found += len(batch.messages)
+            self.unchecked |= not batch.checked and len(batch.messages) > 0
+            if batch.torn:
+                self.torn = (len(batch.messages), *batch.torn)
+
+    def notices(self, promised: int) -> list[Notice]:
+        """What to say; `promised` is how many messages the file counts."""
+        said = []
+        if self.spans or self.rows:
+            numbers: dict[str, Any] = {
+                "case": "chunk" if self.spans else "row",
+                "count": self.spans or self.rows,
+                "why": self.reason,
+                "missing": promised - self.found,
+            }
+            said.append(Notice("DAMAGED", numbers=numbers))
+        elif promised != self.found:
+            numbers = {"promised": promised, "found": self.found}
+            said.append(Notice("DAMAGED", numbers={"case": "count"} | numbers))
+        if self.torn:
+            taken, held, size = self.torn
+            numbers = {"taken": taken, "held": held, "bytes": size}
+            numbers["lost"] = round(taken * (size - held) / held) if taken else 0  # by their bytes
+            said.append(Notice("CUT_OFF", numbers={"case": "torn"} | numbers))
+        if self.unchecked:
+            said.append(Notice("NO_CHECKSUM", numbers={"case": "file"}))
+        return said
 
 
 @dataclass(frozen=True)

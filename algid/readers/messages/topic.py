@@ -13,10 +13,9 @@ from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
-from algid.readers.messages.batch import Losses
 from algid.readers.messages.codec import decoder_for
 from algid.readers.messages.layout import Decoder
-from algid.readers.messages.message_file import MessageFile, channels_by_topic
+from algid.readers.messages.message_file import Losses, MessageFile, channels_by_topic
 from algid.readers.stated import several
 from algid.readers.table import SampleTable, stack
 
