@@ -382,8 +382,9 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     Notes
     -----
     Friction by load and gains make the torque bilinear in c: Y is taken at `c` then, with the load
-    that c gives, a joint's rows times its gain, and nothing in the columns of gains. The column of
-    a low-pass, which is no function of the motion at one instant, is nothing too.
+    that c gives, a joint's rows times its gain, the links' columns at their own motion behind
+    elastic joints, and nothing in the columns of gains and of compliance. The column of a low-pass,
+    which is no function of the motion at one instant, is nothing too.
 
     Raises
     ------
@@ -397,21 +398,62 @@ def regressor(model: Model, motion: Motion, c: FloatArray | None = None) -> Floa
     if c is None:
         c = np.zeros(len(model.names))
     compiled = model.compiled
-    values = Values(motion, model.shape)
+    values = of_links = Values(motion, model.shape)
+    links = link_motion(model, c, motion)
+    if links is not motion:
+        of_links = Values(links, model.shape)
+    own = inertial(model)
     Y = np.zeros((2, len(compiled.names), motion.theta.shape[1]))
     for joint, place, entry in compiled.regressor:
-        values.into(Y[joint, place], entry)
+        (of_links if place in own else values).into(Y[joint, place], entry)
+    for share, whole in of_motors(model):
+        Y[:, share] = c[whole] * (Y[:, share] - Y[:, whole])
     for name, joint in attributes(model, "by_load"):
         loads = list(compiled.loads)
-        load = _torques(Y[joint, loads], c[loads])
+        load = _torques(Y[joint, loads], apart(model, c)[loads])
         Y[joint, compiled.place[name]] = np.abs(load) * smooth_sign(model, motion.omega[joint])
     return _amplified(model, c, Y)
 
 
 def loads_of(model: Model) -> tuple[str, ...]:
     """Names of the columns that are the joints' load, which a payload changes."""
-    own = _compiled(model.terms, model.gravity != 0, by_torque=False)
-    return tuple(own.names[place] for place in own.loads)
+    return tuple(model.names[place] for place in inertial(model))
+
+
+def inertial(model: Model) -> tuple[int, ...]:
+    """Places of the columns of inertia, Coriolis torque and weight."""
+    return _compiled(model.terms, model.gravity != 0, by_torque=False).loads
+
+
+def of_motors(model: Model) -> list[tuple[int, int]]:
+    """Places of the motors' shares, and of what they are shares of."""
+    place = model.compiled.place
+    pairs = []
+    for term in model.terms:
+        pairs += [(place[share], place[whole]) for share, whole in TERMS[term].of_motor]
+    return pairs
+
+
+def apart(model: Model, c: FloatArray) -> FloatArray:
+    """Coefficients (q, ...) whose links are without their motors, and these in place of shares."""
+    pairs = of_motors(model)
+    if pairs:
+        c = np.array(c)
+    for share, whole in pairs:
+        c[share] *= c[whole]
+        c[whole] -= c[share]
+    return c
+
+
+def link_motion(model: Model, c: FloatArray, motion: Motion) -> Motion:
+    """The links' motion where the joints are elastic and `motion`, the motors', has a load."""
+    pairs = attributes(model, "elastic")
+    if not pairs or motion.load is None:
+        return motion
+    signals = np.stack([motion.theta, motion.omega, motion.alpha])
+    for name, joint in pairs:
+        signals[:, joint] -= c[model.compiled.place[name]] * motion.load[:, joint]
+    return Motion(*signals)
 
 
 def phasor(model: Model, c: FloatArray, name: str) -> complex:
@@ -489,7 +531,7 @@ def load(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
     It is what friction by load goes by, less that friction, and as no gain reads it.
     """
-    values = Values(motion, model.shape)
+    values, c = Values(motion, model.shape), apart(model, c)
     inertia, rest = model.compiled.of_load
     m11, m12, m21, m22 = (summed(weighted, c, values) for weighted in inertia)
     alpha1, alpha2 = motion.alpha
@@ -512,6 +554,7 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
 
     Notes
     -----
+    The load that bends elastic joints stays as it is: see `algid.estimators.elastic.with_bends`.
     The regressor where the torque is linear in c. Else, with sgn L, t = tanh(ω / ω_s), load shares
     e and gains g,
 
@@ -522,11 +565,15 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     if model.linear:
         return J
     place, loads = model.compiled.place, list(model.compiled.loads)
+    for share, whole in of_motors(model):
+        J[:, whole] += c[share] / c[whole] * J[:, share]
     factor = gains(model, c)
     for name, joint in attributes(model, "gains"):
         J[joint, place[name]] = _torques(J[joint], c) / factor[joint]
     for name, joint in attributes(model, "by_load"):
-        load = _torques(J[joint, loads], c[loads])  # a gain scales it, which leaves its sign
+        load = _torques(
+            J[joint, loads], apart(model, c)[loads]
+        )  # a gain scales it, which leaves its sign
         sign = smooth_sign(model, motion.omega[joint])
         J[joint, loads] *= 1 + c[place[name]] * sign * np.sign(load)
     return J
@@ -547,7 +594,7 @@ def partials(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
         By order of θ's derivative, torque's joint and angle's joint. Where a load is nothing its
         sign is too.
     """
-    compiled = model.compiled
+    compiled, c = model.compiled, apart(model, c)
     values = Values(motion, model.shape)
     P = np.empty((3, 2, 2, motion.theta.shape[1]))
     for where, weighted in compiled.partials.items():
@@ -596,7 +643,7 @@ def inertia(model: Model, c: FloatArray, theta: FloatArray) -> FloatArray:
 
     `c` is (q,), or (q, ...) for arms of their own at each sample.
     """
-    values = Values(Motion(theta, theta, theta), model.shape)
+    values, c = Values(Motion(theta, theta, theta), model.shape), apart(model, c)
     M = np.empty((2, 2) + theta.shape[1:])
     for entry, weighted in model.compiled.inertia.items():
         M[entry] = summed(weighted, c, values)
@@ -627,7 +674,7 @@ def acceleration(
 
     The signs of L are those of the torque left for it, and found again until they are their own.
     """
-    compiled = model.compiled
+    compiled, c = model.compiled, apart(model, c)
     by_load = attributes(model, "by_load")
     values = Values(Motion(theta, omega, omega), model.shape)
     left = np.array(tau, dtype=np.float64)

@@ -37,6 +37,7 @@ from algid.arm import FloatArray
 from algid.base.compiled import chi2_tail
 from algid.base.names import vector
 from algid.estimators.combine import Prior, scaled_pinv
+from algid.estimators.elastic import flexed, with_bends
 from algid.estimators.fit import Fit, Misfit, Overlooked
 from algid.estimators.imprint import Imprint, summed
 from algid.model import (
@@ -117,7 +118,8 @@ def columns(model: Model, c: FloatArray, motion: Motion, dt: float) -> FloatArra
     whole, modelled = _whole(model), _acting(model, c, motion)
     known = dict(zip(model.names, c.tolist(), strict=True))
     wide = vector(whole.names, known, otherwise=0.0)
-    J = sensitivity(whole, wide, motion)
+    bent = flexed(whole, wide, motion, dt)
+    J = with_bends(whole, wide, bent, sensitivity(whole, wide, bent), dt)
     for name, joint in attributes(whole, "gains"):
         J[joint, whole.names.index(name)] = modelled[joint]
     rows = []

@@ -23,20 +23,33 @@ window.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from algid.arm import FloatArray
-from algid.model import Model, Motion, attributes, gains, load
+from algid.estimators.elastic import flexed, turns
+from algid.model import (
+    Model,
+    Motion,
+    apart,
+    attributes,
+    gains,
+    inertial,
+    link_motion,
+    load,
+    of_motors,
+    sensitivity,
+)
 from algid.physics.expressions import Product, Values
 from algid.signals.filters import correlate, differentiator, half_length
 from algid.signals.segments import Segment
 
 OVERLAP = 8
 _WINDOW = Polynomial([0, 1]) ** 4 * Polynomial([1, -1]) ** 4
+_FLEXED = 1e-4  # rad: by how much links are turned for differences
 _WINDOW_INTEGRAL = 1 / 630  # Beta(5, 5)
 
 Known = dict[Hashable, FloatArray]
@@ -173,6 +186,12 @@ class Windows:
             return Motion(theta, omega, omega)
 
         self._fill(X, model, motion, theta.shape[1], known)
+        bends = np.zeros((2, size - 1, X.shape[2]))
+        if at is not None and attributes(model, "elastic"):
+            self._bend(X, bends, model, at, motion(), tau)
+        for share, whole in of_motors(model):
+            X[:, share] = here[whole] * (X[:, share] - X[:, whole])
+            bends[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
         if at is not None and attributes(model, "by_load"):
             place = model.compiled.place
             for name, joint, dissipated in self._dissipated(model, at, theta, motion().omega):
@@ -181,6 +200,9 @@ class Windows:
         X[:, -1] = self._of_torque(tau, 0, known)
         if at is not None:
             _linearise_bilinear(X, model, at)
+            bends *= gains(model, at)[:, None, None]
+            X[:, :-1] += bends
+            X[:, -1] += np.einsum("j,ajr->ar", at, bends[:, : len(at)])
         slope = delay or model.lag_name is not None
         tau_slope = self._of_torque(tau, 1, known) if slope else 0.0
         if model.lag_name is not None:
@@ -195,6 +217,34 @@ class Windows:
         X = np.zeros((2, len(model.names), samples // self.step - OVERLAP + 1))
         self._fill(X, model, lambda: motion, samples, {})
         return X
+
+    def _bend(
+        self,
+        X: FloatArray,
+        bends: FloatArray,
+        model: Model,
+        c: FloatArray,
+        motion: Motion,
+        tau: FloatArray,
+    ) -> None:
+        """Give the links' columns of X their own motion behind elastic joints.
+
+        What coefficients change by turning the links is added to `bends` (2, q, R), by differences,
+        so that moments need no derivative of the load's rate.
+        """
+        own, links_own = list(inertial(model)), apart(model, c)[list(inertial(model))]
+        late = np.arange(tau.shape[1]) - (self.shift / self.dt - self.whole)
+        acting = np.stack([np.interp(late, np.arange(tau.shape[1]), row) for row in tau])
+        alpha = np.gradient(motion.omega, self.dt, axis=1)
+        motion = flexed(model, c, replace(motion, alpha=alpha), self.dt, acting)
+        links = link_motion(model, c, motion)
+        X[:, own] = self.columns(model, links)[:, own]
+        J = sensitivity(model, c, motion)
+        for place, turn in turns(model, c, motion, J, self.dt):
+            step = _FLEXED / max(float(np.abs(turn[0]).max()), 1e-300)
+            theta, omega = links.theta + step * turn[0], links.omega + step * turn[1]
+            moved = self.columns(model, Motion(theta, omega, omega))[:, own] - X[:, own]
+            bends[:, place] += np.einsum("aqr,q->ar", moved, links_own) / step
 
     def _acting(self, torques: FloatArray) -> FloatArray:
         """Torques (m, n) that act where a piece's windows are, of all (m, N) of the piece."""

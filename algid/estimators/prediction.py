@@ -23,6 +23,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.estimators.combine import left_out
+from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.standing import Standing, standing
 from algid.estimators.weak import Source
@@ -187,16 +188,16 @@ class PredictionSums:
         self._torque = self._torque + X[:, -1].sum(axis=1)
         self._gram += X @ X.swapaxes(1, 2)
 
-    def _rows(self, motion: Motion) -> FloatArray:
+    def _rows(self, motion: Motion, dt: float) -> FloatArray:
         """The regressor (2, q, n), and the velocities if one set of coefficients is scored."""
-        Y = regressor(self._model, motion, self._at)
         if self._at is None:
-            return Y
+            return regressor(self._model, motion)
+        Y = regressor(self._model, flexed(self._model, self._at, motion, dt), self._at)
         return np.concatenate([Y, motion.omega[:, None]], axis=1)
 
 
 def _filtered(
-    rows: Callable[[Motion], FloatArray], piece: Segment, shift: float, by: PredictionFilter
+    rows: Callable[[Motion, float], FloatArray], piece: Segment, shift: float, by: PredictionFilter
 ) -> tuple[FloatArray, FloatArray]:
     """Times (n,) in s and X (2, q + 1, n) of a piece, from the `rows` (2, q, n) of its motion.
 
@@ -207,7 +208,7 @@ def _filtered(
     if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
         return np.zeros(0), np.zeros((2, 0, 0))
     theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
-    Y = rows(motion_of(theta, dt))
+    Y = rows(motion_of(theta, dt), dt)
     if shift:
         place = np.arange(signals.shape[1]) + shift / dt
         whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
@@ -255,8 +256,8 @@ def scored_torque(
     """
     by = by or PredictionFilter()
 
-    def rows(motion: Motion) -> FloatArray:
-        return torque(model, c, motion)[:, None]
+    def rows(motion: Motion, dt: float) -> FloatArray:
+        return torque(model, c, flexed(model, c, motion, dt))[:, None]
 
     for piece in pieces_of(segments, _PIECE_SECONDS):
         lag = shift.at(piece.dt) - model.lag(c)

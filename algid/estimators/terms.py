@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.base.names import evenly_spread, outside
+from algid.base.names import evenly_spread, outside, vector
 from algid.estimators import weak
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.hold import SURE, Hold, Lateness
@@ -57,6 +57,7 @@ from algid.model import (
     terms_named,
     without_delay,
 )
+from algid.physics.effort import ELASTIC
 from algid.physics.motion import Widths
 from algid.physics.terms import ALWAYS
 from algid.signals.segments import Segment, pieces, spread_pieces
@@ -211,19 +212,25 @@ class _Pieces:
         """The pieces as a pass gives them."""
         return [partial(tuple, log) for log in self.logs]
 
-    def normals(self, settings: WeakSettings) -> list[weak.Normal]:
-        """Normal equations of the logs that are long enough."""
+    def normals(self, settings: WeakSettings, at: FloatArray | None) -> list[weak.Normal]:
+        """Normal equations of the logs that are long enough, linearised `at` coefficients (q,)."""
         every = [
-            weak.normal_equations(source, settings, None, known)
+            weak.normal_equations(source, settings, at, known)
             for source, known in zip(self.sources, self.known, strict=True)
         ]
         return [normal for normal in every if normal is not None]
 
 
+Elastic = Mapping[bool, Mapping[str, float]]
+"""Coefficients by name, of unloaded and of loaded logs, of an arm whose joints are elastic."""
+
+
 def _start(
-    kinds: Sequence[_Pieces], settings: WeakSettings
+    kinds: Sequence[_Pieces], settings: WeakSettings, elastic: Elastic
 ) -> tuple[Model, dict[bool, FloatArray]]:
     """Widths of friction, and coefficients of the first terms, by windows; loaded logs' apart.
+
+    Those of elastic joints are among the first where there are such coefficients.
 
     Raises
     ------
@@ -231,12 +238,17 @@ def _start(
         If no log is long enough for a window.
     """
     model = settings.model
+    firsts = FIRST_TERMS + (ELASTIC if elastic else ())
 
     def solved(model: Model) -> tuple[float, dict[bool, FloatArray]]:
         cost, at = 0.0, {}
         for loaded, own in enumerate(kinds):
             # beside a delay, which looks like friction where joints turn back
-            normals = own.normals(replace(settings, model=model, estimate_delay=True))
+            at_first = None
+            if bool(loaded) in elastic:
+                at_first = vector(model.names, elastic[bool(loaded)], otherwise=0.0)
+            beside_delay = replace(settings, model=model, estimate_delay=True)
+            normals = own.normals(beside_delay, at_first)
             if normals:
                 c, _ = weak.solve(normals)
                 grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
@@ -252,14 +264,14 @@ def _start(
         using = _using(shape)
         if not using:
             continue
-        terms = FIRST_TERMS + using[:1] if not set(using) & set(FIRST_TERMS) else FIRST_TERMS
+        terms = firsts if set(using) & set(firsts) else firsts + using[:1]
         costs = []
         for value in values:
             trial = replace(model, **{shape: float(value)})  # type: ignore[arg-type]
             costs.append(solved(replace(trial, terms=terms))[0])
         best = float(np.exp(_lowest(np.log(values), costs)))
         model = replace(model, **{shape: best})  # type: ignore[arg-type]
-    model = replace(model, terms=FIRST_TERMS)
+    model = replace(model, terms=firsts)
     return model, solved(model)[1]
 
 
@@ -524,7 +536,22 @@ def select(
         If no log is long enough for a window, or for the likelihood.
     """
     kinds = [_Pieces.of(unloaded), _Pieces.of(loaded)]
-    shapes, start = _start(kinds, settings)
+    chosen, elastic = _selected(kinds, settings, candidates, kept, absent, {})
+    if elastic:  # what rigid joints have for friction's width is not theirs
+        chosen, _ = _selected(kinds, settings, candidates, kept, absent, elastic)
+    return chosen
+
+
+def _selected(
+    kinds: Sequence[_Pieces],
+    settings: WeakSettings,
+    candidates: Sequence[str],
+    kept: Sequence[str],
+    absent: Collection[str],
+    elastic: Elastic,
+) -> tuple[Selection, Elastic]:
+    """The terms that `select` chooses, and the coefficients if elastic joints are among them."""
+    shapes, start = _start(kinds, settings, elastic)
     every = replace(shapes, terms=tuple(name for name, term in TERMS.items() if not term.lags))
     shared = Shared(every, delay=True)
     every_log = opened(kinds[0].sources, kinds[1].sources, shared, settings.shift)
@@ -555,11 +582,13 @@ def select(
         late = (after[False][-1] - at[logs[0].loaded][-1]) / first.dt
         far = abs(late) > 1 and terms[len(fixed) : len(fixed) + 1] == [*_DELAY]
         linear = all(EVERY_TERM[term].linear and not EVERY_TERM[term].timing for term in terms)
+        # joints that give much are far from linear in what they give
+        far |= not set(ELASTIC).isdisjoint(terms)
         if (refuted and not far) or linear or terms == before:
             break
         at, before = after, terms
         first = FirstPass(logs, shared, at, base)
-        if far and late < 0 and _LAG:
+        if abs(late) > 1 and far and late < 0 and _LAG:
             other = _lagging(logs, shared, at, base)
             others = [term for term in terms if term not in _DELAY]
             left, column = first.columns(terms), other.columns([*others, *_LAG])
@@ -582,10 +611,13 @@ def select(
         refuted=refuted,
         late=lateness,
     )
+    found = {}
+    if not set(ELASTIC).isdisjoint(terms):
+        found = {kind: dict(zip(first.names, c.tolist(), strict=True)) for kind, c in after.items()}
     if not candidates:
-        return chosen
+        return chosen, found
     trials = tuple(search.trial(term, terms, kept) for term in everything)
-    return replace(chosen, chosen_by="logs", trials=trials)
+    return replace(chosen, chosen_by="logs", trials=trials), found
 
 
 def _lagging(

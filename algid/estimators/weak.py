@@ -40,7 +40,7 @@ from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_su
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.too_short import OF_A_WINDOW, TooShortError
-from algid.model import K2, K4, Model
+from algid.model import K2, K4, Model, attributes
 from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
 from algid.signals.shift import AT_ONCE, TorqueShift
@@ -123,6 +123,8 @@ def fit(
     model = settings.model
     shared = Shared(model, settings.estimate_delay, bool(loaded), dict(lengths or {}))
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
+    compliances = [name for name, _ in attributes(model, "elastic")]
+    soft = np.isin(model.names, compliances)
     at: dict[bool, FloatArray] = {}
     for _ in range(_PASSES):
         normals = {}
@@ -141,7 +143,8 @@ def fit(
         if not model.linear:
             before, at = at, {log.loaded: log.c0[: len(model.names)] for log in logs}
             moves = [np.abs(at[kind] - before.get(kind, np.inf))[iterated] for kind in at]
-            settled = bool(np.max(moves) < _SETTLED)
+            sizes = [np.where(soft, np.abs(at[kind]), 1.0)[iterated] for kind in at]
+            settled = bool(np.all(np.array(moves) <= _SETTLED * np.array(sizes)))
         every = [normal for own in normals.values() for normal in own]
         if settled and abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every):
             break

@@ -32,6 +32,7 @@ import numpy as np
 
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import lapack
+from algid.estimators.elastic import flexed, with_bends
 from algid.model import Model, Motion, partials, regressor, sensitivity, torque
 from algid.signals.differences import POINTS, Stencil, weighted
 from algid.signals.filters import recursion
@@ -164,14 +165,14 @@ def linearise(
     """
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
-    motion = Motion(*stencil.differences(theta0))
+    measured = stencil.moving(piece.tau)[:, torques]
+    motion = flexed(model, c, Motion(*stencil.differences(theta0)), stencil.dt, measured)
     J, torques_of_model = modelled(model, c, motion, stencil.dt)
     G = along_stencil(partials(model, c, motion), stencil.weights)
     rising = torques_of_model
     if smooth is not None:
-        motion = Motion(*stencil.differences(smooth))
+        motion = flexed(model, c, Motion(*stencil.differences(smooth)), stencil.dt, measured)
         J, rising = modelled(model, c, motion, stencil.dt)
-    measured = stencil.moving(piece.tau)[:, torques]
     error = measured - torques_of_model - forward(G, piece.theta - theta0, first)
     parts = []
     if not residual_only:
@@ -220,6 +221,7 @@ def modelled(
         tau = np.einsum("aqn,qn->an", J, c.reshape(c.shape[0], -1))
     else:
         J, tau = sensitivity(model, c, motion), torque(model, c, motion)
+        J = with_bends(model, c, motion, J, dt)
     if model.lag_name is not None:
         J[:, model.names.index(model.lag_name)] = -_low_passed_slope(tau, dt, model.lag(c))
     return J, tau

@@ -9,10 +9,11 @@ t2 tanh(ω / ω_s); parameters have their names in capitals.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
+from algid.base.names import names_in, outside
 from algid.exports.description import Description
 from algid.model import TERMS, Model, Weighted, attributes
 from algid.physics.expressions import Atom
@@ -23,7 +24,13 @@ _FUNCTIONS = ("cos", "exp", "sin", "tanh")
 
 def program(arm: Description) -> dict[str, Any]:
     """What the templates of programs are made of."""
-    model = arm.coefficients.model
+    lacking = [
+        TERMS[name]
+        for name in arm.coefficients.model.terms
+        if TERMS[name].timing is not None or TERMS[name].elastic
+    ]
+    held_terms = outside(arm.coefficients.model.terms, names_in(lacking))
+    model = replace(arm.coefficients.model, terms=held_terms)
     compiled, loads = model.compiled, list(model.compiled.loads)
     others = sorted(set(range(len(compiled.names))) - set(loads))
 
@@ -57,11 +64,11 @@ def program(arm: Description) -> dict[str, Any]:
     extra = [[_source(model, weighted, "") for weighted in row] for row in X]
     body = " ".join([*(line for lines in atoms.values() for line in lines), *share])
     return {
-        "lacking": [TERMS[name] for name in model.terms if TERMS[name].timing is not None],
+        "lacking": lacking,
         "jump": False,
         "negative": (),
         "rotor_within": False,
-        "constants": _constants(arm),
+        "constants": _constants(model, arm.coefficients.value),
         "functions": [name for name in _FUNCTIONS if re.search(rf"\b{name}\(", body)],
         "atoms": atoms,
         "M": [[_source(model, weighted) for weighted in row] for row in M],
@@ -80,10 +87,9 @@ def program(arm: Description) -> dict[str, Any]:
     }
 
 
-def _constants(arm: Description) -> dict[str, float]:
+def _constants(model: Model, value: Mapping[str, float]) -> dict[str, float]:
     """Constants of the module by their names."""
-    model, value = arm.coefficients.model, arm.coefficients.value
-    constants = {name.upper(): value[name] for name in model.names if name != model.lag_name}
+    constants = {name.upper(): value[name] for name in model.names}
     shapes = {shape for term in model.terms for shape in TERMS[term].shapes}
     for width in fields(Widths):
         if width.name in shapes:

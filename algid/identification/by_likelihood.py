@@ -16,6 +16,7 @@ from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior, joined, without
 from algid.estimators.diagnostics import constrained
 from algid.estimators.doubt import doubted_without_motor
+from algid.estimators.elastic import with_rotors
 from algid.estimators.fit import Fit, Misfit
 from algid.estimators.hold import Hold
 from algid.estimators.prediction import PredictionSums
@@ -80,7 +81,8 @@ def run_fit(
 
         def fitted(selection: Selection) -> Fit:
             windows = weak_settings(settings, selection)
-            return estimate(unloaded, loaded, windows, settings.lengths, known, survey.progress)
+            before = with_rotors(known, selection.model)
+            return estimate(unloaded, loaded, windows, settings.lengths, before, survey.progress)
 
         # why no term is chosen but every one shrunk, if so
         notes: tuple[Notice, ...] | None = None
@@ -215,7 +217,7 @@ def _shrunk(
     shaped = replace(ours, model=chosen.shapes or chosen.model, shift=shift)
     every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
     nothing = absent(settings.effort, every.names)
-    known = without(prior, nothing)
+    known = with_rotors(without(prior, nothing), chosen.model)
     fit = robust.fit(unloaded, loaded, shaped, settings.lengths, known)
     fit = replace(fit, notes=notes + fit.notes)
     terms = fit.shared.model.terms

@@ -23,7 +23,7 @@ from algid.identification.predicted import prediction
 from algid.identification.recordings import Recordings
 from algid.identification.remarks import fit_notes, fit_warnings, torque_unit
 from algid.identification.series import torque_coefficients, torque_shift
-from algid.model import DELAYS, UNITS
+from algid.model import DELAYS, UNITS, attributes
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
@@ -274,6 +274,7 @@ def fit_summary(
         cross_validation=cross_validation,
         repeatability=_repeatability(fit),
         torque_gain=_torque_gain(fit, settings.payload_mass),
+        stiffness=_stiffness(fit),
     )
 
 
@@ -422,10 +423,21 @@ def _torque_gain(fit: Fit, known: float | None) -> Estimate | None:
     """
     if known is None or "m_p" not in fit.names:
         return None
-    place = fit.names.index("m_p")
-    mass, std = float(fit.values[place]), float(fit.std[place])
+    return _inverse(fit, "m_p", known, "1")
+
+
+def _stiffness(fit: Fit) -> dict[str, Estimate]:
+    """Stiffness of each elastic joint, by the inverse of its compliance."""
+    joints = attributes(fit.shared.model, "elastic")
+    return {f"k_e{joint + 1}": _inverse(fit, name, 1.0, "N m/rad") for name, joint in joints}
+
+
+def _inverse(fit: Fit, name: str, over: float, unit: str) -> Estimate:
+    """`over` a parameter, with its interval; unknown where that may be nothing or less."""
+    place = fit.names.index(name)
+    value, std = float(fit.values[place]), float(fit.std[place])
     half = fit.quantile * std
-    if not np.isfinite(std) or mass <= half:
-        return unknown("1")
-    gain = estimate(known / mass, known / mass * std / mass, 0.0, "1", fit.status[place])
-    return gain.model_copy(update={"ci95": (known / (mass + half), known / (mass - half))})
+    if not np.isfinite(std) or value <= half:
+        return unknown(unit)
+    found = estimate(over / value, over / value * std / value, 0.0, unit, fit.status[place])
+    return found.model_copy(update={"ci95": (over / (value + half), over / (value - half))})

@@ -13,6 +13,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.arrow import table_of_columns
+from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
 from algid.estimators.noise import first_guess
@@ -65,6 +66,7 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
     )
     omega = np.gradient(theta, piece.dt, axis=1)
     motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
+    motion = flexed(model, c, motion, piece.dt)
     predicted = smoothed(torque(model, c, motion), piece.dt, bandwidth)
     shift -= model.lag(c)  # a torque that lags shows at its stamp what acted before
     predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])

@@ -22,13 +22,19 @@ the arm; as commanded; as a motor's current."""
 _EVERY = ALWAYS + OPTIONAL
 FRICTION = tuple(term.name for term in _EVERY if term.damping or term.shapes)
 """Terms that damp a joint, or depend on a width of friction."""
+ELASTIC = tuple(term.name for term in _EVERY if term.elastic)
+"""Terms that bend a joint by all the load on its link, its weight too."""
 _OF_DRIVES = FRICTION + tuple(term.name for term in _EVERY if term.rotor or term.gains)
 
 
 def without_terms(effort: Effort | None, terms: Iterable[str]) -> tuple[str, ...]:
     """Those of the optional `terms` that a torque so logged may have."""
-    gone = {"friction-compensated": FRICTION, "external": _OF_DRIVES}.get(effort or "", ())
-    return outside(terms, gone)
+    gone = {
+        "gravity-compensated": ELASTIC,
+        "friction-compensated": FRICTION,
+        "external": _OF_DRIVES + ELASTIC,
+    }
+    return outside(terms, gone.get(effort or "", ()))
 
 
 def absent(effort: Effort | None, names: Iterable[str]) -> tuple[str, ...]:

@@ -28,11 +28,15 @@ class Widths:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Angles, velocities, accelerations (2, N) and what eq. (1) needs of them."""
+    """Angles, velocities, accelerations (2, N) and what eq. (1) needs of them.
+
+    `load` (3, 2, N) is what bends the joints where they are elastic, in N m, with its two rates.
+    """
 
     theta: FloatArray
     omega: FloatArray
     alpha: FloatArray
+    load: FloatArray | None = None
 
     @cached_property
     def trigonometry(self) -> tuple[FloatArray, ...]:

@@ -62,6 +62,7 @@ def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Resul
 def arm_tables(result: Result) -> tuple[Table, ...]:
     """The arm first: its constants, the payload, and the moments of a bent arm."""
     constants = {name: one for name, one in result.parameters.items() if name in CONSTANT_NAMES}
+    stiffness = result.fit.stiffness if result.fit else {}
     rows = []
     for name, one in moments(result).items():
         size, half = resolved(one.size, one.std), significant(one.half, 2)
@@ -69,6 +70,7 @@ def arm_tables(result: Result) -> tuple[Table, ...]:
     return (
         estimates_table("Constants", constants, result),
         estimates_table("Payload", result.payload, result),
+        estimates_table("Stiffness of elastic joints", stiffness, result),
         Table(
             "Moments off the links' lines",
             {

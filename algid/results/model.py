@@ -270,7 +270,7 @@ class FitSummary(_Model):
     belongs to `covariance_names`; `intervals` says what the intervals rest on (white noise, blocks
     of the logs, or the larger of those and of the jackknife over logs); `by_log` is what each log
     tells by itself; `unidentifiable` says in words which directions the logs do not determine;
-    `endogeneity` goes by joint.
+    `endogeneity` goes by joint; `stiffness` is that of elastic joints, k_e1 and k_e2.
     """
 
     noise: dict[str, float]
@@ -291,6 +291,7 @@ class FitSummary(_Model):
     endogeneity: dict[str, Endogeneity] = {}
     repeatability: Repeatability | None = None
     torque_gain: Estimate | None = None
+    stiffness: dict[str, Estimate] = {}
 
     @property
     def prediction(self) -> TorquePrediction | None:

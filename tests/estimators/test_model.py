@@ -42,6 +42,9 @@ VALUES = {
     "k1s": 0.004,
     "k2s": -0.2,
     "k4s": 0.3,
+    "h1": 2e-3,
+    "h2": 5e-3,
+    "r1": 0.0,
     "lag": 0.0,
 }
 C = np.array([VALUES[name] for name in FULL.names])

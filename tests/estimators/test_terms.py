@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 from scipy.signal import lfilter
 
 from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
@@ -31,6 +32,7 @@ VALUES = {
         9.81e-3,
         0.03,
     ),
+    "elastic": (2e-3, 8e-3, 0.3),
     "lag": (5e-3,),
 }
 
@@ -57,11 +59,29 @@ def term_log(
     alpha = forward_dynamics(k, moved.theta, moved.omega, moved.tau)
     here = {**values, **dict(zip(CONSTANT_NAMES, k.tolist(), strict=True))}
     tau = evaluated(torque_by_hand(), model, here, Motion(moved.theta, moved.omega, alpha))[:, 0]
+    theta = moved.theta
     if "lag" in values:
         tau = _behind(tau, values["lag"])
+    if "h1" in values:
+        theta, tau = _behind_springs(here, model, Motion(moved.theta, moved.omega, alpha))
     rng = np.random.default_rng(loaded)
     drawn = noise * rng.standard_normal((2, *tau.shape))
-    return Segment(0.0, DT, moved.theta + drawn[0], tau + 10 * drawn[1])
+    return Segment(0.0, DT, theta + drawn[0], tau + 10 * drawn[1])
+
+
+def _behind_springs(
+    values: dict[str, float], model: Model, links: Motion
+) -> tuple[FloatArray, FloatArray]:
+    """Angles and torques of the motors of links with an exact motion, by Spong's equations."""
+    rotor = values["r1"] * values["k5"]
+    own = {**values, "k5": values["k5"] - rotor, "k6": 0.0, "k7": 0.0}
+    load = evaluated(torque_by_hand(), model, own, links)[:, 0]
+    theta = links.theta + np.array([[values["h1"]], [values["h2"]]]) * load
+    t = np.arange(theta.shape[1]) * DT
+    spline = make_interp_spline(t, theta.T, k=7)
+    omega, alpha = (spline.derivative(order)(t).T for order in (1, 2))
+    viscous = np.array([[values["k6"]], [values["k7"]]]) * omega
+    return theta, load + viscous + np.array([[rotor], [0.0]]) * alpha
 
 
 def _behind(tau: FloatArray, lag: float) -> FloatArray:

@@ -6,6 +6,7 @@ from algid.physics.terms.asymmetry import ASYMMETRY
 from algid.physics.terms.base import Term, TorqueColumn
 from algid.physics.terms.coulomb import COULOMB
 from algid.physics.terms.delay import DELAY
+from algid.physics.terms.elastic import ELASTIC
 from algid.physics.terms.gain import GAIN
 from algid.physics.terms.lag import LAG
 from algid.physics.terms.load import LOAD
@@ -29,6 +30,7 @@ OPTIONAL: tuple[Term, ...] = (
     LOAD,
     GAIN,
     PHASES,
+    ELASTIC,
     LAG,
     DELAY,
 )

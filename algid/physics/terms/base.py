@@ -72,6 +72,8 @@ class Term:
         Whether most real joints have it: other terms are weighed beside it first.
     shapes : names of the widths that its columns have, fields of `algid.physics.motion.Widths`
     by_load : pairs of a parameter and a joint: load times smooth sign of velocity it multiplies
+    elastic : pairs of a parameter and the joint whose compliance it is
+    of_motor : pairs of a parameter and the one of which it is the motor's share, by name
     gains : pairs of a parameter g and the joint whose torque it multiplies by 1 + g
     sines : pairs of a parameter and the one whose sine part it is: both are one phasor
     timing : "delay" or "lag"
@@ -93,6 +95,8 @@ class Term:
     usual: bool = False
     shapes: tuple[str, ...] = ()
     by_load: tuple[tuple[str, int], ...] = ()
+    elastic: tuple[tuple[str, int], ...] = ()
+    of_motor: tuple[tuple[str, str], ...] = ()
     gains: tuple[tuple[str, int], ...] = ()
     sines: tuple[tuple[str, str], ...] = ()
     timing: Literal["delay", "lag"] | None = None
@@ -124,4 +128,4 @@ class Term:
     @property
     def linear(self) -> bool:
         """Whether the torque is linear in its parameters beside those of other terms."""
-        return not (self.by_load or self.gains)
+        return not (self.by_load or self.gains or self.elastic)
