@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from algid.base.errors import SettingError
 from algid.moved import refuse_moved_keywords
-from algid.options import ADVANCED, Option, flag
+from algid.options import ADVANCED, BY_SET, Option, flag
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
@@ -41,6 +41,8 @@ class Keyword:
         The first sentence of its entry in the docstring, or the field's description.
     option : Option
     place : an `inspect` kind of parameter
+    by_set : bool
+        Whether it has no flag of its own.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Keyword:
     help: str
     option: Option
     place: Any = inspect.Parameter.KEYWORD_ONLY
+    by_set: bool = False
 
     @property
     def kind(self) -> Any:
@@ -100,21 +103,29 @@ def keywords(verb: Callable[..., Any]) -> Mapping[str, Keyword]:
         default = one.default
         if default is None and option.default is not None:
             default = option.default
-        found[one.name] = Keyword(
-            one.name, hint, default, helps.get(one.name, ""), option, one.kind
-        )
+        text, by_set = helps.get(one.name, ""), one.name in BY_SET
+        found[one.name] = Keyword(one.name, hint, default, text, option, one.kind, by_set)
     return found
 
 
-def fields(model: Any, kind: Any = None) -> dict[str, Keyword]:
-    """The fields of `Settings` or `Profile` by name; `kind` is what is typed for each."""
-    found = {}
+def fields(model: Any, kind: Any = None, of: str = "") -> list[Keyword]:
+    """The fields of `Settings` or `Profile`, and `of` a channel; `kind` is what is typed."""
+    found = []
     for name, one in model.model_fields.items():
+        if hasattr(one.annotation, "model_fields"):
+            found += fields(one.annotation, kind, f"{name}.")
+            continue
         panel = (one.json_schema_extra or {}).get("panel") or ADVANCED
         option = next((part for part in one.metadata if isinstance(part, Option)), Option(kind))
-        option = replace(option, panel=panel)
-        default = False if one.annotation is bool and kind is None else None
-        found[name] = Keyword(name, one.annotation, default, one.description or "", option)
+        keyword = Keyword(
+            of + name,
+            one.annotation,
+            False if one.annotation is bool and kind is None else None,
+            one.description or "",
+            replace(option, panel=panel),
+            by_set=bool(of) or name in BY_SET,
+        )
+        found.append(keyword)
     return found
 
 

@@ -11,6 +11,7 @@ import inspect
 import shlex
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -33,7 +34,7 @@ from algid.api.signature import (
 from algid.base.exits import epilog
 from algid.base.text import lines_of
 from algid.cli.output import complain, shown
-from algid.options import ADVANCED, BY_SET, EVERYDAY, VALUES, Option
+from algid.options import ADVANCED, EVERYDAY, VALUES, Option
 
 COMMANDS: Mapping[str, str] = {
     "inspect": "inspect",
@@ -90,14 +91,15 @@ def command(name: str) -> Command:
     """The command that calls a verb."""
     module = import_module(f"algid.api.{name}")
     verb = getattr(module, COMMANDS[name])
-    own, of_logs = keywords(verb), _of_logs(verb)
-    by_set = [one for one in own.values() if one.name in BY_SET]
-    taken = [one for one in [*own.values(), *of_logs.values()] if one.name not in BY_SET]
-    if by_set or of_logs:
-        text = "Any other setting, as tau1.sign=-1; may be repeated."
-        if not of_logs:
-            text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
-        words = Option(list[str], panel=ADVANCED, words=lambda: _lines(by_set, bool(of_logs)))
+    of_logs = _of_logs(verb)
+    every = [*keywords(verb).values(), *of_logs]
+    by_set = [one for one in every if one.by_set]
+    taken = list({one.name: one for one in every if not one.by_set}.values())
+    if by_set:
+        text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
+        if of_logs:
+            text = "Any other setting, as tau1.sign=-1; may be repeated."
+        words = Option(list[str], panel=ADVANCED, words=lambda: _lines(by_set))
         taken.append(Keyword("set", str, None, text, words))
     if name in PRINTED:
         taken.append(_of_command("format", Literal["table", "json"], "table", "What to print."))
@@ -211,37 +213,28 @@ def _of_command(name: str, hint: Any, default: Any, text: str) -> Keyword:
     return Keyword(name, hint, default, text, Option(panel=ADVANCED))
 
 
-def _of_logs(verb: Callable[..., Any]) -> dict[str, Keyword]:
+def _of_logs(verb: Callable[..., Any]) -> list[Keyword]:
     """The fields of `Profile`, and of `Settings`, of a verb that takes them as ``**options``."""
     *_, last = inspect.signature(verb).parameters.values()
     if "Options" not in str(last.annotation):
-        return {}
-    from algid.profile import ALL_CHANNELS, Profile
+        return []
+    from algid.profile import Profile
     from algid.settings import OF_PRIOR, Settings
 
-    found = fields(Profile, str)
-    for name in (*ALL_CHANNELS, "velocity", *OF_PRIOR):
-        del found[name]
+    found = []
+    for one in fields(Profile, str):
+        # what an arm is said to be is no log's, and its velocity is true or false here
+        behind = one.by_set or one.hint is bool or one.name in OF_PRIOR
+        found.append(replace(one, by_set=behind))
     if "Unpack[Options]" in str(last.annotation):
-        found |= fields(Settings)
+        found += fields(Settings)
     return found
 
 
-def _lines(by_set: list[Keyword], of_logs: bool) -> list[str]:
+def _lines(by_set: list[Keyword]) -> list[str]:
     """What ``--set`` takes: a line a word, or ``NAME=``."""
-    hints = {one.name: one.hint for one in by_set}
-    if of_logs:
-        from algid.profile import Profile
-        from algid.settings import Settings
-
-        hints = {name: one.annotation for name, one in Settings.model_fields.items()}
-        hints = {name: hint for name, hint in hints.items() if name in BY_SET}
-        for name, one in Profile.model_fields.items():
-            channel = getattr(one.annotation, "model_fields", None) or {"": one}
-            for key, part in channel.items():
-                hints[f"{name}.{key}".rstrip(".")] = part.annotation
     lines = []
-    for name, hint in hints.items():
-        words = ["true", "false"] if hint is bool else words_of(hint)
-        lines += [f"{name}={word}" for word in words] or [f"{name}="]
+    for one in by_set:
+        words = ["true", "false"] if one.hint is bool else words_of(one.hint)
+        lines += [f"{one.name}={word}" for word in words] or [f"{one.name}="]
     return lines
