@@ -24,7 +24,6 @@ from pyarrow import feather, parquet
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
 from scipy.io import savemat
 
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
@@ -33,14 +32,8 @@ from algid.profile import Profile
 from algid.readers import read_log
 from algid.writers import FORMATS, mcap, write_log
 from tests.readers.logs import EPOCH_NS, TRUTH
-from tests.readers.mcaps import (
-    NO_INDEX,
-    TOPIC,
-    joint_state,
-    messages_of,
-    protobuf_schema,
-    write_mcap,
-)
+from tests.readers.mcaps import NO_INDEX, TOPIC, messages_of, write_mcap
+from tests.readers.ways import STORES, Message, States, fill, written
 
 EXPECTED = Path(__file__).with_name("sound_files.json")
 ROWS = 300
@@ -408,26 +401,38 @@ def with_imu() -> list[tuple[str, int, bytes]]:
 IMU = {"/imu": ("sensor_msgs/msg/Imu", "ros2msg", b"float64[7] values")}
 
 
-def six_joints() -> list[tuple[str, int, bytes]]:
+def _sent(way: str, sent: list[Message], **settings: Any) -> Callable[[Path], Made]:
+    return lambda folder: (written(way, folder, States(sent)), settings)
+
+
+def joint_states(velocity: bool = False) -> list[Message]:
+    """The states, with velocities or without."""
+    found = []
+    for row, stamp in enumerate(log().stamp_ns.tolist()):
+        one = Message(VALUES[:2, row].tolist(), VALUES[2:4, row].tolist(), stamp, stamp)
+        found.append(replace(one, velocity=VALUES[4:, row].tolist()) if velocity else one)
+    return found
+
+
+def six_joints() -> list[Message]:
     """States of six joints, of which the names change places."""
-    messages = []
+    found = []
     for row, stamp in enumerate(log().stamp_ns.tolist()):
         order = [0, 1, 2, 3, 4, 5] if row % 7 else [5, 3, 1, 0, 2, 4]
         names = [f"arm_joint_{place + 1}" for place in order]
-        values = [VALUES[place, row] for place in order]
-        messages.append((TOPIC, stamp, joint_state(stamp, names, values, values, values).done()))
-    return messages
+        values = VALUES[order, row].tolist()
+        found.append(Message(values, values, stamp, stamp, names, values))
+    return found
 
 
-def two_topics() -> list[tuple[str, int, bytes]]:
+def two_topics() -> list[Message]:
     """Angles on one topic, and torques on another at other times."""
-    messages = []
-    for row, stamp in enumerate(log().stamp_ns.tolist()):
-        positions, efforts = VALUES[:2, row].tolist(), VALUES[2:4, row].tolist()
-        later = stamp + 300_000
-        messages.append(("/q", stamp, joint_state(stamp, position=positions).done()))
-        messages.append(("/tau", later, joint_state(later, effort=efforts).done()))
-    return messages
+    found = []
+    for one in joint_states():
+        later = one.stamp + 300_000
+        found.append(replace(one, effort=(), topic="/q"))
+        found.append(replace(one, position=(), topic="/tau", stamp=later, log_stamp=later))
+    return found
 
 
 TWO = {
@@ -437,89 +442,21 @@ TWO = {
 }
 
 
-def as_json() -> list[tuple[str, int, bytes]]:
-    """The states as JSON."""
-    return [
-        (
-            TOPIC,
-            stamp,
-            json.dumps(
-                {
-                    "header": {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}},
-                    "name": ["j1", "j2"],
-                    "position": VALUES[:2, row].tolist(),
-                    "effort": VALUES[2:4, row].tolist(),
-                }
-            ).encode(),
-        )
-        for row, stamp in enumerate(log().stamp_ns.tolist())
-    ]
-
-
-def as_protobuf() -> list[tuple[str, int, bytes]]:
-    """The states as Protobuf."""
-    _, state = protobuf_schema()
-    messages = []
-    for row, stamp in enumerate(log().stamp_ns.tolist()):
-        one = state(name=["j1", "j2"], position=VALUES[:2, row], effort=VALUES[2:4, row])
-        one.timestamp.seconds, one.timestamp.nanos = divmod(stamp, 10**9)
-        messages.append((TOPIC, stamp, one.SerializeToString()))
-    return messages
-
-
-def standing() -> list[tuple[str, int, bytes]]:
-    """States whose headers were never filled in."""
-    return [
-        (
-            TOPIC,
-            stamp,
-            joint_state(
-                0, position=VALUES[:2, row].tolist(), effort=VALUES[2:4, row].tolist()
-            ).done(),
-        )
-        for row, stamp in enumerate(log().stamp_ns.tolist())
-    ]
-
-
-def ros1(folder: Path, name: str = "log.bag", packing: Any = None, start: int = 0) -> Path:
+def ros1(folder: Path, packing: Any = None) -> Path:
     """The states as a ROS 1 bag of small chunks."""
-    store = get_typestore(Stores.ROS1_NOETIC)
-    writer = Writer1(folder / name)
+    writer = Writer1(folder / "log.bag")
     writer.chunk_threshold = 4096
     if packing is not None:
         writer.set_compression(packing)
     with writer:
-        channel = writer.add_connection("/joint_states", JOINT_STATE, typestore=store)
-        for row, stamp in enumerate(log().stamp_ns.tolist()[start:], start=start):
-            data = store.serialize_ros1(state_of(store, row, seq=row), JOINT_STATE)
-            writer.write(channel, stamp, data)
-    return folder / name
-
-
-def state_of(store: Any, row: int, **header: int) -> Any:
-    """One sample as the message of a type store."""
-    time, head, state = (
-        store.types[name]
-        for name in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header", JOINT_STATE)
-    )
-    seconds, rest = divmod(int(STAMPS[row] + EPOCH_NS), 10**9)
-    return state(
-        header=head(stamp=time(sec=seconds, nanosec=rest), frame_id="", **header),
-        name=["j1", "j2"],
-        position=VALUES[:2, row].copy(),
-        velocity=VALUES[4:, row].copy(),
-        effort=VALUES[2:4, row].copy(),
-    )
+        fill(writer, STORES[0], States(joint_states(velocity=True)), {"seq": 0})
+    return folder / "log.bag"
 
 
 def ros2(folder: Path, plugin: StoragePlugin, version: Literal[8, 9] = 9) -> Path:
     """The states as a rosbag2 folder."""
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    writer = Writer2(folder / "bag", version=version, storage_plugin=plugin)
-    with writer:
-        channel = writer.add_connection("/joint_states", JOINT_STATE, typestore=store)
-        for row, stamp in enumerate(log().stamp_ns.tolist()):
-            writer.write(channel, stamp, store.serialize_cdr(state_of(store, row), JOINT_STATE))
+    with Writer2(folder / "bag", version=version, storage_plugin=plugin) as writer:
+        fill(writer, STORES[1], States(joint_states(velocity=True)), {})
     return folder / "bag"
 
 
@@ -606,7 +543,6 @@ def mcaps() -> dict[str, Callable[[Path], Made]]:
         found[f"packed by {packing.name}, no index"] = _mcap(
             states, compression=packing, **NO_INDEX
         )
-    schema, _ = protobuf_schema()
     more: dict[str, Callable[[Path], Made]] = {
         "without chunks": _mcap(states, use_chunking=False),
         "without checksums": _mcap(states, enable_crcs=False),
@@ -616,13 +552,13 @@ def mcaps() -> dict[str, Callable[[Path], Made]]:
         "another topic between, no index": _mcap(with_imu, IMU, **NO_INDEX),
         "big endian": _mcap(lambda: messages_of(log(), order=">")),
         "log time": _mcap(states, settings={"clock": "log"}),
-        "headers that stand still": _mcap(standing),
-        "two of six joints": _mcap(six_joints, settings={"joints": ["arm_joint_2", "arm_joint_5"]}),
-        "two topics": _mcap(two_topics, settings=TWO),
-        "JSON": _mcap(as_json, {TOPIC: ("arm", "jsonschema", b"{}")}, encoding="json"),
-        "Protobuf": _mcap(
-            as_protobuf, {TOPIC: ("arm.State", "protobuf", schema)}, encoding="protobuf"
+        "headers that stand still": _sent(
+            "cdr", [replace(one, stamp=0, name=("joint1", "joint2")) for one in joint_states()]
         ),
+        "two of six joints": _sent("cdr", six_joints(), joints=["arm_joint_2", "arm_joint_5"]),
+        "two topics": _sent("cdr", two_topics(), **TWO),
+        "JSON": _sent("json", joint_states()),
+        "Protobuf": _sent("pb", joint_states()),
         "channels of two publishers": _redefined_alike,
         "references": _referenced,
     }

@@ -40,7 +40,7 @@ _MASKED = {"parquet", "feather", "dict", "pandas", "polars", "arrays"}
 _ZONED = {"csv", "tsv", "jsonl", "parquet", "feather", "pandas", "polars"}
 CANONICAL = ["time", "q1", "q2", "tau1", "tau2"]
 _JSON_SCHEMA = b'{"type":"object"}'
-_STORES = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+STORES = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 
 
 class CannotSayError(Exception):
@@ -429,18 +429,19 @@ def _lists(way: str, folder: Path, log: States) -> Path:
 def _bag1(folder: Path, log: States) -> Path:
     path = folder / "log.bag"
     with Ros1Writer(path) as writer:
-        _fill(writer, _STORES[0], log, {"seq": 0})
+        fill(writer, STORES[0], log, {"seq": 0})
     return path
 
 
 def _db3(folder: Path, log: States) -> Path:
     path = folder / "log"
     with Ros2Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        _fill(writer, _STORES[1], log, {})
+        fill(writer, STORES[1], log, {})
     return path
 
 
-def _fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
+def fill(writer: Any, store: Any, log: States, head: Mapping[str, int]) -> None:
+    """Write joint states into a bag; `head` is what its headers have beside ROS 2's."""
     _usual_definition(log)
     if log.metadata:
         raise CannotSayError
