@@ -4,14 +4,11 @@ word about them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pytest
-from pyarrow import feather
 from scipy.io import savemat
 
 from algid.base.errors import LogError
@@ -40,26 +37,6 @@ def npz(folder: Path) -> Path:
 def mat(folder: Path) -> Path:
     savemat(folder / "log.mat", {"t": T, "q": THETA.T, "tau": TAU.T, "comment": "arm 7"})
     return folder / "log.mat"
-
-
-def feather_flat(folder: Path) -> Path:
-    columns = {"time": T, "q1": THETA[0], "q2": THETA[1], "tau1": TAU[0], "tau2": TAU[1]}
-    feather.write_feather(pa.table(columns), str(folder / "log.feather"), compression="zstd")
-    return folder / "log.feather"
-
-
-@pytest.mark.parametrize("make", [npz, mat, feather_flat])
-@pytest.mark.parametrize("share", [0.2, 0.9])
-def test_cut_files_are_refused_in_one_line(
-    make: Callable[[Path], Path], share: float, tmp_path: Path
-) -> None:
-    path = make(tmp_path)
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(LogError) as refused:
-        read_log(path)
-    assert str(path) in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -38,17 +38,6 @@ def _told(path: Path, profile: Profile) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("form", ["csv", "parquet", "feather"])
-def test_a_joint_that_moves_beside_is_told(form: str, tmp_path: Path) -> None:
-    path = tmp_path / f"log.{form}"
-    frame = _arm("q{}", "tau{}", ("1", "2", "3", "4"))
-    getattr(frame, {"csv": "write_csv", "parquet": "write_parquet", "feather": "write_ipc"}[form])(
-        path
-    )
-    (text,) = _told(path, Profile(joints=("2", "3")))
-    assert text.startswith("1 other joint moves meanwhile: 4 by 0.6 rad (in the first 400 samples)")
-
-
 def test_angles_in_degrees_are_told_in_rad(tmp_path: Path) -> None:
     _arm("q{}_deg", "tau{}", ("1", "2", "3", "4"), np.pi / 180).write_csv(tmp_path / "log.csv")
     (text,) = _told(tmp_path / "log.csv", Profile(joints=("2", "3")))

@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 
 from algid.base.errors import LogError
 from algid.log import Log, Origin
-from algid.readers import open_log, read_log
+from algid.readers import read_log
 from algid.writers import FORMATS, write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 
@@ -42,17 +42,6 @@ def test_any_finite_log_survives(
         write_log(path, log)
         found = read_log(path)
     assert same(found, log)
-
-
-@pytest.mark.parametrize("kind", FORMATS)
-def test_blocks_add_up_to_the_whole(kind: str, tmp_path: Path) -> None:
-    log = noise_log(5000)
-    parts = [log.part(first, first + 1000) for first in range(0, 5000, 1000)]
-    write_log(tmp_path / f"log.{kind}", iter(parts))
-    blocks = list(open_log(tmp_path / f"log.{kind}").blocks(700))
-    assert max(map(len, blocks)) <= 700
-    assert np.array_equal(np.concatenate([block.stamp_ns for block in blocks]), log.stamp_ns)
-    assert np.array_equal(np.concatenate([block.tau for block in blocks], axis=1), log.tau)
 
 
 def test_mcap_reads_the_same_in_mcap_ros2_and_rosbags(tmp_path: Path) -> None:

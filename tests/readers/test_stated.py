@@ -145,23 +145,6 @@ def test_units_of_a_schema_are_used(
     assert np.allclose(1000 * log.tau, np.arange(ROWS) + 1, rtol=1e-12)
 
 
-def test_units_of_a_list_column(tmp_path: Path) -> None:
-    pairs = pa.array([[row, row] for row in np.arange(ROWS) + 1.0])
-    schema = pa.schema(
-        [
-            ("t", pa.float64()),
-            pa.field("q", pairs.type, metadata={"units": "deg"}),
-            ("tau", pairs.type),
-        ]
-    )
-    pq.write_table(
-        pa.table([np.arange(ROWS) / 100, pairs, pairs], schema=schema), tmp_path / "log.parquet"
-    )
-    log = read_log(tmp_path / "log.parquet")
-    assert np.rad2deg(log.theta[1, 0]) == pytest.approx(1)
-    assert log.tau[1, 0] == 1
-
-
 def test_metadata_that_are_no_units_are_left_alone() -> None:
     metadata = {
         "units": "{" * 9000,

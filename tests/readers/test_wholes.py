@@ -44,19 +44,6 @@ def nested() -> list[dict[str, Any]]:
     ]
 
 
-@pytest.mark.parametrize("name", ["a.jsonl", "a.txt"])
-def test_nested_json_lines_are_read(name: str, tmp_path: Path) -> None:
-    path = lines(tmp_path / name, nested())
-    assert format_of(path).name == "jsonl"
-    log = read_log(path)
-    assert np.array_equal(log.theta, LOG.theta)
-    assert np.array_equal(log.tau, LOG.tau)
-    assert log.omega is not None
-    assert np.array_equal(log.omega, OMEGA)
-    assert log.origin.mapping["tau2"] == "motor_state[1].tau_est"
-    assert [entry.name for entry in contents(path)[1]][:3] == ["t", "mode", "motor_state[0].q"]
-
-
 @pytest.mark.parametrize(
     "wrong", ['{"t": 1, "motor_state": [', "[1, 2]", "nan", '{"t": 1,}', '{"t": NaN}']
 )

@@ -27,27 +27,6 @@ def columns(log: algid.Log) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.parametrize("kind", ["csv", "parquet", "frame", "dict"])
-def test_rows_without_a_time_are_counted(kind: str, log: algid.Log, tmp_path: Path) -> None:
-    frame = pl.DataFrame(columns(log))
-    given: object = columns(log) if kind == "dict" else frame
-    if kind == "csv":
-        given = tmp_path / "log.csv"
-        frame.write_csv(tmp_path / "log.csv")
-    if kind == "parquet":
-        given = tmp_path / "log.parquet"
-        frame.write_parquet(tmp_path / "log.parquet")
-    found = algid.read_log(given, algid.Profile(rate=200.0))
-    assert found.theta == pytest.approx(log.theta)
-    assert found.t == pytest.approx(log.t, abs=1e-9)
-    assert found.origin.mapping["t"] == "rows at 200 Hz"
-    clock = algid.inspect(given, rate=200.0).clock
-    assert clock is not None
-    assert clock.rate == pytest.approx(200.0)
-    with pytest.raises(LogError, match=r"no column for t; .* --rate HZ"):
-        algid.read_log(given)
-
-
 def test_a_row_that_lacks_a_value_has_no_time_to_be_counted_by(log: algid.Log) -> None:
     torque = [None if row == 7 else value for row, value in enumerate(log.tau[1].tolist())]
     frame = pl.DataFrame(columns(log)).with_columns(tau2=pl.Series(torque))
