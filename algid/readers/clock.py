@@ -36,8 +36,6 @@ _SHORTEST = 64
 """Late samples at a table's end that wait for the next table, and least of a run before all."""
 _NO_HOLE = 0.75
 """Of the usual rows in a time, between the half that one of two threads writes and all of them."""
-_MOST_RUNS = 1000
-"""More are a broken clock's."""
 PAUSE = 20
 """Periods between a run and the next one: a gap that no window spans."""
 
@@ -62,8 +60,8 @@ def in_order(
     ------
     LogError
         If time goes back where it may not, or by more than `HORIZON` rows, or in a quarter of the
-        rows by more than a few; if it stands still in half of them; if there are too many runs, or
-        fewer than `segment`.
+        rows by more than a few; if it stands still in half of them; if there are fewer runs than
+        `segment`.
     """
     run, shift_ns = 1, 0
     held: SampleTable | None = (
@@ -112,11 +110,6 @@ def in_order(
             assert held is not None
             if not runs:
                 raise LogError(_backwards(path, int(held.stamp_ns[-1]), first_ns))
-            if run == _MOST_RUNS:
-                other = Remedy({"time": None}, "name another time")
-                raise LogError(
-                    f"{path}: time starts again {_MOST_RUNS} times; expected one clock; {other}"
-                )
             yield moved(held)
             period = _period(held.stamp_ns[-HORIZON:])
             shift_ns += int(held.stamp_ns[-1]) + max(1, round(PAUSE * period)) - first_ns

@@ -84,7 +84,7 @@ class PdLaw:
     kd: float
 
 
-def laws_of(path: str, profile: Profile) -> tuple[PdLaw | None, PdLaw | None]:
+def laws_of(path: str, profile: Profile) -> tuple[PdLaw | None, ...]:
     """The PD law of each joint, where the profile has one.
 
     Raises
@@ -92,22 +92,17 @@ def laws_of(path: str, profile: Profile) -> tuple[PdLaw | None, PdLaw | None]:
     LogError
         If one lacks its gain or its desired angle.
     """
-    return _law(path, 1, profile), _law(path, 2, profile)
-
-
-def _law(path: str, joint: int, profile: Profile) -> PdLaw | None:
-    name, channel = f"tau{joint}", (profile.tau1, profile.tau2)[joint - 1]
-    given = [key for key in ("q_des", "kp", "kd") if getattr(channel, key) is not None]
-    if not given:
-        return None
-    needed = {f"{name}.{key}": None for key in ("q_des", "kp") if key not in given}
-    if needed:
-        raise LogError(
-            f"{path}: a PD law of {name} needs a desired angle and a gain, found "
-            f"{', '.join(given)} alone: "
-            f"{Remedy(needed)}"
-        )
-    return PdLaw(float(channel.kp or 0.0), float(channel.kd or 0.0))
+    laws: list[PdLaw | None] = []
+    for name, channel in (("tau1", profile.tau1), ("tau2", profile.tau2)):
+        given = [key for key in ("q_des", "kp", "kd") if getattr(channel, key) is not None]
+        needed = {f"{name}.{key}": None for key in ("q_des", "kp") if key not in given}
+        if given and needed:
+            raise LogError(
+                f"{path}: a PD law of {name} needs a desired angle and a gain, found "
+                f"{', '.join(given)} alone: {Remedy(needed)}"
+            )
+        laws.append(PdLaw(float(channel.kp or 0), float(channel.kd or 0)) if given else None)
+    return tuple(laws)
 
 
 @dataclass(frozen=True)
@@ -125,7 +120,7 @@ class Conversion:
     absolute: bool = False
     base: bool = False
     passive: int | None = None
-    laws: tuple[PdLaw | None, PdLaw | None] = (None, None)
+    laws: tuple[PdLaw | None, ...] = (None, None)
 
     def apply(self, table: SampleTable, signals: Mapping[str, FloatArray]) -> None:
         """Fill in a table's signals (2, N) by quantity, in rad, N m, rad/s."""
@@ -176,7 +171,9 @@ def channel_readings(
         if name not in mapping:
             continue
         joint = int(name[-1]) - 1
-        like = f"theta{joint + 1}" if _is_desired(name, profile) else name
+        # in the place of a torque may stand a desired angle, recorded as the angle is
+        desired = getattr(profile.channel(name), "q_des", None) is not None
+        like = f"theta{joint + 1}" if desired else name
         channel = _channel(like, profile)
         unit, source = _unit(like, profile, stated)
         if name == f"tau{profile.passive}":
@@ -211,19 +208,8 @@ def _unit(name: str, profile: Profile, stated: Mapping[str, str]) -> tuple[str, 
             return unit, profile.told_by(f"{place}.unit")
         if place in stated:
             return stated[place], "names"
-    return _usual_unit(name, profile), "assumed"
-
-
-def _is_desired(name: str, profile: Profile) -> bool:
-    """Whether a desired angle, recorded as the angle is, stands in the place of a torque."""
-    return getattr(profile.channel(name), "q_des", None) is not None
-
-
-def _usual_unit(name: str, profile: Profile) -> str:
-    """The unit of a channel of which nobody says it."""
-    if not name.startswith("tau"):
-        return "rad"
-    return "A" if profile.effort == "current" else "N m"
+    torque = "A" if profile.effort == "current" else "N m"
+    return torque if name.startswith("tau") else "rad", "assumed"
 
 
 def _factor(

@@ -189,11 +189,6 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
             "row 1: time: expected ISO 8601.* from 1970 to 2261",
         ),
         (
-            "name,logs,time\nx,a.csv,9999-12-31T23:59-23:59\n",
-            "row 1: time: expected ISO 8601.* from 1970 to 2261",
-        ),
-        ("name,logs,time\nx,a.csv,1969-12-31T23:59:59Z\n", "row 1: time: expected ISO 8601"),
-        (
             "name,logs\na.algid/b,a.csv\n",
             "row 1: name: a job's name .* no folder .* ends in .algid",
         ),
@@ -226,7 +221,6 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
     ("text", "told"),
     [
         ("", r"expected tables \[\[job\]\] alone, found nothing"),
-        ("job = 1", r"expected tables \[\[job\]\] alone, found job"),
         ("job = [1]", r"expected tables \[\[job\]\] alone, found job"),
         (
             "more = 1\n[[job]]\nname = 'x'\nlogs = 'a.csv'",
@@ -257,7 +251,6 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
             f"{JOB}payload = 1{'0' * 400}",
             "job 1: payload: expected text, a date, true, .* 64 bits, found ",
         ),
-        (f"{JOB}payload = 1{'0' * 5000}", "the manifest cannot be read"),
         (
             f"{JOB}payload = 0x1{'0' * 5000}",
             "job 1: payload: expected text, a date, true, .* 64 bits, found ",
@@ -265,7 +258,6 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         (f"{JOB}payload = nan", "job 1: payload: .* finite number"),
         (f"{JOB}payload = {{a = 1}}", "job 1: payload: .* found {'a': 1}"),
         (f"{JOB}robot = [1]", r"job 1: robot: .* found \[1\]"),
-        (f"{JOB}time = 9999-12-31T23:59:59-23:59", "job 1: time: expected ISO 8601"),
     ],
 )
 def test_a_bad_manifest_in_toml_is_refused_by_its_place(

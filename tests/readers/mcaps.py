@@ -152,18 +152,3 @@ def chunks_of(path: Path) -> list[Any]:
         summary = make_reader(stream).get_summary()
     assert summary is not None
     return list(summary.chunk_indexes)
-
-
-def small_chunks(path: Path, rows: int = 1000, **options: Any) -> None:
-    """Joint states, each in a chunk of its own."""
-    schemas = {"/joint_states": (JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())}
-    wave = np.sin(np.arange(rows) * 0.01)
-    messages = (
-        (
-            "/joint_states",
-            row * 10**6,
-            joint_state(row * 10**6, position=(wave[row], 0.5), effort=(1.0, -wave[row])).done(),
-        )
-        for row in range(rows)
-    )
-    write_mcap(path, messages, schemas, chunk_size=1, **options)

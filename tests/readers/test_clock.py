@@ -121,13 +121,6 @@ def test_a_repeated_stamp_is_a_loss_where_its_values_are_others(cut: int | None)
         assert (said.text, said.lossy) == (text, other != 5.0)
 
 
-def test_half_of_a_log_at_repeated_stamps_counts_as_lost() -> None:
-    stamps = np.repeat(np.arange(2500), 2)
-    (said,) = ordered(table(stamps, q=np.arange(5000.0))).notices
-    assert said.text.endswith("; 2,500 with other values are lost")
-    assert said.lossy
-
-
 def test_what_empty_tables_tell_is_kept() -> None:
     first, last = Notice("ONE", "first"), Notice("TWO", "last")
     found = ordered(table([], first), table([1, 2]), table([], last))
@@ -254,13 +247,3 @@ def test_a_topic_is_read_whole_in_order_or_refused() -> None:
         match=r"topic '/other' holds no sample of tau1; .*--set tau1.topic=NAME",
     ):
         whole_topic("log", "/other", ["tau1", "tau2"], iter([table([])]))
-
-
-def test_of_repeated_stamps_the_first_is_kept_however_many_there_are() -> None:
-    """Also among thousands, which numpy sorts in other ways than a few."""
-    stamps = np.repeat(np.arange(3000), 2)
-    stamps[40:44] = stamps[40:44][::-1]
-    found = ordered(table(stamps, q=np.arange(6000.0)))
-    wanted = 2.0 * np.arange(3000)
-    wanted[20:22] = 42, 40  # the first of each as they stood
-    assert np.array_equal(found.columns["q"], wanted)

@@ -80,12 +80,6 @@ def test_late_blocks_start_no_run() -> None:
         assert read(parts).columns["theta1"].tolist() == list(range(6000))
 
 
-def test_a_clock_that_starts_all_the_time_is_refused() -> None:
-    stamps = np.tile(np.arange(80) * MS, 1001)
-    with pytest.raises(LogError, match="time starts again 1000 times; expected one clock; name"):
-        read([table(stamps, np.arange(stamps.size) * 1.0)])
-
-
 def test_what_is_said_of_other_runs_is_kept() -> None:
     first, last = Notice("ONE", "of the first"), Notice("TWO", "of the last", lossy=True)
     stamps = np.arange(2000) * MS
