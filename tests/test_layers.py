@@ -66,7 +66,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
-                       "readers signals units", "numpy"),
+                       "readers signals units", "numpy pydantic"),
     "report": room(
         "arm arrow blocks criteria errors files inspection log methods model notices options "
         "progress quantiles results ros2 significance text verdict words writers",
@@ -106,7 +106,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm batches check designs errors estimators exits exports files fleet identification "
         "inspection limits log methods moved notices options physics profile progress "
         "readers report results runtime settings stores synth text tracks units words writers",
-        "numpy plotly polars",
+        "numpy plotly polars pydantic",
     ),
     "cli": room(
         "api errors exits faults guard moved options profile report runtime settings text",

@@ -318,17 +318,16 @@ def share_of(jobs: list[Job], part: str, watch: bool = False) -> list[Job]:
 
 def bytes_of(text: str) -> int:
     """A size like ``2GB``; raises `SettingError` where it is none, or too small to work in."""
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
     if sys.platform == "darwin":
         raise SettingError(
             f"{flag('memory_limit')}: macOS does not bound the memory of a process; leave it out"
         )
-    units = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "ki": 2**10, "mi": 2**20, "gi": 2**30}
-    number = text.strip().lower().removesuffix("b")
-    unit = number.lstrip("0123456789.").strip()
     try:
-        size = int(float(number.removesuffix(unit)) * units[unit])
-    except (ValueError, KeyError, OverflowError):
-        size = 0
+        size = TypeAdapter(ByteSize).validate_python(text.lower().removesuffix("b") + "b")
+    except ValidationError:
+        size = ByteSize(0)
     if size < 1 << 29:
         raise SettingError(
             f"{flag('memory_limit')}: expected at least 512MiB, like 2GB, found {text!r}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
 from algid.api.given import opened
-from algid.api.options import Force, Place
+from algid.api.options import Force
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing
@@ -25,7 +25,7 @@ def compare(
         Result | str | Path | Sequence[Result | str | Path], Option(kind=list[Path])
     ],
     labels: Sequence[str] | None = None,
-    out: Place | None = None,
+    out: str | Path | None = None,
     force: Force = False,
 ) -> Comparison:
     """Lay results side by side: differences in σ from the first one, and which settings differ.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @verb
 def convert(
     source: str | Path,
-    out: Annotated[str | Path, Option(kind=Path, flag=OUT)],
+    out: Annotated[str | Path, Option(flag=OUT)],
     *,
     profile: ProfileLike | None = None,
     force: Force = False,

@@ -35,7 +35,7 @@ SEED: Range = (0, 2**63)
 UNIT = "steps"
 """What progress counts."""
 
-Pair = Annotated[float | tuple[float, float] | str, Option(kind=str)]
+Pair = float | tuple[float, float] | str
 Span = float | tuple[float, float] | str | tuple[tuple[float, float], tuple[float, float]]
 
 
@@ -85,15 +85,15 @@ def design(
     prior: Annotated[Result | str | Path, Option(kind=str, words=cases)],
     *,
     limits: str | Path | None = None,
-    range: Annotated[Span, Option(kind=str)] | None = None,  # noqa: A002  # as the flag
+    range: Span | None = None,  # noqa: A002  # as the flag
     speed: Pair | None = None,
     acceleration: Pair | None = None,
     torque: Pair | None = None,
     tip_height: Annotated[float, Option(range=PLANNED["tip_height"])] | None = None,
     duration: Annotated[float, Option(range=PLANNED["duration"])] | None = None,
     rate: Annotated[float, Option(range=PLANNED["rate"])] | None = None,
-    runs: Annotated[tuple[int, int] | str, Option(kind=str)] | None = None,
-    for_: Annotated[Sequence[str] | str, Option(kind=str)] | None = None,
+    runs: tuple[int, int] | str | None = None,
+    for_: Sequence[str] | str | None = None,
     position_noise: Annotated[float, Option(range=NOISE)] | None = None,
     torque_noise: Annotated[float, Option(range=NOISE)] | None = None,
     noise_from: AnyLog | None = None,
@@ -102,7 +102,7 @@ def design(
     l1: Length | None = None,
     l2: Length | None = None,
     margin: Annotated[float, Option(range=(0, 0.5))] = 0.05,
-    joints: Annotated[tuple[str, str] | str, Option(kind=str)] = "joint1,joint2",
+    joints: tuple[str, str] | str = "joint1,joint2",
     seed: Annotated[int, Option(range=SEED)] = 0,
     out: Folder | None = None,
     force: Force = False,

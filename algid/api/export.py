@@ -56,7 +56,7 @@ def export(
     rotor1: Annotated[float, Option(range=(0, 1e6))] | None = None,
     draws: Annotated[int, Option(range=(1, 100_000))] | None = None,
     seed: Annotated[int, Option(range=(0, 2**63))] = 0,
-    flange: Annotated[Sequence[float] | str, Option(kind=str)] | None = None,
+    flange: Sequence[float] | str | None = None,
     out: Folder | None = None,
     force: Force = False,
 ) -> Exported:

@@ -7,7 +7,7 @@ import shlex
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meant
@@ -16,7 +16,7 @@ from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
 from algid.base.files import refuse_existing, whole_file
 from algid.base.text import lines_of
-from algid.options import Option, flag
+from algid.options import flag
 
 if TYPE_CHECKING:
     from algid.inspection.report import Inspection
@@ -30,7 +30,7 @@ def inspect(
     log: AnyLog,
     *,
     profile: ProfileLike | None = None,
-    write_profile: Annotated[str | Path, Option(kind=Path)] | None = None,
+    write_profile: str | Path | None = None,
     force: Force = False,
     **options: Unpack[LogOptions],
 ) -> Inspection:

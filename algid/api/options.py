@@ -27,12 +27,11 @@ Loaded = Annotated["LogLike | Iterable[LogLike]", Option(kind=list[Path], flag="
 AnyResult = Annotated["Result | str | Path", Option(kind=Path)]
 """A result, or the path of one."""
 OUT = "-o"
-Folder = Annotated[str | Path, Option(kind=Path, default=Path())]
+Folder = Annotated[str | Path, Option(default=Path())]
 """Where a command writes: the working folder by default."""
-Place = Annotated[str | Path, Option(kind=Path, flag=OUT)]
 Length = Annotated[float, Option(range=KNOWN_LENGTH)]
 Force = Annotated[bool, Option(panel=ADVANCED)]
-Export = Annotated[bool | Literal["mcap"], Option(kind=str, panel=ADVANCED)]
+Export = Annotated[bool | Literal["mcap"], Option(panel=ADVANCED)]
 """Whether what is shown over time is also written as MCAP."""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
-from algid.api.options import Export, Place
+from algid.api.options import Export
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.options import Option, flag
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @verb
 def report(
     *results: Annotated[str | Path, Option(kind=list[Path])],
-    out: Place | None = None,
+    out: str | Path | None = None,
     export: Export = False,
     shared_library: bool = False,
     progress: Progress | None = None,

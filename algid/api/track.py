@@ -36,7 +36,7 @@ UNIT = "passes"
 @verb
 def track(
     log: AnyLog,
-    parameters: Annotated[Result | str | Path, Option(kind=Path, flag="--parameters")],
+    parameters: Annotated[Result | str | Path, Option(flag="--parameters")],
     *,
     l1: Length | None = None,
     l2: Length | None = None,

@@ -268,8 +268,7 @@ class Recordings:
 
     def _examined(self, log: Recording, block: Log, *, whole: bool) -> tuple[Notice, ...]:
         """What the named checks find in the first block of a log."""
-        from algid.inspection.checks import noticed
-        from algid.inspection.findings import CONTRADICTIONS
+        from algid.inspection.checks import CONTRADICTIONS, noticed
 
         begin = block if whole else block.part(0, EXAMINED)
         if log.role not in self._limits:

@@ -1,7 +1,8 @@
-"""All checks of `algid.inspection.findings` on a log: channels, sampling, then convention."""
+"""All checks of a log: channels, sampling, conventions; `messages.toml` says what each finds."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cache, partial
 
@@ -18,10 +19,12 @@ from algid.inspection.channels import (
 from algid.inspection.clipping import saturation
 from algid.inspection.conventions import advised, is_right, is_to_scale, judged, mend
 from algid.inspection.dynamics import dynamic_figures, gravity_findings
-from algid.inspection.findings import yielding
 from algid.inspection.sampling import rests, sampling
 from algid.log import Log
-from algid.notices import Notice
+from algid.notices import Notice, Remedy
+
+CONTRADICTIONS = ("WRONG_CONVENTION", "FLIPPED_SIGN", "WRONG_ZERO")
+"""Findings that say that a log was read by a wrong convention."""
 
 
 def examine(
@@ -124,3 +127,17 @@ def noticed(
             notice = replace(notice, text="", numbers=numbers)
         notices.append(replace(notice, refuse=False))
     return tuple(notices)
+
+
+def yielding(notice: Notice, accepted: Collection[str]) -> Notice:
+    """A refusal with what overrides it, or as a warning where its code is in `accepted`.
+
+    Else the same.
+    """
+    if not notice.refuse:
+        return notice
+    if notice.code in accepted:
+        numbers = {**notice.numbers, "accepted": True}
+        return replace(notice, refuse=False, remedies=(), text="", numbers=numbers)
+    override = Remedy({"accept": notice.code}, "to use it nevertheless")
+    return replace(notice, remedies=(*notice.remedies, override))

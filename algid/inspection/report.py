@@ -7,19 +7,20 @@ The whole look at a log that `algid inspect` prints.
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from pydantic import TypeAdapter
+
 from algid.base.errors import LogError
 from algid.base.faults import during
-from algid.inspection.checks import examine
+from algid.inspection.checks import CONTRADICTIONS, examine
 from algid.inspection.clipping import clipped, saturation
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures
 from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
-from algid.inspection.findings import CONTRADICTIONS
 from algid.log import Log
 from algid.notices import Notice, has_code, lossy
 from algid.readers import read_log
@@ -120,8 +121,7 @@ class Inspection:
 
     def as_dict(self) -> dict[str, Any]:
         """As plain data for JSON; what is not finite becomes None."""
-        plain: dict[str, Any] = _finite(asdict(self))
-        return plain
+        return dict(json.loads(TypeAdapter(Any).dump_json(asdict(self))))
 
 
 def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
@@ -177,13 +177,3 @@ def _signals(log: Log) -> dict[str, SignalFigures]:
         for joint, values in enumerate(pair, start=1):
             signals[f"{name}{joint}"] = signal_figures(values)
     return signals
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return list(map(_finite, value))
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from algid.inspection.findings import REFUSED
 from algid.writers import write_log
-from tests.inspection.test_checks import spoiled
+from tests.inspection.test_checks import REFUSED, spoiled
 from tests.processes import Outcome
 
 

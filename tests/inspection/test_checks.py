@@ -11,10 +11,9 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.base.errors import LogError
-from algid.inspection.checks import examine, noticed
+from algid.inspection.checks import examine, noticed, yielding
 from algid.inspection.dynamics import dynamic_figures
 from algid.inspection.figures import signal_figures
-from algid.inspection.findings import yielding
 from algid.log import Log, Origin
 from algid.notices import Notice
 from algid.profile import Profile
