@@ -96,19 +96,13 @@ class Belief:
         """Arms (count, Q) drawn from the belief."""
         rng = np.random.default_rng(seed)
         shape = (count, self.spread.shape[1])
-        if self.box:
-            u = rng.uniform(-1, 1, shape)
-        else:
-            u = rng.standard_normal(shape)
+        u = rng.uniform(-1, 1, shape) if self.box else rng.standard_normal(shape)
         return self.mean + u @ self.spread.T
 
     @property
     def std(self) -> FloatArray:
         """Standard deviations (Q,)."""
-        variance = np.sum(self.spread**2, axis=1)
-        if self.box:
-            variance = variance * (1 / 3)
-        return np.sqrt(variance)
+        return np.sqrt(np.sum(self.spread**2, axis=1) * (1 / 3 if self.box else 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -137,14 +137,8 @@ def usage(
     uses = list(_kinematic(limits, slopes.motion))
     for load in loads:
         uses += _torque(limits.torque, slopes, load, derivatives)
-    rows, values, slopes_of = [], [], []
-    for row, value, slope in uses:
-        rows.append(row)
-        values.append(value)
-        slopes_of.append(slope)
-    if not derivatives:
-        return Usage(tuple(rows), np.array(values))
-    return Usage(tuple(rows), np.array(values), np.array(slopes_of))
+    rows, values, by_motion = zip(*uses, strict=True)
+    return Usage(rows, np.array(values), np.array(by_motion) if derivatives else None)
 
 
 def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
@@ -223,9 +217,7 @@ def _missed(row: Row, limits: Limits, most: float) -> str:
         )
     assert row.joint is not None
     limit = limits.torque[row.joint]
-    asks = "the arm asks for"
-    if row.loaded:
-        asks = "the loaded arm asks for"
+    asks = f"the {'loaded ' if row.loaded else ''}arm asks for"
     return (
         f"{flag('torque')}: {asks} {most * limit:.3g} N m at joint "
         f"{row.joint + 1} even at rest, the limit is {limit:.3g} N m (margin included); raise it, "

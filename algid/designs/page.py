@@ -77,21 +77,13 @@ def bound_table(design: Design) -> Table:
     mean = design.campaign.belief.mean
     rows = []
     for place, name in enumerate(design.names):
-        relative = worst = ABSENT
+        std, worst = design.std[place], design.worst[place]
+        shares = [ABSENT, ABSENT]
         if asked.known[place]:
-            relative = percent(design.std[place], asked.size[place])
-            worst = percent(design.worst[place], asked.size[place])
-        rows.append(
-            (
-                name,
-                resolved(float(mean[place]), float(design.std[place])),
-                significant(float(design.std[place]), 2),
-                unit_text(UNITS[name]),
-                relative,
-                _YES[bool(asked.wanted[place])],
-                worst,
-            )
-        )
+            shares = [percent(one, asked.size[place]) for one in (std, worst)]
+        numbers = (resolved(float(mean[place]), float(std)), significant(float(std), 2))
+        wanted = _YES[bool(asked.wanted[place])]
+        rows.append((name, *numbers, unit_text(UNITS[name]), shares[0], wanted, shares[1]))
     kinds = zip(design.campaign.experiment.runs, ("unloaded", "loaded"), strict=True)
     runs = " and ".join(counted(count, f"{kind} run") for count, kind in kinds if count)
     note = (
@@ -118,17 +110,9 @@ def limit_table(design: Design) -> Table:
     rows = []
     for kind, (row, used) in tightest.items():
         limit, value = amounts(design, row, used)
-        rows.append(
-            (
-                kind,
-                significant(value, 4),
-                significant(limit, 4),
-                percent(used, 1.0, 3),
-                _YES[used >= BINDS * most],
-                SIGNS[row.limit],
-                place_name(row) or ABSENT,
-            )
-        )
+        numbers = (significant(value, 4), significant(limit, 4), percent(used, 1.0, 3))
+        binds = _YES[used >= BINDS * most]
+        rows.append((kind, *numbers, binds, SIGNS[row.limit], place_name(row) or ABSENT))
     note = (
         f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller "
         "overshoots. Torque is the largest that any arm of those believed possible asks for."
@@ -166,12 +150,9 @@ def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
     if row.limit == "range":
         low, high = float(limits.low[row.joint]), float(limits.high[row.joint])
         middle, half = 0.5 * (low + high), used * 0.5 * (high - low)
-        if row.upper:
-            return high, middle + half
-        return low, middle - half
+        return (high, middle + half) if row.upper else (low, middle - half)
     limit = float(getattr(limits, row.limit)[row.joint])
-    if not row.upper:
-        limit = -limit
+    limit = limit if row.upper else -limit
     return limit, used * limit
 
 

@@ -71,12 +71,8 @@ class PriorKnowledge:
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are given, in m."""
-        lengths = {}
-        if self.l1 is not None:
-            lengths["l1"] = self.l1
-        if self.l2 is not None:
-            lengths["l2"] = self.l2
-        return lengths
+        lengths = {"l1": self.l1, "l2": self.l2}
+        return {name: length for name, length in lengths.items() if length is not None}
 
 
 def prior_of(given: Result | str, loaded: bool | None, knowns: PriorKnowledge) -> PriorArm:
@@ -98,14 +94,12 @@ def prior_of(given: Result | str, loaded: bool | None, knowns: PriorKnowledge) -
         If no arm has such an inertia matrix, or a payload is to be carried of which nothing is
         known.
     """
+    source = given.log.path if isinstance(given, Result) else given
+    if isinstance(given, str) and (Path(given).is_dir() or Path(given).suffix == ".json"):
+        given = read_result(given)
     if isinstance(given, Result):
-        source = given.log.path
         prior = _of_result(given, source, loaded, knowns)
-    elif Path(given).is_dir() or Path(given).suffix == ".json":
-        source = given
-        prior = _of_result(read_result(given), source, loaded, knowns)
     else:
-        source = given
         prior = of_case(load_case(given), source, loaded, knowns)
     value = dict(zip(prior.belief.shared.names, prior.belief.mean.tolist(), strict=True))
     wrong = wrong_inertia(value)
@@ -127,21 +121,13 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: PriorKnowledge
     """
     case = replace(case, arm=replace(case.arm, **knowns.lengths))
     arm = case.arm
-    mass, error = case.payload, WRONG
-    if knowns.payload is not None:
-        mass = knowns.payload
-    if knowns.error is not None:
-        error = knowns.error
-    body: list[str] = []
-    if case.place[1]:
-        body.append("y_p")
-    if case.inertia:
-        body.append("J_p")
-    terms: tuple[str, ...] = ()
-    if arm.sines().any() or "y_p" in body:
-        terms = (PHASES,)
+    mass = case.payload if knowns.payload is None else knowns.payload
+    error = WRONG if knowns.error is None else knowns.error
+    shape = {"y_p": case.place[1], "J_p": case.inertia}
+    body = tuple(name for name, value in shape.items() if value)
+    terms = (PHASES,) if arm.sines().any() or "y_p" in body else ()
     model = Model(terms, gravity=arm.g)
-    shared = _shared(model, mass or None, loaded, source, knowns, tuple(body))
+    shared = _shared(model, mass or None, loaded, source, knowns, body)
     more = 1 + error
     wrong = [  # the parameters are linear in each mass and friction
         (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
@@ -173,22 +159,16 @@ def _shared(
         )
     if loaded is None:
         loaded = bool(mass)
-    if not loaded:
-        body = ()
-    return Shared(model, payload=loaded, lengths=knowns.lengths, body=body)
+    return Shared(model, payload=loaded, lengths=knowns.lengths, body=body if loaded else ())
 
 
 def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray:
     """Parameters (Q,) of an arm and its payload, an object of the shape that the case's has."""
     x, y = case.place
-    if x is None:
-        x = arm.l2
-    inertia = case.inertia
-    if case.payload:
-        inertia *= mass / case.payload
+    inertia = case.inertia * (mass / case.payload if case.payload else 1.0)
     value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
     value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
-    value |= {"m_p": mass, "l1": arm.l1, "l2": x, "y_p": y, "J_p": inertia}
+    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2 if x is None else x, "y_p": y, "J_p": inertia}
     return vector(shared.names, value)
 
 
@@ -209,9 +189,7 @@ def _of_result(
                 remedy = f"give {flag(name)}"
             raise ResultError(f"{source}: the result has no {name}; {remedy}")
     mean = vector(shared.names, value)
-    exact = set()
-    if knowns.payload is not None:
-        exact.add("m_p")
+    exact = set() if knowns.payload is None else {"m_p"}
     spread = _spread(result, source, shared.names, mean, exact, knowns.error)
     reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
     doubts = left_out + contradictions(result, knowns.lengths)
@@ -224,10 +202,8 @@ def _estimates(result: Result, payload: float | None) -> dict[str, float]:
 
     An object of another mass is shaped like the one that was identified.
     """
-    value = {}
-    for name, one in result.estimates.items():
-        if one.estimate is not None:
-            value[name] = one.estimate
+    every = result.estimates.items()
+    value = {name: one.estimate for name, one in every if one.estimate is not None}
     if payload is None:
         return value
     if "J_p" in value:
@@ -274,11 +250,8 @@ def _spread(
             f"{source}: {why}; identify from logs that determine them, or say how wrong it may be: "
             f"{flag('prior_error')}"
         )
-    if error is None:
-        error = WRONG
-    for name in bare:
-        row = names.index(name)
-        covariance[row, row] = (error * mean[row] / SURE) ** 2
+    for row in map(names.index, bare):
+        covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2
     size = np.maximum(np.abs(mean), 1e-12)
     eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
     return size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))

@@ -23,7 +23,7 @@ from algid.designs.page import amounts, design_document, verdict
 from algid.log import Log, Origin
 from algid.model import UNITS
 from algid.notices import Notice
-from algid.report.render import page
+from algid.report.render import page, write_texts
 
 # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
 POINTS = 50.0
@@ -65,22 +65,16 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
         "report.html": page(design_document(design, origin.source, origin.doubts)),
         "joint_trajectory.yaml": joint_trajectory(design, origin.joints),
     }
-    for name, text in texts.items():
-        with whole_file(folder / name) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    write_texts(folder, texts)
 
 
 def trajectory(design: Design) -> dict[str, FloatArray]:
     """The trajectory's columns: time, angles, velocities, accelerations, feed-forward torques."""
-    motion = design.motion
-    first = min(design.torque)
     columns = {"t": design.t}
-    columns |= _of_joints("theta", motion.theta)
-    columns |= _of_joints("omega", motion.omega)
-    columns |= _of_joints("alpha", motion.alpha)
-    columns |= _of_joints("tau", design.torque[first])
-    if True in design.torque and not first:
-        columns |= _of_joints("loaded_tau", design.torque[True])
+    for name in ("theta", "omega", "alpha"):
+        columns |= _of_joints(name, getattr(design.motion, name))
+    for name, torque in zip(("tau", "loaded_tau"), design.torque.values(), strict=False):
+        columns |= _of_joints(name, torque)
     return columns
 
 
@@ -132,9 +126,6 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
     """What ``design.json`` holds."""
     campaign = design.campaign
     experiment, limits = campaign.experiment, campaign.limits
-    height = None
-    if np.isfinite(limits.height):
-        height = limits.height
     noise = _of_joints("theta", experiment.noise.theta) | _of_joints("tau", experiment.noise.tau)
     return {
         "schema_version": SCHEMA_VERSION,
@@ -157,7 +148,7 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
             "speed": _finite(limits.speed),
             "acceleration": _finite(limits.acceleration),
             "torque": _finite(limits.torque),
-            "tip_height": height,
+            "tip_height": limits.height if np.isfinite(limits.height) else None,
             "margin": campaign.margin,
         },
         "used": [_used(design, row, share) for row, share in design.binding],
@@ -169,12 +160,9 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
 def _used(design: Design, row: Row, share: float) -> dict[str, Any]:
     """A limit and the share of it that the motion uses."""
     limit, most = amounts(design, row, share)
-    joint = None
-    if row.joint is not None:
-        joint = row.joint + 1
     return {
         "limit": row.limit,
-        "joint": joint,
+        "joint": None if row.joint is None else row.joint + 1,
         "loaded": row.loaded,
         "allowed": limit,
         "most": most,
@@ -185,14 +173,11 @@ def _used(design: Design, row: Row, share: float) -> dict[str, Any]:
 def _parameter(design: Design, place: int) -> dict[str, Any]:
     """What is believed of a parameter, and the error bars that the campaign will give it."""
     asked = design.campaign.asked
-    relative = None
-    if asked.known[place]:
-        relative = float(design.relative[place])
     return {
         "believed": float(design.campaign.belief.mean[place]),
         "believed_std": float(design.campaign.belief.std[place]),
         "std": float(design.std[place]),
-        "relative": relative,
+        "relative": float(design.relative[place]) if asked.known[place] else None,
         "worst_std": float(design.worst[place]),
         "unit": UNITS[design.names[place]],
         "asked": bool(asked.wanted[place]),
@@ -202,7 +187,4 @@ def _parameter(design: Design, place: int) -> dict[str, Any]:
 
 def _finite(values: FloatArray) -> list[float | None]:
     """As JSON has them: null where there is no limit."""
-    limits: list[float | None] = values.tolist()
-    for place in np.flatnonzero(~np.isfinite(values)):
-        limits[place] = None
-    return limits
+    return [one if np.isfinite(one) else None for one in values.tolist()]
