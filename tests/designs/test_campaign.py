@@ -10,15 +10,11 @@ import polars as pl
 import pytest
 from click.testing import CliRunner
 
-from algid.arm import FloatArray, inverse_dynamics
+from algid.arm import inverse_dynamics
 from algid.base.errors import AlgidError, SettingError
-from algid.base.progress import Progress
 from algid.designs.belief import objective_of
 from algid.designs.campaign import Campaign, Design, plan
-from algid.designs.information import Experiment, Information
-from algid.designs.limits import resting
-from algid.designs.optimise import kept
-from algid.designs.position import PositionProblem
+from algid.designs.information import Experiment
 from algid.designs.prior import PriorKnowledge, prior_of
 from algid.designs.request import limits_of, request
 from algid.estimators.whitening import NoiseLevels
@@ -88,55 +84,11 @@ def test_no_limit_breaks_for_any_arm_that_is_believed_possible(design: Design) -
             assert np.all(np.abs(torque) <= limits.torque[:, None])
 
 
-def random_bounds(count: int) -> FloatArray:
-    asked = campaign()
-    kept_limits = asked.limits.within(asked.margin)
-    loads = [asked.belief.load(loaded) for loaded in (False, True)]
-    rest = resting(kept_limits, asked.belief.shared.model, loads)
-    problem = PositionProblem(
-        asked.experiment, asked.belief, kept_limits, asked.asked, DURATION, rest
-    )
-    rng = np.random.default_rng(5)
-    bounds = []
-    for _ in range(count):
-        x = kept(problem, problem.random(rng), 100.0, 0.999)
-        slopes = problem.slopes(x, 100.0)
-        bounds.append(
-            asked.asked.largest(Information(asked.experiment, asked.belief.mean, slopes).S)
-        )
-    return np.array(bounds)
-
-
-def test_error_bars_are_less_than_half_those_of_random_motions(design: Design) -> None:
-    assert design.largest <= 0.5 * np.median(random_bounds(15))
-
-
 def test_what_is_asked_for_is_what_becomes_certain(design: Design) -> None:
     payload = plan(campaign(["m_p"]))
     place = design.names.index("m_p")
     assert payload.relative[place] < 0.9 * design.relative[place]
     assert payload.largest == payload.relative[place]
-
-
-def test_shares_of_the_seconds_add_up(design: Design) -> None:
-    np.testing.assert_allclose(design.shares.sum(axis=1), 1.0, rtol=1e-6)
-
-
-def test_a_search_that_is_broken_off_keeps_the_best_so_far() -> None:
-    calls = 0
-
-    def impatient(_stage: str, _done: int, _total: int) -> None:
-        nonlocal calls
-        calls += 1
-        if calls == 20:
-            raise KeyboardInterrupt
-
-    progress: Progress = impatient
-    found = plan(campaign(), progress)
-    assert found.interrupted
-    assert np.isfinite(found.largest)
-    assert max(used for _, used in found.binding) <= 1.0
-    assert found.largest < 0.5 * np.median(random_bounds(5))
 
 
 def run(*arguments: str) -> tuple[int, str]:

@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from algid import __version__
 from algid.arm import FloatArray
@@ -14,7 +13,7 @@ from algid.designs.belief import Belief, Objective
 from algid.designs.campaign import Campaign, Design
 from algid.designs.information import Experiment
 from algid.designs.limits import Limits, Row, Usage
-from algid.designs.write import Provenance, design_json, joint_trajectory, trajectory
+from algid.designs.write import Provenance, design_json
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion
@@ -65,50 +64,6 @@ def made_up(*, loaded: tuple[bool, ...] = (False, True)) -> Design:
         usage=Usage(rows, np.array([[0.1, 0.5], [0.2, 0.9], [-0.4, 0.7]])),
         interrupted=True,
     )
-
-
-BASE = ["t", "theta1", "theta2", "omega1", "omega2", "alpha1", "alpha2", "tau1", "tau2"]
-
-
-@pytest.mark.parametrize(
-    ("loaded", "more"),
-    [
-        ((False,), []),
-        ((True,), []),
-        ((False, True), ["loaded_tau1", "loaded_tau2"]),
-    ],
-)
-def test_a_trajectory_has_the_columns_that_its_runs_need(
-    loaded: tuple[bool, ...], more: list[str]
-) -> None:
-    one = made_up(loaded=loaded)
-    columns = trajectory(one)
-    assert list(columns) == BASE + more
-    np.testing.assert_array_equal(columns["t"], T)
-    np.testing.assert_array_equal(columns["omega2"], one.motion.omega[1])
-    np.testing.assert_array_equal(columns["alpha1"], one.motion.alpha[0])
-    np.testing.assert_array_equal(columns["tau1"], one.torque[loaded[0]][0])
-    if more:
-        np.testing.assert_array_equal(columns["loaded_tau2"], one.torque[True][1])
-
-
-def test_points_of_the_joint_trajectory_come_fifty_times_a_second_and_at_the_end() -> None:
-    text = joint_trajectory(made_up(), ("schulter", 'a "b"'))
-    message = YAML(typ="safe").load(text)
-    assert message["joint_names"] == ["schulter", 'a "b"']
-    assert message["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
-    places = [*range(0, 60, 2), 60]  # 120 Hz over 50: every other sample
-    assert len(message["points"]) == len(places)
-    for point, place in zip(message["points"], places, strict=True):
-        told = point["time_from_start"]
-        assert (told["sec"], told["nanosec"]) == divmod(round(place / 120 * 1e9), 10**9)
-        for name, values in (
-            ("positions", "theta"),
-            ("velocities", "omega"),
-            ("accelerations", "alpha"),
-        ):
-            expected = getattr(made_up().motion, values)[:, place]
-            np.testing.assert_allclose(point[name], expected, atol=0.5001e-9)
 
 
 def test_the_json_holds_what_decides_and_what_is_predicted() -> None:

@@ -5,7 +5,6 @@ whole matrices.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -117,28 +116,6 @@ def test_information_is_that_of_the_whole_covariance(sigma: float, runs: tuple[i
     np.testing.assert_allclose(S, S.T, rtol=1e-9, atol=1e-9 * np.abs(S).max())
 
 
-def test_without_noise_of_the_angles_each_sample_adds_its_own() -> None:
-    noise = NoiseLevels(np.full(2, 1e-12), np.array([0.02, 0.05]))
-    one = motion()
-    J = slopes_by(
-        lambda b: torque_by_hand(b, one.theta, one.omega, one.alpha, False), BETA
-    ).reshape(2, -1, BETA.size)
-    information = Information(
-        Experiment(SHARED, (2, 0), noise, RATE), BETA, Sensitivities(SHARED.model, one, RATE)
-    )
-    parts = information.parts(25)
-    ends = (0, 25, 60)  # the last 10 of 60 samples are no part of their own
-    assert len(information.parts(24)) == 2
-    assert len(information.parts(22)) == 3
-    for first, last, part in zip(ends[:-1], ends[1:], parts, strict=True):
-        own = J[:, first:last] / noise.tau[:, None, None]
-        expected = 2 * np.einsum("anq,anr->qr", own, own)
-        np.testing.assert_allclose(part, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-    np.testing.assert_allclose(
-        parts.sum(axis=0), information.S, rtol=0, atol=1e-9 * np.abs(information.S).max()
-    )
-
-
 def test_a_delay_is_told_by_the_slope_of_the_torque_and_takes_of_the_rest() -> None:
     noise = NoiseLevels(np.full(2, 1e-12), np.array([0.02, 0.05]))
     one, delayed = motion(), replace(SHARED, delay=True)
@@ -157,25 +134,6 @@ def test_a_delay_is_told_by_the_slope_of_the_torque_and_takes_of_the_rest() -> N
     information = Information(Experiment(delayed, (1, 1), noise, RATE), beta, slopes)
     assert information.gradient(A).shape == (6, one.theta.shape[1])
     assert S.shape == (size, size)
-
-
-def test_noise_takes_information_away_and_none_adds_any() -> None:
-    one = motion()
-    found = []
-    for sigma in (1e-5, 1e-3, 1e-2):
-        noise = NoiseLevels(np.full(2, sigma), np.full(2, 0.02))
-        found.append(
-            Information(
-                Experiment(SHARED, (1, 1), noise, RATE),
-                BETA,
-                Sensitivities(SHARED.model, one, RATE),
-            ).S
-        )
-    scale = np.sqrt(np.diag(found[0]))
-    for more, less in pairwise(found):
-        lost = np.linalg.eigvalsh((more - less) / np.outer(scale, scale))
-        assert lost.min() > -1e-9 * lost.max()  # the difference is positive semidefinite
-        assert lost.max() > 0.1
 
 
 def test_slopes_by_the_motion_are_those_of_the_torque_by_hand() -> None:

@@ -68,11 +68,3 @@ def test_the_gradient_is_the_transpose_of_the_motion() -> None:
     np.testing.assert_allclose(
         family.gradient(weights[2], basis), family.gradient(weights, basis)[2], rtol=1e-12
     )
-
-
-def test_random_motions_have_as_much_velocity_in_each_harmonic() -> None:
-    family = Fourier(4.0)
-    rng = np.random.default_rng(0)
-    drawn = np.array([family.random(rng, np.array([0.1, 0.2])) for _ in range(2000)])
-    np.testing.assert_array_equal(drawn[:, :2], [[0.1, 0.2]] * 2000)
-    np.testing.assert_allclose(drawn[:, 2:].std(axis=0), 1.0, atol=5 / np.sqrt(4000))

@@ -14,7 +14,6 @@ import pytest
 from click.testing import CliRunner
 from scipy.stats import norm
 
-from algid.base.errors import ResultError
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.records import JobRecord, JobStatus, stat_of
@@ -132,18 +131,6 @@ def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
     assert typed(mean["y"]) == pytest.approx(windows["mean"].to_list(), rel=1e-6)
     assert typed(drift["y"]) == pytest.approx(windows.filter("drift")["mean"].to_list(), rel=1e-6)
     assert drift["marker"]["symbol"] != points["marker"]["symbol"]
-
-
-def test_what_is_no_batch_is_refused(tmp_path: Path) -> None:
-    pl.DataFrame({"a": [1]}).write_parquet(tmp_path / "jobs.parquet")
-    done = CliRunner().invoke(app, ["report", str(tmp_path)])
-    assert isinstance(done.exception, ResultError)
-    assert "no column job, robot, status, time; expected jobs.parquet of algid batch" in str(
-        done.exception
-    )
-    _written(tmp_path, {})
-    with pytest.raises(ResultError, match="no job has given parameters"):
-        CliRunner().invoke(app, ["report", str(tmp_path)], catch_exceptions=False)
 
 
 def test_the_page_is_two_tables_and_a_figure_and_leads_to_reports(tmp_path: Path) -> None:

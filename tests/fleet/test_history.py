@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from scipy.stats import binom, linregress
+from scipy.stats import binom
 from scipy.stats import t as student
 
 from algid.base.errors import ResultError
@@ -102,35 +102,6 @@ def test_a_wrong_label_is_found_however_few_the_logs(
 ) -> None:
     findings = _history(_payloads(values), tmp_path).findings
     assert sorted(findings.filter(kind="payload")["job"]) == wrong
-
-
-def test_the_scatter_about_the_line_widens_its_error(tmp_path: Path) -> None:
-    last = (
-        _history(_jobs(1, 60, seed=7, scatter=4.0), tmp_path)
-        .windows.filter(parameter="k2")
-        .row(-1, named=True)
-    )
-    jobs = pl.read_parquet(tmp_path / "jobs.parquet")
-    t = np.arange(60) / 30.4375
-    # its error is the scatter's, which is four times the intervals'
-    found = linregress(t, jobs["k2"].to_numpy())
-    assert last["slope_std"] == pytest.approx(found.stderr, rel=1e-9)
-    assert last["p"] == pytest.approx(found.pvalue, rel=1e-6)
-    calm = (
-        _history(_jobs(1, 60, seed=7, scatter=0.25), tmp_path)
-        .windows.filter(parameter="k2")
-        .row(-1, named=True)
-    )
-    assert calm["slope_std"] == pytest.approx(
-        0.005 / np.sqrt(np.sum((t - t.mean()) ** 2)), rel=1e-9
-    )
-
-
-def test_a_window_holds_three_months(tmp_path: Path) -> None:
-    history = _history(_jobs(1, 200, seed=8), tmp_path)
-    months = np.floor(np.arange(200) / 30.4375)
-    expected = [int(np.sum((months > month - 3) & (months <= month))) for month in range(7)]
-    assert history.windows.filter(parameter="k1").sort("month")["logs"].to_list() == expected
 
 
 def test_a_panic_of_the_library_is_a_refusal(

@@ -24,17 +24,6 @@ def run(*arguments: object) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-def test_report_writes_its_files_and_prints_the_table(folder: Path) -> None:
-    out, err = run("report", folder, "--export", "mcap")
-    assert "k1" in out
-    assert err.splitlines() == [
-        f"wrote {folder / name}" for name in ("report.html", "report.md", "estimates.mcap")
-    ]
-    assert all(
-        (folder / name).stat().st_size for name in ("report.html", "report.md", "estimates.mcap")
-    )
-
-
 def test_compare_tells_sigma_in_every_format(folder: Path) -> None:
     table, _ = run("compare", folder, folder / "result.json")
     assert "Every setting is the same, and every log was read the same way." in " ".join(

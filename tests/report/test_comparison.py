@@ -14,7 +14,6 @@ from algid.report.comparison import Comparison, compare, verdict, write_comparis
 from algid.results import Estimate, Result
 from tests.report.folders import estimate
 from tests.report.pages import Page, typed
-from tests.report.test_terminal import printed
 
 
 def with_k6(result: Result, one: Estimate) -> Result:
@@ -116,11 +115,3 @@ def test_the_verdict_names_what_chance_does_not_explain(result: Result) -> None:
     )
     assert near.grade == "good"
     assert near.headline == "9 of 9 differences within 1.96 σ; the largest is k1 of <1> (+1.0 σ)"
-
-
-@pytest.mark.parametrize("count", [2, 6])
-def test_any_number_of_results_is_readable_in_a_pipe(result: Result, count: int) -> None:
-    found = compare([result] * count, [f"robot-{place}/2026-05" for place in range(count)])
-    text = printed(found.tables()[0], 80)
-    assert all(label in text for label in found.labels)
-    assert text.count(found.tables()[0].rows[0][2]) >= count

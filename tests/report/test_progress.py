@@ -108,7 +108,3 @@ def test_every_stage_comes_to_its_end(estimator: str, log: Log, tmp_path: Path) 
         # whose last one is the first log's alone
         if done and not (stage == "series" and estimator == "refined"):
             assert done[-1] == (samples, samples)
-
-
-def test_a_told_identification_finds_the_same(log: Log) -> None:
-    assert identify(log, progress=lambda *_: None) == identify(log)

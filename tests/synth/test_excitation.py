@@ -17,7 +17,6 @@ from algid.synth.excitation import Hold, MultiSine, SampledTorque, wide_multi_si
 from algid.synth.run import held
 
 ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
-TIMES = np.array([0.0, 0.013, 0.7, 3.0])
 
 
 def test_the_wide_torque_scales_with_what_the_arm_asks_for() -> None:

@@ -11,19 +11,10 @@ from algid.arm import FloatArray, energy, forward_dynamics, mass_matrix
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.model import Model
-from algid.synth.excitation import no_torque
 from algid.synth.simulator import simulate
 from tests.exports.arms import ODD, result_of, values_of
 
-FREE = np.array([0.05, 1.0, 0.03, 4.0, 0.2, 0.0, 0.0])  # without friction
 START = np.array([0.5, -1.0]), np.array([2.0, -3.0])
-
-
-def test_energy_is_kept_without_friction() -> None:
-    motion = simulate(FREE, no_torque, np.linspace(0, 3, 61), *START)
-    stored = energy(FREE, motion.theta, motion.omega)
-    assert np.ptp(motion.theta, axis=1).min() > 1
-    np.testing.assert_allclose(stored, stored[0], rtol=0, atol=1e-10 * np.abs(stored).max())
 
 
 def test_angular_momentum_is_kept_in_a_horizontal_plane() -> None:
@@ -45,17 +36,6 @@ def test_an_arm_without_coupling_is_two_bodies_in_closed_form() -> None:
     first = (3 * (1 - np.cos(2 * t)) / 4 - t**2 / 2) / 2.0
     whole = t**2 / 2 / 0.5
     np.testing.assert_allclose(motion.theta, [first, whole - first], atol=1e-11)
-
-
-def test_friction_alone_slows_exponentially() -> None:
-    """With k1 = 0, no weight, no torque and k7 = 0: k5 θ̈1 = −k6 θ̇1, while link 2 keeps its own
-    turning in space.
-    """
-    k = np.array([0.0, 0.0, 0.5, 0.0, 2.0, 0.8, 0.0])
-    t = np.linspace(0, 4, 41)
-    motion = simulate(k, no_torque, t, np.zeros(2), np.array([3.0, -1.0]))
-    np.testing.assert_allclose(motion.omega[0], 3 * np.exp(-0.4 * t), atol=1e-11)
-    np.testing.assert_allclose(motion.omega.sum(axis=0), 2.0, atol=1e-11)
 
 
 def states(count: int = 40) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from algid.arm import energy, forward_dynamics
+from algid.arm import forward_dynamics
 from algid.base.errors import SettingError
-from algid.signals.differences import integral
 from algid.synth.cases import load_case
 from algid.synth.excitation import Hold, SampledTorque, Torque, wide_multi_sine
 from algid.synth.run import Acquisition, held, synthesise
@@ -16,17 +15,6 @@ from algid.synth.simulator import simulate
 
 CASE = load_case("case1")
 K = CASE.arm.constants()
-
-
-def test_energy_balance_holds() -> None:
-    t = 5e-5 * np.arange(20001)
-    motion = simulate(K, wide_multi_sine(CASE.arm), t)
-    power = motion.tau * motion.omega - K[5:, None] * motion.omega**2
-    stored = energy(K, motion.theta, motion.omega)
-    work = integral(power.sum(axis=0), t[1])
-    turned_over = integral(np.abs(power).sum(axis=0), t[1])[-1]
-    # the work is integrated at 20 kHz, to within 2e-10 of what is turned over
-    assert np.abs(stored - stored[0] - work).max() <= 1e-9 * turned_over
 
 
 def test_angles_agree_with_another_integrator() -> None:
@@ -48,11 +36,6 @@ def test_angles_agree_with_another_integrator() -> None:
 def test_a_torque_that_no_arm_bears_is_refused() -> None:
     with pytest.raises(SettingError, match=r"grows without bound .* weaker torque"):
         simulate(K, lambda now: np.full((2, now.size), 1e30), np.linspace(0, 1, 11))
-
-
-def test_an_arm_faster_than_any_is_refused_before_its_steps_become_tiny() -> None:
-    with pytest.raises(SettingError, match=r"faster than 10000 rad/s .* weaker torque"):
-        simulate(K, lambda now: np.full((2, now.size), 1e9), np.linspace(0, 1, 11))
 
 
 @pytest.mark.parametrize("hold", ["zoh", "foh"])

@@ -124,21 +124,6 @@ def test_a_track_is_the_weighted_mean_over_its_neighbourhood_and_its_band_that_o
     assert found.changes.shape == (0, 3)
 
 
-def test_an_uncertain_arm_adds_its_share_to_the_variance() -> None:
-    """var m_p = 1/ΣA + (ΣT/ΣA)ᵀ Σ (ΣT/ΣA): sums by NumPy over the cells of the same log."""
-    log = loaded(0.3)
-    k = CASE.arm.constants()
-    covariance = np.diag(np.append((1e-3 * k) ** 2, [1e-8, 4e-8]))
-    sure, wide = (
-        track(lambda: segments([log]), ARM, one).stretches[0] for one in (NOTHING, covariance)
-    )
-    cells = joined(cells_of(segments([log]), ARM, carrying(sure.m_p)))
-    J = cells.sensitivity(ARM, np.full(len(cells), sure.m_p)).sum(axis=0) / cells.A.sum()
-    # cells at both ends are left out
-    assert sure.std**2 == pytest.approx(1 / cells.A.sum(), rel=0.1)
-    assert wide.std**2 - sure.std**2 == pytest.approx(float(J @ covariance @ J), rel=0.1)
-
-
 def test_a_hole_in_a_log_is_told_and_cuts_no_stretch() -> None:
     log = loaded(0.3, 4.0)
     stamps = log.stamp_ns + np.where(np.arange(len(log)) >= 1000, 2_000_000_000, 0)
