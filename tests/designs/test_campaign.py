@@ -209,7 +209,7 @@ REFUSED = [
     (["case1", *SENSORS, *LIMITS, "--for", "k9"], "--for k9: expected some of k1"),
     (["case1", *SENSORS, *LIMITS, "--runs", "1,0", "--for", "m_p"], "there are no loaded runs"),
     (["case1", *SENSORS, *LIMITS, "--runs", "0,0"], "--runs: expected numbers of runs"),
-    (["case1", *SENSORS, *LIMITS, "--joints", "one"], "--joints: expected two names"),
+    (["case1", *SENSORS, *LIMITS, "--joints", "one"], "expected two names like shoulder,elbow"),
     (["nocase", *SENSORS, *LIMITS], "no such case"),
 ]
 
