@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.base.arrow import numbers_of, whole_column
+from algid.base.arrow import column_of, numbers_of, whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.words import repeated
@@ -112,15 +112,14 @@ class Cell:
 
     def of(self, batch: pa.RecordBatch) -> pa.Array:
         """The numbers of a batch: integers, floats, or for a clock ticks of its type."""
+        column = batch.column(self.column)
+        if self.steps or self.label or not _is_plain(self.type):
+            column = self._within(column, batch)
+        if not self.fills and (self.scale, self.offset) == (1.0, 0.0):
+            return column
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        column = batch.column(self.column)
-        marked = bool(self.fills) or (self.scale, self.offset) != (1.0, 0.0)
-        if self.steps or self.label or not _is_plain(self.type):
-            column = self._within(column, batch)
-        if not marked:
-            return column
         values = column.cast(pa.float64())
         for fill in self.fills:
             missing = pc.is_nan(values) if np.isnan(fill) else pc.equal(values, fill)
@@ -130,6 +129,11 @@ class Cell:
     def _within(self, column: pa.Array, batch: pa.RecordBatch) -> pa.Array:
         import pyarrow as pa
 
+        kind = column.type
+        if pa.types.is_fixed_size_list(kind) and _is_plain(kind.value_type) and self.steps:
+            numbers = column.flatten()
+            if not (column.null_count or numbers.null_count):  # a matrix
+                return column_of(whole_column(numbers)[self.steps[0] :: kind.list_size])
         if pa.types.is_decimal256(self.type):  # polars has none
             return column.cast(pa.float64())
         if self.is_clock and not self.steps:
