@@ -287,10 +287,6 @@ def named_matrix(way: str, folder: Path) -> Any:
     path = folder / f"log.{way}"
     rows = {"time": T, "joint_names": [names] * N, "q": q.tolist(), "tau": tau.tolist()}
     match way:
-        case "npz":
-            np.savez(path, joint_names=np.array(names), **content)
-        case "mat":
-            scipy.io.savemat(path, {**content, "joint_names": np.array(names, object)})
         case "h5":
             with h5py.File(path, "w") as file:
                 for name, values in content.items():
@@ -299,12 +295,13 @@ def named_matrix(way: str, folder: Path) -> Any:
                 file.attrs["joint_names"] = names
                 file["joint_names"] = np.array(names, "S")
         case "parquet" | "feather":
-            said = {"joint_names": json.dumps(names)}
+            stated = {"joint_names": json.dumps(names)}
             table = pa.table({"time": T, "q": list(q), "tau": list(tau)})
             fields = [one.with_metadata({"names": json.dumps(names)}) for one in table.schema]
-            _write_table(way, table.cast(pa.schema(fields, metadata=said)), path)
-        case "dict":
-            return {**content, "joint_names": names}
+            _write_table(way, table.cast(pa.schema(fields, metadata=stated)), path)
+        case "npz" | "mat" | "dict":
+            said = np.array(names, object if way == "mat" else None)
+            return _arrays(way, folder, {**content, "joint_names": said})
         case "pandas":
             return pd.DataFrame(rows)
         case "polars":

@@ -278,15 +278,6 @@ def test_what_a_profile_says_wrongly_is_mended_by_a_flag(name: str, tmp_path: Pa
     assert flag_first(str(refused.value)), refused.value
 
 
-def test_joints_that_are_not_there_are_told_from_those_that_are(tmp_path: Path) -> None:
-    path = table("t,shoulder_pos,elbow_pos,shoulder_torque,elbow_torque")(tmp_path)
-    with pytest.raises(LogError, match="joints there are: shoulder, elbow"):
-        read_log(path, Profile(joints=("foo", "bar")))
-    mcap = states(("/one",), ("j1", "j2", "j3"))(tmp_path)
-    with pytest.raises(LogError, match="j1, j2, j3"):
-        read_log(mcap, Profile(joints=("foo", "bar")))
-
-
 @pytest.mark.parametrize(
     "header", ["t,q1,q2,q_cmd,q_ref,tau1,tau2", "t,max_pos,min_pos,q1,q2,tau1,tau2"]
 )

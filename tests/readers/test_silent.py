@@ -4,7 +4,6 @@ a clock set back.
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -64,14 +63,6 @@ def test_empty_lines_are_no_rows(tmp_path: Path) -> None:
     log = read(tmp_path, HEAD, *ROWS[:500], *["", "\r"] * 20, *ROWS[500:], "", "")
     assert len(log) == N
     assert lost(log) == []
-
-
-def test_rows_without_a_value_are_counted_in_compressed_text(tmp_path: Path) -> None:
-    text = "\n".join([HEAD, *ROWS[:500], *[",,,,"] * 20, "", *ROWS[520:], ""])
-    (tmp_path / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
-    assert lost(read_log(tmp_path / "log.csv.gz")) == [
-        "20 of 1,000 rows dropped for want of a value"
-    ]
 
 
 @pytest.mark.parametrize("quoted", ['"x', 'a"b', '"'])
