@@ -231,7 +231,9 @@ def _from_summary(stream: IO[bytes], summary: Summary) -> FileIndex | None:
     for entry in summary.metadata_indexes:
         if entry.name == KEY:
             record = _parsed(Metadata, _read(stream, entry.offset + 9, entry.length - 9))
-            found.metadata.setdefault(record.name, record.metadata)
+            if record.name != KEY:
+                raise ValueError("its metadata stand elsewhere")
+            found.metadata.setdefault(KEY, record.metadata)
     return found
 
 

@@ -426,7 +426,14 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
     path = tmp_path / "log.mcap"
     write_log(path, LOG, truth=TRUTH)
     assert read_log(path).origin.truth == TRUTH
-    path.write_bytes(path.read_bytes().replace(b'"arm"', b'"mra"'))
+    content = path.read_bytes()
+    name = b"\x05\0\0\0algid"
+    place = content.index(name, content.index(name) + 1) - 9  # the header has it too
+    path.write_bytes(content[:place] + bytes(64) + content[place + 64 :])
+    found = read_log(path)
+    assert (same(found, LOG), found.origin.truth) == (True, None)
+    assert [one.code for one in found.notices] == ["DAMAGED_INDEX", "DAMAGED"]
+    path.write_bytes(content.replace(b'"arm"', b'"mra"'))
     with pytest.raises(
         LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"
     ):
