@@ -18,7 +18,6 @@ from algid.arm import FloatArray
 from algid.base.quantiles import medians
 from algid.estimators.combine import BlockSums, LogInformation
 from algid.estimators.identifiability import Correlations, correlations
-from algid.estimators.imprint import Imprint
 from algid.estimators.innovations import ResidualSums, residual_sums
 from algid.estimators.noise import (
     Components,
@@ -261,33 +260,23 @@ class LogEvidence:
         """The larger torque's error over the least that anybody need worry about."""
         return float(np.max(self.noise.tau / self._least))
 
-    @property
-    def noiseless(self) -> bool:
-        """Whether the torque's error is nothing that anybody need worry about."""
-        return self.relative_error <= 1
+    def products(self, c: FloatArray, beside: Beside | None = None) -> tuple[FloatArray, float]:
+        """Products (2, m, m) by joint of the training set's whitened columns at `c`.
 
-    def imprint(self, c: FloatArray, torques: Beside) -> Imprint:
-        """What `torques` beside the model's leave in the training set at `c`; trajectories stay."""
-        gram = np.zeros(())
-        for piece, theta in zip(self.kept, self._trajectories, strict=True):
-            linear = self._linearise(c, theta, piece)
-            model = self._shared.model
-            made = torques(model, c[: len(model.names)], linear.motion, piece.dt)
-            rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
-            rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
-            whitened = np.concatenate([linear.columns, linear.solve_in_place(rows)])
-            gram = gram + whitened @ whitened.T
-        return Imprint(self.loaded, gram)
-
-    def products(self, c: FloatArray) -> tuple[FloatArray, float]:
-        """Products (2, q + 1, q + 1) by joint of the training set's whitened columns at `c`.
-
-        The residual's is the last column. With them the logarithm of the covariance's determinant.
+        The residual's column follows those of the q coefficients, then come torques `beside` the
+        model's. With them the logarithm of the covariance's determinant.
         """
         gram, determinant = np.zeros(()), 0.0
         for piece, theta in zip(self.kept, self._trajectories, strict=True):
             linear = self._linearise(c, theta, piece)
-            by_joint = linear.columns.reshape(len(linear.columns), -1, 2).transpose(2, 0, 1)
+            columns = linear.columns
+            if beside is not None:
+                model = self._shared.model
+                made = beside(model, c[: len(model.names)], linear.motion, piece.dt)
+                rows = (made / self.noise.tau[None, :, None]).swapaxes(1, 2)
+                rows = np.ascontiguousarray(rows).reshape(rows.shape[0], -1)
+                columns = np.concatenate([columns, linear.solve_in_place(rows)])
+            by_joint = columns.reshape(len(columns), -1, 2).transpose(2, 0, 1)
             gram = gram + by_joint @ by_joint.swapaxes(1, 2)
             determinant += 2 * float(np.log(linear.factor[-1]).sum())
         return gram, determinant

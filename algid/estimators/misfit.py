@@ -39,7 +39,6 @@ from algid.base.names import vector
 from algid.estimators.combine import Prior, scaled_pinv
 from algid.estimators.elastic import flexed, with_bends
 from algid.estimators.fit import Fit, Misfit, Overlooked
-from algid.estimators.imprint import Imprint, summed
 from algid.model import (
     DELAYS,
     EVERY_TERM,
@@ -187,19 +186,31 @@ def _change(model: Model, c: FloatArray, motion: Motion, width: str) -> FloatArr
     return (torque(wider, c, motion) - torque(narrower, c, motion)) / (2 * _STEP)
 
 
-def misfit(fit: Fit, imprints: Sequence[Imprint], prior: Prior | None) -> Misfit:
+def misfit(fit: Fit, products: Sequence[tuple[bool, FloatArray]], prior: Prior | None) -> Misfit:
     """The score test of a fit by the likelihood.
 
     Parameters
     ----------
     fit : Fit
-    imprints : of some of its logs, with `columns`
+    products : of some of its logs: whether it is loaded, and the products (q + 1 + m, q + 1 + m)
+        of its whitened columns, its residual and the torques `columns`
     prior : Prior, optional
         What held the fit beside its logs.
     """
-    sums = summed(fit, imprints, prior)
-    _, M, b = sums.beside()
-    size = np.diag(sums.GG)
+    Q = len(fit.names)
+    whole = np.zeros(())
+    for loaded, gram in products:
+        T = fit.shared.jacobian(fit.values, loaded)
+        by_shared = np.eye(len(gram), len(gram) - len(T) + Q, Q - len(T))
+        by_shared[: len(T), :Q] = T
+        whole = whole + by_shared.T @ gram @ by_shared
+    S, X, G = whole[:Q, :Q], whole[:Q, Q + 1 :], whole[Q + 1 :, Q + 1 :]
+    if prior is not None:
+        known = prior.places(fit.names)
+        S[np.ix_(known, known)] += prior.precision
+    D = scaled_pinv(S) @ X  # what the parameters take up
+    M, b = G - X.T @ D, whole[Q + 1 :, Q] - D.T @ whole[:Q, Q]
+    size = np.diag(G)
     count = len(_widths(fit.shared.model))
     if count:  # widths are estimated too
         shares = M[:-count, -count:] @ scaled_pinv(M[-count:, -count:])

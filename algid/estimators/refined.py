@@ -26,9 +26,7 @@ from algid.estimators.body import with_body
 from algid.estimators.combine import Prior, combine
 from algid.estimators.fit import Fit, finish
 from algid.estimators.identifiability import judge, open_directions
-from algid.estimators.imprint import Imprint
-from algid.estimators.integration import deviations, widened_by_integration
-from algid.estimators.log_likelihood import Beside, LogEvidence, Outcome, opened
+from algid.estimators.log_likelihood import LogEvidence, Outcome, opened
 from algid.estimators.misfit import columns, misfit
 from algid.estimators.parametrisation import Shared
 from algid.estimators.repeats import Groups, grouped
@@ -149,11 +147,12 @@ def fit(
     )
     if width is not None:
         fitted = replace(fitted, covariance=fitted.covariance + width.covariance)
-    if all(log.noiseless for log in logs):
-        fitted = widened_by_integration(fitted, _imprints(fitted, logs, deviations), prior)
-    elif noise is None:
-        some = evenly_spread(logs, _MOST_TESTED)
-        lacking = misfit(fitted, _imprints(fitted, some, columns), prior)
+    if noise is None:
+        products = []
+        for log in evenly_spread(logs, _MOST_TESTED):
+            gram, _ = log.products(shared.coefficients(fitted.values, log.loaded), columns)
+            products.append((log.loaded, gram.sum(axis=0)))
+        lacking = misfit(fitted, products, prior)
         if lacking.significant:
             note = Notice("REFUTED", numbers={"case": "motion", "kept": start.estimator})
             refuted = start.noted(note)
@@ -183,12 +182,6 @@ def _repeats(logs: Sequence[LogEvidence]) -> Groups:
         return ()
     unloaded = [log.training for log in logs if not log.loaded]
     return grouped(unloaded, [log.training for log in logs if log.loaded])
-
-
-def _imprints(fitted: Fit, logs: Sequence[LogEvidence], torques: Beside) -> list[Imprint]:
-    """What `torques` beside those of the fit leave in the training sets of logs."""
-    shared, beta = fitted.shared, fitted.values
-    return [log.imprint(shared.coefficients(beta, log.loaded), torques) for log in logs]
 
 
 def _anchored(start: Fit) -> Prior | None:

@@ -11,7 +11,6 @@ import pytest
 from scipy.stats import chi2
 
 from algid.arm import FloatArray
-from algid.estimators.imprint import Imprint
 from algid.estimators.misfit import columns, lacking, misfit
 from algid.identification.identify import identify
 from algid.model import TERMS, Model, Motion, regressor, torque
@@ -45,7 +44,7 @@ def told(
             model=model, delay=delay, jacobian=lambda _c, _loaded: np.eye(len(c))
         ),
     )
-    return rows, misfit(fit, [Imprint(False, rows @ rows.T)], None)  # type: ignore[arg-type]
+    return rows, misfit(fit, [(False, rows @ rows.T)], None)  # type: ignore[arg-type]
 
 
 def squares(columns: FloatArray, e: FloatArray) -> float:
