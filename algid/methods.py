@@ -6,15 +6,13 @@ identification, reports and the guide. Adding one is a module and an entry.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from algid.base.progress import Progress
-    from algid.estimators.combine import Prior
     from algid.estimators.fit import Fit
-    from algid.estimators.weak import WeakSettings
+    from algid.estimators.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -29,9 +27,9 @@ class Estimator:
         What it is called in a sentence.
     does, when : str
         What it does and when to take it, for the guide.
-    fit : callable or None
-        ``fit(unloaded, loaded, windows, lengths, prior, progress)`` gives a `Fit`. None where
-        estimates are what time series settle to: the paper's method.
+    module : str or None
+        Whose ``fit(problem)`` gives a `Fit`. None where estimates are what time series settle to:
+        the paper's method.
     observer : "zero-phase" or "luenberger"
         Where its velocities come from, unless the settings say otherwise.
     lacks : names of settings
@@ -44,49 +42,23 @@ class Estimator:
     title: str
     does: str
     when: str
-    fit: Callable[..., Fit] | None
+    module: str | None
     observer: Literal["zero-phase", "luenberger"] = "zero-phase"
     lacks: tuple[str, ...] = ()
     beside_paper: bool = False
 
+    def fit(self, problem: Problem) -> Fit:
+        """The fit of a problem.
 
-def _refined(
-    unloaded: Sequence[Any],
-    loaded: Sequence[Any],
-    windows: WeakSettings,
-    lengths: dict[str, float],
-    prior: Prior | None,
-    progress: Progress | None,
-) -> Fit:
-    from algid.estimators import refined
-
-    return refined.fit(unloaded, loaded, windows, lengths, prior, progress)
-
-
-def _weak(
-    unloaded: Sequence[Any],
-    loaded: Sequence[Any],
-    windows: WeakSettings,
-    lengths: dict[str, float],
-    prior: Prior | None,
-    _: Progress | None,
-) -> Fit:
-    from algid.estimators import weak
-
-    return weak.fit(unloaded, loaded, windows, lengths, prior)
-
-
-def _instruments(
-    unloaded: Sequence[Any],
-    loaded: Sequence[Any],
-    windows: WeakSettings,
-    lengths: dict[str, float],
-    prior: Prior | None,
-    _: Progress | None,
-) -> Fit:
-    from algid.estimators import instruments
-
-    return instruments.fit(unloaded, loaded, windows, lengths, prior)
+        Raises
+        ------
+        ValueError
+            If the estimator gives time series.
+        """
+        if self.module is None:
+            raise ValueError(f"{self.name} gives time series, not a fit")
+        fit: Fit = import_module(self.module).fit(problem)
+        return fit
 
 
 ESTIMATORS: tuple[Estimator, ...] = (
@@ -96,7 +68,7 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "maximum likelihood with noise in angles and torques; noise levels from the data; banded "
         "Gauss-Newton",
         "always, first",
-        _refined,
+        "algid.estimators.refined",
         beside_paper=True,
     ),
     Estimator(
@@ -105,14 +77,14 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "momentum form under sliding modulating functions, weighted least squares; no acceleration "
         "anywhere",
         "very long logs, a first look",
-        _weak,
+        "algid.estimators.weak",
     ),
     Estimator(
         "instruments",
         "instrumental variables",
         "the same windows, with regressors simulated from the measured torque as instruments",
         "where unmodelled torque drives the motion",
-        _instruments,
+        "algid.estimators.instruments",
     ),
     Estimator(
         "paper",
@@ -154,4 +126,4 @@ def estimator_of(name: str) -> Estimator:
 
 def settles(name: object) -> bool:
     """Whether the estimates of the estimator of that name are what time series settle to."""
-    return any(one.name == name and one.fit is None for one in ESTIMATORS)
+    return any(one.name == name and one.module is None for one in ESTIMATORS)

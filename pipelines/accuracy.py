@@ -21,6 +21,7 @@ import numpy as np
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit
+from algid.estimators.problem import Problem, WeakSettings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
@@ -209,8 +210,8 @@ def _delayed(here: scenes.Scene, seed: int) -> tuple[FloatArray, float]:
     late = replace(
         log, theta=log.theta[:, :-5], tau=log.tau[:, 5:]
     )  # the logged torque acts 5 ms after its stamp
-    estimated = refined.fit([lambda: [late]], settings=weak.WeakSettings(estimate_delay=True))
-    ignored = refined.fit([lambda: [late]]).values[5:7] / here.arm.constants()[5:7] - 1
+    estimated = refined.fit(Problem([lambda: [late]], settings=WeakSettings(estimate_delay=True)))
+    ignored = refined.fit(Problem([lambda: [late]])).values[5:7] / here.arm.constants()[5:7] - 1
     return estimated.values, float(100 * np.abs(ignored).max())
 
 
@@ -222,7 +223,7 @@ def _held(here: scenes.Scene) -> dict[str, float]:
     bias = {}
     for hold in ("zoh", "foh"):
         fit = refined.fit(
-            [lambda: [log]], settings=weak.WeakSettings(shift=TorqueShift(hold == "zoh"))
+            Problem([lambda: [log]], settings=WeakSettings(shift=TorqueShift(hold == "zoh")))
         )
         bias[hold] = float(100 * np.abs(fit.values[5:7] / k[5:7] - 1).max())
     return bias
@@ -238,7 +239,7 @@ def cost_rows() -> list[Row]:
         repeats = max(1, 10 // count)
         begin = time.process_time()
         for _ in range(repeats):
-            refined.fit([partial(_first, tens, count)])
+            refined.fit(Problem([partial(_first, tens, count)]))
         seconds.append((time.process_time() - begin) / repeats)
     slope = np.polyfit(np.log(lengths), np.log(seconds), 1)[0]
     rows: list[Row] = [

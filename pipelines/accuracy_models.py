@@ -23,8 +23,8 @@ import numpy as np
 
 from algid.arm import CONSTANT_NAMES
 from algid.estimators import refined, robust
+from algid.estimators.problem import Problem, WeakSettings
 from algid.estimators.terms import Selection, select
-from algid.estimators.weak import WeakSettings
 from algid.model import Model
 from pipelines import real_arms
 
@@ -51,12 +51,12 @@ def draw(job: tuple[str, int, int, str]) -> Row:
     logs = [lambda: [unloaded]], [lambda: [loaded]]
     weak = WeakSettings(bandwidth=60.0)
     flags = Selection(Model(("coulomb", "offset", "rotor")), delay=True)
-    chosen = select(*logs, weak) if mode == MODES[0] else flags
+    chosen = select(Problem(*logs, weak)) if mode == MODES[0] else flags
     weak = replace(weak, model=chosen.model, estimate_delay=chosen.delay)
-    fit = refined.fit(*logs, weak)
+    fit = refined.fit(Problem(*logs, weak))
     if fit.refuted and mode == MODES[0]:
         fit = robust.fit(
-            *logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False)
+            Problem(*logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False))
         )
     truth = _scenes[row, arm, False].truth
     names = [*CONSTANT_NAMES, "m_p"]

@@ -33,7 +33,7 @@ from algid.base.errors import ResultError
 from algid.estimators import refined
 from algid.estimators.body import with_body_of
 from algid.estimators.fit import Fit
-from algid.estimators.weak import WeakSettings
+from algid.estimators.problem import Problem, WeakSettings
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.model import Model
@@ -275,7 +275,7 @@ def _burdened(q: FloatArray, g: float) -> FloatArray:
 
 def _fitted(logs: list[Segment], model: Model) -> Fit:
     unloaded, loaded = logs
-    return refined.fit([lambda: [unloaded]], [lambda: [loaded]], WeakSettings(model))
+    return refined.fit(Problem([lambda: [unloaded]], [lambda: [loaded]], WeakSettings(model)))
 
 
 def _segment(motion: SimulatedMotion, rng: np.random.Generator) -> Segment:

@@ -17,14 +17,13 @@ from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import ratio_of_joints
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import MOTORLESS
-from algid.estimators.weak import Normal, Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.weak import Normal
 from algid.model import K1, K2, K3, RIGID
 from algid.notices import Notice
 
 
-def doubted(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
-) -> Fit:
+def doubted(fit: Fit, problem: Problem) -> Fit:
     """The fit with status WEAK_EXCITATION for k1 … k5 where they are doubtful.
 
     Parameters
@@ -32,12 +31,10 @@ def doubted(
     fit : Fit
         With `FEWEST_LOGS` logs or more it is the joints' contradiction alone that is asked for, a
         smaller one: see `ratio_of_joints`.
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`.
-    settings : WeakSettings
-        Of the fit: its window, bandwidth, hold and delay; a model that is linear.
+    problem : Problem
+        With a model that is linear.
     """
-    doubt = _doubt(fit, unloaded, loaded, settings)
+    doubt = _doubt(fit, problem)
     if doubt is None:
         return fit
     return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
@@ -52,28 +49,16 @@ LEAST_ACTING = 0.02
 """Share of the other joint's torque: less at a joint without a motor is bearing or cable."""
 
 
-def doubted_without_motor(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
-) -> Fit:
+def doubted_without_motor(fit: Fit, problem: Problem) -> Fit:
     """The fit with status WEAK_EXCITATION for k1 … k5 if they do not explain an undriven joint.
 
     Inertia, weight and friction, which cancel there, are then of no size beside the other joint's
     torque: constants near nothing solve that equation too, and least squares ends there where
     friction and cables pull as hard as the arm's own load.
-
-    Parameters
-    ----------
-    fit : Fit
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`.
-    settings : WeakSettings
-        Of the fit.
     """
     model = fit.shared.model
-    settings = replace(_delayed(fit, settings), model=model)
-    for kind, sources in ((False, unloaded), (True, loaded)):
-        if not sources:
-            continue
+    settings = problem.at(model, fit.delay).settings
+    for kind, sources in problem.kinds():
         c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
         normals = weak.normals_of(sources, settings, c)
         if not normals:
@@ -88,24 +73,14 @@ def doubted_without_motor(
     return fit
 
 
-def _delayed(fit: Fit, settings: WeakSettings) -> WeakSettings:
-    """The settings with the fit's delay, where it has one."""
-    known = replace(settings, estimate_delay=False)
-    if fit.delay is None:
-        return known
-    return known.delayed(fit.delay)
-
-
-def _doubt(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
-) -> Notice | None:
+def _doubt(fit: Fit, problem: Problem) -> Notice | None:
     """Why k1 … k5 are doubtful; None where nothing says so."""
     few = len(fit.logs) < FEWEST_LOGS
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if few and still:
         return Notice("HARDLY_DRIVEN", numbers={"case": "still", "joints": still})
-    settings = _delayed(fit, settings)
-    for kind, sources in ((False, unloaded), (True, loaded)):
+    settings = problem.at(problem.settings.model, fit.delay).settings
+    for kind, sources in problem.kinds():
         normals = weak.normals_of(sources, settings)
         if not normals:
             continue

@@ -40,15 +40,14 @@ from algid.estimators import weak
 from algid.estimators.combine import (
     BlockSums,
     LogInformation,
-    Prior,
     combine,
     scaled_pinv,
 )
 from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import OVERLAP, Windows, row_weights
 from algid.estimators.parametrisation import Shared
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.references import Following, followed
-from algid.estimators.weak import Source, WeakSettings
 from algid.model import Model, advanced, inertia
 from algid.signals.filters import correlate, differentiator, half_length, smoother
 from algid.signals.segments import Segment
@@ -73,29 +72,16 @@ class Moments:
     astray: int
 
 
-def fit(
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source] = (),
-    settings: WeakSettings | None = None,
-    lengths: dict[str, float] | None = None,
-    prior: Prior | None = None,
-    start: Fit | None = None,
-) -> Fit:
+def fit(problem: Problem, start: Fit | None = None) -> Fit:
     """Parameters of the arm, and of its payload if there are loaded logs, by windowed instruments.
+
+    Each log is gone over up to ten times.
 
     Parameters
     ----------
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called up to ten
-        times.
-    settings : WeakSettings
-        Window, bandwidth, model, hold and delay, as for the weak estimator.
-    lengths : dict
-        Known link lengths "l1", "l2" in m.
-    prior : Prior
-        What an earlier result knows of the arm; unloaded logs are not needed then.
+    problem : Problem
     start : Fit
-        The weak estimate with these settings, where it has been made.
+        The weak estimate, where it has been made.
 
     Returns
     -------
@@ -108,42 +94,37 @@ def fit(
     ValueError
         If no log is long enough for a window, or there is neither an unloaded log nor a prior.
     """
-    settings = settings or WeakSettings()
     if start is None:
-        start = weak.fit(unloaded, loaded, settings, lengths, prior)
+        start = weak.fit(problem)
     shared = start.shared
     if shared.delay:
-        settings = settings.delayed(float(start.values[len(settings.model.names)]))
-    following = followed([*unloaded, *loaded], settings)
+        problem = problem.at(shared.model, start.delay, estimate_delay=True)
+    following = followed(problem)
     beta, logs = start.values, None
     for _ in range(_ROUNDS):
-        logs = evidence(shared, beta, unloaded, loaded, settings, following)
+        logs = evidence(problem, shared, beta, following)
         if not logs:
             return replace(start.marked("NOT_CONVERGED"), converged=False)
         before = beta
-        beta, S, _ = combine(shared, logs, before, prior)
+        beta, S, _ = combine(shared, logs, before, problem.prior)
         if float((beta - before) @ S @ (beta - before)) < SETTLED_SIMULATED**2:
             break
     assert logs is not None
-    return finish("instruments", shared, logs, beta, start.moved, prior, coloured=True)
+    return finish("instruments", shared, logs, beta, start.moved, problem.prior, coloured=True)
 
 
 def evidence(
+    problem: Problem,
     shared: Shared,
     beta: FloatArray,
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source],
-    settings: WeakSettings,
     following: Following | None = None,
 ) -> list[LogInformation] | None:
     """Each log's likelihood projected on instruments, simulated at shared parameters `beta` (Q,).
 
     Its rows weigh by their residual there. None where the windows cannot be simulated.
     """
-    logs = []
-    for kind, sources in ((False, unloaded), (True, loaded)):
-        if not sources:  # without loaded logs there is no payload among the parameters
-            continue
+    logs, settings = [], problem.settings
+    for kind, sources in problem.kinds():
         c0 = shared.coefficients(beta, kind)
         c = c0.copy()
         if shared.delay:

@@ -32,8 +32,7 @@ from algid.estimators.noise import (
     variance_score,
 )
 from algid.estimators.parametrisation import Shared
-from algid.estimators.too_short import TooShortError
-from algid.estimators.weak import Source
+from algid.estimators.problem import Problem, Source, TooShortError
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
 from algid.model import Model, Motion
 from algid.signals.differences import POINTS, Stencil
@@ -320,13 +319,7 @@ class LogEvidence:
         return Stencil(dt, shift.at(dt), held=shift.held, lag=shared.model.lag(c))
 
 
-def opened(
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source],
-    shared: Shared,
-    shift: TorqueShift,
-    noise: NoiseLevels | None = None,
-) -> list[LogEvidence]:
+def opened(problem: Problem, shared: Shared, noise: NoiseLevels | None = None) -> list[LogEvidence]:
     """The logs that are long enough.
 
     Raises
@@ -335,10 +328,12 @@ def opened(
         If there are logs of a kind and none is.
     """
     logs: list[LogEvidence] = []
-    for kind, sources in (("unloaded", unloaded), ("loaded", loaded)):
-        every = [LogEvidence(one, kind == "loaded", shared, shift, noise) for one in sources]
+    shift = problem.settings.shift
+    for loaded, sources in problem.kinds():
+        every = [LogEvidence(one, loaded, shared, shift, noise) for one in sources]
         kept = [log for log in every if log.kept]
-        if every and not kept:
+        if not kept:
+            kind = "loaded" if loaded else "unloaded"
             raise TooShortError(
                 f"no {kind} log is long enough for the likelihood: expected at least {SHORTEST} "
                 "samples without a gap"

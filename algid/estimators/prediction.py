@@ -25,8 +25,8 @@ from algid.arm import FloatArray
 from algid.estimators.combine import left_out
 from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
+from algid.estimators.problem import Source
 from algid.estimators.standing import Standing, standing
-from algid.estimators.weak import Source
 from algid.model import Model, Motion, regressor, torque
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Cutter, Segment, pieces_of

@@ -21,7 +21,6 @@ B       what the reference makes of angles and torques           (4, m)    mixed
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +28,7 @@ import numpy as np
 from algid.arm import FloatArray, keep_arrays
 from algid.estimators import weak
 from algid.estimators.combine import scaled_pinv
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem
 from algid.signals.segments import Segment
 
 _LONGEST = 1.0  # s: a joint has followed its reference by then
@@ -64,12 +63,12 @@ class Following:
         return replace(piece, theta=theta, tau=tau, omega=omega)
 
 
-def followed(sources: Sequence[Source], settings: WeakSettings) -> Following | None:
+def followed(problem: Problem) -> Following | None:
     """How the arm follows the references of its logs; None where one has none, or it does not."""
     gram = None
-    for source in sources:
+    for source in problem.logs:
         known = False
-        for piece, _, _ in weak.overlapping(source(), settings):
+        for piece, _, _ in weak.overlapping(source(), problem.settings):
             if piece.reference is None:
                 return None
             F = _features(piece)

@@ -29,8 +29,8 @@ from algid.estimators.identifiability import judge, open_directions
 from algid.estimators.log_likelihood import LogEvidence, Outcome, opened
 from algid.estimators.misfit import columns, misfit
 from algid.estimators.parametrisation import Shared
+from algid.estimators.problem import Problem
 from algid.estimators.repeats import Groups, grouped
-from algid.estimators.weak import Source, WeakSettings
 from algid.estimators.weak import fit as weak_fit
 from algid.estimators.whitening import NoiseLevels
 from algid.estimators.widths import Width, has_width, likeliest_width
@@ -57,30 +57,13 @@ _ANCHOR = 1e-3  # of a parameter's size: how firmly a direction without informat
 End = Literal["settled", "refuted", "unsettled"]
 
 
-def fit(
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source] = (),
-    settings: WeakSettings | None = None,
-    lengths: dict[str, float] | None = None,
-    prior: Prior | None = None,
-    progress: Progress | None = None,
-    noise: NoiseLevels | None = None,
-) -> Fit:
+def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
     """Most likely parameters of the arm, and of its payload where there are loaded logs.
 
     Parameters
     ----------
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; it is called
-        several times.
-    settings : WeakSettings
-        Model, hold and delay; window and bandwidth are of the weak estimate that it starts from.
-    lengths : dict
-        Known link lengths "l1", "l2" in m.
-    prior : Prior
-        What an earlier result knows of the arm; unloaded logs are not needed then.
-    progress : callable
-        Called with each step of the training and how many samples of how many it has gone over.
+    problem : Problem
+        Its window and bandwidth are of the weak estimate that this starts from.
     noise : NoiseLevels
         Known noise levels; None estimates them log by log.
 
@@ -97,14 +80,13 @@ def fit(
     ValueError
         If a known noise level is not positive.
     """
-    settings = settings or WeakSettings()
     if noise is not None and not (np.all(noise.theta > 0) and np.all(noise.tau > 0)):
         raise ValueError(
             f"known noise levels must be positive, got {noise.theta} rad and {noise.tau} N m"
         )
-    start = weak_fit(unloaded, loaded, settings, lengths, prior)
+    start, prior, progress = weak_fit(problem), problem.prior, problem.progress
     shared, anchored = start.shared, _anchored(start)
-    logs = opened(unloaded, loaded, shared, settings.shift, noise)
+    logs = opened(problem, shared, noise)
     turn, dt = max((largest_turn(log.kept), log.kept[0].dt) for log in logs)
     if turn > FAR:
         numbers = {"case": "turn", "kept": start.estimator, "turn": turn, "rate": turn / FAR / dt}

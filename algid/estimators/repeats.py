@@ -10,7 +10,7 @@ and where errors are judged by how logs and stretches scatter, their mean stands
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.estimators.combine import LogInformation
-from algid.signals.segments import Segment
+from algid.estimators.problem import Source
 
 ALIKE = 0.95  # of one: a tenth of the power may differ
 _RATE = 50.0  # Hz
@@ -26,7 +26,6 @@ _LONGEST = 60.0  # s that are compared
 _SHIFT = 5.0  # s, by which two recordings of one motion are started apart by hand
 _LENGTHS = 0.8  # of the longer one: a log that is shorter is no repeat
 
-Source = Callable[[], Iterable[Segment]]
 Groups = tuple[tuple[int, ...], ...]
 """Places of logs that repeat each other; each log is in one group."""
 

@@ -73,10 +73,10 @@ from algid.estimators.doubt import doubted_without_motor
 from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
+from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.estimators.references import Following, followed
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
-from algid.estimators.too_short import OF_A_WINDOW, TooShortError
-from algid.estimators.weak import Normal, Source, WeakSettings
+from algid.estimators.weak import Normal
 from algid.model import EVERY_TERM, K3, RIGID, SINES, TERMS, attributes
 from algid.notices import Notice, Remedy
 
@@ -100,38 +100,26 @@ _LAGS = 8  # steps between windows, two windows in all
 _MEMORY = 40  # lags of the autocovariances
 
 
-def fit(
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source] = (),
-    settings: WeakSettings | None = None,
-    lengths: Mapping[str, float] | None = None,
-    known: Prior | None = None,
-) -> Fit:
+def fit(problem: Problem) -> Fit:
     """Parameters of the arm, of every term and of its payload where there are loaded logs.
 
     By least squares, or by instruments where the torque is endogenous and there is one.
 
     Parameters
     ----------
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time; called a few
-        times.
-    settings : WeakSettings
-        Window, bandwidth, hold and delay; its model's gravity and shapes of friction. With a delay
-        that is not zero none is estimated.
-    lengths : mapping of "l1", "l2" to m, where known
-    known : Prior
-        What an earlier result knows of the arm and of its terms; unloaded logs are not needed then.
+    problem : Problem
+        Its model's gravity and shapes of friction count, not its terms. With a delay that is not
+        zero none is estimated. The prior may know terms too.
 
     Raises
     ------
     ValueError
-        If no log is long enough for a window, or there is neither an unloaded log nor `known`.
+        If no log is long enough for a window, or there is neither an unloaded log nor a prior.
     """
-    problem = RobustProblem.of(unloaded, loaded, settings or WeakSettings(), lengths, known)
-    least = problem.least_squares()
-    fit = problem.with_window_scatter(problem.instruments_if_endogenous(least), least)
-    return problem.with_load_scatter(fit, least)
+    robust = RobustProblem.of(problem)
+    least = robust.least_squares()
+    fit = robust.with_window_scatter(robust.instruments_if_endogenous(least), least)
+    return robust.with_load_scatter(fit, least)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,70 +148,53 @@ class RobustProblem:
 
     Parameters
     ----------
-    unloaded, loaded : their sources
-    settings : WeakSettings
-        With every term that the logs can determine, and the speeds below which a joint stands.
+    problem : Problem
+        Of those logs, with every term that they can determine, and the speeds below which a joint
+        stands.
     shared : Shared
-    known : Prior
     moved : (2,), rad, how far each joint travelled
     groups : logs that repeat each other
     keeps : whether the logs are short enough for their moments to stay in memory
     """
 
-    unloaded: tuple[Source, ...]
-    loaded: tuple[Source, ...]
-    settings: WeakSettings
+    problem: Problem
     shared: Shared
-    known: Prior | None
     moved: FloatArray
     groups: Groups
     keeps: bool
 
     @classmethod
-    def of(
-        cls,
-        unloaded: Sequence[Source],
-        loaded: Sequence[Source],
-        settings: WeakSettings,
-        lengths: Mapping[str, float] | None = None,
-        known: Prior | None = None,
-    ) -> RobustProblem:
+    def of(cls, problem: Problem) -> RobustProblem:
         """See `fit`."""
+        settings, prior = problem.settings, problem.prior
         bare = replace(settings, model=replace(settings.model, terms=()), estimate_delay=False)
         long_enough: dict[bool, list[Source]] = {False: [], True: []}
         normals = []
-        for kind, sources in ((False, unloaded), (True, loaded)):
+        for kind, sources in problem.kinds():
             for source in sources:
                 normal = weak.normal_equations(source, bare)
                 if normal is not None:
                     long_enough[kind].append(source)
                     normals.append(normal)
-        every = long_enough[False] + long_enough[True]
         delay = settings.estimate_delay or settings.shift.delay == 0
-        model = replace(settings.model, terms=offered(normals, known.names if known else ()))
-        rest = AT_REST * weak.speeds(every, settings)
+        model = replace(settings.model, terms=offered(normals, prior.names if prior else ()))
+        kept = replace(problem, unloaded=long_enough[False], loaded=long_enough[True])
+        rest = AT_REST * weak.speeds(kept.logs, settings)
+        ours = kept.but(model=model, estimate_delay=delay, rest=(float(rest[0]), float(rest[1])))
         return cls(
-            tuple(long_enough[False]),
-            tuple(long_enough[True]),
-            replace(
-                settings,
-                model=model,
-                estimate_delay=delay,
-                rest=(float(rest[0]), float(rest[1])),
-            ),
-            Shared(model, delay, bool(loaded), dict(lengths or {})),
-            known,
+            ours,
+            replace(ours.shared, payload=bool(problem.loaded)),
             np.max([normal.moved for normal in normals], axis=0, initial=0.0),
-            grouped(long_enough[False], long_enough[True]),
+            grouped(kept.unloaded, kept.loaded),
             sum(normal.samples for normal in normals) <= _MOST_KEPT,
         )
 
     def least_squares(self, window: float = 1.0, *, by_torque: bool = False) -> Fit:
         """Every term shrunk, by windows of `window` times the settings' length."""
-        shared, known = self.shared, self.known
-        model = replace(self.settings.model, by_torque=by_torque)
-        settings = replace(self.settings, window=window * self.settings.window, model=model)
-        memory: list[dict[Hashable, Known] | None] = [None] * len(self.unloaded + self.loaded)
+        shared, known, settings = self.shared, self.problem.prior, self.problem.settings
+        model = replace(settings.model, by_torque=by_torque)
+        settings = replace(settings, window=window * settings.window, model=model)
+        memory: list[dict[Hashable, Known] | None] = [None] * len(self.problem.logs)
         if self.keeps:
             memory = [{} for _ in memory]
         normals = self._normals(settings, {}, memory)
@@ -261,8 +232,8 @@ class RobustProblem:
     ) -> dict[bool, list[Normal]]:
         """Normal equations of unloaded and of loaded logs, linearised `at` coefficients (q,)."""
         normals: dict[bool, list[Normal]] = {False: [], True: []}
-        for place, source in enumerate(self.unloaded + self.loaded):
-            kind = place >= len(self.unloaded)
+        for place, source in enumerate(self.problem.logs):
+            kind = place >= len(self.problem.unloaded)
             normal = weak.normal_equations(source, settings, at.get(kind), memory[place])
             if normal is None:
                 raise TooShortError(f"no {OF_A_WINDOW}")
@@ -312,7 +283,7 @@ class RobustProblem:
             logs,
             beta,
             self.moved,
-            joined(self.known, shrinkage),
+            joined(self.problem.prior, shrinkage),
             coloured=True,
             repeats=self.groups,
             shrinkage=shrinkage,
@@ -362,7 +333,7 @@ class RobustProblem:
         A reference that the logs hold and the arm follows is an instrument, else a torque that
         answers nothing.
         """
-        following = followed(self.unloaded + self.loaded, self.settings)
+        following = followed(self.problem)
         corrected = self.by_instruments(least, least.values, following)
         if corrected is None:
             return least
@@ -375,7 +346,7 @@ class RobustProblem:
         case = "reference"
         if following is None:
             case = "torque"
-            silent = no_feedback(corrected, self.unloaded, self.loaded, self.settings)
+            silent = no_feedback(corrected, self.problem)
             if silent < ANSWERS:
                 return fit.noted(feedback(silent))
         note = Notice("INSTRUMENTS", numbers={"case": case, "distance": tests.moved})
@@ -389,10 +360,8 @@ class RobustProblem:
         Along the motion that a reference explains, where the arm is `following` one, else along a
         simulated one; None where the windows cannot be simulated.
         """
-        settings = _of(least, self.settings)
-        logs = instruments.evidence(
-            self.shared, at, self.unloaded, self.loaded, settings, following
-        )
+        problem = _of(least, self.problem)
+        logs = instruments.evidence(problem, self.shared, at, following)
         if logs is None or len(logs) != len(least.logs) or least.shrinkage is None:
             return None
         return self._finished("instruments", self._divided(logs, at), at, least.shrinkage)
@@ -575,11 +544,9 @@ def compared(better: Fit, least: Fit) -> Exogeneity:
     return Exogeneity(distance, moved, float(chi2_tail(places.size, max(h, 0.0))))
 
 
-def _of(fit: Fit, settings: WeakSettings) -> WeakSettings:
-    """The settings with the fit's model and delay."""
-    if fit.delay is not None:
-        settings = settings.delayed(fit.delay)
-    return replace(settings, model=fit.shared.model, estimate_delay=fit.shared.delay)
+def _of(fit: Fit, problem: Problem) -> Problem:
+    """The logs by the fit's model and delay."""
+    return problem.at(fit.shared.model, fit.delay, estimate_delay=fit.shared.delay)
 
 
 def _influences(fit: Fit) -> list[FloatArray]:
@@ -599,13 +566,11 @@ def feedback(p_value: float) -> Notice:
     return Notice("FEEDBACK", numbers={"p_value": p_value}, remedies=(remedy,))
 
 
-def no_feedback(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
-) -> float:
+def no_feedback(fit: Fit, problem: Problem) -> float:
     """Bonferroni p value of the residual's correlations with later torques without feedback."""
-    settings = replace(_of(fit, settings), estimate_delay=False)
+    settings = problem.at(fit.shared.model, fit.delay).settings
     products, variance = np.zeros((_LAGS, 2)), np.zeros(2)
-    for kind, sources in ((False, unloaded), (True, loaded)):
+    for kind, sources in problem.kinds():
         for source in sources:
             c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
             e, y = _residual(source, settings, c)
@@ -649,13 +614,11 @@ def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return products(e, y, range(1, _LAGS + 1)), variance
 
 
-def with_feedback_noted(
-    fit: Fit, unloaded: Sequence[Source], loaded: Sequence[Source], settings: WeakSettings
-) -> Fit:
+def with_feedback_noted(fit: Fit, problem: Problem) -> Fit:
     """A fit by instruments, with a warning where it is the torque and answers the motion."""
-    if followed([*unloaded, *loaded], settings) is not None:
+    if followed(problem) is not None:
         return fit
-    silent = no_feedback(fit, unloaded, loaded, settings)
+    silent = no_feedback(fit, problem)
     if silent >= LEVEL:
         return fit
     return fit.noted(feedback(silent))
@@ -683,12 +646,7 @@ def unshrunk(fit: Fit, name: str) -> Fit:
     )
 
 
-def of_passive_joint(
-    unloaded: Sequence[Source],
-    settings: WeakSettings,
-    lengths: dict[str, float] | None = None,
-    prior: Prior | None = None,
-) -> Fit | None:
+def of_passive_joint(problem: Problem) -> Fit | None:
     """Parameters of an arm with a joint that has no motor, by windowed instruments.
 
     The equation of such a joint has no torque that scales it: constants near nothing solve it, and
@@ -700,14 +658,8 @@ def of_passive_joint(
 
     Parameters
     ----------
-    unloaded : sequence of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time.
-    settings : WeakSettings
-        A linear model and no delay to estimate.
-    lengths : dict
-        Known link lengths "l1", "l2" in m.
-    prior : Prior
-        What an earlier result knows of the arm.
+    problem : Problem
+        Of unloaded logs, with a linear model and no delay to estimate.
 
     Returns
     -------
@@ -715,16 +667,17 @@ def of_passive_joint(
         None where instruments do not converge, or end at constants near nothing or that physics
         forbids.
     """
-    start = weak.fit(unloaded, (), settings, lengths, prior)
-    total = np.sum([normal.gram for normal in weak.normals_of(unloaded, settings)], axis=(0, 1, 2))
+    start = weak.fit(problem)
+    normals = weak.normals_of(problem.unloaded, problem.settings)
+    total = np.sum([normal.gram for normal in normals], axis=(0, 1, 2))
     start = replace(start, values=scaled_pinv(total[:-1, :-1]) @ total[:-1, -1])
-    better = instruments.fit(unloaded, (), settings, lengths, prior, start)
+    better = instruments.fit(problem, start)
     if not better.converged:
         return None
     for one in broken_bounds(better):
         if one.distance is None or one.distance > better.quantile:
             return None
-    checked = doubted_without_motor(better, unloaded, (), settings)
+    checked = doubted_without_motor(better, problem)
     if checked is not better:
         return None
     return better.noted(Notice("INSTRUMENTS", numbers={"case": "passive"}))

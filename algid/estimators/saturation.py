@@ -32,7 +32,8 @@ from algid.arm import FloatArray
 from algid.base.quantiles import median
 from algid.estimators.combine import long_run_variance, scaled_pinv
 from algid.estimators.modulating_functions import OVERLAP
-from algid.estimators.weak import Normal, WeakSettings, grams, overlapping, solve
+from algid.estimators.problem import WeakSettings
+from algid.estimators.weak import Normal, grams, overlapping, solve
 from algid.model import FIRST_TERMS, Model
 from algid.signals.segments import Segment, append
 

@@ -40,8 +40,7 @@ from algid.estimators.hold import SURE, Hold, Lateness
 from algid.estimators.log_likelihood import LogEvidence, opened
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
-from algid.estimators.too_short import OF_A_WINDOW, TooShortError
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
 from algid.model import (
     CHOICES,
     DELAYS,
@@ -507,9 +506,7 @@ class _Search:
 
 
 def select(
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source],
-    settings: WeakSettings,
+    problem: Problem,
     candidates: Sequence[str] = CHOICE,
     kept: Sequence[str] = (),
     absent: Collection[str] = (),
@@ -518,11 +515,9 @@ def select(
 
     Parameters
     ----------
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`; it is called once. Of more than `_MOST_LOGS` some,
-        evenly spread.
-    settings : WeakSettings
-        Its model's gravity, its window, bandwidth, hold and delay.
+    problem : Problem
+        Each of its logs is gone over once. Of more than `_MOST_LOGS` some, evenly spread. Its
+        model's gravity counts, not its terms.
     candidates : names in `CHOICE`
         A delay that turns out negative is a lag where that explains more.
     kept : names in `CHOICES`
@@ -535,26 +530,28 @@ def select(
     TooShortError
         If no log is long enough for a window, or for the likelihood.
     """
-    kinds = [_Pieces.of(unloaded), _Pieces.of(loaded)]
-    chosen, elastic = _selected(kinds, settings, candidates, kept, absent, {})
+    logs = [_Pieces.of(problem.unloaded), _Pieces.of(problem.loaded)]
+    chosen, elastic = _selected(logs, problem, candidates, kept, absent, {})
     if elastic:  # what rigid joints have for friction's width is not theirs
-        chosen, _ = _selected(kinds, settings, candidates, kept, absent, elastic)
+        chosen, _ = _selected(logs, problem, candidates, kept, absent, elastic)
     return chosen
 
 
 def _selected(
     kinds: Sequence[_Pieces],
-    settings: WeakSettings,
+    problem: Problem,
     candidates: Sequence[str],
     kept: Sequence[str],
     absent: Collection[str],
     elastic: Elastic,
 ) -> tuple[Selection, Elastic]:
     """The terms that `select` chooses, and the coefficients if elastic joints are among them."""
+    settings = problem.settings
     shapes, start = _start(kinds, settings, elastic)
     every = replace(shapes, terms=tuple(name for name, term in TERMS.items() if not term.lags))
     shared = Shared(every, delay=True)
-    every_log = opened(kinds[0].sources, kinds[1].sources, shared, settings.shift)
+    some = replace(problem, unloaded=kinds[0].sources, loaded=kinds[1].sources)
+    every_log = opened(some, shared)
     logs = [log for log in every_log if log.loaded in start]
     driven = [
         any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)

@@ -17,7 +17,7 @@ beta    parameters that the logs share: the arm's, delay, payload     (Q,)      
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import TypeVar
 
@@ -39,13 +39,11 @@ from algid.estimators.fit import Fit, finish
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
-from algid.estimators.too_short import OF_A_WINDOW, TooShortError
-from algid.model import K2, K4, Model, attributes
+from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
+from algid.model import K2, K4, attributes
 from algid.signals.differences import held_torque
 from algid.signals.segments import Segment, pieces
-from algid.signals.shift import AT_ONCE, TorqueShift
 
-Source = Callable[[], Iterable[Segment]]
 Gathered = TypeVar("Gathered")
 _TOGETHER = 256  # logs that are left out at once
 State = TypeVar("State")
@@ -62,73 +60,26 @@ _FIRST_MASSES = (0.02, 0.1, 0.5, 2.0, 10.0)  # kg
 _FIRST_LENGTH = 0.3  # m
 
 
-@dataclass(frozen=True)
-class WeakSettings:
-    """Settings of the weak estimator.
-
-    Parameters
-    ----------
-    model : Model
-    window : float, s
-        Length of a window; a record shorter than four windows gets shorter ones.
-    bandwidth : float, Hz, or None for the log's own velocities
-        Of the zero-phase differentiator behind k1's column.
-    shift : TorqueShift
-        After how long a logged torque acts; its delay is where the estimate of it starts with
-        `estimate_delay`.
-    estimate_delay : bool
-    rest : (2,) float, rad/s
-        Speeds of the joints, RMS over a window, below which a joint stands: dry friction holds it
-        then, and its window is left out. None looks at every window.
-    """
-
-    model: Model = field(default_factory=Model)
-    window: float = 0.4
-    bandwidth: float | None = 40.0
-    shift: TorqueShift = AT_ONCE
-    estimate_delay: bool = False
-    rest: tuple[float, float] | None = None
-
-    def delayed(self, delay: float) -> WeakSettings:
-        """The same with a delay of the torque, s."""
-        return replace(self, shift=replace(self.shift, delay=delay))
-
-
-def fit(
-    unloaded: Sequence[Source],
-    loaded: Sequence[Source] = (),
-    settings: WeakSettings | None = None,
-    lengths: dict[str, float] | None = None,
-    prior: Prior | None = None,
-) -> Fit:
+def fit(problem: Problem) -> Fit:
     """Least-squares parameters of the arm, and of its payload where there are loaded logs.
 
-    Parameters
-    ----------
-    unloaded, loaded : sequences of callables
-        Each gives a fresh iterable of `Segment`, the stretches of one log in time. It is called
-        once, and a few times more where a delay is estimated or the model is not linear.
-    settings : WeakSettings
-    lengths : dict
-        Known link lengths "l1", "l2" in m.
-    prior : Prior
-        What an earlier result knows of the arm; unloaded logs are not needed then.
+    Each log is gone over once, and a few times more where a delay is estimated or the model is not
+    linear.
 
     Raises
     ------
     ValueError
         If no log is long enough for a window, or there is neither an unloaded log nor a prior.
     """
-    settings = settings or WeakSettings()
+    settings, shared, prior = problem.settings, problem.shared, problem.prior
     model = settings.model
-    shared = Shared(model, settings.estimate_delay, bool(loaded), dict(lengths or {}))
     iterated = [model.names.index(name) for name in model.iterated if name in model.names]
     compliances = [name for name, _ in attributes(model, "elastic")]
     soft = np.isin(model.names, compliances)
     at: dict[bool, FloatArray] = {}
     for _ in range(_PASSES):
         normals = {}
-        for kind, sources in ((False, unloaded), (True, loaded)):
+        for kind, sources in problem.kinds():
             own = normals_of(sources, settings, at.get(kind))
             if own:
                 normals[kind] = own

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -11,22 +11,21 @@ import numpy as np
 from algid.base.names import within
 from algid.base.runtime import Worker
 from algid.base.significance import LEVEL
-from algid.estimators import robust, weak
+from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
-from algid.estimators.combine import Prior, joined, without
+from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.doubt import doubted_without_motor
 from algid.estimators.elastic import with_rotors
 from algid.estimators.fit import Fit, Misfit
-from algid.estimators.hold import Hold
 from algid.estimators.prediction import PredictionSums
+from algid.estimators.problem import Source
 from algid.estimators.terms import Selection, TermTrial, has_need, plausible
-from algid.identification.passes import Pass, long_enough, passes, weak_settings
+from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
 from algid.model import DELAYS, FIRST_TERMS, TERMS, Model
 from algid.notices import Notice
-from algid.physics.effort import absent
 from algid.settings import Settings
 from algid.signals.segments import Segment
 
@@ -64,55 +63,36 @@ def run_fit(
         If the settings' estimator gives time series.
     """
     estimator = estimator_of(settings.estimator)
-    if estimator.fit is None:
-        raise ValueError(f"{estimator.name} gives time series, not a fit")
-    estimate = estimator.fit
+    first = chosen
     sums: dict[Recording, PredictionSums] = {}
-    ours = weak_settings(settings, chosen)
     watched = None
     if chosen.model.linear and not chosen.delay and chosen.model.lag_name is None:
         watched = partial(_scored, chosen.model, settings, sums)  # which depends on no estimate
-    unloaded, loaded = passes(survey, settings, watched)
-    nothing = absent(settings.effort, chosen.model.names)
+
+    def fitted(selection: Selection) -> Fit:
+        return estimator.fit(problem_of(survey, settings, selection, prior))
+
     with long_enough(survey):
-        known = without(prior, nothing)
-        if chosen.undetermined is not None and chosen.delay:
-            known = joined(known, chosen.undetermined.prior)
-
-        def fitted(selection: Selection) -> Fit:
-            windows = weak_settings(settings, selection)
-            before = with_rotors(known, selection.model)
-            return estimate(unloaded, loaded, windows, settings.lengths, before, survey.progress)
-
         # why no term is chosen but every one shrunk, if so
-        notes: tuple[Notice, ...] | None = None
-        picked = chosen
+        notes: tuple[Notice, ...] = ()
         if chosen.refuted and settings.chooses and estimator.name == "refined":
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
-            fit = fitted(chosen)
+            fit = estimator.fit(problem_of(survey, settings, chosen, prior, watched))
             if fit.misfit is not None and settings.chooses:
                 fit, chosen = completed(fit, chosen, fitted)
-                ours = weak_settings(settings, chosen)
-                sums.clear()
-            picked = chosen
             if fit.refuted and settings.chooses:
                 notes = fit.notes
-        if notes is not None:
-            fit, chosen = _shrunk(notes, unloaded, loaded, ours, settings, chosen, prior)
-            sums.clear()
-        if not chosen.shrunk and fit.shared.model != chosen.model:
+        picked = chosen
+        if notes:
+            fit, chosen = _shrunk(notes, survey, settings, chosen, prior)
+        elif fit.shared.model != chosen.model:
             # the fit has estimated the width of friction's step
             chosen = replace(chosen, model=fit.shared.model)
-            sums.clear()
-        better = _of_motorless(fit, survey, settings, picked, prior)
-        if better is not None:
-            fit, chosen = better
-            ours = weak_settings(settings, chosen)
-            sums.clear()
+        fit, chosen = _of_motorless(fit, chosen, survey, settings, picked, prior)
         if fit.estimator == "instruments" and not chosen.shrunk:
-            fit = robust.with_feedback_noted(fit, unloaded, loaded, ours)
-    return finished(fit, settings), sums, chosen
+            fit = robust.with_feedback_noted(fit, problem_of(survey, settings, chosen))
+    return finished(fit, settings), sums if chosen is first else {}, chosen
 
 
 def finished(fit: Fit, settings: Settings) -> Fit:
@@ -168,32 +148,34 @@ _BY_NOTHING = "left out: it was judged beside constants near nothing"
 
 
 def _of_motorless(
-    fit: Fit, survey: Recordings, settings: Settings, chosen: Selection, prior: Prior | None
-) -> tuple[Fit, Selection] | None:
+    fit: Fit,
+    chosen: Selection,
+    survey: Recordings,
+    settings: Settings,
+    picked: Selection,
+    prior: Prior | None,
+) -> tuple[Fit, Selection]:
     """The fit by instruments, where least squares leaves open what a joint without a motor does.
 
-    It has the most common of the chosen terms: the others, and the hold, were judged beside
-    constants near nothing. None where least squares determines them, or instruments do not either.
+    It has the most common of the terms that were `picked`: the others, and the hold, were judged
+    beside constants near nothing. Unchanged where least squares determines them, or instruments do
+    not either.
     """
-    unloaded, loaded = passes(survey, settings)
     passive = any(log.origin.reading.passive for log in survey.logs)
-    if settings.estimator != "refined" or loaded or not passive:
-        return None
-    if doubted_without_motor(fit, unloaded, loaded, weak_settings(settings, chosen)) is fit:
-        return None
-    terms = chosen.model.terms
-    if chosen.chosen_by == "logs":
+    if settings.estimator != "refined" or survey.loaded or not passive:
+        return fit, chosen
+    if doubted_without_motor(fit, problem_of(survey, settings, picked)) is fit:
+        return fit, chosen
+    terms = picked.model.terms
+    if picked.chosen_by == "logs":
         terms = within(terms, FIRST_TERMS)
-    dropped = {trial.term for trial in chosen.trials if trial.kept}.difference(terms)
-    plainer = replace(chosen.left_out(dropped, _BY_NOTHING), delay=False, late=None)
-    model = plainer.model
+    dropped = {trial.term for trial in picked.trials if trial.kept}.difference(terms)
+    plainer = replace(picked.left_out(dropped, _BY_NOTHING), delay=False, late=None)
     if plainer.hold_by == "logs":
         plainer = replace(plainer, hold="foh")
-    ours = weak_settings(settings, plainer)
-    known = without(prior, absent(settings.effort, model.names))
-    better = robust.of_passive_joint(unloaded, ours, settings.lengths, known)
+    better = robust.of_passive_joint(problem_of(survey, settings, plainer, prior))
     if better is None:
-        return None
+        return fit, chosen
     return better, plainer
 
 
@@ -202,38 +184,29 @@ _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"
 
 def _shrunk(
     notes: tuple[Notice, ...],
-    unloaded: Sequence[Pass],
-    loaded: Sequence[Pass],
-    ours: weak.WeakSettings,
+    survey: Recordings,
     settings: Settings,
     chosen: Selection,
     prior: Prior | None,
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk, and its model; `notes` say why no other stands."""
-    hold: Hold = chosen.hold
+    every = tuple(name for name, term in TERMS.items() if term.spread)
+    model = replace(chosen.shapes or chosen.model, terms=every)
+    shrunken = replace(chosen, model=model, shrunk=True, late=None)
     if chosen.hold_by == "logs":
-        hold = "foh"  # else by a likelihood that does not hold: a term takes up the delay
-    shift = replace(ours.shift, held=hold == "zoh")
-    shaped = replace(ours, model=chosen.shapes or chosen.model, shift=shift)
-    every = replace(shaped.model, terms=tuple(name for name, term in TERMS.items() if term.spread))
-    nothing = absent(settings.effort, every.names)
-    known = with_rotors(without(prior, nothing), chosen.model)
-    fit = robust.fit(unloaded, loaded, shaped, settings.lengths, known)
-    fit = replace(fit, notes=notes + fit.notes)
+        # else by a likelihood that does not hold: a term takes up the delay
+        shrunken = replace(shrunken, hold="foh")
+    fit = robust.fit(problem_of(survey, settings, shrunken, with_rotors(prior, chosen.model)))
     terms = fit.shared.model.terms
     if fit.shared.delay:
         terms += DELAYS
-    trials = tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms)
-    shrunken = Selection(
-        fit.shared.model,
-        fit.shared.delay,
-        chosen.chosen_by,
-        trials,
-        shrunk=True,
-        hold=hold,
-        hold_by=chosen.hold_by,
+    shrunken = replace(
+        shrunken,
+        model=fit.shared.model,
+        delay=fit.shared.delay,
+        trials=tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms),
     )
-    return fit, shrunken
+    return replace(fit, notes=notes + fit.notes), shrunken
 
 
 def _scored(
@@ -241,7 +214,7 @@ def _scored(
     settings: Settings,
     sums: dict[Recording, PredictionSums],
     log: Recording,
-    moving: Pass,
+    moving: Source,
 ) -> Iterator[Segment]:
     """A pass that also gathers, once, what the prediction will be scored by."""
     if log in sums:

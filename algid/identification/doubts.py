@@ -11,7 +11,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.innovations import ResidualSums, pooled
 from algid.estimators.prediction import PredictionScore, score
 from algid.estimators.terms import Selection
-from algid.identification.passes import passes, weak_settings
+from algid.identification.passes import problem_of
 from algid.identification.predicted import prediction
 from algid.identification.recordings import Recordings
 from algid.identification.remarks import exchanged
@@ -33,15 +33,14 @@ def residual_of(
     """
     if fit.residual:
         return pooled(fit.residual)
-    windows = weak_settings(settings, chosen)
+    problem = problem_of(survey, settings, chosen)
     if fit.delay is not None:
-        windows = replace(windows.delayed(fit.delay), estimate_delay=False)
-    unloaded, loaded = passes(survey, settings)
+        problem = problem.at(chosen.model, fit.delay)
     sums = []
-    for role, of_role in (("unloaded", unloaded), ("loaded", loaded)):
-        for moving in of_role:
-            c = torque_coefficients(fit, role)
-            of_log = weak.residuals(moving, windows, c)
+    for loaded, sources in problem.kinds():
+        c = torque_coefficients(fit, "loaded" if loaded else "unloaded")
+        for source in sources:
+            of_log = weak.residuals(source, problem.settings, c)
             if of_log is not None:
                 sums.append(of_log)
     return pooled(sums)
@@ -55,8 +54,7 @@ def with_doubt(fit: Fit, survey: Recordings, settings: Settings, chosen: Selecti
     contradiction is reported, as logs in each other's place are.
     """
     if any(log.origin.reading.passive for log in survey.logs):
-        unloaded, loaded = passes(survey, settings)
-        fit = doubted_without_motor(fit, unloaded, loaded, weak_settings(settings, chosen))
+        fit = doubted_without_motor(fit, problem_of(survey, settings, chosen))
     if not (fit.refuted and settings.chooses) or exchanged(fit):
         return fit
     far = []
@@ -71,9 +69,8 @@ def with_doubt(fit: Fit, survey: Recordings, settings: Settings, chosen: Selecti
             return fit
         doubt = Notice("HARDLY_DRIVEN", numbers={"case": "bounds", "bounds": far})
         return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
-    unloaded, loaded = passes(survey, settings)
     common = replace(chosen, model=replace(chosen.model, terms=FIRST_TERMS))
-    return doubted(fit, unloaded, loaded, weak_settings(settings, common))
+    return doubted(fit, problem_of(survey, settings, common))
 
 
 def _explains_little(fit: Fit, survey: Recordings, settings: Settings) -> bool:

@@ -13,7 +13,7 @@ from algid.estimators.fit import Fit
 from algid.estimators.hold import Hold
 from algid.estimators.terms import CHOICE, Selection, TermTrial, needs_shape, price, select
 from algid.identification.known import model_of
-from algid.identification.passes import long_enough, passes, weak_settings
+from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recordings
 from algid.model import CHOICES, COLUMN_NAMES, DELAYS, EVERY_TERM, Model, without_delay
 from algid.physics.effort import absent, without_terms
@@ -81,12 +81,9 @@ def _by_first_pass(survey: Recordings, settings: Settings, hold: Hold) -> Select
         candidates = CHOICE
     elif settings.chooses:
         candidates = without_delay(CHOICE)
-    unloaded, loaded = passes(survey, settings)
     plain = replace(_given(Model(gravity=settings.gravity), ()), hold=hold)
     chosen = select(
-        unloaded,
-        loaded,
-        weak_settings(settings, plain),
+        problem_of(survey, settings, plain),
         without_terms(settings.effort, candidates),
         settings.terms,
         absent(settings.effort, COLUMN_NAMES),

@@ -20,7 +20,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.criteria import HOLE
 from algid.base.significance import NORMAL
-from algid.estimators.too_short import TooShortError
+from algid.estimators.problem import TooShortError
 from algid.signals.segments import Segment
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.cells import CELL, Cells, cells_of, joined

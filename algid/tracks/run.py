@@ -12,7 +12,7 @@ from algid import __version__
 from algid.base.errors import LogError
 from algid.base.files import read_whole
 from algid.base.runtime import one_blas_thread
-from algid.estimators.too_short import TooShortError
+from algid.estimators.problem import TooShortError
 from algid.identification.identify import reused
 from algid.identification.known import contradictions
 from algid.identification.open_logs import LogLike, open_source, read_otherwise

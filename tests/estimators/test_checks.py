@@ -28,7 +28,7 @@ from algid.estimators.fit import finish, own_estimates
 from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, motion_of, score
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.identification.remarks import fit_warnings
 from algid.model import Model
 from algid.signals.segments import Segment
@@ -40,7 +40,7 @@ from .conftest import DT, Bench
 
 
 def test_bounds_hold_for_a_real_arm_and_name_what_breaks(bench: Bench) -> None:
-    fit = weak.fit([lambda: [bench.log(sigma=1e-3)]])
+    fit = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
     assert broken_bounds(fit) == []
     assert constrained(fit) is fit
     values = fit.values.copy()
@@ -54,7 +54,7 @@ def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     # less than no friction
     log = replace(log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega)
-    free = weak.fit([lambda: [log]])
+    free = weak.fit(Problem([lambda: [log]]))
     assert [bound.bound for bound in broken_bounds(free)] == ["k6 >= 0"]
     bound = constrained(free)
     assert broken_bounds(bound) == []
@@ -64,7 +64,9 @@ def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
 def test_only_terms_that_are_there_earn_their_place(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     log = replace(log, tau=log.tau + 0.1 * np.tanh(bench.bare.omega / 0.2))
-    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "rotor"))))
+    fit = weak.fit(
+        Problem([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "rotor"))))
+    )
     worths = {worth.term: worth for worth in term_worths(fit)}
     assert worths["coulomb"].earned
     assert not worths["rotor"].earned
@@ -72,9 +74,9 @@ def test_only_terms_that_are_there_earn_their_place(bench: Bench) -> None:
 
 def test_a_loaded_log_from_another_arm_is_told(bench: Bench) -> None:
     bare, burdened = bench.log(sigma=1e-3), bench.log(True, 1e-3)
-    alike = payload_distance(refined.fit([lambda: [bare]], [lambda: [burdened]]))
+    alike = payload_distance(refined.fit(Problem([lambda: [bare]], [lambda: [burdened]])))
     other = replace(burdened, tau=burdened.tau + np.array([[0.05], [0.05]]) * bench.burdened.omega)
-    apart = payload_distance(refined.fit([lambda: [bare]], [lambda: [other]]))
+    apart = payload_distance(refined.fit(Problem([lambda: [bare]], [lambda: [other]])))
     assert alike is not None
     assert apart is not None
     assert alike < 3
@@ -106,17 +108,17 @@ def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
 
 def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
     sources: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=seed)]) for seed in range(3)]
-    fit = weak.fit(sources)
+    fit = weak.fit(Problem(sources))
     found = cross_validate(fit, sources)
     assert found is not None
     others = [sources[:place] + sources[place + 1 :] for place in range(3)]
     by_hand = [
-        score(Model(), weak.fit(rest).values, source()).residual
+        score(Model(), weak.fit(Problem(rest)).values, source()).residual
         for rest, source in zip(others, sources, strict=True)
     ]
     # of noise alone; the weights of the joints are each fit's own
     assert np.allclose(found.residual, np.sum(by_hand, axis=0), rtol=0.01)
-    assert cross_validate(weak.fit(sources[:1]), sources[:1]) is None
+    assert cross_validate(weak.fit(Problem(sources[:1])), sources[:1]) is None
 
 
 def test_directions_without_information_are_put_in_words() -> None:
@@ -242,7 +244,7 @@ def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Be
         for log, share in zip(logs, frictions, strict=True)
     ]
     sources: list[Source] = [partial(list, [log]) for log in logs]
-    three, five = weak.fit(sources[:3]), weak.fit(sources)
+    three, five = weak.fit(Problem(sources[:3])), weak.fit(Problem(sources))
     assert (three.intervals, five.intervals) == ("sandwich", "jackknife")
     expected = bench.arm.b1 * frictions.std(ddof=1) / np.sqrt(5)
     # logs weigh by how well the joint estimate fits them
@@ -255,7 +257,7 @@ def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Be
 def test_friction_that_is_not_there_has_its_error_bar(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     log = replace(log, tau=log.tau - np.array([[bench.arm.b1], [bench.arm.b2]]) * bench.bare.omega)
-    fit = weak.fit([partial(list, [log])], settings=WeakSettings(Model(("coulomb",))))
+    fit = weak.fit(Problem([partial(list, [log])], settings=WeakSettings(Model(("coulomb",)))))
     assert set(fit.status) == {"OK"}
     assert np.all(np.abs(fit.values[5:]) < 4.5 * fit.std[5:])
     assert np.all(fit.std[5:] < 0.02)
@@ -301,7 +303,7 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     for seed, mass in enumerate(masses):
         log = bench.log(loaded=True, sigma=1e-4, seed=seed)
         burdened.append(partial(list, [replace(log, tau=log.tau + (mass - bench.payload) * share)]))
-    fit = weak.fit(bare, burdened, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})
+    fit = weak.fit(Problem(bare, burdened, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
     found = repeatability(fit)
     assert found is not None
     np.testing.assert_allclose(found.masses, masses, atol=6e-4)
@@ -311,7 +313,7 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     assert high / found.std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
     assert (
         repeatability(
-            weak.fit(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2})
+            weak.fit(Problem(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
         )
         is None
     )
@@ -319,7 +321,7 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
 
 def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) -> None:
     """k1 k2 = m2² g l1 lc2² (Table 1); logs in each other's place make a payload below nothing."""
-    fit = weak.fit([lambda: [bench.log(sigma=1e-3)]])
+    fit = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
     turned = replace(fit, values=fit.values * np.array([1, -1, 1, 1, 1, 1, 1]))
     (broken,) = [bound for bound in broken_bounds(turned) if bound.bound == "k1 k2 >= 0"]
     assert broken.distance is not None
@@ -330,11 +332,11 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     (broken,) = [bound for bound in broken_bounds(inside_out) if bound.bound == "k5 >= 0"]
     assert broken.distance == pytest.approx(fit.values[4] / fit.std[4])
     both = weak.fit(
-        [lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]]
+        Problem([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
     )
     assert any(warning.code == "LOGS_APART" for warning in fit_warnings(both))
     right = weak.fit(
-        [lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]]
+        Problem([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
     )
     assert not any(warning.code == "LOGS_APART" for warning in fit_warnings(right))
 
@@ -345,7 +347,7 @@ def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
 ) -> None:
     """By the least eigenvalue of M(θ2), eq. (2), with the rotor in M22, over a turn."""
     settings = WeakSettings(Model(("rotor",) if rotor else ()))
-    fit = weak.fit([partial(list, [bench.log(sigma=1e-3)])], settings=settings)
+    fit = weak.fit(Problem([partial(list, [bench.log(sigma=1e-3)])], settings=settings))
     rng = np.random.default_rng(0)
     seen = set()
     for _ in range(200):
@@ -388,7 +390,7 @@ def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Be
     )
     for share, told in ((0.0, False), (0.5, True)):
         compensated = replace(log, tau=log.tau - share * weight)
-        fit = weak.fit([partial(list, [compensated])], lengths=lengths)
+        fit = weak.fit(Problem([partial(list, [compensated])], lengths=lengths))
         found = length_by_constants(fit)
         assert found is not None
         assert found[0] == pytest.approx(bench.arm.l1 / (1 - share), rel=0.05)

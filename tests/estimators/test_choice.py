@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.terms import CHOICE, Selection, needs_shape, select
-from algid.estimators.weak import Source, WeakSettings
 from algid.model import EVERY_TERM, TERMS, Model
 from algid.signals.segments import Segment
 from tests.estimators.conftest import Bench
@@ -19,7 +19,7 @@ SETTINGS = WeakSettings(bandwidth=60.0)
 
 
 def _of(log: Segment, **asked: object) -> Selection:
-    return select([partial(list, [log])], [], SETTINGS, **asked)  # type: ignore[arg-type]
+    return select(Problem([partial(list, [log])], [], SETTINGS), **asked)  # type: ignore[arg-type]
 
 
 def _chosen(bench: Bench, terms: tuple[str, ...], **asked: object) -> Selection:
@@ -27,7 +27,7 @@ def _chosen(bench: Bench, terms: tuple[str, ...], **asked: object) -> Selection:
     values = term_values(bench, terms)
     bare, burdened = (term_log(bench, model, values, loaded) for loaded in (False, True))
     unloaded: list[Source] = [partial(list, [bare])]
-    return select(unloaded, [partial(list, [burdened])], SETTINGS, **asked)  # type: ignore[arg-type]
+    return select(Problem(unloaded, [partial(list, [burdened])], SETTINGS), **asked)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -125,4 +125,4 @@ def test_torque_that_no_term_explains_refutes_the_first_pass(bench: Bench) -> No
 
 def test_logs_too_short_for_a_window_are_refused() -> None:
     with pytest.raises(ValueError, match="no log is long enough"):
-        select([list], [], SETTINGS)
+        select(Problem([list], [], SETTINGS))

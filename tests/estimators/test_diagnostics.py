@@ -27,7 +27,7 @@ from algid.estimators.diagnostics import (
 from algid.estimators.doubt import UNLIKE
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import Model
 from algid.notices import Notice
 
@@ -156,22 +156,24 @@ def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
     for seed in range(12):
         logs = [bench.log(loaded, 1e-3, 20 + seed) for loaded in (False, True)]
         found.append(
-            payload_distance(weak.fit([partial(list, logs[:1])], [partial(list, logs[1:])]))
+            payload_distance(
+                weak.fit(Problem([partial(list, logs[:1])], [partial(list, logs[1:])]))
+            )
         )
     apart = [distance for distance in found if distance is not None]
     assert len(apart) == 12
     assert max(apart) < 5
     other = replace(logs[1], tau=logs[1].tau + 0.5 * bench.arm.b2 * bench.burdened.omega)
-    told = payload_distance(weak.fit([partial(list, logs[:1])], [partial(list, [other])]))
+    told = payload_distance(weak.fit(Problem([partial(list, logs[:1])], [partial(list, [other])])))
     assert told is not None
     assert told > 5
 
 
 def test_a_payload_that_one_kind_of_log_cannot_tell_has_no_distance(bench: Bench) -> None:
     bare: Source = partial(list, [bench.log(sigma=1e-3)])
-    fit = weak.fit([bare], [partial(list, [bench.log(True, 1e-3)])])
+    fit = weak.fit(Problem([bare], [partial(list, [bench.log(True, 1e-3)])]))
     assert payload_distance(fit) is not None
-    assert payload_distance(weak.fit([bare])) is None
+    assert payload_distance(weak.fit(Problem([bare]))) is None
     first, second = fit.logs
     S = second.S.copy()
     S[:, 6] = S[:, :, 6] = 0.0  # nothing of k7
@@ -182,7 +184,7 @@ def test_a_payload_that_one_kind_of_log_cannot_tell_has_no_distance(bench: Bench
 def test_a_loaded_log_that_tells_no_mass_has_no_repeatability(bench: Bench) -> None:
     lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
     burdened = [lambda: [bench.log(True, 1e-3, 1)], lambda: [bench.log(True, 1e-3, 2)]]
-    fit = weak.fit([lambda: [bench.log(sigma=1e-3)]], burdened, lengths=lengths)
+    fit = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]], burdened, lengths=lengths))
     assert repeatability(fit) is not None
     empty = replace(fit.logs[2], S=np.zeros_like(fit.logs[2].S))
     assert repeatability(replace(fit, logs=(*fit.logs[:2], empty))) is None

@@ -15,8 +15,8 @@ from algid.estimators import doubt, robust, weak
 from algid.estimators.diagnostics import ratio_of_joints
 from algid.estimators.doubt import UNLIKE, UNLIKE_IN_MANY, doubted
 from algid.estimators.fit import Fit
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.robust import unshrunk
-from algid.estimators.weak import Source, WeakSettings
 from algid.model import RIGID, Model
 from algid.notices import Notice
 from algid.signals.segments import Segment
@@ -58,8 +58,8 @@ def test_a_joint_whose_torque_counts_the_other_way_has_a_negative_ratio(bench: B
 def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     idle = replace(log, tau=log.tau * np.array([[1.0], [0.02]]))
-    fit = replace(weak.fit([lambda: [idle]]), notes=(REFUTED,))
-    found = doubted(fit, [lambda: [idle]], [], WeakSettings())
+    fit = replace(weak.fit(Problem([lambda: [idle]])), notes=(REFUTED,))
+    found = doubted(fit, Problem([lambda: [idle]]))
     assert _statuses(fit) == dict.fromkeys(fit.names, "OK")
     assert _statuses(found) == {
         name: "OK" if name in ("k6", "k7") else "WEAK_EXCITATION" for name in fit.names
@@ -87,7 +87,7 @@ def test_torques_that_contradict_each_other_are_told_by_any_number_of_logs(
     scale = np.array([[1.0], [factor]])
     logs = [replace(log, tau=log.tau * scale) for log in _runs(bench, count)]
     sources: list[Source] = [partial(list, [log]) for log in logs]
-    found = doubted(weak.fit(sources), sources, [], WeakSettings())
+    found = doubted(weak.fit(Problem(sources)), Problem(sources, [], WeakSettings()))
     assert ("JOINTS_CONTRADICT" in [note.code for note in found.notes]) is told
     assert ("WEAK_EXCITATION" in found.status) is told
 
@@ -100,7 +100,7 @@ def _runs(bench: Bench, count: int) -> list[Segment]:
 def test_a_gain_far_outside_its_prior_is_found_without_it(bench: Bench, factor: float) -> None:
     scale = np.array([[1.0], [factor]])
     logs = [replace(log, tau=log.tau * scale) for log in _runs(bench, 4)]
-    drawn = robust.fit([partial(list, [log]) for log in logs])
+    drawn = robust.fit(Problem([partial(list, [log]) for log in logs]))
     free = unshrunk(drawn, "gain2")
     place = drawn.names.index("gain2")
     assert free.values[place] > free.quantile * free.std[place]
@@ -116,8 +116,8 @@ def test_a_joint_that_is_driven_in_no_log_is_told_where_the_other_does_not_contr
     monkeypatch.setattr(doubt, "ratio_of_joints", lambda *_: None)
     log = bench.log(sigma=1e-4)
     idle = replace(log, tau=log.tau * np.array([[1.0], [share]]))
-    fit = replace(weak.fit([lambda: [idle]]), notes=(REFUTED,))
-    notes = doubted(fit, [lambda: [idle]], [], WeakSettings()).notes[1:]
+    fit = replace(weak.fit(Problem([lambda: [idle]])), notes=(REFUTED,))
+    notes = doubted(fit, Problem([lambda: [idle]])).notes[1:]
     assert [note.code for note in notes] == ["HARDLY_DRIVEN"] * told
     assert all("joint 2 is hardly driven (under 10 %" in note.text for note in notes)
 
@@ -131,8 +131,8 @@ def test_a_light_second_link_is_driven(bench: Bench) -> None:
     assert size[1] < 0.02 * size[0]
     tau = motion.tau + 0.01 * size * rng.standard_normal(motion.tau.shape)
     log = Segment(0.0, DT, motion.theta + 1e-4 * rng.standard_normal(tau.shape), tau)
-    fit = replace(weak.fit([lambda: [log]]), notes=(REFUTED,))
-    assert doubted(fit, [lambda: [log]], [], WeakSettings()) is fit
+    fit = replace(weak.fit(Problem([lambda: [log]])), notes=(REFUTED,))
+    assert doubted(fit, Problem([lambda: [log]])) is fit
 
 
 def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
@@ -141,18 +141,18 @@ def test_a_loaded_log_is_held_against_itself(bench: Bench) -> None:
     """
     bare, burdened = bench.log(sigma=1e-4), bench.log(True, 1e-4)
     sources = [lambda: [bare]], [lambda: [burdened]]
-    assert set(doubted(weak.fit(*sources), *sources, WeakSettings()).status) == {"OK"}
+    assert set(doubted(weak.fit(Problem(*sources)), Problem(*sources)).status) == {"OK"}
     idle = replace(burdened, tau=burdened.tau * np.array([[0.02], [1.0]]))
     wrong = [lambda: [bare]], [lambda: [idle]]
-    assert "WEAK_EXCITATION" in doubted(weak.fit(*wrong), *wrong, WeakSettings()).status
+    assert "WEAK_EXCITATION" in doubted(weak.fit(Problem(*wrong)), Problem(*wrong)).status
 
 
 def test_a_refuted_log_in_which_a_joint_stood_still_is_not_ok(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     tremble = 1e-3 * np.sin(40 * log.t)  # backlash, say: told well enough to be determined
     still = replace(log, theta=np.stack([log.theta[0], 0.3 + tremble]))
-    fit = weak.fit([lambda: [still]])
-    found = doubted(fit, [lambda: [still]], [], WeakSettings())
+    fit = weak.fit(Problem([lambda: [still]]))
+    found = doubted(fit, Problem([lambda: [still]]))
     assert "joint 2 never moved: give a log in which both joints do" in [
         note.text for note in found.notes
     ]
@@ -161,7 +161,7 @@ def test_a_refuted_log_in_which_a_joint_stood_still_is_not_ok(bench: Bench) -> N
         for name, word in _statuses(found).items()
         if name in ("k1", "k2", "k3", "k4", "k5") and word == "OK"
     ]
-    with_motion = doubted(weak.fit([lambda: [log]]), [lambda: [log]], [], WeakSettings())
+    with_motion = doubted(weak.fit(Problem([lambda: [log]])), Problem([lambda: [log]]))
     assert with_motion.notes == ()
 
 
@@ -174,7 +174,7 @@ def test_an_arm_that_a_payload_outweighs_is_not_thrown_away(bench: Bench) -> Non
     motion = simulate(heavy, wide, np.arange(4001) * DT)
     bare, burdened = bench.log(sigma=1e-4), Segment(0.0, DT, motion.theta, motion.tau)
     assert np.all(np.std(burdened.tau, axis=1) > 5 * np.std(bare.tau, axis=1))
-    fit = robust.fit([lambda: [bare]], [lambda: [burdened]])
+    fit = robust.fit(Problem([lambda: [bare]], [lambda: [burdened]]))
     assert set(fit.status) == {"OK"}
     for name, true in zip(RIGID, bench.truth, strict=False):
         assert fit.values[fit.names.index(name)] == pytest.approx(true, rel=0.02), name

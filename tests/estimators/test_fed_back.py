@@ -13,7 +13,7 @@ import numpy as np
 
 from algid.estimators import refined
 from algid.estimators.fit import Fit
-from algid.estimators.weak import WeakSettings
+from algid.estimators.problem import Problem, WeakSettings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
@@ -45,7 +45,7 @@ def follower() -> Segment:
 
 
 def fitted(log: Segment) -> Fit:
-    return refined.fit([lambda: [log]], (), WeakSettings(shift=TorqueShift(held=True)))
+    return refined.fit(Problem([lambda: [log]], (), WeakSettings(shift=TorqueShift(held=True))))
 
 
 def test_noise_that_is_fed_back_is_no_delay() -> None:

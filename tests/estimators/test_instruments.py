@@ -13,7 +13,7 @@ import pytest
 from algid.estimators import instruments, refined, terms, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import Model, Motion, acceleration, torque
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -28,8 +28,8 @@ def test_instruments_undo_most_of_what_a_disturbance_does() -> None:
     made = scene(1, feedback=False)
     logs = [Segment(0.0, DT, *log) for log in zip(made.theta, made.tau, strict=True)]
     sources: list[Source] = [partial(list, [log]) for log in logs]
-    least = weak.fit(sources)
-    found = instruments.fit(sources, start=least)
+    least = weak.fit(Problem(sources))
+    found = instruments.fit(Problem(sources), start=least)
     assert found.estimator == "instruments"
     truth = made.arm.constants()
     inertias = [0, 2, 4]
@@ -43,8 +43,8 @@ def test_a_payload_of_nothing_has_its_error_bar_where_lengths_are_known(bench: B
     unloaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=1)])]
     loaded: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=2)])]
     for fit in (
-        weak.fit(unloaded, loaded, lengths=lengths),
-        refined.fit(unloaded, loaded, lengths=lengths),
+        weak.fit(Problem(unloaded, loaded, lengths=lengths)),
+        refined.fit(Problem(unloaded, loaded, lengths=lengths)),
     ):
         place = fit.names.index("m_p")
         assert fit.status[place] == "OK"
@@ -142,8 +142,8 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     assert found is not None
     assert found.astray == found.rows > 0
     assert not found.gram.any()
-    least = weak.fit([lambda: [log]])
-    astray = instruments.fit([lambda: [log]], start=replace(least, values=-least.values))
+    least = weak.fit(Problem([lambda: [log]]))
+    astray = instruments.fit(Problem([lambda: [log]]), start=replace(least, values=-least.values))
     assert (astray.converged, set(astray.status), astray.estimator) == (
         False,
         {"NOT_CONVERGED"},
@@ -161,8 +161,8 @@ def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turn
 
 def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
-    least = weak.fit([lambda: [log]])
-    found = instruments.fit([lambda: [log]], start=least)
+    least = weak.fit(Problem([lambda: [log]]))
+    found = instruments.fit(Problem([lambda: [log]]), start=least)
     np.testing.assert_array_equal(found.moved, least.moved)
     k4 = float(least.values[3])
     sure = Prior(
@@ -170,7 +170,7 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
         np.array([*least.values[:3], 1.01 * k4]),
         np.diag([0, 0, 0, 1e10 / k4**2]),
     )
-    told = instruments.fit([lambda: [log]], prior=sure)
+    told = instruments.fit(Problem([lambda: [log]], prior=sure))
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4
@@ -186,7 +186,7 @@ def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.Monke
         return [bench.log(sigma=1e-3, seed=number)]
 
     sources: list[Source] = [partial(source, number) for number in range(4)]
-    assert not terms.select(sources, [], WeakSettings()).model.terms
+    assert not terms.select(Problem(sources, [], WeakSettings())).model.terms
     assert looked_at == [0, 2]
 
 

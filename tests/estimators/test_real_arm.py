@@ -12,7 +12,7 @@ from algid.estimators import refined, weak
 from algid.estimators.diagnostics import term_worths
 from algid.estimators.doubt import doubted
 from algid.estimators.prediction import cross_validate
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import Model
 from algid.signals.segments import Segment
 
@@ -44,7 +44,7 @@ def _run(path: Path) -> Segment:
 
 
 def test_prediction_beats_the_published_parameters(sources: list[Source]) -> None:
-    fit = refined.fit(sources, settings=WeakSettings(Model(("coulomb", "rotor"))))
+    fit = refined.fit(Problem(sources, settings=WeakSettings(Model(("coulomb", "rotor")))))
     assert fit.refuted  # an arm's torque error is no white noise
     assert fit.unidentifiable == ()
     found = cross_validate(fit, sources)
@@ -55,13 +55,14 @@ def test_prediction_beats_the_published_parameters(sources: list[Source]) -> Non
 def test_the_differentiators_bandwidth_does_not_move_k2(sources: list[Source]) -> None:
     model = Model(("coulomb", "rotor"))
     narrow, wide = (
-        weak.fit(sources, settings=WeakSettings(model, bandwidth=hertz)) for hertz in (10.0, 30.0)
+        weak.fit(Problem(sources, settings=WeakSettings(model, bandwidth=hertz)))
+        for hertz in (10.0, 30.0)
     )
     assert abs(narrow.values[1] - wide.values[1]) < wide.std[1]
 
 
 def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source]) -> None:
-    fit = weak.fit(sources, settings=WeakSettings(Model(("coulomb", "offset", "rotor"))))
+    fit = weak.fit(Problem(sources, settings=WeakSettings(Model(("coulomb", "offset", "rotor")))))
     assert {worth.term: worth.earned for worth in term_worths(fit)} == {
         "coulomb": True,
         "offset": False,
@@ -78,10 +79,8 @@ def test_runs_in_which_a_joint_is_hardly_driven_are_not_ok_alone() -> None:
     for name in ("143747", "143906", "144115", "143524", "154220"):
         log = _run(RUNS / f"20230629-{name}.csv")
         found = doubted(
-            weak.fit([partial(list, [log])], settings=settings),
-            [partial(list, [log])],
-            [],
-            settings,
+            weak.fit(Problem([partial(list, [log])], settings=settings)),
+            Problem([partial(list, [log])], [], settings),
         )
         in_doubt[name] = "OK" not in found.status[:5]
     assert in_doubt == {

@@ -9,8 +9,8 @@ import pytest
 from scipy.signal import lfilter
 
 from algid.arm import FloatArray
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.references import followed
-from algid.estimators.weak import Source, WeakSettings
 from algid.log import Log, Origin, join
 from algid.signals.segments import Segment, segments
 
@@ -44,7 +44,7 @@ def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() 
     coefficients in the independent samples, some 30 in 6 × 16 s / 0.2 s.
     """
     made = [log(seed) for seed in range(6)]
-    found = followed(sources_of(*(one for one, _ in made)), SETTINGS)
+    found = followed(Problem(sources_of(*(one for one, _ in made)), settings=SETTINGS))
     assert found is not None
     piece, clean = made[0]
     motion = found.motion(piece)
@@ -59,7 +59,7 @@ def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() 
 def test_velocities_are_those_of_the_explained_motion() -> None:
     piece, _ = log(0, disturbance=0.0)
     piece = replace(piece, omega=np.gradient(piece.theta, DT, axis=1))
-    found = followed(sources_of(piece), SETTINGS)
+    found = followed(Problem(sources_of(piece), settings=SETTINGS))
     assert found is not None
     motion = found.motion(piece)
     assert motion is not None
@@ -71,11 +71,11 @@ def test_velocities_are_those_of_the_explained_motion() -> None:
 
 def test_what_the_arm_does_not_follow_is_no_instrument() -> None:
     piece, _ = log(0)
-    assert followed(sources_of(piece), SETTINGS) is not None
+    assert followed(Problem(sources_of(piece), settings=SETTINGS)) is not None
     other = np.sin(2 * np.pi * 2.9 * piece.t + np.array([[0.0], [1.0]]))
-    assert followed(sources_of(replace(piece, reference=other)), SETTINGS) is None
+    assert followed(Problem(sources_of(replace(piece, reference=other)), settings=SETTINGS)) is None
     held = replace(piece, reference=np.zeros_like(piece.theta))
-    assert followed(sources_of(held), SETTINGS) is None
+    assert followed(Problem(sources_of(held), settings=SETTINGS)) is None
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
@@ -87,19 +87,26 @@ def test_where_a_reference_is_missing_it_stands_still(value: float) -> None:
     held = piece.reference.copy()
     held[:, :300] = held[:, 300:301]
     found, same = (
-        followed(sources_of(replace(piece, reference=one)), SETTINGS) for one in (holed, held)
+        followed(Problem(sources_of(replace(piece, reference=one)), settings=SETTINGS))
+        for one in (holed, held)
     )
     assert found is not None
     assert same is not None
     assert np.array_equal(found.B, same.B)
     holed[:, : len(piece) // 2 + 1] = value
-    assert followed(sources_of(piece, replace(piece, reference=holed)), SETTINGS) is None
+    assert (
+        followed(Problem(sources_of(piece, replace(piece, reference=holed)), settings=SETTINGS))
+        is None
+    )
 
 
 def test_logs_without_a_reference_have_no_such_instrument() -> None:
     piece, _ = log(0)
-    assert followed(sources_of(piece, replace(piece, reference=None)), SETTINGS) is None
-    assert followed([], SETTINGS) is None
+    assert (
+        followed(Problem(sources_of(piece, replace(piece, reference=None)), settings=SETTINGS))
+        is None
+    )
+    assert followed(Problem([], settings=SETTINGS)) is None
 
 
 def test_a_reference_goes_where_its_samples_go() -> None:

@@ -7,8 +7,8 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators import robust
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.repeats import grouped
-from algid.estimators.weak import Source, WeakSettings
 from algid.signals.segments import Segment
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
@@ -45,7 +45,7 @@ def test_a_repeat_may_be_recorded_some_seconds_later() -> None:
 
 
 def fitted(logs: list[Segment]) -> tuple[FloatArray, FloatArray]:
-    found = robust.fit([source(log) for log in logs], (), WeakSettings(bandwidth=60.0))
+    found = robust.fit(Problem([source(log) for log in logs], (), WeakSettings(bandwidth=60.0)))
     return found.values[:7], found.std[:7]
 
 

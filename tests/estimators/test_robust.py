@@ -18,8 +18,8 @@ from algid.estimators import instruments, robust, weak
 from algid.estimators.combine import LogInformation, Prior, joined, sandwich, scatters
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.robust import Expected, RobustProblem, _crossed, dispersion, shrink
-from algid.estimators.weak import Source, WeakSettings
 from algid.model import TERMS, Model
 from algid.signals.segments import Segment
 from pipelines.disturbed import DT, NAMES, Scene, scene
@@ -151,7 +151,7 @@ def test_two_priors_know_what_each_knows() -> None:
 
 
 def least_squares(sources: Sequence[Source], settings: WeakSettings) -> Fit:
-    return RobustProblem.of(sources, (), settings).least_squares()
+    return RobustProblem.of(Problem(sources, (), settings)).least_squares()
 
 
 def _rubbing(bench: Bench, part: slice) -> Segment:
@@ -173,10 +173,10 @@ def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
     same = WeakSettings(
         found.shared.model, bandwidth=60.0, estimate_delay=True, rest=(still[0], still[1])
     )
-    free = weak.fit(sources, settings=same)
+    free = weak.fit(Problem(sources, settings=same))
     phi = np.trace(free.logs[0].total[0]) / np.trace(found.logs[0].total[0])
     prior = Prior(found.shrinkage.names, found.shrinkage.mean, phi * found.shrinkage.precision)
-    every = weak.fit(sources, settings=same, prior=prior)
+    every = weak.fit(Problem(sources, settings=same, prior=prior))
     assert every.names == found.names
     # weights rest on another residual
     np.testing.assert_allclose(every.values[:7], found.values[:7], rtol=6e-3)
@@ -240,7 +240,7 @@ def sources_of(made: Scene, *, reference: bool = False) -> list[Source]:
 
 def settled(made: Scene, *, reference: bool = False) -> tuple[Fit, Fit]:
     """By least squares, and what stands in the end."""
-    problem = RobustProblem.of(sources_of(made, reference=reference), (), SETTINGS)
+    problem = RobustProblem.of(Problem(sources_of(made, reference=reference), (), SETTINGS))
     least = problem.least_squares()
     return least, problem.instruments_if_endogenous(least)
 
@@ -269,10 +269,10 @@ def test_feedback_is_said_and_leaves_least_squares() -> None:
     least, found = settled(made)
     assert found.values == pytest.approx(least.values)
     assert [note.code for note in found.notes] == ["FEEDBACK"]
-    problem = RobustProblem.of(sources_of(made), (), SETTINGS)
+    problem = RobustProblem.of(Problem(sources_of(made), (), SETTINGS))
     by_instruments = problem.by_instruments(least, least.values)
     assert by_instruments is not None
-    watched = robust.with_feedback_noted(by_instruments, sources_of(made), (), problem.settings)
+    watched = robust.with_feedback_noted(by_instruments, problem.problem)
     assert [note.code for note in watched.notes] == ["FEEDBACK"]
 
 
@@ -285,10 +285,10 @@ def test_a_reference_is_the_instrument_under_feedback() -> None:
     assert [note.code for note in found.notes] == ["INSTRUMENTS"]
     assert off(found, made).max() < 1
     assert off(found, made)[0] < 0.5 * off(least, made)[0]  # k1 is attenuated most
-    sources = sources_of(made, reference=True)
-    assert robust.with_feedback_noted(found, sources, (), SETTINGS).notes == found.notes
-    asked = instruments.fit(sources_of(made, reference=True), settings=SETTINGS)
-    by_torque = instruments.fit(sources_of(made), settings=SETTINGS)
+    problem = Problem(sources_of(made, reference=True), settings=SETTINGS)
+    assert robust.with_feedback_noted(found, problem).notes == found.notes
+    asked = instruments.fit(problem)
+    by_torque = instruments.fit(Problem(sources_of(made), settings=SETTINGS))
     truth = made.arm.constants()[:5]
     error, worse = (np.abs(fit.values[:5] / truth - 1).mean() for fit in (asked, by_torque))
     assert error < 0.5 * worse
@@ -311,7 +311,7 @@ def rubbing(bench: Bench) -> Source:
 
 
 def test_the_covariance_grows_by_the_mean_square_of_what_other_windows_move(bench: Bench) -> None:
-    problem = RobustProblem.of([rubbing(bench)], (), WeakSettings())
+    problem = RobustProblem.of(Problem([rubbing(bench)], (), WeakSettings()))
     least = problem.least_squares()
     found = problem.with_window_scatter(least, least)
     moved = [problem.least_squares(window).values - least.values for window in (0.5, 2.0)]
@@ -330,7 +330,7 @@ def test_the_covariance_grows_by_the_mean_square_of_what_other_windows_move(benc
 def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) -> None:
     """Run 7 of design A.0 was 3.9 standard deviations of the difference off."""
     runs = [even(log) for log in runs_of(shared_data, "A.0")]
-    alone = RobustProblem.of([partial(list, [runs[6]])], (), WeakSettings())
+    alone = RobustProblem.of(Problem([partial(list, [runs[6]])], (), WeakSettings()))
     least = alone.least_squares()
     others: list[Source] = [partial(list, [run]) for place, run in enumerate(runs) if place != 6]
     rest = least_squares(others, WeakSettings())

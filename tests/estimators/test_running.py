@@ -8,6 +8,7 @@ import pytest
 from algid.estimators import refined, weak
 from algid.estimators.combine import combine
 from algid.estimators.fit import Fit, Status
+from algid.estimators.problem import Problem
 from algid.estimators.running import has_running, running
 from algid.estimators.whitening import NoiseLevels
 from algid.signals.segments import Segment
@@ -22,7 +23,11 @@ def _source(segment: Segment):  # type: ignore[no-untyped-def]
 def _fit(bench: Bench, estimator: str, seed: int, loaded: bool) -> Fit:
     bare = [_source(bench.log(sigma=1e-4, seed=seed))]
     burdened = [_source(bench.log(True, sigma=1e-4, seed=seed))] if loaded else []
-    return weak.fit(bare, burdened) if estimator == "weak" else refined.fit(bare, burdened)
+    return (
+        weak.fit(Problem(bare, burdened))
+        if estimator == "weak"
+        else refined.fit(Problem(bare, burdened))
+    )
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])
@@ -57,7 +62,9 @@ def test_a_log_that_begins_at_rest_begins_with_nothing(bench: Bench) -> None:
         np.concatenate([still, log.theta], axis=1),
         np.concatenate([still, log.tau], axis=1),
     )
-    found = running(weak.fit([_source(rest)]), [6.0], 30)  # pytest makes an overflow an error
+    found = running(
+        weak.fit(Problem([_source(rest)])), [6.0], 30
+    )  # pytest makes an overflow an error
     assert np.isnan(found.beta[0]).any()
     assert np.isfinite(found.beta[-1]).all()
 
@@ -68,7 +75,9 @@ def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
     """
     log = bench.log(sigma=1e-4, seed=2)
     known = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-3))
-    whole, half = (refined.fit([_source(log.part(0, end))], noise=known) for end in (4001, 2001))
+    whole, half = (
+        refined.fit(Problem([_source(log.part(0, end))]), noise=known) for end in (4001, 2001)
+    )
     found = running(whole, [4.0], 8)
     place = int(np.argmin(np.abs(found.share - 0.5)))
     assert found.share[place] == pytest.approx(0.5, abs=0.01)

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from algid.arm import CONSTANT_NAMES, FloatArray, forward_dynamics, with_payload
 from algid.estimators import refined, weak
 from algid.estimators.fit import Fit
+from algid.estimators.problem import Problem, WeakSettings
 from algid.model import TERMS, UNITS, Model, Motion
 from algid.signals.segments import Segment
 from tests.estimators.by_hand import evaluated, torque_by_hand
@@ -95,8 +96,8 @@ def _behind(tau: FloatArray, lag: float) -> FloatArray:
 def _fit(estimator: str, model: Model, log: Segment, loaded: Segment | None = None) -> Fit:
     logs = [lambda: [log]], [] if loaded is None else [lambda: [loaded]]
     if estimator == "weak":
-        return weak.fit(*logs, settings=weak.WeakSettings(model=model))
-    return refined.fit(*logs, settings=weak.WeakSettings(model=model))
+        return weak.fit(Problem(*logs, settings=WeakSettings(model=model)))
+    return refined.fit(Problem(*logs, settings=WeakSettings(model=model)))
 
 
 @pytest.mark.parametrize("estimator", ["weak", "refined"])

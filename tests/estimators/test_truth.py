@@ -17,7 +17,7 @@ from algid.arm import mass_matrix, passive_torque, with_payload
 from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
 from algid.estimators.prediction import cross_validate, score
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import TERMS as MODEL_TERMS
 from algid.model import Model
 from algid.signals.segments import Segment
@@ -106,8 +106,10 @@ def _fit(estimator: str, terms: str, unloaded: list[Source], loaded: list[Source
     delay = "delay" in terms
     settings = WeakSettings(model, shift=TorqueShift(hold == "zoh"), estimate_delay=delay)
     if estimator != "refined":
-        return (weak if estimator == "weak" else instruments).fit(unloaded, loaded, settings)
-    return refined.fit(unloaded, loaded, settings)
+        return (weak if estimator == "weak" else instruments).fit(
+            Problem(unloaded, loaded, settings)
+        )
+    return refined.fit(Problem(unloaded, loaded, settings))
 
 
 def _truth(fit: Fit) -> np.ndarray:

@@ -10,7 +10,7 @@ from algid.estimators import weak
 from algid.estimators import weak as normal
 from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.parametrisation import Shared
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
@@ -27,18 +27,18 @@ def _cut(log: Segment, *edges: int) -> list[Segment]:
 
 
 def test_exact_logs_give_the_constants_and_the_payload(bench: Bench) -> None:
-    fit = weak.fit([lambda: [bench.log()]], [lambda: [bench.log(loaded=True)]])
+    fit = weak.fit(Problem([lambda: [bench.log()]], [lambda: [bench.log(loaded=True)]]))
     assert fit.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "m_p", "l1", "l2")
     assert np.allclose(fit.values, bench.truth, rtol=1e-4)  # the differentiator's ripple
     assert set(fit.status) == {"OK"}
 
 
 def test_recorded_velocities_serve_as_well(bench: Bench) -> None:
-    fit = weak.fit([lambda: [bench.log()]], settings=WeakSettings(bandwidth=None))
+    fit = weak.fit(Problem([lambda: [bench.log()]], settings=WeakSettings(bandwidth=None)))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-6)  # quadrature alone
     without = replace(bench.log(), omega=None)
     with pytest.raises(ValueError, match="no velocities"):
-        weak.fit([lambda: [without]], settings=WeakSettings(bandwidth=None))
+        weak.fit(Problem([lambda: [without]], settings=WeakSettings(bandwidth=None)))
 
 
 def test_blocks_of_any_size_give_the_same_normal_equations(
@@ -71,7 +71,7 @@ def test_intervals_of_a_long_log_hold() -> None:
     def ratios(seed: int) -> FloatArray:
         noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
         log = Segment(0.0, dt, motion.theta + 1e-4 * noise[0], motion.tau + 1e-2 * noise[1])
-        fit = weak.fit([lambda: [log]])
+        fit = weak.fit(Problem([lambda: [log]]))
         assert fit.intervals == "sandwich"
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
@@ -81,7 +81,7 @@ def test_intervals_of_a_long_log_hold() -> None:
 def test_a_gap_starts_new_windows(bench: Bench) -> None:
     log = bench.log()
     first, second = log.part(0, 1800), replace(log.part(2300, 4001), continues=False)
-    fit = weak.fit([lambda: [first, second]])
+    fit = weak.fit(Problem([lambda: [first, second]]))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-3)
 
 
@@ -89,13 +89,15 @@ def test_further_columns_are_told_from_those_of_the_arm(bench: Bench) -> None:
     log = bench.log()
     friction = 0.2 * np.tanh(bench.bare.omega / 0.2)
     log = replace(log, tau=log.tau + friction + np.array([[0.03], [-0.05]]))
-    fit = weak.fit([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "offset"))))
+    fit = weak.fit(
+        Problem([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "offset"))))
+    )
     assert np.allclose(fit.values[7:], [0.2, 0.2, 0.03, -0.05], atol=2e-3)
 
 
 def test_too_short_a_log_is_refused(bench: Bench) -> None:
     with pytest.raises(ValueError, match="long enough"):
-        weak.fit([lambda: [bench.log().part(0, 12)]])
+        weak.fit(Problem([lambda: [bench.log().part(0, 12)]]))
 
 
 @pytest.mark.parametrize("delay", [False, True])
@@ -116,9 +118,9 @@ def test_what_is_told_without_a_log_is_what_the_others_tell(
     ]
     prior = None
     if known:
-        before = weak.fit(bare)
+        before = weak.fit(Problem(bare))
         prior, bare = Prior.of(before.names, before.values, before.covariance), []
-    fit = weak.fit(bare, burdened, settings, prior=prior)
+    fit = weak.fit(Problem(bare, burdened, settings, prior=prior))
     assert fit.intervals == "jackknife"
     assert fit.without is not None
     assert len(fit.without) == len(bare) + len(burdened)
@@ -127,7 +129,7 @@ def test_what_is_told_without_a_log_is_what_the_others_tell(
         rest_loaded = [
             source for number, source in enumerate(burdened) if len(bare) + number != place
         ]
-        alone = weak.fit(rest, rest_loaded, settings, prior=prior)
+        alone = weak.fit(Problem(rest, rest_loaded, settings, prior=prior))
         # a delay found anew is linearised anew
         assert np.all(np.abs(told - alone.values) < (0.02 if delay else 1e-4) * fit.std)
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators import refined, weak
+from algid.estimators import refined
+from algid.estimators.problem import Problem, WeakSettings
 from algid.estimators.widths import NARROWEST, likeliest_width
 from algid.model import Model
 from algid.signals.segments import Segment
@@ -48,8 +49,8 @@ def test_the_width_that_starts_the_fit_does_not_stay_in_it() -> None:
     found = []
     for start in (0.02, 0.2):
         model = Model(("coulomb",), coulomb_speed=start)
-        settings = weak.WeakSettings(model=model, bandwidth=60.0)
-        found.append(refined.fit([lambda: [log]], settings=settings))
+        settings = WeakSettings(model=model, bandwidth=60.0)
+        found.append(refined.fit(Problem([lambda: [log]], settings=settings)))
     for fit in found:
         assert (fit.estimator, fit.converged) == ("refined", True)
         # three seconds with a dozen reversals tell it to a factor of two
@@ -82,8 +83,8 @@ def test_friction_that_is_not_there_leaves_its_width_open_and_nothing_else() -> 
     log, truth = rubbing()
     still = replace(log, theta=log.theta[:, :400], tau=log.tau[:, :400])
     model = Model(("coulomb",), coulomb_speed=0.2)
-    settings = weak.WeakSettings(model=model, bandwidth=60.0)
-    fit = refined.fit([lambda: [still]], settings=settings)
+    settings = WeakSettings(model=model, bandwidth=60.0)
+    fit = refined.fit(Problem([lambda: [still]], settings=settings))
     assert np.all(np.isfinite(fit.covariance))
     assert fit.covariance.shape == (truth.size, truth.size)
 

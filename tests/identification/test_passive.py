@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError
 from algid.estimators import instruments, refined, robust, weak
-from algid.estimators.weak import Source, WeakSettings
+from algid.estimators.problem import Problem, Source
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from algid.profile import Profile
@@ -110,7 +110,7 @@ def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> Non
 @pytest.mark.parametrize("passive", [1, 2])
 def test_intervals_hold_where_a_joint_has_no_motor(passive: int) -> None:
     motion, k = moved("case1", passive), load_case("case1").arm.constants()
-    fits = [refined.fit([source(logged(motion, seed))]) for seed in range(140)]
+    fits = [refined.fit(Problem([source(logged(motion, seed))])) for seed in range(140)]
     # The motorless row has a noise of its own, a thousandth of the other joint's torque; here it
     # has none.
     holds_at_least_95(
@@ -204,8 +204,8 @@ def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:
     """A torque of the other sign turns the whole arm round, which no instrument makes physical."""
     segments_of = pieces_of(log_of("case1", 2, 0))
     turned = [replace(segment, tau=-segment.tau) for segment in segments_of]
-    assert robust.of_passive_joint([lambda: segments_of], WeakSettings()) is not None
-    assert robust.of_passive_joint([lambda: turned], WeakSettings()) is None
+    assert robust.of_passive_joint(Problem([lambda: segments_of])) is not None
+    assert robust.of_passive_joint(Problem([lambda: turned])) is None
 
 
 def test_cables_of_two_percent_leave_the_constants_told() -> None:

@@ -13,6 +13,7 @@ import pytest
 from algid.arm import FloatArray, with_payload
 from algid.base.errors import SettingError
 from algid.estimators import refined
+from algid.estimators.problem import Problem
 from algid.identification.identify import identify
 from algid.log import Log, Origin
 from algid.settings import Settings
@@ -80,7 +81,7 @@ def test_intervals_hold_where_the_second_motor_stands_at_the_base() -> None:
         noise = np.random.default_rng(seed).standard_normal((2, *motion.theta.shape))
         tau = motion.tau + 1e-2 * np.stack([noise[1, 0] + noise[1, 1], noise[1, 1]])
         log = Segment(0.0, DT, motion.theta + 1e-3 * noise[0], tau)
-        fit = refined.fit([lambda: [log]])
+        fit = refined.fit(Problem([lambda: [log]]))
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
     holds_95(np.array([ratios(seed) for seed in range(140)]))

@@ -76,15 +76,15 @@ from dataclasses import replace
 from algid.estimators import weak
 
 
-def fit(unloaded, loaded, windows, lengths, prior, progress):
-    return replace(weak.fit(unloaded, loaded, windows, lengths, prior), estimator="toy")
+def fit(problem):
+    return replace(weak.fit(problem), estimator="toy")
 '''
 ENTRY = """    Estimator(
         "toy",
         "the toy's form",
         "what the weak form does",
         "in tests",
-        lambda *given: import_module("algid.estimators.toy").fit(*given),
+        "algid.estimators.toy",
     ),
 """
 TRIAL = """
