@@ -17,8 +17,8 @@ from algid.base.significance import (
     LEVEL,
     NORMAL,
     ONE_SIDED,
+    SHARES,
     SURE,
-    TESTS,
     chance,
     sigmas,
 )
@@ -38,7 +38,9 @@ def test_limits_are_those_of_the_normal_distribution() -> None:
 def test_a_log_without_fault_keeps_to_the_budget() -> None:
     """All tests at once on independent noise: the worst case, in which their shares add up."""
     draw = np.random.default_rng(8)
-    largest = np.abs(draw.standard_normal((20_000, len(TESTS), 12))).max(axis=2)
+    assert sum(SHARES.values()) == pytest.approx(1)
+    count = round(sum(SHARES.values()) * BUDGET / LEVEL)
+    largest = np.abs(draw.standard_normal((20_000, count, 12))).max(axis=2)
     warned = np.any(largest > sigmas(comparisons=12), axis=1)
     assert 0.7 * BUDGET < warned.mean() < 1.2 * BUDGET  # ± 2.6 standard errors
 

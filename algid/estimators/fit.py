@@ -12,7 +12,7 @@ import numpy as np
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.compiled import student_quantile
 from algid.base.names import outside, places_outside
-from algid.base.significance import LEVEL, NORMAL
+from algid.base.significance import NORMAL, level
 from algid.estimators.combine import (
     LogInformation,
     Prior,
@@ -71,7 +71,7 @@ class Misfit:
     @property
     def significant(self) -> bool:
         """Whether the residual depends on the motion."""
-        return self.p_value < LEVEL
+        return self.p_value < level("REFUTED")
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
 from algid.base.criteria import STILL, UNDETERMINED
-from algid.base.significance import LEVEL
+from algid.base.significance import level
 from algid.model import PARAMETERS, RIGID
 from algid.notices import Notice
 from algid.physics.parameters import INERTIA, LENGTH, MASS, MOMENT, VISCOUS
@@ -265,7 +265,7 @@ def judge(sums: Correlations) -> Whiteness:
     Returns
     -------
     Whiteness
-        A joint is white with a p-value of `LEVEL` at least, and without heavy tails.
+        A joint is white with a p-value of its share at least, and without heavy tails.
 
     Notes
     -----
@@ -286,5 +286,5 @@ def judge(sums: Correlations) -> Whiteness:
     variance = power[0, :, 0] / sums.count[0]
     kurtosis = sums.fourth / sums.count[0] / variance**2 - 3
     heavy = (kurtosis > _HEAVY) & (kurtosis > _TAILS * np.sqrt(24 / sums.count[0]))
-    first, second = ((p_value >= LEVEL) & ~heavy).tolist()
+    first, second = ((p_value >= 0.5 * level("NOT_WHITE")) & ~heavy).tolist()
     return Whiteness(p_value, rho[0, :, 0], kurtosis, (first, second))

@@ -136,8 +136,8 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
             products.append((log.loaded, gram.sum(axis=0)))
         lacking = misfit(fitted, products, prior)
         if lacking.significant:
-            note = Notice("REFUTED", numbers={"case": "motion", "kept": start.estimator})
-            refuted = start.noted(note)
+            numbers = {"kept": start.estimator, "p_value": lacking.p_value}
+            refuted = start.noted(Notice("REFUTED", numbers={"case": "motion"} | numbers))
             return replace(refuted, misfit=lacking, iterations=iterations, deviance=deviance)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)

@@ -54,7 +54,7 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray, keep_arrays
 from algid.base.compiled import chi2_tail
 from algid.base.criteria import AT_REST
-from algid.base.significance import LEVEL, chance
+from algid.base.significance import chance, level
 from algid.estimators import instruments, weak
 from algid.estimators.combine import (
     LogInformation,
@@ -69,7 +69,7 @@ from algid.estimators.combine import (
     scores_of,
 )
 from algid.estimators.diagnostics import broken_bounds
-from algid.estimators.doubt import doubted_without_motor
+from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, finish
 from algid.estimators.modulating_functions import Known, row_weights
 from algid.estimators.parametrisation import Shared
@@ -349,7 +349,9 @@ class RobustProblem:
             silent = no_feedback(corrected, self.problem)
             if silent < ANSWERS:
                 return fit.noted(feedback(silent))
-        note = Notice("INSTRUMENTS", numbers={"case": case, "distance": tests.moved})
+        note = Notice(
+            "INSTRUMENTS", numbers={"case": case, "distance": tests.moved, "p_value": tests.same}
+        )
         return replace(corrected, endogeneity=tests.distance).noted(note)
 
     def by_instruments(
@@ -525,7 +527,7 @@ class Exogeneity:
     @property
     def endogenous(self) -> bool:
         """Whether least squares is off by more than its error bars take in."""
-        return self.same < LEVEL and self.moved > MOVES
+        return self.same < level("INSTRUMENTS") and self.moved > MOVES
 
 
 def compared(better: Fit, least: Fit) -> Exogeneity:
@@ -619,7 +621,7 @@ def with_feedback_noted(fit: Fit, problem: Problem) -> Fit:
     if followed(problem) is not None:
         return fit
     silent = no_feedback(fit, problem)
-    if silent >= LEVEL:
+    if silent >= level("FEEDBACK"):
         return fit
     return fit.noted(feedback(silent))
 
@@ -677,7 +679,6 @@ def of_passive_joint(problem: Problem) -> Fit | None:
     for one in broken_bounds(better):
         if one.distance is None or one.distance > better.quantile:
             return None
-    checked = doubted_without_motor(better, problem)
-    if checked is not better:
+    if undriven(better, problem) is not None:
         return None
     return better.noted(Notice("INSTRUMENTS", numbers={"case": "passive"}))

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from algid.base.names import within
 from algid.base.runtime import Worker
-from algid.base.significance import LEVEL
+from algid.base.significance import level
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
-from algid.estimators.doubt import doubted_without_motor
 from algid.estimators.elastic import with_rotors
+from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, Misfit
 from algid.estimators.prediction import PredictionSums
 from algid.estimators.problem import Source
@@ -33,9 +33,30 @@ Predictions = Mapping[Recording, PredictionSums]
 """What scores a prediction of a log by any coefficients."""
 
 
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A fit of recordings, and how it came about.
+
+    Parameters
+    ----------
+    fit : Fit
+    survey : Recordings
+    settings : Settings
+    chosen : the model that it has in the end
+    predictions : sums that score its prediction of each log, where a pass of the estimator could
+        gather them
+    """
+
+    fit: Fit
+    survey: Recordings = field(default_factory=lambda: Recordings(()))
+    settings: Settings = field(default_factory=Settings)
+    chosen: Selection = field(default_factory=lambda: Selection(Model(), False))
+    predictions: Predictions = field(default_factory=dict)
+
+
 def run_fit(
     survey: Recordings, settings: Settings, chosen: Selection, prior: Prior | None
-) -> tuple[Fit, Predictions, Selection]:
+) -> Fitted:
     """Fit the settings' estimator to logs.
 
     Where its likelihood is refuted, every term shrunk: see `robust`.
@@ -49,11 +70,6 @@ def run_fit(
         The torque's model, and whether a delay is estimated.
     prior : Prior
         What is known of the arm beforehand.
-
-    Returns
-    -------
-    The fit, the sums that score its prediction of each log, where a pass of the estimator could
-    gather them, and the model that it has in the end.
 
     Raises
     ------
@@ -92,7 +108,8 @@ def run_fit(
         fit, chosen = _of_motorless(fit, chosen, survey, settings, picked, prior)
         if fit.estimator == "instruments" and not chosen.shrunk:
             fit = robust.with_feedback_noted(fit, problem_of(survey, settings, chosen))
-    return finished(fit, settings), sums if chosen is first else {}, chosen
+    sums = sums if chosen is first else {}
+    return Fitted(finished(fit, settings), survey, settings, chosen, sums)
 
 
 def finished(fit: Fit, settings: Settings) -> Fit:
@@ -133,11 +150,11 @@ def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
     if misfit is None:
         return None
     left = {trial.term for trial in chosen.trials if not trial.kept}
-    level = LEVEL / max(1, len(misfit.overlooked))
+    least = level("REFUTED") / max(1, len(misfit.overlooked))
     seen = []
     for one in misfit.overlooked:
         possible = one.term in left and has_need(one.term, chosen.model.terms)
-        if possible and one.p_value < level and plausible(one.values):
+        if possible and one.p_value < least and plausible(one.values):
             seen.append((one.p_value, one.term))
     if not seen:
         return None
@@ -164,7 +181,7 @@ def _of_motorless(
     passive = any(log.origin.reading.passive for log in survey.logs)
     if settings.estimator != "refined" or survey.loaded or not passive:
         return fit, chosen
-    if doubted_without_motor(fit, problem_of(survey, settings, picked)) is fit:
+    if undriven(fit, problem_of(survey, settings, picked)) is None:
         return fit, chosen
     terms = picked.model.terms
     if picked.chosen_by == "logs":

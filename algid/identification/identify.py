@@ -25,7 +25,7 @@ from algid.identification.open_logs import (
 )
 from algid.identification.outcome import Identified
 from algid.identification.recordings import Recording, Recordings
-from algid.identification.series import write_fit_series
+from algid.identification.series import residual_of, write_fit_series
 from algid.identification.summary import result_of
 from algid.methods import estimator_of, settles
 from algid.options import flag
@@ -34,9 +34,7 @@ from algid.results import Result, read_result, write_result
 from algid.settings import DEFAULTS, OF_BOTH, OF_PRIOR, Settings, refuse_contradictions
 
 if TYPE_CHECKING:
-    from algid.estimators.fit import Fit
-    from algid.estimators.terms import Selection
-    from algid.identification.by_likelihood import Predictions
+    from algid.identification.by_likelihood import Fitted
     from algid.notices import Notice
     from algid.profile import Profile
 
@@ -275,42 +273,38 @@ def _by_likelihood(
 
     A zero of θ1 that is `stated` is not doubted.
     """
-    from algid.identification.doubts import residual_of, with_doubt
+    from algid.identification.checks import doubted
     from algid.identification.efforts import of_effort, with_effort
     from algid.identification.outcome import outcome_of
     from algid.identification.phases import turn_note
     from algid.identification.prior import statement_of, with_prior
 
     said = statement_of(settings)
-    asked = settings
-    fit, predictions, chosen = _fitted(survey, settings, earlier)
-    sure = with_doubt(fit, survey, settings, chosen)
+    first = _fitted(survey, settings, earlier)
+    found, shown = doubted(first), settings
     of_driver: list[Notice] = []
-    if sure is fit:  # of constants in doubt no weight is missed
-        settings = with_effort(fit, settings)
-        of_driver = of_effort(fit, settings, asked)
-    if settings != asked:
-        fit, predictions, chosen = _fitted(survey, settings, earlier)
-        sure = with_doubt(fit, survey, settings, chosen)
+    if found is first:  # of constants in doubt no weight is missed
+        shown = with_effort(found.fit, settings)
+        of_driver = of_effort(found.fit, shown, settings)
+    if shown != settings:
+        found = doubted(_fitted(survey, shown, earlier))
     if said is not None:
-        sure = with_prior(sure, said)
-    settings = settings.but(torque_hold=chosen.hold)
+        found = replace(found, fit=with_prior(found.fit, said))
     survey.begin("prediction")
-    outcome = outcome_of(sure, predictions, survey, settings, chosen)
-    outcome = replace(outcome, notices=outcome.notices + of_driver)
+    outcome = outcome_of(found)
+    notices = outcome.notices + of_driver
     turned = None
     if earlier is None and not _zero_is_stated(survey.logs[0], stated):
-        turned = turn_note(sure, survey.logs[0])
+        turned = turn_note(found.fit, survey.logs[0])
     if turned is not None:
-        outcome = replace(outcome, notices=[turned, *outcome.notices])
+        notices = [turned, *notices]
+    outcome = replace(outcome, notices=notices)
     if folder is not None:
         survey.begin("series")
-        write_fit_series(
-            folder, sure, survey, settings, residual_of(survey, settings, chosen, sure)
-        )
+        write_fit_series(folder, found, residual_of(found))
         if estimator_of(settings.estimator).beside_paper:
-            outcome = _with_the_papers(outcome, survey, settings, folder)
-    return outcome, settings
+            outcome = _with_the_papers(outcome, survey, found.settings, folder)
+    return outcome, found.settings
 
 
 def _zero_is_stated(log: Recording, stated: dict[str, Any]) -> bool:
@@ -325,9 +319,7 @@ def _zero_is_stated(log: Recording, stated: dict[str, Any]) -> bool:
     )
 
 
-def _fitted(
-    survey: Recordings, settings: Settings, earlier: Earlier | None
-) -> tuple[Fit, Predictions, Selection]:
+def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> Fitted:
     """The fit with the terms that the logs choose, without those that it finds to be nothing."""
     from algid.identification.by_likelihood import run_fit
     from algid.identification.known import prior_of
@@ -341,11 +333,11 @@ def _fitted(
         prior = prior_of(earlier.result, chosen.model, earlier.file)
     survey.begin("fitting")
     settings = settings.but(torque_hold=chosen.hold)
-    fit, predictions, chosen = run_fit(survey, settings, chosen, prior)
-    better = without_insignificant(chosen, fit, settings)
-    if (better.model, better.delay) != (chosen.model, chosen.delay):
-        fit, predictions, chosen = run_fit(survey, settings, better, prior)
-    return fit, predictions, chosen
+    found = run_fit(survey, settings, chosen, prior)
+    better = without_insignificant(found.chosen, found.fit, settings)
+    if (better.model, better.delay) != (found.chosen.model, found.chosen.delay):
+        found = run_fit(survey, settings, better, prior)
+    return replace(found, settings=settings.but(torque_hold=found.chosen.hold))
 
 
 def _with_the_papers(

@@ -12,22 +12,20 @@ import numpy as np
 from algid import results
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.names import outside, places_outside, within
-from algid.base.significance import LEVEL, chance
+from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
 from algid.estimators.fit import Fit, own_estimates
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionScore, cross_validate, score
 from algid.estimators.terms import Selection
-from algid.identification.by_likelihood import Predictions
+from algid.identification.by_likelihood import Fitted
+from algid.identification.checks import fit_notes, remarks
 from algid.identification.predicted import prediction
-from algid.identification.recordings import Recordings
-from algid.identification.remarks import fit_notes, fit_warnings, torque_unit
 from algid.identification.series import torque_coefficients, torque_shift
 from algid.model import DELAYS, UNITS, attributes
 from algid.notices import Notice
 from algid.physics.effort import absent
 from algid.results import Estimate, Status
-from algid.settings import Settings
 from algid.table4 import LOADED_ROWS, UNLOADED_ROWS, finite
 from algid.table4 import UNITS as TABLE_UNITS
 
@@ -57,10 +55,9 @@ class Identified:
         )
 
 
-def outcome_of(
-    fit: Fit, predictions: Predictions, survey: Recordings, settings: Settings, chosen: Selection
-) -> Identified:
+def outcome_of(found: Fitted) -> Identified:
     """The fit as a result holds it."""
+    fit, survey, settings = found.fit, found.survey, found.settings
     # a constant that the model has no column for is not identifiable
     estimates = {name: unknown(UNITS[name]) for name in CONSTANT_NAMES}
     estimates |= _estimates(fit.names, fit.values, fit.std, fit.quantile, fit.status)
@@ -78,8 +75,8 @@ def outcome_of(
     combined = {}
     if survey.loaded:
         combined = _loaded_rows(fit, rows, stds, gone)
-    summary = fit_summary(fit, predictions, survey, settings, chosen)
-    notices = list(fit_warnings(fit, torque_unit(survey.logs)))
+    summary = fit_summary(found)
+    notices = list(remarks(found))
     if settings.cross_validate and summary.cross_validation is None:
         notices.append(Notice("SHORT_LOG", numbers={"case": "validation"}))
     outcome = Identified(
@@ -240,11 +237,10 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
     return rows, stds
 
 
-def fit_summary(
-    fit: Fit, predictions: Predictions, survey: Recordings, settings: Settings, chosen: Selection
-) -> results.FitSummary:
+def fit_summary(found: Fitted) -> results.FitSummary:
     """The statistical part of a result."""
-    residual, crossed = _predicted(fit, predictions, survey, settings)
+    fit, chosen = found.fit, found.chosen
+    residual, crossed = _predicted(found)
     cross_validation = None
     if crossed is not None:
         cross_validation = prediction(crossed)
@@ -273,7 +269,7 @@ def fit_summary(
         residual=prediction(residual),
         cross_validation=cross_validation,
         repeatability=_repeatability(fit),
-        torque_gain=_torque_gain(fit, settings.payload_mass),
+        torque_gain=_torque_gain(fit, found.settings.payload_mass),
         stiffness=_stiffness(fit),
     )
 
@@ -339,7 +335,8 @@ def _endogeneity(fit: Fit) -> dict[str, results.Endogeneity]:
         return {}
     # as many coefficients were looked at as a log has (Bonferroni)
     p_value = chance(statistic, len(fit.shared.log_names))
-    test = results.Endogeneity(statistic=statistic, p_value=p_value, endogenous=p_value < LEVEL)
+    endogenous = p_value < level("INSTRUMENTS")
+    test = results.Endogeneity(statistic=statistic, p_value=p_value, endogenous=endogenous)
     return {"largest": test}
 
 
@@ -353,15 +350,14 @@ def _repeatability(fit: Fit) -> results.Repeatability | None:
     )
 
 
-def _predicted(
-    fit: Fit, predictions: Predictions, survey: Recordings, settings: Settings
-) -> tuple[PredictionScore, PredictionScore | None]:
+def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
     """How well the fit predicts its own logs and, if asked and possible, each from the others."""
+    fit, survey, settings = found.fit, found.survey, found.settings
     own = PredictionScore()
     for log in survey.logs:
         c = torque_coefficients(fit, log.role)
-        if log in predictions:
-            own += predictions[log].score(c)
+        if log in found.predictions:
+            own += found.predictions[log].score(c)
         else:
             own += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
     if not settings.cross_validate:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,13 @@ from algid.arm import FloatArray
 from algid.base.arrow import table_of_columns
 from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
-from algid.estimators.innovations import ResidualSums, autocorrelation, spectra, whiteness_of
+from algid.estimators.innovations import (
+    ResidualSums,
+    autocorrelation,
+    pooled,
+    spectra,
+    whiteness_of,
+)
 from algid.estimators.noise import first_guess
 from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import PredictionFilter, scored_torque
@@ -26,6 +33,9 @@ from algid.settings import Settings
 from algid.signals.filters import half_length, smoothed
 from algid.signals.segments import Segment, pieces
 from algid.signals.shift import TorqueShift
+
+if TYPE_CHECKING:
+    from algid.identification.by_likelihood import Fitted
 
 PREDICTED_ROWS = 1 << 17
 NOISE_SHARE = 0.05  # of the torque's RMS: what the angles' noise may add to the prediction
@@ -251,15 +261,38 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
             }
 
 
-def write_fit_series(
-    folder: Path, fit: Fit, survey: Recordings, settings: Settings, residual: ResidualSums | None
-) -> None:
+def residual_of(found: Fitted) -> ResidualSums | None:
+    """Residual sums of the estimator behind a fit: of its innovations, or of its windows.
+
+    None where no log is long enough.
+    """
+    from algid.estimators import weak
+    from algid.identification.passes import problem_of
+
+    fit = found.fit
+    if fit.residual:
+        return pooled(fit.residual)
+    problem = problem_of(found.survey, found.settings, found.chosen)
+    if fit.delay is not None:
+        problem = problem.at(found.chosen.model, fit.delay)
+    sums = []
+    for loaded, sources in problem.kinds():
+        c = torque_coefficients(fit, "loaded" if loaded else "unloaded")
+        for source in sources:
+            of_log = weak.residuals(source, problem.settings, c)
+            if of_log is not None:
+                sums.append(of_log)
+    return pooled(sums)
+
+
+def write_fit_series(folder: Path, found: Fitted, residual: ResidualSums | None) -> None:
     """Write the time series of a fit, and what its `residual` looks like.
 
     `torque.parquet`, `scored.parquet` (of logs long enough to be scored), `information.parquet`,
     `running.parquet` (not of a fit that was held within
     bounds or did not converge) and, where there is a residual, `innovations.parquet`.
     """
+    fit, survey = found.fit, found.survey
     starts, durations = [], []
     for log in survey.logs:
         summary = survey.summary(log)
@@ -268,7 +301,7 @@ def write_fit_series(
     coefficients: dict[str, FloatArray] = {}
     for log in survey.logs:
         coefficients[log.role] = torque_coefficients(fit, log.role)
-    model, shift = fit.shared.model, torque_shift(settings, fit)
+    model, shift = fit.shared.model, torque_shift(found.settings, fit)
     torques = torque_blocks(survey, model, coefficients, shift)
     write_columns(folder / "torque.parquet", torques, starts)
     write_columns(

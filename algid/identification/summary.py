@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from algid import __version__
+from algid.identification.checks import FAR_APART
 from algid.identification.outcome import Identified
 from algid.identification.recordings import Recordings
-from algid.identification.remarks import FAR_APART
 from algid.log import Truth
 from algid.model import K4
 from algid.notices import Notice, has_code, merged

@@ -29,7 +29,8 @@ from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.prediction import cross_validate, motion_of, score
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.identification.remarks import fit_warnings
+from algid.identification.by_likelihood import Fitted
+from algid.identification.checks import remarks
 from algid.model import Model
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
@@ -334,11 +335,11 @@ def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) ->
     both = weak.fit(
         Problem([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
     )
-    assert any(warning.code == "LOGS_APART" for warning in fit_warnings(both))
+    assert any(warning.code == "LOGS_APART" for warning in remarks(Fitted(both)))
     right = weak.fit(
         Problem([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
     )
-    assert not any(warning.code == "LOGS_APART" for warning in fit_warnings(right))
+    assert not any(warning.code == "LOGS_APART" for warning in remarks(Fitted(right)))
 
 
 @pytest.mark.parametrize("rotor", [0.0, 0.02])
@@ -394,7 +395,7 @@ def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Be
         found = length_by_constants(fit)
         assert found is not None
         assert found[0] == pytest.approx(bench.arm.l1 / (1 - share), rel=0.05)
-        assert any(warning.code == "LENGTH_MISMATCH" for warning in fit_warnings(fit)) is told
+        assert any(warning.code == "LENGTH_MISMATCH" for warning in remarks(Fitted(fit))) is told
 
 
 def test_motion_by_five_points_is_exact_for_a_cubic_and_repeats_itself_at_the_ends() -> None:

@@ -18,6 +18,9 @@ from algid.estimators.identifiability import Whiteness
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.terms import Selection
 from algid.estimators.whitening import NoiseLevels
+from algid.identification import checks
+from algid.identification.by_likelihood import Fitted
+from algid.identification.checks import Check, doubted, fit_notes, remarks
 from algid.identification.open_logs import open_source
 from algid.identification.outcome import (
     distrusted,
@@ -28,9 +31,8 @@ from algid.identification.outcome import (
 )
 from algid.identification.predicted import prediction
 from algid.identification.recordings import Recordings
-from algid.identification.remarks import fit_notes, fit_warnings
 from algid.log import Log, Origin
-from algid.model import Model
+from algid.model import RIGID
 from algid.notices import Notice
 from algid.results import Estimate, FitSummary, Repeatability, Status
 from algid.settings import Settings
@@ -59,7 +61,8 @@ def survey(*, loaded: bool = True) -> Recordings:
 
 def summed(fit: Fit, chosen: Selection | None = None, **settings: Any) -> FitSummary:
     chosen = chosen or Selection(fit.shared.model, False)
-    found = outcome_of(fit, {}, survey(loaded=fit.shared.payload), Settings(**settings), chosen).fit
+    recordings = survey(loaded=fit.shared.payload)
+    found = outcome_of(Fitted(fit, recordings, Settings(**settings), chosen)).fit
     assert found is not None
     return found
 
@@ -91,7 +94,7 @@ def test_distrust_takes_ok_and_leaves_what_was_no_better() -> None:
 
 
 def test_parameters_are_within_the_fits_quantile_of_their_deviations() -> None:
-    found = outcome_of(fit_of(), {}, survey(), Settings(), Selection(Model(), False))
+    found = outcome_of(Fitted(fit_of(), survey()))
     assert list(found.parameters) == [f"k{n}" for n in range(1, 8)]
     assert list(found.payload) == ["m_p", "l1", "l2"]
     k4 = found.parameters["k4"]
@@ -143,9 +146,7 @@ def test_rows_of_what_the_logs_leave_open_are_left_out() -> None:
 
 
 def test_loaded_rows_of_a_fit_that_did_not_settle_say_so() -> None:
-    found = outcome_of(
-        replace(fit_of(), converged=False), {}, survey(), Settings(), Selection(Model(), False)
-    )
+    found = outcome_of(Fitted(replace(fit_of(), converged=False), survey()))
     assert {one.status for one in found.loaded.values()} == {Status.NOT_CONVERGED}
     assert list(found.loaded) == list(LOADED_ROWS)
     assert found.loaded["k4+z4"].ci95 is not None
@@ -154,7 +155,7 @@ def test_loaded_rows_of_a_fit_that_did_not_settle_say_so() -> None:
 def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_none() -> None:
     for k6, status in ((-2.9, Status.OK), (-3.2, Status.IMPLAUSIBLE)):
         fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
-        found = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+        found = outcome_of(Fitted(fit, survey()))
         assert {one.status for one in (found.parameters | found.payload).values()} == {status}
         assert found.fit is not None
         assert [one.bound for one in found.fit.broken_bounds] == ["k6 >= 0"]
@@ -256,11 +257,11 @@ def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> No
 
 
 def found(fit: Fit, code: str) -> list[Notice]:
-    return [one for one in fit_warnings(fit) if one.code == code]
+    return [one for one in remarks(Fitted(fit)) if one.code == code]
 
 
 def test_a_good_fit_is_passed_over_in_silence() -> None:
-    assert list(fit_warnings(fit_of())) == []
+    assert list(remarks(Fitted(fit_of()))) == []
 
 
 def test_a_payload_near_zero_is_at_most_the_end_of_its_interval() -> None:
@@ -282,8 +283,10 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
         fit = fit_of(lengths={"l1": ARM.l1 + times * std})
         assert bool(found(fit, "LENGTH_MISMATCH")) is told
     (one,) = found(fit, "LENGTH_MISMATCH")
+    given = ARM.l1 + 1.01 * ACCUSED * std
+    p_value = 2 * norm.sf(1.01 * ACCUSED)
     assert one.numbers == pytest.approx(
-        {"length": ARM.l1, "half": QUANTILE * std, "given": ARM.l1 + 1.01 * ACCUSED * std}
+        {"length": ARM.l1, "half": QUANTILE * std, "given": given, "p_value": p_value}
     )
 
 
@@ -295,7 +298,7 @@ def test_a_negative_mass_by_far_says_exchanged() -> None:
 
 def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
     note = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
-    assert list(fit_warnings(replace(fit_of(), notes=(note,)))) == [note]
+    assert list(remarks(Fitted(replace(fit_of(), notes=(note,))))) == [note]
 
 
 def notes(**changes: Any) -> list[Notice]:
@@ -329,9 +332,7 @@ def test_repeatability_and_gain_are_told_in_numbers() -> None:
 
 
 def test_cross_validation_that_could_not_be_done_is_told() -> None:
-    outcome = outcome_of(
-        fit_of(), {}, survey(), Settings(cross_validate=True), Selection(Model(), False)
-    )
+    outcome = outcome_of(Fitted(fit_of(), survey(), Settings(cross_validate=True)))
     assert [one.code for one in outcome.notices] == ["SHORT_LOG"]
 
 
@@ -341,7 +342,7 @@ def test_an_interval_that_contains_zero_is_never_ok() -> None:
     for std, status in ((1.01, Status.NOT_SIGNIFICANT), (0.99, Status.OK)):
         stds = {name: std * value / QUANTILE for name, value in wide.items()}
         fit = with_stds(with_values(fit_of(), **wide), **stds)
-        outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+        outcome = outcome_of(Fitted(fit, survey()))
         every = outcome.parameters | outcome.payload | outcome.loaded
         assert {every[name].status for name in wide} == {status}
         assert every["k4"].status is Status.OK
@@ -355,7 +356,7 @@ def test_an_interval_that_contains_zero_is_never_ok() -> None:
 def test_a_bound_is_mentioned_from_the_level_of_the_intervals_on() -> None:
     for k6, mentioned in ((-0.7, False), (-1.9, False), (-2.9, True)):
         fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
-        outcome = outcome_of(fit, {}, survey(), Settings(), Selection(Model(), False))
+        outcome = outcome_of(Fitted(fit, survey()))
         assert outcome.fit is not None
         assert bool(outcome.fit.broken_bounds) is mentioned
 
@@ -367,3 +368,16 @@ def test_that_what_is_only_rounding_is_zero_and_can_be_read_back() -> None:
     assert found.ci95 == (-0.2, 0.2)
     assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").estimate == 2e-30
     assert estimate(2e-30, 1e-31, 0.2, "N m", "OK").std == 0.0
+
+
+def test_a_check_that_doubts_takes_the_error_bars_of_the_rigid_arm_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": 2})
+    table = (Check("HARDLY_DRIVEN", lambda _: iter([seen]), "doubt"),)
+    monkeypatch.setattr(checks, "CHECKS", table)
+    fit = doubted(Fitted(fit_of())).fit
+    marked = dict(zip(fit.names, fit.status, strict=True))
+    assert {name for name, word in marked.items() if word == "WEAK_EXCITATION"} == set(RIGID[:5])
+    assert fit.notes == (seen,)
+    assert not list(remarks(Fitted(fit_of())))  # it is said once, among the fit's notes

@@ -20,6 +20,7 @@ from algid.estimators.innovations import residual_sums
 from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import score
 from algid.identification import series
+from algid.identification.by_likelihood import Fitted
 from algid.identification.open_logs import open_source
 from algid.identification.recordings import Recordings
 from algid.identification.series import (
@@ -254,7 +255,7 @@ def test_a_fits_series_stand_in_its_folder(
     fit = fit_of()
     # torques beside it
     residual = residual_sums(np.random.default_rng(0).standard_normal((4, 4000)), DT)
-    write_fit_series(tmp_path, fit, survey, Settings(), residual)
+    write_fit_series(tmp_path, Fitted(fit, survey), residual)
     names = [
         "information.parquet",
         "innovations.parquet",
@@ -313,7 +314,7 @@ def test_a_fit_held_within_bounds_or_of_fewer_logs_lacks_what_it_cannot_tell(
 ) -> None:
     survey = Recordings([open_source(both[0][0], "unloaded"), open_source(both[1][0], "loaded")])
     fit = fit_of()
-    write_fit_series(tmp_path, replace(fit, logs=fit.logs[:1]), survey, Settings(), None)
+    write_fit_series(tmp_path, Fitted(replace(fit, logs=fit.logs[:1]), survey), None)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scored.parquet", "torque.parquet"]
 
 

@@ -62,13 +62,14 @@ def estimates(log: Recording, settings: Settings) -> tuple[FloatArray, FloatArra
         values = np.array([one.estimate for one in result.parameters.values()], dtype=np.float64)
         return values, 1e-9 * np.abs(values), result  # condition numbers to 1e6, times rounding
     chosen = choose_model(survey, settings)
-    fit, predictions, chosen = run_fit(survey, settings, chosen, None)
+    found = run_fit(survey, settings, chosen, None)
+    fit = found.fit
     assert fit.converged
     # A window or sample lost at a seam moves an estimate by 1e-4 of its deviation or more;
     # rounding, times the
     # condition of the normal equations, by 1e-9 of it.
     room = np.concatenate([fit.std, fit.std]) * 1e-7
-    result = result_of(outcome_of(fit, predictions, survey, settings, chosen), settings, survey)
+    result = result_of(outcome_of(found), settings, survey)
     return np.concatenate([fit.values, fit.std]), room, result
 
 

@@ -19,26 +19,8 @@ from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import MOTORLESS
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.weak import Normal
-from algid.model import K1, K2, K3, RIGID
+from algid.model import K1, K2, K3
 from algid.notices import Notice
-
-
-def doubted(fit: Fit, problem: Problem) -> Fit:
-    """The fit with status WEAK_EXCITATION for k1 … k5 where they are doubtful.
-
-    Parameters
-    ----------
-    fit : Fit
-        With `FEWEST_LOGS` logs or more it is the joints' contradiction alone that is asked for, a
-        smaller one: see `ratio_of_joints`.
-    problem : Problem
-        With a model that is linear.
-    """
-    doubt = _doubt(fit, problem)
-    if doubt is None:
-        return fit
-    return fit.marked("WEAK_EXCITATION", RIGID).noted(doubt)
-
 
 UNLIKE, UNLIKE_IN_MANY = 0.5, 0.2
 """Share of the larger of two values: more than what a model lacks makes in one run, and in many."""
@@ -49,8 +31,8 @@ LEAST_ACTING = 0.02
 """Share of the other joint's torque: less at a joint without a motor is bearing or cable."""
 
 
-def doubted_without_motor(fit: Fit, problem: Problem) -> Fit:
-    """The fit with status WEAK_EXCITATION for k1 … k5 if they do not explain an undriven joint.
+def undriven(fit: Fit, problem: Problem) -> Notice | None:
+    """Why k1 … k5 are doubtful where they do not explain a joint without a motor.
 
     Inertia, weight and friction, which cancel there, are then of no size beside the other joint's
     torque: constants near nothing solve that equation too, and least squares ends there where
@@ -68,13 +50,21 @@ def doubted_without_motor(fit: Fit, problem: Problem) -> Fit:
         for joint in range(2):
             acting = float(np.diag(gram[joint])[:-1] @ c**2)
             if power[joint] == 0 and acting < LEAST_ACTING**2 * float(power[1 - joint]):
-                note = Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": joint + 1})
-                return fit.marked("WEAK_EXCITATION", RIGID).noted(note)
-    return fit
+                return Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": joint + 1})
+    return None
 
 
-def _doubt(fit: Fit, problem: Problem) -> Notice | None:
-    """Why k1 … k5 are doubtful; None where nothing says so."""
+def contradicted(fit: Fit, problem: Problem) -> Notice | None:
+    """Why k1 … k5 are doubtful in a fit whose likelihood is refuted; None where nothing says so.
+
+    Parameters
+    ----------
+    fit : Fit
+        With `FEWEST_LOGS` logs or more it is the joints' contradiction alone that is asked for, a
+        smaller one: see `ratio_of_joints`.
+    problem : Problem
+        With a model that is linear.
+    """
     few = len(fit.logs) < FEWEST_LOGS
     still = [f"joint {joint + 1}" for joint in range(2) if fit.moved[joint] < STILL]
     if few and still:
@@ -119,7 +109,7 @@ def _confirmed(
 def _hardly_driven(normals: Sequence[Normal]) -> int | None:
     """The joint, 1 or 2, whose torque is nowhere more than bearings and cables make, if any.
 
-    One without a torque has no motor: see `doubted_without_motor`.
+    One without a torque has no motor: see `undriven`.
     """
     torques = np.max([normal.gram[:, :, -1, -1].sum(axis=0) / normal.rows for normal in normals], 0)
     for joint in range(2):
