@@ -8,26 +8,21 @@ import pytest
 
 from algid.arm import inverse_dynamics
 from algid.estimators import combine as combine_module
-from algid.estimators import refined, weak
+from algid.estimators import weak
 from algid.estimators.combine import (
     MOST_BLOCKS,
     BlockSums,
     LogInformation,
-    jackknife,
     long_run_variance,
 )
 from algid.estimators.diagnostics import (
     broken_bounds,
-    constrained,
-    length_by_constants,
-    payload_distance,
     repeatability,
-    term_worths,
 )
-from algid.estimators.fit import finish, own_estimates
+from algid.estimators.fit import finish
 from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
-from algid.estimators.prediction import cross_validate, motion_of, score
+from algid.estimators.prediction import motion_of, score
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import remarks
@@ -38,58 +33,6 @@ from algid.synth.cases import load_case
 from tests.intervals import holds_95
 
 from .conftest import DT, Bench
-
-
-def test_bounds_hold_for_a_real_arm_and_name_what_breaks(bench: Bench) -> None:
-    fit = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
-    assert broken_bounds(fit) == []
-    assert constrained(fit) is fit
-    values = fit.values.copy()
-    values[5] = -0.01
-    broken = broken_bounds(replace(fit, values=values))
-    assert [bound.bound for bound in broken] == ["k6 >= 0"]
-    assert broken[0].distance == pytest.approx(0.01 / fit.std[5])
-
-
-def test_constrained_estimates_obey_the_bounds(bench: Bench) -> None:
-    log = bench.log(sigma=1e-3)
-    # less than no friction
-    log = replace(log, tau=log.tau - np.array([[0.3], [0.0]]) * bench.bare.omega)
-    free = weak.fit(Problem([lambda: [log]]))
-    assert [bound.bound for bound in broken_bounds(free)] == ["k6 >= 0"]
-    bound = constrained(free)
-    assert broken_bounds(bound) == []
-    assert bound.values[5] == pytest.approx(0.0, abs=1e-4)
-
-
-def test_only_terms_that_are_there_earn_their_place(bench: Bench) -> None:
-    log = bench.log(sigma=1e-3)
-    log = replace(log, tau=log.tau + 0.1 * np.tanh(bench.bare.omega / 0.2))
-    fit = weak.fit(
-        Problem([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "rotor"))))
-    )
-    worths = {worth.term: worth for worth in term_worths(fit)}
-    assert worths["coulomb"].earned
-    assert not worths["rotor"].earned
-
-
-def test_a_loaded_log_from_another_arm_is_told(bench: Bench) -> None:
-    bare, burdened = bench.log(sigma=1e-3), bench.log(True, 1e-3)
-    alike = payload_distance(refined.fit(Problem([lambda: [bare]], [lambda: [burdened]])))
-    other = replace(burdened, tau=burdened.tau + np.array([[0.05], [0.05]]) * bench.burdened.omega)
-    apart = payload_distance(refined.fit(Problem([lambda: [bare]], [lambda: [other]])))
-    assert alike is not None
-    assert apart is not None
-    assert alike < 3
-    assert apart > 6
-
-
-def test_prediction_of_an_exact_log_is_exact(bench: Bench) -> None:
-    found = score(Model(), bench.arm.constants(), [bench.log()])
-    # what the first filter takes of the motion below 5 Hz, and its derivatives err
-    assert np.all(found.nrmse < 1e-3)
-    wrong = score(Model(), 1.3 * bench.arm.constants(), [bench.log()])
-    assert np.all(wrong.rmse > 3 * found.rmse)
 
 
 def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
@@ -105,30 +48,6 @@ def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
     late = replace(log, theta=log.theta[:, :-20], tau=log.tau[:, 20:])
     assert np.all(score(Model(), k, [late], TorqueShift(delay=0.02)).r2 > 0.9999)
     assert np.all(score(Model(), k, [late]).r2 < 0.99)
-
-
-def test_cross_validation_leaves_each_log_out(bench: Bench) -> None:
-    sources: list[Source] = [partial(list, [bench.log(sigma=1e-3, seed=seed)]) for seed in range(3)]
-    fit = weak.fit(Problem(sources))
-    found = cross_validate(fit, sources)
-    assert found is not None
-    others = [sources[:place] + sources[place + 1 :] for place in range(3)]
-    by_hand = [
-        score(Model(), weak.fit(Problem(rest)).values, source()).residual
-        for rest, source in zip(others, sources, strict=True)
-    ]
-    # of noise alone; the weights of the joints are each fit's own
-    assert np.allclose(found.residual, np.sum(by_hand, axis=0), rtol=0.01)
-    assert cross_validate(weak.fit(Problem(sources[:1])), sources[:1]) is None
-
-
-def test_directions_without_information_are_put_in_words() -> None:
-    S = 1e8 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 1.0, 1.0]])
-    known = examine(("k1", "k3", "k5"), np.array([0.02, 0.05, 0.04]), S, np.array([1.0, 0.001]))
-    assert tuple(one.text for one in known.left_open) == (
-        "k3 and k5 only as a sum: joint 2 never moved",
-    )
-    assert known.determined == (True, False, False)
 
 
 def test_a_parameters_size_is_the_largest_of_its_class() -> None:
@@ -215,53 +134,6 @@ def test_long_run_variance_of_an_autoregression() -> None:
     assert lags > 5
     # spectrum at zero
     assert variance[0, 0] / noise.size == pytest.approx(1 / (1 - 0.6) ** 2, rel=0.15)
-
-
-def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
-    """Logs of one coefficient each, alike in information: the variance of a mean in closed form."""
-    rng = np.random.default_rng(0)
-    told = rng.normal(2.0, 0.3, 7)
-    logs = [
-        LogInformation(False, np.array([x]), np.ones((1, 1, 1)), np.zeros((1, 1))) for x in told
-    ]
-    without = np.array([np.delete(told, place).mean() for place in range(7)])[:, None]
-    found = jackknife(logs, without)
-    assert found is not None
-    assert found[0, 0] == pytest.approx(told.var(ddof=1) / 7, rel=1e-12)
-    assert jackknife(logs[:3], without[:3]) is None
-
-
-def test_what_differs_from_run_to_run_is_in_the_intervals_of_four_logs(bench: Bench) -> None:
-    """Viscous friction that differs by 10 % from run to run, as with the temperature of the
-    grease.
-    """
-    frictions = 1 + 0.1 * np.random.default_rng(1).standard_normal(5)
-    logs = [bench.log(sigma=1e-3, seed=seed) for seed in range(5)]
-    logs = [
-        replace(
-            log,
-            tau=log.tau + (share - 1) * bench.arm.b1 * np.array([[1.0], [0.0]]) * bench.bare.omega,
-        )
-        for log, share in zip(logs, frictions, strict=True)
-    ]
-    sources: list[Source] = [partial(list, [log]) for log in logs]
-    three, five = weak.fit(Problem(sources[:3])), weak.fit(Problem(sources))
-    assert (three.intervals, five.intervals) == ("sandwich", "jackknife")
-    expected = bench.arm.b1 * frictions.std(ddof=1) / np.sqrt(5)
-    # logs weigh by how well the joint estimate fits them
-    assert 0.5 * expected < five.std[5] < 1.5 * expected
-    assert abs(five.values[5] - bench.arm.b1) < 3 * five.std[5]
-    own = own_estimates(five)
-    assert np.allclose([one.values[5] for one in own], bench.arm.b1 * frictions, rtol=0.02)
-
-
-def test_friction_that_is_not_there_has_its_error_bar(bench: Bench) -> None:
-    log = bench.log(sigma=1e-3)
-    log = replace(log, tau=log.tau - np.array([[bench.arm.b1], [bench.arm.b2]]) * bench.bare.omega)
-    fit = weak.fit(Problem([partial(list, [log])], settings=WeakSettings(Model(("coulomb",)))))
-    assert set(fit.status) == {"OK"}
-    assert np.all(np.abs(fit.values[5:]) < 4.5 * fit.std[5:])
-    assert np.all(fit.std[5:] < 0.02)
 
 
 def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
@@ -380,22 +252,6 @@ def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
             assert by_name["M22 > 0"] == pytest.approx(k3 + rotor)
         seen |= set(by_name)
     assert seen == {*ends, "M22 > 0"}
-
-
-def test_gravity_compensated_by_half_is_told_where_the_length_is_known(bench: Bench) -> None:
-    """l1 = g k1 / k2 doubles then; with the whole torque it is the arm's own."""
-    lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
-    log, k = bench.log(sigma=1e-4), bench.arm.constants()
-    weight = inverse_dynamics(
-        k * np.array([0, 1, 0, 1, 0, 0, 0]), bench.bare.theta, 0 * bench.bare.omega, 0 * log.tau
-    )
-    for share, told in ((0.0, False), (0.5, True)):
-        compensated = replace(log, tau=log.tau - share * weight)
-        fit = weak.fit(Problem([partial(list, [compensated])], lengths=lengths))
-        found = length_by_constants(fit)
-        assert found is not None
-        assert found[0] == pytest.approx(bench.arm.l1 / (1 - share), rel=0.05)
-        assert any(warning.code == "LENGTH_MISMATCH" for warning in remarks(Fitted(fit))) is told
 
 
 def test_motion_by_five_points_is_exact_for_a_cubic_and_repeats_itself_at_the_ends() -> None:

@@ -121,8 +121,3 @@ def test_torque_that_no_term_explains_refutes_the_first_pass(bench: Bench) -> No
     assert chosen.late is not None
     assert not chosen.late.determined
     assert not _of(log).refuted
-
-
-def test_logs_too_short_for_a_window_are_refused() -> None:
-    with pytest.raises(ValueError, match="no log is long enough"):
-        select(Problem([list], [], SETTINGS))

@@ -50,16 +50,6 @@ def test_a_joint_whose_torque_counts_the_other_way_has_a_negative_ratio(bench: B
     assert ratio_of_joints([normal], Model(), UNLIKE) == pytest.approx(-1.0, rel=0.03)
 
 
-def test_constants_that_the_joints_contradict_are_not_ok(bench: Bench) -> None:
-    log = bench.log(sigma=1e-4)
-    idle = replace(log, tau=log.tau * np.array([[1.0], [0.02]]))
-    fit = replace(weak.fit(Problem([lambda: [idle]])), notes=(REFUTED,))
-    contradiction = contradicted(fit, Problem([lambda: [idle]]))
-    assert contradiction is not None
-    assert contradiction.code == "JOINTS_CONTRADICT"
-    assert contradiction.numbers == {"ratio": pytest.approx(0.02, rel=0.03)}
-
-
 @pytest.mark.parametrize(
     ("factor", "count", "told"),
     [

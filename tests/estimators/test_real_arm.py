@@ -9,7 +9,6 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from algid.estimators import refined, weak
-from algid.estimators.diagnostics import term_worths
 from algid.estimators.excitation import contradicted
 from algid.estimators.prediction import cross_validate
 from algid.estimators.problem import Problem, Source, WeakSettings
@@ -50,24 +49,6 @@ def test_prediction_beats_the_published_parameters(sources: list[Source]) -> Non
     found = cross_validate(fit, sources)
     assert found is not None
     assert np.all(found.rmse < PUBLISHED)
-
-
-def test_the_differentiators_bandwidth_does_not_move_k2(sources: list[Source]) -> None:
-    model = Model(("coulomb", "rotor"))
-    narrow, wide = (
-        weak.fit(Problem(sources, settings=WeakSettings(model, bandwidth=hertz)))
-        for hertz in (10.0, 30.0)
-    )
-    assert abs(narrow.values[1] - wide.values[1]) < wide.std[1]
-
-
-def test_friction_earns_its_place_and_the_offset_does_not(sources: list[Source]) -> None:
-    fit = weak.fit(Problem(sources, settings=WeakSettings(Model(("coulomb", "offset", "rotor")))))
-    assert {worth.term: worth.earned for worth in term_worths(fit)} == {
-        "coulomb": True,
-        "offset": False,
-        "rotor": True,
-    }
 
 
 def test_runs_in_which_a_joint_is_hardly_driven_are_not_ok_alone() -> None:

@@ -1,6 +1,5 @@
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,13 +21,6 @@ from algid.synth.simulator import simulate
 from tests.intervals import holds_95, in_axes
 
 from .conftest import DT, Bench
-
-
-def test_exact_logs_leave_a_hundredth_of_the_papers_error(bench: Bench) -> None:
-    fit = refined.fit(Problem([lambda: [bench.log()]], [lambda: [bench.log(loaded=True)]]))
-    assert fit.converged
-    # The smallest error of Table 4 is 0.005 %.
-    assert np.allclose(fit.values, bench.truth, rtol=0.5e-6)
 
 
 def test_noise_levels_and_error_bars_are_honest(bench: Bench) -> None:
@@ -78,15 +70,6 @@ def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
         refined.fit(Problem([lambda: [bench.log()]]), noise=NoiseLevels(np.zeros(2), np.ones(2)))
 
 
-def test_known_lengths_sharpen_the_payload(bench: Bench) -> None:
-    sources = [lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]]
-    free = refined.fit(Problem(*sources))
-    known = refined.fit(Problem(*sources, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
-    assert known.names[-1] == "m_p"
-    assert known.std[7] < 0.6 * free.std[7]
-    assert abs(known.values[7] - bench.payload) < 4 * known.std[7]
-
-
 def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
     before = refined.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
     prior = Prior.of(before.names, before.values, before.covariance)
@@ -98,17 +81,6 @@ def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
         after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std
     )
     assert np.allclose(after.std, together.std, rtol=0.1)
-
-
-def test_a_delay_is_recovered_with_its_error_bar(bench: Bench) -> None:
-    log = bench.log(sigma=1e-4)
-    late = replace(log, theta=log.theta[:, :-5], tau=log.tau[:, 5:], omega=None)
-    fit = refined.fit(Problem([lambda: [late]], settings=WeakSettings(estimate_delay=True)))
-    assert fit.names[-1] == "delay"
-    assert (fit.estimator, fit.converged) == ("refined", True)
-    assert abs(fit.values[-1] - 5e-3) < 1e-4
-    assert abs(fit.values[-1] - 5e-3) < 4 * fit.std[-1]
-    assert np.allclose(fit.values[5:7], bench.truth[5:7], rtol=1e-3)
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4])
@@ -228,32 +200,6 @@ def test_noise_levels_of_many_logs_that_have_settled_are_not_scored_again(
         np.testing.assert_allclose(one.theta, other.theta, rtol=1e-2)
 
 
-def test_a_joint_that_never_moved_is_named() -> None:
-    t = np.arange(3001) * DT
-    rng = np.random.default_rng(0)
-    theta = np.stack([np.sin(3 * t), np.zeros_like(t)]) + 1e-4 * rng.standard_normal((2, t.size))
-    tau = np.stack([np.cos(3 * t), 0.3 * np.cos(3 * t)])
-    fit = refined.fit(Problem([lambda: [Segment(0.0, DT, theta, tau)]]))
-    assert "NOT_IDENTIFIABLE" in fit.status
-    assert all(one.numbers["why"] == ": joint 2 never moved" for one in fit.unidentifiable)
-    assert fit.unidentifiable
-    assert np.isinf(fit.std[[status == "NOT_IDENTIFIABLE" for status in fit.status]]).all()
-
-
-def test_a_horizontal_arm_has_five_constants(bench: Bench) -> None:
-    k = bench.arm.constants() * [1, 0, 1, 0, 1, 1, 1]
-    t = np.arange(1501) * DT
-    motion = simulate(k, lambda now: np.stack([np.sin(9 * now), 0.6 * np.cos(14 * now)]), t)
-    fit = refined.fit(
-        Problem(
-            [lambda: [Segment(0.0, DT, motion.theta, motion.tau)]],
-            settings=WeakSettings(Model(gravity=0)),
-        )
-    )
-    assert fit.names == ("k1", "k3", "k5", "k6", "k7")
-    assert np.allclose(fit.values, k[[0, 2, 4, 5, 6]], rtol=1e-4)
-
-
 def test_long_logs_take_one_more_pass_and_agree(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -273,13 +219,6 @@ def test_long_logs_take_one_more_pass_and_agree(
         assert residual.products[:, 0] / residual.pairs[0] == pytest.approx(
             1, abs=0.09
         )  # four standard errors
-
-
-def test_blocks_of_any_size_give_the_same_estimate(bench: Bench) -> None:
-    log = bench.log(sigma=1e-3)
-    cut = [log.part(first, last) for first, last in pairwise([0, 17, 1200, 1201, 3500, len(log)])]
-    whole = refined.fit(Problem([lambda: [log]]))
-    assert np.array_equal(refined.fit(Problem([lambda: cut])).values, whole.values)
 
 
 def test_a_joint_at_rest_leaves_its_friction_open_and_the_rest_known() -> None:

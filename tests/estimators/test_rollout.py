@@ -51,14 +51,6 @@ def test_angles_are_the_simulators() -> None:
             )
 
 
-def test_the_true_arm_follows_the_log(segment: Segment) -> None:
-    score = rollouts(Model(), K, [segment], 8.0)
-    assert score.count[0] > score.count[1] > score.count[2] > 50
-    # what the filter's ends and straight lines between samples leave
-    assert score.rmse.max() < 2e-3
-    assert score.distance.max() > 0.3
-
-
 def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
     wrong = K * np.array([1, 1.1, 1, 1.1, 1, 1, 1])
     score = rollouts(Model(), wrong, [segment], 8.0)

@@ -45,14 +45,6 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
     assert np.isfinite(found.beta[-1]).all()
 
 
-def test_its_band_shrinks(bench: Bench) -> None:
-    found = running(_fit(bench, "refined", 2, loaded=False), [4.0], 40)
-    known = found.half[np.isfinite(found.half).all(axis=1)]
-    # information adds up; its linearisation moves a little
-    assert np.all(np.diff(known, axis=0) <= 1e-3 * known[:-1])
-    assert np.all(known[-1] < 0.5 * known[0])
-
-
 def test_a_log_that_begins_at_rest_begins_with_nothing(bench: Bench) -> None:
     log = bench.log()
     still = np.zeros((2, 2000))

@@ -26,13 +26,6 @@ def _cut(log: Segment, *edges: int) -> list[Segment]:
     return [log.part(first, last) for first, last in pairwise(ends)]
 
 
-def test_exact_logs_give_the_constants_and_the_payload(bench: Bench) -> None:
-    fit = weak.fit(Problem([lambda: [bench.log()]], [lambda: [bench.log(loaded=True)]]))
-    assert fit.names == ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "m_p", "l1", "l2")
-    assert np.allclose(fit.values, bench.truth, rtol=1e-4)  # the differentiator's ripple
-    assert set(fit.status) == {"OK"}
-
-
 def test_recorded_velocities_serve_as_well(bench: Bench) -> None:
     fit = weak.fit(Problem([lambda: [bench.log()]], settings=WeakSettings(bandwidth=None)))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-6)  # quadrature alone
@@ -83,21 +76,6 @@ def test_a_gap_starts_new_windows(bench: Bench) -> None:
     first, second = log.part(0, 1800), replace(log.part(2300, 4001), continues=False)
     fit = weak.fit(Problem([lambda: [first, second]]))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-3)
-
-
-def test_further_columns_are_told_from_those_of_the_arm(bench: Bench) -> None:
-    log = bench.log()
-    friction = 0.2 * np.tanh(bench.bare.omega / 0.2)
-    log = replace(log, tau=log.tau + friction + np.array([[0.03], [-0.05]]))
-    fit = weak.fit(
-        Problem([lambda: [log]], settings=WeakSettings(model=Model(("coulomb", "offset"))))
-    )
-    assert np.allclose(fit.values[7:], [0.2, 0.2, 0.03, -0.05], atol=2e-3)
-
-
-def test_too_short_a_log_is_refused(bench: Bench) -> None:
-    with pytest.raises(ValueError, match="long enough"):
-        weak.fit(Problem([lambda: [bench.log().part(0, 12)]]))
 
 
 @pytest.mark.parametrize("delay", [False, True])

@@ -13,7 +13,6 @@ import pytest
 from scipy.signal import lfilter
 
 import algid
-from algid import results
 from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError, OutputError, ResultError, SettingError
 from algid.estimators import refined
@@ -68,20 +67,6 @@ def test_exact_logs_give_the_arm_and_the_payload(estimator: str, wide: tuple[Log
     assert all(
         row.error_percent is not None and row.error_percent < limit for row in result.table4
     ), result.table4
-
-
-def test_noise_lies_within_the_intervals(noisy: tuple[Log, Log]) -> None:
-    result = identify(*noisy)
-    assert result.fit is not None
-    assert result.fit.converged
-    known = noisy[0].origin.truth
-    assert known is not None
-    truth = dict(zip(result.parameters, algid.Arm.constants(known.arm), strict=False))
-    for name, true in truth.items():
-        found = result.parameters[name]
-        assert found.estimate is not None
-        assert found.std is not None
-        assert abs(found.estimate - true) < 4.5 * found.std  # 7 draws of a normal: 1 in 20,000
 
 
 def test_the_robust_estimate_has_its_own_verdict_where_the_likelihood_does_not_converge(
@@ -172,11 +157,6 @@ def test_loaded_log_alone_with_parameters(
     assert one.estimate == pytest.approx(other.estimate, rel=1e-9 if estimator == "paper" else 1e-3)
 
 
-def test_swapped_logs_are_refused(wide: tuple[Log, Log]) -> None:
-    with pytest.raises(LogError, match="swap the logs"):
-        identify(wide[1], wide[0], PAPER)
-
-
 def test_logs_of_two_arms_are_told() -> None:
     # of 2 s the windows are too few for seven coefficients: any body of a payload fits them then
     sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
@@ -197,15 +177,6 @@ def test_weak_excitation_is_a_status_not_a_number() -> None:
     assert not result.complete
 
 
-def test_weak_excitation_by_likelihood_names_what_is_missing() -> None:
-    sensors = Sensors(position_noise=1e-4, torque_noise=1e-3)
-    still, _ = algid.synthesise("case1", duration=3.0, torque="none", sensors=sensors)
-    result = identify(still)
-    assert any(found.status is Status.NOT_IDENTIFIABLE for found in result.parameters.values())
-    assert result.fit is not None
-    assert result.fit.unidentifiable
-
-
 def test_settings_that_the_paper_lacks_are_refused() -> None:
     with pytest.raises(SettingError, match="--model"):
         Settings(estimator="paper", model="coulomb")
@@ -219,21 +190,6 @@ def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]
     file.write_text(file.read_text().replace('"schema_version": 4', '"schema_version": 7'))
     with pytest.raises(ResultError, match="expected 3 or 4, found 7"):
         read_result(file)
-
-
-def test_blocks_change_no_estimate(
-    tmp_path: Path, wide: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    algid.write_log(tmp_path / "log.parquet", wide[0], truth=wide[0].origin.truth)
-    settings = Settings(estimator="weak", model="plain")
-    whole = identify(wide[0], None, settings)
-    from algid.readers.log_reader import TableReader
-
-    blocks = TableReader.blocks
-    monkeypatch.setattr(TableReader, "blocks", lambda self, _rows=0: blocks(self, 700))
-    parts = identify(tmp_path / "log.parquet", None, settings)
-    for name, found in whole.parameters.items():
-        assert parts.parameters[name].estimate == pytest.approx(found.estimate, rel=1e-12)
 
 
 def test_real_arm_is_identified(shared_data: Path) -> None:
@@ -359,22 +315,6 @@ def flipped(log: Log) -> Log:
     return replace(log, theta=log.theta * np.array([[1], [-1]]), omega=None)
 
 
-@pytest.mark.parametrize("estimator", ["weak", "paper"])
-def test_an_impossible_arm_has_no_status_ok(
-    estimator: str, noisy: tuple[Log, Log], wide: tuple[Log, Log]
-) -> None:
-
-    log = (noisy if estimator == "weak" else wide)[0]
-    result = identify(flipped(log), None, Settings(estimator=estimator))
-    assert result.parameters["k7"].estimate is not None
-    assert result.parameters["k7"].estimate < 0
-    statuses = {found.status for found in result.estimates.values()}
-    assert Status.IMPLAUSIBLE in statuses
-    assert Status.OK not in statuses
-    assert not result.complete
-    assert result.verdict.grade == "failed"
-
-
 @pytest.mark.parametrize("change", ["joint 2 flipped", "torque flipped"])
 def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> None:
     logs = [
@@ -400,27 +340,6 @@ def test_constrain_obeys_every_bound(change: str, noisy: tuple[Log, Log]) -> Non
         )
         assert np.all(np.linalg.eigvalsh([[m11, m12], [m12, m22]]) > 0)
     assert any("--set constrain enforces" in warning for warning in result.warnings)
-
-
-def test_a_bound_broken_by_chance_is_no_failure() -> None:
-    from algid.identification.outcome import is_implausible
-
-    def fit(sigma: float | None, r2: float, nrmse: float) -> results.FitSummary:
-        predicted = results.TorquePrediction(
-            rmse=(1, 1), nrmse=(0.1, nrmse), r2=(0.9, r2), filter="none"
-        )
-        bounds = [results.Bound(bound="k6 >= 0", value=-1, distance_sigma=sigma)]
-        return results.FitSummary(
-            noise={}, covariance_names=[], covariance=[], intervals="sandwich", iterations=0,
-            converged=True, broken_bounds=bounds, residual=predicted,
-        )  # fmt: skip
-
-    assert not is_implausible(fit(2.9, 0.9, 0.3))
-    assert not is_implausible(fit(None, 0.9, 0.3))
-    assert is_implausible(fit(3.2, 0.9, 0.3))
-    assert is_implausible(fit(1.0, -0.01, 0.9))
-    # the torque hardly varies: there is nothing to explain
-    assert not is_implausible(fit(1.0, -0.01, 0.05))
 
 
 def test_a_log_whose_lost_samples_were_renumbered_has_failed_unless_it_is_accepted() -> None:
