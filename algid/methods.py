@@ -6,8 +6,8 @@ identification, reports and the guide. Adding one is a module and an entry.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ class Estimator:
         What it is called in a sentence.
     does, when : str
         What it does and when to take it, for the guide.
-    module : str or None
-        Whose ``fit(problem)`` gives a `Fit`. None where estimates are what time series settle to:
-        the paper's method.
+    fit : callable or None
+        ``fit(problem)`` gives a `Fit`. None where estimates are what time series settle to: the
+        paper's method.
     observer : "zero-phase" or "luenberger"
         Where its velocities come from, unless the settings say otherwise.
     lacks : names of settings
@@ -42,23 +42,28 @@ class Estimator:
     title: str
     does: str
     when: str
-    module: str | None
+    fit: Callable[[Problem], Fit] | None
     observer: Literal["zero-phase", "luenberger"] = "zero-phase"
     lacks: tuple[str, ...] = ()
     beside_paper: bool = False
 
-    def fit(self, problem: Problem) -> Fit:
-        """The fit of a problem.
 
-        Raises
-        ------
-        ValueError
-            If the estimator gives time series.
-        """
-        if self.module is None:
-            raise ValueError(f"{self.name} gives time series, not a fit")
-        fit: Fit = import_module(self.module).fit(problem)
-        return fit
+def _refined(problem: Problem) -> Fit:
+    from algid.estimators import refined
+
+    return refined.fit(problem)
+
+
+def _weak(problem: Problem) -> Fit:
+    from algid.estimators import weak
+
+    return weak.fit(problem)
+
+
+def _instruments(problem: Problem) -> Fit:
+    from algid.estimators import instruments
+
+    return instruments.fit(problem)
 
 
 ESTIMATORS: tuple[Estimator, ...] = (
@@ -68,7 +73,7 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "maximum likelihood with noise in angles and torques; noise levels from the data; banded "
         "Gauss-Newton",
         "always, first",
-        "algid.estimators.refined",
+        _refined,
         beside_paper=True,
     ),
     Estimator(
@@ -77,14 +82,14 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "momentum form under sliding modulating functions, weighted least squares; no acceleration "
         "anywhere",
         "very long logs, a first look",
-        "algid.estimators.weak",
+        _weak,
     ),
     Estimator(
         "instruments",
         "instrumental variables",
         "the same windows, with regressors simulated from the measured torque as instruments",
         "where unmodelled torque drives the motion",
-        "algid.estimators.instruments",
+        _instruments,
     ),
     Estimator(
         "paper",
@@ -126,4 +131,4 @@ def estimator_of(name: str) -> Estimator:
 
 def settles(name: object) -> bool:
     """Whether the estimates of the estimator of that name are what time series settle to."""
-    return any(one.name == name and one.module is None for one in ESTIMATORS)
+    return any(one.name == name and one.fit is None for one in ESTIMATORS)

@@ -45,7 +45,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "arm compiled criteria model names notices physics progress quantiles signals "
         "significance", "numpy scipy", PURE
     ),
-    "methods": room("estimators progress"),
+    "methods": room("estimators"),
     "files": room("errors limits options staging", "pydantic"),
     "stores": room("errors files", "pyarrow"),
     "runtime": room(packages="threadpoolctl"),

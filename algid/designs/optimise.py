@@ -49,7 +49,7 @@ class Evaluation:
     room_gradient: FloatArray
 
 
-class Problem(Protocol):
+class Programme(Protocol):
     """A family of motions within limits."""
 
     @property
@@ -78,12 +78,12 @@ class Found:
     interrupted: bool
 
 
-def optimise(problem: Problem, rate: float, seed: int, progress: Progress | None = None) -> Found:
+def optimise(problem: Programme, rate: float, seed: int, progress: Progress | None = None) -> Found:
     """The best motion that the search finds; the best so far where it is interrupted.
 
     Parameters
     ----------
-    problem : Problem
+    problem : Programme
     rate : float, Hz
         Samples a second at which the limits are kept in the end.
     seed : int
@@ -118,7 +118,7 @@ def optimise(problem: Problem, rate: float, seed: int, progress: Progress | None
     return Found(*search.best, interrupted=False)
 
 
-def kept(problem: Problem, x: FloatArray, rate: float, most: float = 1.0) -> FloatArray:
+def kept(problem: Programme, x: FloatArray, rate: float, most: float = 1.0) -> FloatArray:
     """The motion `x`, drawn back to rest until it uses `most` of the limits.
 
     a small one is enlarged to that.
@@ -141,7 +141,7 @@ def kept(problem: Problem, x: FloatArray, rate: float, most: float = 1.0) -> Flo
 class _Search:
     """Run stages, keep the best motion that obeys the limits, and report the progress."""
 
-    def __init__(self, problem: Problem, rate: float, progress: Progress | None) -> None:
+    def __init__(self, problem: Programme, rate: float, progress: Progress | None) -> None:
         self._problem, self._rate, self._progress = problem, rate, progress
         self.best: tuple[FloatArray, float] | None = None
         self.current: FloatArray | None = None

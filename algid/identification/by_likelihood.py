@@ -79,6 +79,9 @@ def run_fit(
         If the settings' estimator gives time series.
     """
     estimator = estimator_of(settings.estimator)
+    if estimator.fit is None:
+        raise ValueError(f"{estimator.name} gives time series, not a fit")
+    estimate = estimator.fit
     first = chosen
     sums: dict[Recording, PredictionSums] = {}
     watched = None
@@ -86,7 +89,7 @@ def run_fit(
         watched = partial(_scored, chosen.model, settings, sums)  # which depends on no estimate
 
     def fitted(selection: Selection) -> Fit:
-        return estimator.fit(problem_of(survey, settings, selection, prior))
+        return estimate(problem_of(survey, settings, selection, prior))
 
     with long_enough(survey):
         # why no term is chosen but every one shrunk, if so
@@ -94,7 +97,7 @@ def run_fit(
         if chosen.refuted and settings.chooses and estimator.name == "refined":
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
-            fit = estimator.fit(problem_of(survey, settings, chosen, prior, watched))
+            fit = estimate(problem_of(survey, settings, chosen, prior, watched))
             if fit.misfit is not None and settings.chooses:
                 fit, chosen = completed(fit, chosen, fitted)
             if fit.refuted and settings.chooses:

@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
-from algid.estimators.doubt import UNLIKE
 
 from algid.arm import FloatArray
 from algid.estimators import weak
@@ -25,6 +24,7 @@ from algid.estimators.diagnostics import (
     repeatability,
     term_worths,
 )
+from algid.estimators.excitation import UNLIKE
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings

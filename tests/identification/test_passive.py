@@ -101,7 +101,7 @@ def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> Non
     """Without noise both residuals are rounding: neither may drown the other joint's equation,
     which sets the scale.
     """
-    fit = estimator([source(logged(moved("case1", passive), 0, 0.0))])  # type: ignore[operator]
+    fit = estimator(Problem([source(logged(moved("case1", passive), 0, 0.0))]))  # type: ignore[operator]
     # the bound is the weak form's quadrature at 500 Hz
     np.testing.assert_allclose(fit.values, load_case("case1").arm.constants(), rtol=2e-3)
 

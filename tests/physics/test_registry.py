@@ -84,7 +84,7 @@ ENTRY = """    Estimator(
         "the toy's form",
         "what the weak form does",
         "in tests",
-        "algid.estimators.toy",
+        lambda problem: import_module("algid.estimators.toy").fit(problem),
     ),
 """
 TRIAL = """
