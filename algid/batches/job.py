@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from algid import __version__
 from algid.base.errors import AlgidError, LogError, chain_of, text_of
-from algid.base.files import refuse_links, temporary_folder
+from algid.base.files import refuse_links, sha256_of, temporary_folder
 from algid.base.runtime import keep_freed, keep_to_one_core
 from algid.base.stores import is_url, open_store, public, put_folder, reading
 from algid.batches.jobs import Job, redacted_path
@@ -61,6 +61,9 @@ class Task:
         }
         content |= {"settings": self.settings.as_json(), "report": self.report}
         content["version"] = __version__
+        prior = self.settings.prior or (self.profile and self.profile.prior)
+        if prior:
+            content["prior"] = sha256_of(Path(prior))
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def record(self, status: JobStatus, reason: str, **known: Any) -> JobRecord:

@@ -86,7 +86,7 @@ def statement_of(settings: Settings) -> Statement | None:
     if settings.prior is None:
         return None
     file, error = settings.prior, settings.prior_error
-    if Path(file).suffix == ".urdf":
+    if Path(file).suffix.lower() == ".urdf":
         arm = replace(arm_of(Path(file))[0], g=settings.gravity)
         covariance = drawn_covariance(arm, (ERROR if error is None else error) / 100)
         said = Statement(file, RIGID, arm.constants()[: len(RIGID)], covariance)
@@ -95,7 +95,10 @@ def statement_of(settings: Settings) -> Statement | None:
             raise SettingError(
                 f"{flag('prior_error')}: {file} is a result, which has error bars; leave it out"
             )
-        result = read_result(file)
+        try:
+            result = read_result(file)
+        except ResultError as wrong:
+            raise ResultError(f"{flag('prior')}: no URDF by its name, and {wrong}") from wrong
         names = with_error_bar(result, RIGID)
         if not names:
             raise ResultError(f"{file}: the result has no error bars of k1 … k5; give another one")

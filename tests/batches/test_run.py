@@ -29,7 +29,9 @@ from algid.identification.identify import identify
 from algid.notices import Notice
 from algid.results import Result
 from algid.settings import Settings
+from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
+from pipelines.prior import urdf
 
 
 class Here(Executor):
@@ -130,6 +132,16 @@ def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -
     assert algid.batch(logs, out, retry_failed=True, **quick).anew == {"failed before": 1}
     done = algid.batch(logs, out, window=0.3, **quick)
     assert (done.anew, done.ran) == ({"of other settings": 3}, 3)
+
+
+def test_a_changed_prior_is_another_setting(logs: Path) -> None:
+    prior, arm = logs.parent / "arm.urdf", load_case("case1").arm
+    recipe = replace(CONFIG, settings=WEAK.but(prior=str(prior)))
+    for one, count in ((arm, 3), (arm, 0), (replace(arm, m2=1.1 * arm.m2), 3)):
+        prior.write_text(urdf(one))
+        executor = Here()
+        _run(logs, executor, recipe)
+        assert len(executor.ran) == count
 
 
 def test_a_changed_log_of_equal_size_runs_again(logs: Path) -> None:

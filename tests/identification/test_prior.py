@@ -189,6 +189,7 @@ def test_a_profile_names_it(cad: Path) -> None:
     [
         ({"prior_error": 20}, "--set prior_error: expected a prior"),
         ({"prior": "none.urdf"}, "none.urdf: cannot read it"),
+        ({"prior": "arm.xacro"}, "--prior: no URDF by its name, and .*arm.xacro: cannot read it"),
         ({"prior": "arm.urdf", "prior_error": 0.2}, "--set prior_error: expected a number from 1"),
         ({"prior": "arm.urdf", "estimator": "paper"}, "--prior: the paper's method"),
         ({"prior": "arm.urdf", "parameters": "first.algid"}, "--prior: .* leave one of them out"),
