@@ -203,7 +203,7 @@ def of_arrays(
                 others.append(f"{name} ({' × '.join(map(str, array.shape))})")
             continue
         try:
-            plain = array.dtype.kind in "iuf" and not np.ma.isMaskedArray(array)
+            plain = array.dtype.kind in "iuf"
             made = _arrow(array[:1] if plain else array)
         except (pa.ArrowException, TypeError, ValueError, UnicodeError):
             others.append(f"{name} (no numbers)")

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.feather as feather
-import pyarrow.parquet as pq
 import pytest
 
 from algid.profile import Profile, Torque
@@ -122,7 +120,6 @@ def arrow(field_units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
     return pa.table(values, schema=pa.schema(fields, metadata=metadata or None))
 
 
-@pytest.mark.parametrize("kind", ["parquet", "feather"])
 @pytest.mark.parametrize(
     ("field_units", "metadata"),
     [
@@ -134,13 +131,8 @@ def arrow(field_units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
         ),
     ],
 )
-def test_units_of_a_schema_are_used(
-    field_units: dict[str, str], metadata: dict[str, str], kind: str, tmp_path: Path
-) -> None:
-    path = tmp_path / f"log.{kind}"
-    write = pq.write_table if kind == "parquet" else feather.write_feather
-    write(arrow(field_units, metadata), path)
-    log = read_log(path)
+def test_units_of_a_schema_are_used(field_units: dict[str, str], metadata: dict[str, str]) -> None:
+    log = read_log(arrow(field_units, metadata))
     assert np.allclose(np.rad2deg(log.theta), np.arange(ROWS) + 1, rtol=1e-12)
     assert np.allclose(1000 * log.tau, np.arange(ROWS) + 1, rtol=1e-12)
 
