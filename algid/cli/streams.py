@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import codecs
 import io
 import os
 import sys
-import unicodedata
 from typing import Any
 
 from algid.base.errors import OutputError
-
-SPELLINGS = {
-    "–": "-", "—": "-", "−": "-", "…": "...", "±": "+-", "•": "*", "·": "*", "×": "x",
-    "∞": "inf", "°": " deg",
-    "→": "->", "≤": "<=", "≥": ">=", "≈": "~", "Δ": "d", "α": "alpha", "θ": "theta",
-    "σ": "sigma", "τ": "tau",
-    "ω": "omega", "µ": "u", "μ": "u", "√": "sqrt", "²": "^2", "³": "^3", "─": "-",
-    "‘": "'", "’": "'",
-}  # fmt: skip
 
 
 class _Pipe(io.FileIO):
@@ -53,7 +42,6 @@ def _to_nowhere(handle: int) -> None:
 
 def harden_streams() -> None:
     """Let this process print to a reader that leaves, and to a terminal that lacks characters."""
-    codecs.register_error("spelled", _spelled)
     for name, handle, told_as in (("stdout", 1, "standard output"), ("stderr", 2, None)):
         if (
             getattr(sys, name) is None
@@ -70,18 +58,5 @@ def harden_streams() -> None:
             handle = os.dup(handle)
         raw = io.BufferedWriter(_Pipe(handle, told_as))
         lines = name == "stderr" or stream.isatty()
-        setattr(sys, name, io.TextIOWrapper(raw, stream.encoding, "spelled", line_buffering=lines))
-
-
-def _spelled(error: UnicodeError) -> tuple[str, int]:
-    """Letters that the terminal lacks in such that every terminal has."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    spelled = ""
-    for letter in error.object[error.start : error.end]:
-        near = (
-            SPELLINGS.get(letter)
-            or unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
-        )
-        spelled += near or letter.encode("ascii", "backslashreplace").decode()
-    return spelled, error.end
+        text = io.TextIOWrapper(raw, stream.encoding, "backslashreplace", line_buffering=lines)
+        setattr(sys, name, text)

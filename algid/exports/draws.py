@@ -72,8 +72,7 @@ def draws_of(
     covariance = result.fit.covariance_of(names)
     size = np.sqrt(np.diag(covariance))
     size[size == 0] = 1.0
-    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
     freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
     shared = Shared(
         model,
@@ -82,14 +81,16 @@ def draws_of(
         body=within(BODY_PARAMETERS, names),
     )
     limits = bounds(shared) if set(shared.names) <= set(names) else bounds(Shared(model))
-    whole = dict.fromkeys(shared.names, 0.0)
     refused = 0
     why: str | None = ""
     while refused < _HOPELESS:
         wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
-        drawn = mean + root @ random.standard_normal(len(names)) * wide
+        one_each = random.multivariate_normal(
+            still, correlation, method="eigh", check_valid="ignore"
+        )
+        drawn = mean + size * one_each * wide
         numbers = dict(zip(names, drawn.tolist(), strict=True))
-        beta = np.array(list({**whole, **numbers}.values())[: len(whole)])
+        beta = np.array([numbers.get(name, 0.0) for name in shared.names])
         why = next((name for name, limit in limits.items() if limit(beta) < 0), None)
         try:
             one = describe(_with(result, numbers), file, knowns, links=links)
