@@ -181,10 +181,10 @@ def _identified(task: Task) -> Result:
                 shared_library=not away,
             )
         except AlgidError as error:  # which names the copies
-            text = str(error)
             for log in logs:
-                text = text.replace(str(log.path), log.url) if isinstance(log, Staged) else text
-            raise type(error)(text) from error
+                if isinstance(log, Staged):
+                    error.args = (str(error).replace(str(log.path), log.url),)
+            raise
         if away:
             name = f"{task.job.name}.algid"
             put_folder(open_store(task.out), name, place.with_name(f"{place.name}.algid"))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from algid.synth.sensors import Sensors
 from tests.batches.test_run import Here
 from tests.objects import Served, s3
 from tests.processes import Outcome
+from tests.readers.mcaps import write_mcap
 
 ODD = (
     "run%41.csv",
@@ -222,6 +224,15 @@ def test_a_log_that_cannot_be_looked_at_for_a_while_loses_no_result(
     served.denied = lambda _method, _path: False
     ended = _run(served)
     assert (_ends(ended), ended.ran) == ({"a": JobStatus.OK, "b": JobStatus.OK}, 0)
+
+
+def test_a_log_without_joints_is_refused_by_its_url(served: Served, tmp_path: Path) -> None:
+    write_mcap(
+        tmp_path / "a.mcap", [("/x", 1, b"\0\1\0\0\7")], {"/x": ("a/B", "ros2msg", b"int8 x")}
+    )
+    open_store(served.url("logs")).write("a.mcap", (tmp_path / "a.mcap").read_bytes())
+    (record,) = _run(served).records
+    assert re.match(rf"s3://{served.bucket}/logs/a\.mcap\S*: no topic holds", record.reason)
 
 
 def test_a_record_that_may_not_be_read_counts_as_none(served: Served, log: bytes) -> None:
