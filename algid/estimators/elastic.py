@@ -24,6 +24,7 @@ from algid.model import (
     apart,
     attributes,
     gains,
+    inertia,
     inertial,
     link_motion,
     load,
@@ -34,7 +35,8 @@ from algid.model import (
 from algid.physics.expressions import Values
 
 _ROTOR = 0.5  # a motor's share of the inertia that its joint feels, before any log
-_ROUNDS = 3
+_ROUNDS = 6
+_STIFF = 80.0  # rad/s: of slower joints substitution takes the load no further than it converges
 _DEGREE = 6
 _REACH = 0.125  # s, of a window to either side
 
@@ -64,9 +66,16 @@ def flexed(
     """
     if not attributes(model, "elastic"):
         return motion
-    reach = _REACH if tau is None else 0.5 * _REACH
+    reach = 0.5 * _REACH
+    if tau is None:
+        soft = 0.0
+        for name, joint in attributes(model, "elastic"):
+            swung = inertia(model, c, motion.theta)[joint, joint]
+            soft = max(soft, float(np.max(c[model.compiled.place[name]] * swung)))
+        reach = _REACH * max(1.0, _STIFF * np.sqrt(soft))
+    own = replace(model, by_torque=False)  # the load on the links, friction or not
     for _ in range(_ROUNDS if tau is None else 1):
-        through = load(model, c, link_motion(model, c, motion))
+        through = load(own, c, link_motion(model, c, motion))
         if tau is not None:
             through = through + (tau - torque(model, c, motion)) / gains(model, c).reshape(2, -1)
         motion = replace(motion, load=_rates(through, dt, reach))

@@ -82,6 +82,7 @@ from algid.notices import Notice, Remedy
 
 _DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _ROUNDS = 3  # linearisations: the third moves nothing by a hundredth of a standard deviation
+_SOFT_ROUNDS = 5  # of them where joints are elastic
 _MOST_KEPT = 1 << 20  # samples of all logs whose moments stay in memory, some 40 bytes each
 _STEPS, _SETTLED = 200, 1e-3  # of expectation and maximisation, and change of log τ at the last
 _LEAST = 1e-4  # of s: a spread that counts as nothing
@@ -203,7 +204,8 @@ class RobustProblem:
         beta, _ = weak.first_estimate(shared, solved, known)
         driven = {kind: _driven(own) for kind, own in normals.items()}
         share: FloatArray = np.ones(0)
-        for number in range(_ROUNDS):
+        rounds = _SOFT_ROUNDS if attributes(model, "elastic") else _ROUNDS
+        for number in range(rounds):
             base = settings.shift.delay
             if number:
                 columns = len(settings.model.names)
