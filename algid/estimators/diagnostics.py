@@ -441,14 +441,9 @@ def by_themselves(
     shared: Shared, logs: Sequence[LogInformation]
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Coefficients (q,) of logs of one kind, their sandwich (q, q), whether all are determined."""
-    size = len(shared.log_names)
-    S, y = np.zeros((size, size)), np.zeros(size)
-    for log in logs:
-        of_log, g = log.total
-        S = S + of_log
-        y = y + (g + of_log @ log.c0)
-    inverse = scaled_pinv(S)
-    c = inverse @ y
+    own = Shared(shared.model, shared.delay)
     plain = [replace(log, loaded=False) for log in logs]
-    meat, _ = sandwich(scatters(Shared(shared.model, shared.delay), plain, c))
+    c, S, _ = combine(own, plain, np.zeros(len(own.names)))
+    inverse = scaled_pinv(S)
+    meat, _ = sandwich(scatters(own, plain, c))
     return c, inverse @ meat @ inverse, bool(np.linalg.matrix_rank(inverse @ S) == len(c))
