@@ -26,15 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Staged:
-    """A log that was fetched from an object store: its copy on this machine, and its URL.
-
-    A copy that is not `whole` holds what the reader needs, and zeros elsewhere: the log's hash is
-    not known then.
-    """
+    """A log that was fetched from an object store: its copy on this machine, and its URL."""
 
     path: Path
     url: str
-    whole: bool = True
 
 
 LogLike = str | Path | Log | Staged | FrameOrArrays
@@ -76,10 +71,7 @@ def open_source(
     if isinstance(log, Log):
         source = _in_memory(log, role, gravity, effort)
     elif isinstance(log, Staged):
-        source = _of_file(log.path, role, profile, gravity, effort)
-        source = replace(source, name=log.url)
-        if not log.whole:
-            source = replace(source, digest=None)
+        source = replace(_of_file(log.path, role, profile, gravity, effort), name=log.url)
     else:
         source = _of_file(Path(log), role, profile, gravity, effort)
         source = replace(source, name=str(log))
