@@ -10,7 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import algid
-from algid.arm import Arm, regressor
+from algid.arm import Arm
 from algid.base.errors import AlgidError
 from algid.exports.formats import FORMATS, exported
 from algid.exports.links import Knowns
@@ -30,24 +30,6 @@ def text_of(
         to,
         Knowns(**known),
     )[0]
-
-
-def test_pinocchios_regressor_and_links_give_the_torque_of_table_1() -> None:
-    """τ = Y π by Pinocchio's regressor of the links' ten parameters each is algid's Y k by its
-    seven.
-    """
-    pin = pytest.importorskip("pinocchio")
-    robot = pin.buildModelFromXML(text_of("urdf", l2=0.3))
-    data, (theta, omega, alpha) = robot.createData(), states(60)
-    parameters = np.concatenate([body.toDynamicParameters() for body in list(robot.inertias)[1:]])
-    k = ODD.constants()
-    ours = np.einsum("aqn,q->an", regressor(theta, omega, alpha)[:, :5], k[:5])
-    for place in range(theta.shape[1]):
-        q = np.stack([np.cos(theta[:, place]), np.sin(theta[:, place])], axis=1).ravel()
-        Y = pin.computeJointTorqueRegressor(robot, data, q, omega[:, place], alpha[:, place])
-        np.testing.assert_allclose(
-            Y @ parameters, ours[:, place], rtol=0, atol=1e-9 * np.abs(ours).max()
-        )
 
 
 def test_the_tip_is_where_the_angles_say() -> None:

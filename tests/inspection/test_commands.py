@@ -7,8 +7,6 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
-import polars as pl
 import pytest
 from click.testing import CliRunner
 from pydantic import BaseModel
@@ -78,43 +76,6 @@ def test_inspect_tells_types_and_counts_of_flat_logs(tmp_path: Path) -> None:
         ["n", "int64", None],
         *entries("arm.csv"),
     ]
-
-
-@pytest.mark.parametrize(("unit", "factor"), [("ms", 1), ("us", 1000)])
-def test_times_too_far_apart_are_told_and_how_to_mend_them(
-    unit: str, factor: int, tmp_path: Path
-) -> None:
-    log = moving_log()
-    frame = pl.DataFrame(
-        {
-            name: row
-            for pair in ("theta", "tau")
-            for name, row in zip((f"{pair}1", f"{pair}2"), getattr(log, pair), strict=True)
-        }
-    )
-    times = pl.Series(np.arange(len(log)) * factor)
-    for name in ("t", f"t_{unit}"):
-        frame.with_columns(times.alias(name)).write_csv(tmp_path / f"{name}.csv")
-        frame.with_columns(times.alias(name)).write_parquet(tmp_path / f"{name}.parquet")
-    for kind in ("csv", "parquet"):
-        slow = json.loads(run("inspect", tmp_path / f"t.{kind}", "--format", "json"))
-        (notice,) = [one for one in slow["notices"] if one["code"] == "OTHER_UNIT"]
-        assert notice["remedies"][0]["settings"] == {"time_unit": unit}
-        assert slow["clock"]["rate"] == pytest.approx(1 / factor)
-        told = json.loads(run("inspect", tmp_path / f"t_{unit}.{kind}", "--format", "json"))
-        assert told["clock"]["rate"] == pytest.approx(1000)
-        assert "OTHER_UNIT" not in [one["code"] for one in told["notices"]]
-        (tmp_path / "algid.toml").write_text(f'time_unit = "{unit}"\n')
-        mended = run(
-            "inspect",
-            tmp_path / f"t.{kind}",
-            "--profile",
-            tmp_path / "algid.toml",
-            "--format",
-            "json",
-        )
-        assert json.loads(mended)["clock"]["rate"] == pytest.approx(1000)
-        assert "OTHER_UNIT" not in mended
 
 
 def test_inspect_works_on_what_it_refuses(tmp_path: Path) -> None:
