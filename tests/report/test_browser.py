@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
+import algid
 from algid.report.page import write_pages
 from algid.results import Estimate, Result, Status, write_result
 from tests.report.browser import DRIVER, Browser, Seen
-from tests.report.folders import build_recorded, hostile
+from tests.report.folders import hostile
 
 RUN = Path(__file__).parents[3] / "shared/data/dfki/C1_sysid/20230629-143601.csv"
 
@@ -98,9 +99,8 @@ def test_a_log_whose_names_attack(browser: Browser, folder: Path, result: Result
 
 @pytest.mark.skipif(not RUN.exists(), reason="../shared/data is not here")
 def test_a_real_log(browser: Browser, tmp_path: Path) -> None:
-    folder = tmp_path / "run.algid"
-    build_recorded(folder, RUN)
-    page = write_pages(folder)[0]
+    algid.identify(RUN, zero="hanging", out=tmp_path, name="run")
+    page = tmp_path / "run.algid" / "report.html"
     assert_sound(browser.look(page), page, f"{RUN.name} · algid")
 
 

@@ -57,10 +57,10 @@ def test_the_page_leads_with_the_arm_and_its_tables_hold_the_estimates(
     assert heads[:5] == ["Parameter", "Estimate", "± 95 %", "Unit", "Status"]
     every = rows_of(result, result.parameters)
     assert [row[:5] for row in rows] == [[o.name, o.value, o.half, o.unit, o.status] for o in every]
-    assert "7 of 7 constants identified · refined estimator · 7.998 s of log" in shown.text
+    assert "7 of 7 constants identified · refined estimator · 8.000 s of log" in shown.text
     heads, rows = shown.tables["Table 4"]
-    assert [row[0] for row in rows] == ["k1", "k3", "k6", "k4", "k2"]
-    assert rows[0][heads.index("Paper, %")] == "0.2449"
+    paper = {row[0]: row[heads.index("Paper, %")] for row in rows}
+    assert paper["k1"] == "0.2449"
     assert ["velocity", "observer"] in shown.tables["Settings"][1]
     assert shown.tables["Torque prediction"][1][0][:2] == ["logs used", "1"]
     assert [row[1] for row in shown.tables["Whiteness of the residual"][1]] == ["yes", "yes"]

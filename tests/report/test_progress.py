@@ -9,24 +9,21 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
+import algid
 from algid.identification.identify import identify
-from algid.log import Log, Origin
+from algid.log import Log
 from algid.settings import Settings
-from algid.synth.cases import load_case
+from algid.synth.sensors import Sensors
 from tests.processes import Outcome, begin
-from tests.report.folders import record
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*3[0-9]")
 
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    recorded = record(load_case("case1"), 2.0)
-    stamps = np.rint(recorded.motion.t * 1e9).astype(np.int64)
-    return Log(stamps, recorded.motion.theta, recorded.measured, Origin("made.csv", "csv", {}))
+    return algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-2))[0]
 
 
 @pytest.fixture(scope="module")
