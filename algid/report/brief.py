@@ -31,7 +31,10 @@ def verdict_lines(judged: Verdict, width: int = WIDTH, most: int | None = None) 
     """
     lines = lines_of(f"{judged.word}: {visible(judged.headline)}.", width)
     for reason in judged.reasons[:most]:
-        text = reason.sentence if most is None else _short(reason.text, reason.code)
+        text = reason.sentence
+        if most is not None:  # in two lines, its code behind it
+            room = MOST_LINES * (WIDTH - 6) - len(reason.code)
+            text = textwrap.shorten(reason.text, room, placeholder=" …")
         lines += lines_of(f"{visible(text, 2_000)} [{reason.code}]", width, " • ", "   ")
     left = judged.reasons[most:] if most is not None else ()
     if left:
@@ -40,11 +43,6 @@ def verdict_lines(judged: Verdict, width: int = WIDTH, most: int | None = None) 
     if judged.command:
         lines.append(f"Run first: {judged.command}")
     return lines
-
-
-def _short(text: str, code: str) -> str:
-    """A reason in two lines, its code behind it."""
-    return textwrap.shorten(text, MOST_LINES * (WIDTH - 6) - len(code), placeholder=" …")
 
 
 def _codes(notices: Iterable[Notice]) -> str:

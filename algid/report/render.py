@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 from algid.base.files import whole_file
 from algid.base.text import visible
 from algid.base.verdict import MOST_REASONS
-from algid.report.document import Document, Table
+from algid.report.document import Document
 from algid.results import Result
 from algid.results.rows import rows_of
 
@@ -77,12 +77,6 @@ def markdown(document: Document) -> str:
     return _environment(_escaped).get_template("report.md").render(document=document, code=code)
 
 
-def markdown_table(table: Table) -> str:
-    """One table with its title and note."""
-    macros = _environment(_escaped).get_template("table.md").module
-    return str(macros.table(table))  # type: ignore[attr-defined]
-
-
 def notebook(result: Result, title: str) -> str:
     """The verdict with its first reasons, and a table of the estimates under `title`."""
     template = _environment(_shown).get_template("notebook.html")
@@ -125,10 +119,7 @@ def _escaped(value: object) -> object:
 
 def strict_json(value: object) -> str:
     """`value` as JSON; a number that is none is null, as a gap in a line is."""
-    try:
-        return json.dumps(value, allow_nan=False, separators=(",", ":"))
-    except ValueError:
-        return json.dumps(_of_numbers(value), separators=(",", ":"))
+    return json.dumps(_of_numbers(value), allow_nan=False, separators=(",", ":"))
 
 
 def _of_numbers(value: object) -> object:

@@ -6,7 +6,7 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -31,8 +31,6 @@ POINTS = 2_400
 SAMPLES = 2_000
 MOTION = ("t", "theta1", "theta2", "omega1", "omega2")
 GOLDEN = 0.6180339887498949
-PLACES = frozenset({"log", "t", "x"})
-"""Columns that say where a row lies: each has a number in every row."""
 
 
 @contextmanager
@@ -51,32 +49,23 @@ def _parquet(path: Path) -> Iterator[Any]:
         raise ResultError(text) from error
 
 
-def blocks(
-    path: Path,
-    names: Sequence[str] = (),
-    rows: int = ROWS,
-    *,
-    finite: Collection[str] = PLACES,
-) -> Iterator[Block]:
+def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[Block]:
     """Yield columns `names` of `path`, by default all, `rows` samples at a time.
 
-    What is missing is NaN; columns that are `finite` may have none of these.
+    What is missing is NaN.
 
     Raises
     ------
     ResultError
-        If the file cannot be read, lacks a column, or a number in a `finite` one.
+        If the file cannot be read, or lacks a column.
     """
     with _parquet(path) as file:
+        missing = [name for name in names if name not in file.schema_arrow.names]
+        if missing:
+            again = "identify again with this version"
+            raise ResultError(f"{path}: it has no column {missing[0]!r}; {again}")
         for batch in file.iter_batches(batch_size=rows, columns=list(names) or None):
-            block: Block = {name: numbers_of(batch.column(name)) for name in batch.schema.names}
-            for name in (*names, *(finite & block.keys())):
-                if name not in block or (name in finite and not np.isfinite(block[name]).all()):
-                    raise ResultError(
-                        f"{path}: column {name!r}: expected a number in every row; identify again "
-                        "with this version"
-                    )
-            yield block
+            yield {name: numbers_of(batch.column(name)) for name in batch.schema.names}
 
 
 def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:

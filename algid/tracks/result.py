@@ -161,7 +161,7 @@ def read_track(folder: Path) -> TrackResult:
         raise ResultError(
             f"{path}: not JSON ({reason}); expected a track of algid track"
         ) from error
-    parts = list(blocks(folder / CURVE, COLUMNS, finite=COLUMNS))
+    parts = list(blocks(folder / CURVE, COLUMNS))
     if not parts:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
     t, m_p, high, stretch, left = (

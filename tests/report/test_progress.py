@@ -15,7 +15,6 @@ import algid
 from algid.identification.identify import identify
 from algid.log import Log
 from algid.settings import Settings
-from algid.synth.sensors import Sensors
 from tests.processes import Outcome, begin
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*3[0-9]")
@@ -23,7 +22,8 @@ COLOUR = re.compile(r"\x1b\[[0-9;]*3[0-9]")
 
 @pytest.fixture(scope="module")
 def log() -> Log:
-    return algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-2))[0]
+    found, _ = algid.synthesise("case1", duration=2.0, torque="wide", torque_noise=1e-2)
+    return replace(found, omega=None)
 
 
 @pytest.fixture(scope="module")

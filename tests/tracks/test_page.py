@@ -5,7 +5,6 @@ viewers.
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from algid.tracks.page import (
     verdict,
     write_track,
 )
-from algid.tracks.result import COLUMNS, CURVE, TrackResult, read_track, track_json
+from algid.tracks.result import TrackResult, read_track, track_json
 from algid.tracks.run import track_log
 from algid.writers import write_log
 from tests.cli.commands import app
@@ -163,18 +162,3 @@ def test_a_damaged_track_is_refused_in_one_line(
     ) as refused:
         read_track(folder)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize("column", COLUMNS)
-def test_a_curve_without_a_number_in_every_row_is_refused(
-    result: TrackResult, tmp_path: Path, column: str
-) -> None:
-    folder = tmp_path / "picking.track"
-    write_track(result, folder)
-    path = folder / CURVE
-    for value in (None, math.inf, -math.inf):
-        pl.read_parquet(path).with_columns(pl.lit(value, pl.Float64).alias(column)).write_parquet(
-            path
-        )
-        with pytest.raises(ResultError, match=rf"{column}.*expected a number in every row"):
-            read_track(folder)
