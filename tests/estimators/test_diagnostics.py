@@ -11,12 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
+from scipy.stats import chi2, norm
 
-from algid.arm import FloatArray
+from algid.arm import FloatArray, payload_constants, with_payload
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation
 from algid.estimators.diagnostics import (
     broken_bounds,
+    by_themselves,
     constrained,
     length_by_constants,
     payload_distance,
@@ -167,6 +169,22 @@ def test_logs_of_one_arm_are_not_taken_for_those_of_two(bench: Bench) -> None:
     told = payload_distance(weak.fit(Problem([partial(list, logs[:1])], [partial(list, [other])])))
     assert told is not None
     assert told > 5
+
+
+def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Bench) -> None:
+    """χ² of the loaded constants less the arm's and the payload's of another solver."""
+    logs = [bench.log(loaded, 1e-3, 27) for loaded in (False, True)]
+    fit = weak.fit(Problem([partial(list, logs[:1])], [partial(list, logs[1:])]))
+    (c, V, _), (c_loaded, W, _) = (by_themselves(fit.shared, [log]) for log in fit.logs)
+    whitening = np.linalg.inv(np.linalg.cholesky(V + W))
+
+    def left(p: FloatArray) -> FloatArray:
+        z = payload_constants(p[0], p[1], p[2], 9.81)
+        return np.asarray(whitening @ (c_loaded - with_payload(c, z)))
+
+    start = np.array([bench.payload, bench.arm.l1, bench.arm.l2])
+    squares = 2 * scipy.optimize.least_squares(left, start, x_scale=start).cost
+    assert payload_distance(fit) == pytest.approx(norm.isf(chi2.sf(squares, 4)), rel=1e-3)
 
 
 def test_a_payload_that_one_kind_of_log_cannot_tell_has_no_distance(bench: Bench) -> None:
