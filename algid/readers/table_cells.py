@@ -172,9 +172,6 @@ class TableCells:
 
     def batches(self, names: Sequence[str], most: int | None) -> Iterator[list[pa.Array]]:
         """Some cells of each batch of rows; of rows that a flag takes out each is null."""
-        import pyarrow as pa
-        import pyarrow.compute as pc
-
         cells = [self.by_name[name] for name in names]
         columns = [one.column for one in cells] + [one.label for one in cells if one.label]
         for batch in self.table.batches(list(dict.fromkeys((*columns, *self.flags))), most):
@@ -183,6 +180,9 @@ class TableCells:
             for name in self.flags:
                 flagged |= _flag(batch.column(name)) == (name.lower() not in GOOD)
             if flagged.any():
+                import pyarrow as pa
+                import pyarrow.compute as pc
+
                 mask = pa.array(flagged)
                 arrays = [pc.if_else(mask, pa.scalar(None, one.type), one) for one in arrays]
             yield arrays
