@@ -74,8 +74,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(
-        "arm arrow check errors estimators files inspection log methods model names notices "
-        "options physics profile progress readers report results runtime settings signals "
+        "arm arrow check criteria errors estimators files inspection log methods model names "
+        "notices options physics profile progress readers report results runtime settings signals "
         "significance table4 text units words",
         "numpy polars pyarrow",
     ),

@@ -36,6 +36,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import Arm, FloatArray
+from algid.base.criteria import STILL
 from algid.base.errors import ResultError, SettingError
 from algid.base.names import outside, places_outside, vector
 from algid.base.significance import LEVEL, chance
@@ -146,7 +147,10 @@ def with_prior(fit: Fit, said: Statement) -> Fit:
     places = [fit.names.index(name) for name in said.names]
     others = places_outside(range(len(fit.names)), places)
     W, P, m = fit.covariance, said.covariance, said.mean
-    B = _determined(fit, places)
+    # an arm at rest tells its weight: what noise makes of accelerations is no inertia
+    weight = absent("gravity-compensated", RIGID) if (fit.moved < STILL).all() else RIGID
+    doubtful = [fit.status[p] != "OK" or fit.names[p] not in weight for p in places]
+    B = _determined(fit, places, doubtful)
     J = B @ scaled_pinv(B.T @ W[np.ix_(places, places)] @ B) @ B.T
     V = scaled_pinv(J + scaled_pinv(P))
     k = m + V @ J @ (fit.values[places] - m)
@@ -177,14 +181,17 @@ def with_prior(fit: Fit, said: Statement) -> Fit:
     covariance[np.ix_(places, others)] = (A @ V).T
     covariance[np.ix_(others, others)] -= A @ (W[np.ix_(places, places)] - V) @ A.T
     status = list(fit.status)
-    for place, own, before in zip(places, np.diag(V), np.diag(P), strict=True):
-        if status[place] != "OK" or own > _HALF * before:
+    for place, vague, own, before in zip(places, doubtful, np.diag(V), np.diag(P), strict=True):
+        if vague or own > _HALF * before:
             status[place] = "FROM_PRIOR"
     return replace(fit, values=values, covariance=covariance, status=tuple(status))
 
 
-def _determined(fit: Fit, places: list[int]) -> FloatArray:
-    """Basis B (n, r) of the combinations of the parameters at n `places` that logs determine."""
+def _determined(fit: Fit, places: list[int], doubtful: list[bool]) -> FloatArray:
+    """Basis B (n, r) of the combinations of the parameters at n `places` that logs determine.
+
+    They hold nothing of those that are `doubtful`.
+    """
     information = likelihood(fit.shared, fit.logs, fit.values, fit.prior)[2]
     bounded = fit.absent + (() if fit.shrinkage is None else fit.shrinkage.names)
     free = places_outside(fit.names, bounded)
@@ -192,6 +199,5 @@ def _determined(fit: Fit, places: list[int]) -> FloatArray:
         information = scaled_pinv(scaled_pinv(information)[np.ix_(free, free)])
     null, size = open_directions(outside(fit.names, bounded), fit.values[free], information)
     own = [free.index(place) for place in places]
-    doubtful = np.diag([float(fit.status[place] != "OK") for place in places])
-    lost, share, _ = np.linalg.svd(np.hstack([null[own], doubtful]))
+    lost, share, _ = np.linalg.svd(np.hstack([null[own], np.diag(np.array(doubtful, float))]))
     return lost[:, np.count_nonzero(share > SHARE) :] / size[own][:, None]

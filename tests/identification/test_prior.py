@@ -106,6 +106,13 @@ def test_what_logs_leave_open_or_doubt_is_the_priors() -> None:
         assert both.std[2] == pytest.approx(0.2 * K[2])
 
 
+def test_an_arm_at_rest_tells_its_weight_and_no_inertia() -> None:
+    """However sure noise makes a fit of it."""
+    fit = replace(fit_of(payload=False), moved=np.full(2, 5e-3))
+    both = with_prior(fit, said(fit, 0.2))
+    assert both.status == ("FROM_PRIOR", "OK", "FROM_PRIOR", "OK", "FROM_PRIOR", "OK", "OK")
+
+
 @pytest.mark.parametrize(("off", "told"), [(3.0, False), (5.0, True)])
 def test_a_contradiction_beyond_chance_leaves_the_prior_out(off: float, told: bool) -> None:
     fit = fit_of(payload=False)
