@@ -77,7 +77,7 @@ from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError
 from algid.estimators.references import Following, followed
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
-from algid.model import EVERY_TERM, K3, RIGID, SINES, TERMS, attributes
+from algid.model import EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes
 from algid.notices import Notice, Remedy
 
 _DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
@@ -372,11 +372,14 @@ class RobustProblem:
 
 
 def offered(normals: Sequence[Normal], held: Sequence[str] = ()) -> tuple[str, ...]:
-    """Terms that logs can determine: no gain without a motor; a lag is a delay to first order."""
+    """Terms that logs can determine: no gain without a motor; a lag is a delay to first order.
+
+    Elastic joints are those of a first pass alone, which `held` tells.
+    """
     driven = all(normal.gram[:, :, -1, -1].any(axis=0).all() for normal in normals)
     terms = []
     for name, term in TERMS.items():
-        free = term.spread is not None and (driven or not term.gains)
+        free = term.spread is not None and not term.elastic and (driven or not term.gains)
         if free or not set(term.names).isdisjoint(held):
             terms.append(name)
     return tuple(terms)
@@ -435,6 +438,8 @@ def expectation(
             unit = 1.0
             if spread.of == "inertia":
                 unit = value[K3]
+            elif spread.of == "compliance":
+                unit = 1 / max(value[K3 if name.endswith("2") else K5], 1e-300)
             elif spread.of == "torque":
                 unit = float(torque[int(name.endswith("2"))])
             elif spread.of == "cosine":

@@ -533,7 +533,9 @@ def select(
     logs = [_Pieces.of(problem.unloaded), _Pieces.of(problem.loaded)]
     chosen, elastic = _selected(logs, problem, candidates, kept, absent, {})
     if elastic:  # what rigid joints have for friction's width is not theirs
-        chosen, _ = _selected(logs, problem, candidates, kept, absent, elastic)
+        again, _ = _selected(logs, problem, candidates, kept, absent, elastic)
+        if not again.refuted:
+            return again
     return chosen
 
 

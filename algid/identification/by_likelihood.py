@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from algid.base.names import within
+from algid.base.names import outside, within
 from algid.base.runtime import Worker
 from algid.base.significance import level
 from algid.estimators import robust
@@ -26,6 +26,7 @@ from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
 from algid.model import DELAYS, FIRST_TERMS, TERMS, Model
 from algid.notices import Notice
+from algid.physics.effort import ELASTIC
 from algid.settings import Settings
 from algid.signals.segments import Segment
 
@@ -210,13 +211,16 @@ def _shrunk(
     prior: Prior | None,
 ) -> tuple[Fit, Selection]:
     """The fit with every term shrunk, and its model; `notes` say why no other stands."""
-    every = tuple(name for name, term in TERMS.items() if term.spread)
+    # where the first pass is refuted more than elastic joints is amiss, which they would take up
+    firm = chosen.refuted or set(ELASTIC).isdisjoint(chosen.model.terms)
+    shrinking = tuple(name for name, term in TERMS.items() if term.spread)
+    every = outside(shrinking, ELASTIC if firm else ())
     model = replace(chosen.shapes or chosen.model, terms=every)
     shrunken = replace(chosen, model=model, shrunk=True, late=None)
     if chosen.hold_by == "logs":
         # else by a likelihood that does not hold: a term takes up the delay
         shrunken = replace(shrunken, hold="foh")
-    fit = robust.fit(problem_of(survey, settings, shrunken, with_rotors(prior, chosen.model)))
+    fit = robust.fit(problem_of(survey, settings, shrunken, with_rotors(prior, model)))
     terms = fit.shared.model.terms
     if fit.shared.delay:
         terms += DELAYS

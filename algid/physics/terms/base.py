@@ -41,14 +41,15 @@ class PriorSpread:
     size : float
         The largest spread, in what `of` names.
     of : str
-        "torque" (RMS of the joint's), "inertia" (k3), "cosine" (the constant whose sine part a
-        coefficient is), or "unit", the coefficient's own.
+        "torque" (RMS of the joint's), "inertia" (k3), "compliance" (one over the joint's inertia,
+        k5 or k3), "cosine" (the constant whose sine part a coefficient is), or "unit", the
+        coefficient's own.
     usual : float
         What most arms have of `size`.
     """
 
     size: float
-    of: Literal["torque", "inertia", "cosine", "unit"] = "unit"
+    of: Literal["torque", "inertia", "compliance", "cosine", "unit"] = "unit"
     usual: float = 0.5
 
 

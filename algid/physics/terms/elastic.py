@@ -12,7 +12,7 @@ from math import inf
 from algid.physics.expressions import NOTHING
 from algid.physics.parameters import COMPLIANCE, SHARE, Parameter
 from algid.physics.signals import Q1
-from algid.physics.terms.base import Term, TorqueColumn
+from algid.physics.terms.base import PriorSpread, Term, TorqueColumn
 
 ELASTIC = Term(
     name="elastic",
@@ -44,4 +44,5 @@ ELASTIC = Term(
     columns=(TorqueColumn("r1", s=(Q1, NOTHING)),),
     of_motor=(("r1", "k5"),),
     elastic=(("h1", 0), ("h2", 1)),
+    spread=PriorSpread(1 / 20.0**2, "compliance"),  # s²: a link that swings at 20 rad/s
 )
