@@ -391,6 +391,8 @@ def _singular(covariance: FloatArray) -> bool:
     """Whether a covariance, scaled to unit diagonal, has directions without a variance."""
     std = np.sqrt(np.diag(covariance))
     known = std > 0
+    if not known.any():
+        return True
     correlation = covariance[np.ix_(known, known)] / np.outer(std[known], std[known])
     values = np.linalg.eigvalsh(correlation)
     return bool(values[0] < _SINGULAR * values[-1])

@@ -204,9 +204,6 @@ for command in ("identify", "batch", "inspect", "convert", "validate", "track"):
     assert "--toy-side" in shown and "Where the toy stands." in shown, shown
     side = option(command, "toy_side")
     assert [word.value for word in side.shell_complete(None, "r")] == ["right"]
-    line = option(command, "set")
-    found = [word.value for word in line.shell_complete(None, "toy_s")]
-    assert found == ["toy_side=left", "toy_side=right"], found
 others = {one.name for one in derived("compare").params}
 assert others and not {"toy_level", "toy_side"} & others
 # guide
