@@ -231,8 +231,9 @@ def main() -> None:
                     jobs = [(draw, count) for draw in made]
                     print(_row((speed, drive, count), list(pool.map(judged, jobs))), flush=True)
             seeds_of_stiff = range(1000, 1000 + given.rigid // 2)
-            made = draws([Scene(np.inf, drive, seed) for seed in seeds_of_stiff], 1)
-            if made:
+            stiff = [Scene(np.inf, drive, seed) for seed in seeds_of_stiff]
+            if stiff:
+                made = draws(stiff, 1)
                 jobs = [(draw, 1) for draw in made]
                 print(_row(("stiff", drive, 1), list(pool.map(judged, jobs))), flush=True)
 
