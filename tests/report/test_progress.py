@@ -65,7 +65,7 @@ def test_a_terminal_is_shown_stages_and_samples_and_is_left_clean(
 ) -> None:
     printed, seen = on_a_terminal("identify", path, "-o", tmp_path)
     assert "reading" in seen
-    assert "of 2,000 samples" in seen
+    assert "of 2,001 samples" in seen
     assert COLOUR.search(seen)
     assert "k1" in printed
     assert "\x1b" not in printed
