@@ -231,6 +231,8 @@ def _train(
             share *= 0.5
         before = step
         beta = beta + share * step
+        if not np.all(np.isfinite(beta)):
+            raise np.linalg.LinAlgError("the estimates run away")
         if not known and any(log.refuted for log in logs):
             return beta, outcomes, iteration, "refuted"
         if many and free and iteration > 1:

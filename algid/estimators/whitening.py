@@ -161,10 +161,13 @@ def linearise(
     Raises
     ------
     numpy.linalg.LinAlgError
-        If the covariance is not positive definite in floating point.
+        If the covariance is not positive definite in floating point, or the torque acts before or
+        after all angles, as where an estimate of its delay runs away.
     """
     length = theta0.shape[1]
     torques, first = stencil.torques(length), stencil.first(length)
+    if torques.stop <= torques.start:
+        raise np.linalg.LinAlgError(f"no torque acts within the angles, {stencil.shift} s later")
     measured = stencil.moving(piece.tau)[:, torques]
     motion = flexed(model, c, Motion(*stencil.differences(theta0)), stencil.dt, measured)
     J, torques_of_model = modelled(model, c, motion, stencil.dt)

@@ -110,6 +110,14 @@ def test_columns_stand_at_the_motion_that_it_names(bench: Bench, smooth: bool) -
     np.testing.assert_allclose(linear.columns[:-1], expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("shift", [-100.0, 100.0])
+def test_a_torque_that_acts_outside_the_angles_is_no_equation(bench: Bench, shift: float) -> None:
+    """As where an estimate of the delay runs away: the likelihood does not converge."""
+    log, k = bench.log(sigma=1e-3), bench.arm.constants()
+    with pytest.raises(np.linalg.LinAlgError, match="no torque acts within the angles"):
+        linearise(Model(), k, log.theta, log, Stencil(log.dt, shift), NOISE)
+
+
 def test_the_trajectory_moves_towards_the_truth(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     levels = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
