@@ -42,7 +42,6 @@ def keep_arrays(holder: object) -> None:
 
 
 CONSTANT_NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
-PAYLOAD_NAMES = ("z1", "z2", "z3", "z4", "z5")
 PAYLOAD_UNITS = {"z1": "kg m^2", "z2": "kg m^2", "z3": "kg m^2", "z4": "N m", "z5": "N m"}
 
 

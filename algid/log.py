@@ -39,8 +39,6 @@ from algid.notices import Notice
 IntArray = NDArray[np.int64]
 
 CANONICAL_COLUMNS = ("t", "theta1", "theta2", "tau1", "tau2")
-VELOCITY_COLUMNS = ("omega1", "omega2")
-REFERENCE_COLUMNS = ("q_des1", "q_des2")
 SIGNALS = ("theta", "tau", "omega", "reference")
 """Fields of a log (2, N)."""
 

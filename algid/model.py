@@ -571,9 +571,8 @@ def sensitivity(model: Model, c: FloatArray, motion: Motion) -> FloatArray:
     for name, joint in attributes(model, "gains"):
         J[joint, place[name]] = _torques(J[joint], c) / factor[joint]
     for name, joint in attributes(model, "by_load"):
-        load = _torques(
-            J[joint, loads], apart(model, c)[loads]
-        )  # a gain scales it, which leaves its sign
+        # a gain scales the load, which leaves its sign
+        load = _torques(J[joint, loads], apart(model, c)[loads])
         sign = smooth_sign(model, motion.omega[joint])
         J[joint, loads] *= 1 + c[place[name]] * sign * np.sign(load)
     return J

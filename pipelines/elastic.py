@@ -35,9 +35,9 @@ from algid.arm import FloatArray
 from algid.identification.identify import identify
 from algid.log import Log, Origin, Reading
 from pipelines.accuracy_scenes import random_arm
+from pipelines.race_scenes import DURATION, RATE, SIGMA_TAU, SIGMA_THETA, sines, swung
 
-RATE, DURATION, SUBSTEPS = 500.0, 10.0, 6
-SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
+SUBSTEPS = 6
 SPEEDS = (30.0, 55.0, 80.0)  # rad/s, of a link against its motor
 DRIVES = ("open loop", "digital PD")
 ROTOR = (0.05, 0.2)
@@ -87,16 +87,6 @@ def draws(scenes: Sequence[Scene], runs: int) -> list[Draw]:
     return found
 
 
-def _sines(k: FloatArray, seed: int, t: FloatArray) -> FloatArray:
-    """Six harmonics a joint of 0.2 to 3 Hz: torques (2, N) at times (N,)."""
-    k1, k2, k3, k4, k5, k6, k7 = k
-    need = np.array([k4 + k2 + 3 * k6 + 15 * (k5 + k3 + 2 * k1), k2 + 3 * k7 + 15 * k3])
-    rng = np.random.default_rng(seed)
-    frequency, phase = rng.uniform(0.2, 3.0, (2, 6)), rng.uniform(0, 2 * np.pi, (2, 6))
-    angle = 2 * np.pi * frequency[..., None] * t + phase[..., None]
-    return np.asarray(0.2 * need[:, None] * np.sin(angle).sum(axis=1))
-
-
 def _moved(
     scenes: Sequence[Scene], k: FloatArray, B: FloatArray, K: FloatArray, run: int
 ) -> tuple[FloatArray, FloatArray]:
@@ -104,14 +94,11 @@ def _moved(
     n = round(DURATION * RATE)
     fine = np.arange(2 * SUBSTEPS * n + 1) / (2 * SUBSTEPS * RATE)
     seeds = [1000 * scene.seed + run for scene in scenes]
-    tau = np.stack([_sines(k[:, s], seed, fine) for s, seed in enumerate(seeds)], axis=-1)
-    first = np.stack([_sines(k[:, s], 1000 * one.seed, fine) for s, one in enumerate(scenes)], -1)
+    tau = np.stack([sines(k[:, s], seed, fine) for s, seed in enumerate(seeds)], axis=-1)
+    first = np.stack([sines(k[:, s], 1000 * one.seed, fine) for s, one in enumerate(scenes)], -1)
     coulomb = COULOMB * np.sqrt(np.mean(first**2, axis=1))  # runs of an arm rub alike
     held = np.array([scene.drive == "digital PD" for scene in scenes])
     drawn = [np.random.default_rng(seed + 50) for seed in seeds]
-    frequency = np.stack([rng.uniform(0.2, 1.5, (2, 4)) for rng in drawn], axis=-1)
-    phase = np.stack([rng.uniform(0, 2 * np.pi, (2, 4)) for rng in drawn], axis=-1)
-    amplitude = 0.35 / np.sqrt(frequency)
     push = np.stack([k[4] + k[2] + 2 * k[0], k[2]]) * TRACKED**2
     stiff = ~np.isfinite(K[0])
     spring = np.where(stiff, 0.0, K)
@@ -134,25 +121,11 @@ def _moved(
         motor = np.where(stiff, link, (net - passed) / B)
         return np.concatenate([m_dot, motor, q_dot, link])
 
-    h = 1 / RATE / SUBSTEPS
     x = np.zeros((8, len(scenes)))
     x[0] = x[4] = -np.pi / 2
-    angles, torques = np.empty((n, 2, len(scenes))), np.empty((n, 2, len(scenes)))
-    for sample in range(n):
-        angle = 2 * np.pi * frequency * (sample / RATE) + phase
-        wanted = (amplitude * np.sin(angle)).sum(axis=1)
-        wanted[0] -= np.pi / 2
-        speed = (amplitude * 2 * np.pi * frequency * np.cos(angle)).sum(axis=1)
-        controlled = push * (wanted - x[:2]) + 1.4 / TRACKED * push * (speed - x[2:4])
-        start = 2 * SUBSTEPS * sample
-        tau[:, start : start + 2 * SUBSTEPS + 1, held] = controlled[:, None, held]
-        angles[sample], torques[sample] = x[:2], tau[:, start]
-        for part in range(start, start + 2 * SUBSTEPS, 2):
-            a = rate(x, tau[:, part])
-            b = rate(x + 0.5 * h * a, tau[:, part + 1])
-            c = rate(x + 0.5 * h * b, tau[:, part + 1])
-            x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c, tau[:, part + 2]))
-    return angles, torques
+    gains = push, 1.4 / TRACKED * push
+    states, torques = swung(rate, x, tau, held, gains, drawn, SUBSTEPS)
+    return states[:, :2], torques
 
 
 def _logged(angles: FloatArray, torques: FloatArray, place: int, run: int, scene: Scene) -> Log:

@@ -16,10 +16,11 @@ along the links.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import Arm, FloatArray
 from algid.log import Log
@@ -81,30 +82,82 @@ def _moments(arm: Arm, kind: str) -> FloatArray:
     return np.array([arm.l1 * second, arm.g * second, arm.g * (first + arm.m2 * arm.l1)])
 
 
-def _sines(arm: Arm, seed: int, t: FloatArray) -> FloatArray:
+def sines(k: FloatArray, seed: int, t: FloatArray) -> FloatArray:
     """Six harmonics a joint of 0.2 to 3 Hz, which swing the arm about without spinning it round:
-    torques (2, N) at times (N,).
+    torques (2, N) at times (N,), for an arm of constants k (7,).
     """
-    k1, k2, k3, k4, k5, k6, k7 = arm.constants()
+    k1, k2, k3, k4, k5, k6, k7 = k
     need = (k4 + k2 + 3 * k6 + 15 * (k5 + k3 + 2 * k1), k2 + 3 * k7 + 15 * k3)
     rng = np.random.default_rng(seed)
     frequency, phase = rng.uniform(0.2, 3.0, (2, 6)), rng.uniform(0, 2 * np.pi, (2, 6))
     angle = 2 * np.pi * frequency[..., None] * t + phase[..., None]
-    return 0.2 * np.array(need)[:, None] * np.sin(angle).sum(axis=1)
+    return np.asarray(0.2 * np.array(need)[:, None] * np.sin(angle).sum(axis=1))
+
+
+Rate = Callable[[FloatArray, FloatArray], FloatArray]
+"""Rates of states (d, S) at torques (2, S)."""
+
+
+def swung(
+    rate: Rate,
+    x: FloatArray,
+    tau: FloatArray,
+    held: NDArray[np.bool_],
+    gains: tuple[FloatArray, FloatArray],
+    drawn: Sequence[np.random.Generator],
+    substeps: int,
+) -> tuple[FloatArray, FloatArray]:
+    """States (n, d, S) and torques (n, 2, S) at each sample, by Runge and Kutta's fourth order.
+
+    Parameters
+    ----------
+    rate : callable
+    x : (d, S)
+        Where the motions start: angles, and their velocities, of what a controller sees are the
+        first four.
+    tau : (2, 2 substeps n + 1, S), N m
+        Torques at half substeps. Where a controller acts its own are written into them.
+    held : (S,)
+        Where a digital PD law follows sines of up to 1.5 Hz, its torque held between samples.
+    gains : P and D of that law, (2, S) each
+    drawn : generators of the sines, one a motion
+    substeps : int
+        Steps from one sample to the next.
+    """
+    frequency = np.stack([rng.uniform(0.2, 1.5, (2, 4)) for rng in drawn], axis=-1)
+    phase = np.stack([rng.uniform(0, 2 * np.pi, (2, 4)) for rng in drawn], axis=-1)
+    amplitude = 0.35 / np.sqrt(frequency)
+    n, h = tau.shape[1] // (2 * substeps), 1 / RATE / substeps
+    states, torques = np.empty((n, *x.shape)), np.empty((n, 2, x.shape[1]))
+    for sample in range(n):
+        angle = 2 * np.pi * frequency * (sample / RATE) + phase
+        wanted = (amplitude * np.sin(angle)).sum(axis=1)
+        wanted[0] -= np.pi / 2
+        speed = (amplitude * 2 * np.pi * frequency * np.cos(angle)).sum(axis=1)
+        controlled = gains[0] * (wanted - x[:2]) + gains[1] * (speed - x[2:4])
+        first = 2 * substeps * sample
+        tau[:, first : first + 2 * substeps + 1, held] = controlled[:, None, held]
+        states[sample], torques[sample] = x, tau[:, first]
+        for part in range(first, first + 2 * substeps, 2):
+            a = rate(x, tau[:, part])
+            b = rate(x + 0.5 * h * a, tau[:, part + 1])
+            c = rate(x + 0.5 * h * b, tau[:, part + 1])
+            x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c, tau[:, part + 2]))
+    return states, torques
 
 
 def _moved(keys: Sequence[tuple[str, int, int]]) -> list[Truth]:
     """The true motions of kinds, seeds and runs.
 
-    A position-controlled arm follows sines of up to 1.5 Hz by a digital PD law, whose torque is
-    held from sample to sample; the others are driven by sines of torque.
+    A position-controlled arm follows sines; the others are driven by sines of torque.
     """
     arms = [random_arm(100 + seed)[0] for _, seed, _ in keys]
     K = np.stack([_moments(arm, kind) for arm, (kind, _, _) in zip(arms, keys, strict=True)], -1)
     k = np.stack([arm.constants() for arm in arms], axis=-1)
     fine = np.arange(2 * SUBSTEPS * round(DURATION * RATE) + 1) / (2 * SUBSTEPS * RATE)
     drives = [
-        _sines(arm, 1000 * seed + run, fine) for arm, (_, seed, run) in zip(arms, keys, strict=True)
+        sines(arm.constants(), 1000 * seed + run, fine)
+        for arm, (_, seed, run) in zip(arms, keys, strict=True)
     ]
     rubs = np.array([kind == "friction" for kind, _, _ in keys])
     # both runs of an arm rub alike: by its first drive
@@ -113,9 +166,6 @@ def _moved(keys: Sequence[tuple[str, int, int]]) -> list[Truth]:
     held = np.array([kind == "position-controlled" for kind, _, _ in keys])
     tau = np.stack(drives, axis=-1)  # (2, fine, S)
     drawn = [np.random.default_rng(seed + 50 * run) for _, seed, run in keys]
-    frequency = np.stack([rng.uniform(0.2, 1.5, (2, 4)) for rng in drawn], axis=-1)
-    phase = np.stack([rng.uniform(0, 2 * np.pi, (2, 4)) for rng in drawn], axis=-1)
-    amplitude = 0.35 / np.sqrt(frequency)
     stiffness = np.stack([k[4] + k[2] + 2 * k[0], k[2]]) * 20.0**2
 
     def rate(x: FloatArray, torque: FloatArray) -> FloatArray:
@@ -131,25 +181,11 @@ def _moved(keys: Sequence[tuple[str, int, int]]) -> list[Truth]:
         det = m11 * m22 - m12**2
         return np.stack([w1, w2, (m22 * b1 - m12 * b2) / det, (m11 * b2 - m12 * b1) / det])
 
-    n, h = round(DURATION * RATE), 1 / RATE / SUBSTEPS
     x = np.zeros((4, len(keys)))
     x[0] = -np.pi / 2
-    states, torques = np.empty((n, 4, len(keys))), np.empty((n, 2, len(keys)))
-    for sample in range(n):
-        angle = 2 * np.pi * frequency * (sample / RATE) + phase
-        wanted = (amplitude * np.sin(angle)).sum(axis=1)
-        wanted[0] -= np.pi / 2
-        speed = (amplitude * 2 * np.pi * frequency * np.cos(angle)).sum(axis=1)
-        controlled = stiffness * (wanted - x[:2]) + stiffness / 10.0 * (speed - x[2:])
-        first = 2 * SUBSTEPS * sample
-        tau[:, first : first + 2 * SUBSTEPS + 1, held] = controlled[:, None, held]
-        states[sample], torques[sample] = x, tau[:, first]
-        for part in range(first, first + 2 * SUBSTEPS, 2):
-            a = rate(x, tau[:, part])
-            b = rate(x + 0.5 * h * a, tau[:, part + 1])
-            c = rate(x + 0.5 * h * b, tau[:, part + 1])
-            x = x + h / 6 * (a + 2 * b + 2 * c + rate(x + h * c, tau[:, part + 2]))
-    t = np.arange(n) / RATE
+    gains = stiffness, stiffness / 10.0
+    states, torques = swung(rate, x, tau, held, gains, drawn, SUBSTEPS)
+    t = np.arange(len(states)) / RATE
     return [
         Truth(t, states[:, :2, s].T.copy(), states[:, 2:, s].T.copy(), torques[..., s].T.copy())
         for s in range(len(keys))

@@ -30,6 +30,7 @@ from algid.estimators.combine import (
     of_kind,
     sandwich,
     scaled_pinv,
+    scaled_pinvs,
     scatters,
 )
 from algid.estimators.fit import Fit, Status
@@ -304,13 +305,14 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     f, F = of_joint(0)
     s, S = of_joint(1)
 
-    def chi2(ratio: float) -> float:
-        apart = s - ratio * f
-        return float(apart @ scaled_pinv(S + ratio**2 * F) @ apart)
-
-    ratio = min((*_RATIOS, *-_RATIOS), key=chi2)
+    ratios = np.concatenate([[1.0], _RATIOS, -_RATIOS])
+    apart = s - ratios[:, None] * f
+    inverses = scaled_pinvs(S + ratios[:, None, None] ** 2 * F)
+    chi2 = np.einsum("ri,rij,rj->r", apart, inverses, apart)
+    best = int(np.argmin(chi2))
+    ratio = ratios[best]
     differs = min(ratio, 1 / ratio) < 1 - unlike
-    if not differs or chi2(1.0) - chi2(ratio) < FAR_BEYOND**2:
+    if not differs or chi2[0] - chi2[best] < FAR_BEYOND**2:
         return None
     return float(ratio)
 

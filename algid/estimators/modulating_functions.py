@@ -186,12 +186,13 @@ class Windows:
             return Motion(theta, omega, omega)
 
         self._fill(X, model, motion, theta.shape[1], known)
-        bends = np.zeros((2, size - 1, X.shape[2]))
+        bends = None
         if at is not None and attributes(model, "elastic"):
-            self._bend(X, bends, model, at, motion(), tau)
+            bends = self._bend(X, model, at, motion(), tau)
         for share, whole in of_motors(model):
             X[:, share] = here[whole] * (X[:, share] - X[:, whole])
-            bends[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
+            if bends is not None:
+                bends[:, whole] += here[share] / (here[whole] or 1.0) * X[:, share]
         if at is not None and attributes(model, "by_load"):
             place = model.compiled.place
             for name, joint, dissipated in self._dissipated(model, at, theta, motion().omega):
@@ -200,9 +201,10 @@ class Windows:
         X[:, -1] = self._of_torque(tau, 0, known)
         if at is not None:
             _linearise_bilinear(X, model, at)
+        if at is not None and bends is not None:
             bends *= gains(model, at)[:, None, None]
-            X[:, :-1] += bends
-            X[:, -1] += np.einsum("j,ajr->ar", at, bends[:, : len(at)])
+            X[:, : len(at)] += bends
+            X[:, -1] += np.einsum("j,ajr->ar", at, bends)
         slope = delay or model.lag_name is not None
         tau_slope = self._of_torque(tau, 1, known) if slope else 0.0
         if model.lag_name is not None:
@@ -221,16 +223,15 @@ class Windows:
     def _bend(
         self,
         X: FloatArray,
-        bends: FloatArray,
         model: Model,
         c: FloatArray,
         motion: Motion,
         tau: FloatArray,
-    ) -> None:
-        """Give the links' columns of X their own motion behind elastic joints.
+    ) -> FloatArray:
+        """What coefficients change by turning the links behind elastic joints (2, q, R).
 
-        What coefficients change by turning the links is added to `bends` (2, q, R), by differences,
-        so that moments need no derivative of the load's rate.
+        It is found by differences, so that moments need no derivative of the load's rate. The
+        links' columns of X get the links' own motion.
         """
         own, links_own = list(inertial(model)), apart(model, c)[list(inertial(model))]
         late = np.arange(tau.shape[1]) - (self.shift / self.dt - self.whole)
@@ -239,12 +240,14 @@ class Windows:
         motion = flexed(model, c, replace(motion, alpha=alpha), self.dt, acting)
         links = link_motion(model, c, motion)
         X[:, own] = self.columns(model, links)[:, own]
+        bends = np.zeros((2, len(c), X.shape[2]))
         J = sensitivity(model, c, motion)
         for place, turn in turns(model, c, motion, J, self.dt):
             step = _FLEXED / max(float(np.abs(turn[0]).max()), 1e-300)
             theta, omega = links.theta + step * turn[0], links.omega + step * turn[1]
             moved = self.columns(model, Motion(theta, omega, omega))[:, own] - X[:, own]
             bends[:, place] += np.einsum("aqr,q->ar", moved, links_own) / step
+        return bends
 
     def _acting(self, torques: FloatArray) -> FloatArray:
         """Torques (m, n) that act where a piece's windows are, of all (m, N) of the piece."""

@@ -15,7 +15,6 @@ from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
-from algid.estimators.elastic import with_rotors
 from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit, Misfit
 from algid.estimators.prediction import PredictionSums
@@ -220,7 +219,7 @@ def _shrunk(
     if chosen.hold_by == "logs":
         # else by a likelihood that does not hold: a term takes up the delay
         shrunken = replace(shrunken, hold="foh")
-    fit = robust.fit(problem_of(survey, settings, shrunken, with_rotors(prior, model)))
+    fit = robust.fit(problem_of(survey, settings, shrunken, prior))
     terms = fit.shared.model.terms
     if fit.shared.delay:
         terms += DELAYS

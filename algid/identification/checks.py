@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from algid import results
-from algid.base.significance import CERTAIN, SHARES, chance, sigmas
+from algid.base.significance import CERTAIN, chance, sigmas
 from algid.base.units import TORQUE
 from algid.estimators.diagnostics import (
     FAR_BEYOND,
@@ -242,11 +242,6 @@ class Check:
     code: str
     find: Callable[[Fitted], Iterator[Notice]]
     consequence: Literal["doubt", "remark"] = "remark"
-
-    @property
-    def share(self) -> float:
-        """Of the budget of false alarms; 0 of a check that chance does not set off."""
-        return SHARES.get(self.code, 0.0)
 
 
 CHECKS = (
