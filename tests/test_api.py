@@ -62,39 +62,6 @@ def _sections(thing: object) -> dict[str, set[str]]:
     }
 
 
-def test_a_log_shows_no_arrays() -> None:
-    t = 0.01 * np.arange(1201)
-    log = algid.Log.from_arrays(t, np.zeros((2, 1201)), np.zeros((2, 1201)), name="run 1")
-    assert repr(log) == "Log('run 1', N = 1,201, 12 s)"
-
-
-def test_what_the_verbs_give_shows_itself_in_a_line() -> None:
-    unloaded, loaded = algid.synthesise("case1", duration=2.0, torque="wide")
-    result = algid.identify(unloaded, estimator="weak")
-    given = [
-        result.verdict,
-        algid.inspect(unloaded),
-        algid.inspect({"t": unloaded.t, "q": unloaded.theta}),
-        algid.validate(result, unloaded),
-        algid.track(loaded, result, l1=0.1626, l2=0.1232),
-        algid.export(result, "c"),
-        algid.compare([result, result], labels=["a", "b"]),
-    ]
-    shown = list(map(repr, given))
-    assert [text.partition("(")[0] for text in shown] == [type(one).__name__ for one in given]
-    assert all(len(text.splitlines()) == 1 and len(text) < 300 for text in shown), shown
-    assert "N = 2,001" in shown[1]
-    assert "refused: log: no column for tau1, tau2" in shown[2]
-    assert shown[3].startswith("Validated(logs: 1, R² ")
-    assert shown[-1] == "Comparison(a, b: the largest distance 0.0 σ)"
-
-
-def test_a_log_is_written_to_a_path_that_is_text(tmp_path: Path) -> None:
-    log, _ = algid.synthesise("case1", duration=0.1)
-    algid.write_log(str(tmp_path / "a.mcap"), log)
-    assert (algid.read_log(str(tmp_path / "a.mcap")).theta == log.theta).all()
-
-
 def test_a_result_is_read_by_a_string_and_shows_itself_as_a_short_table(tmp_path: Path) -> None:
     made = build(tmp_path / "a.algid", duration=1.0)
     found = algid.read_result(str(tmp_path / "a.algid"))
@@ -175,41 +142,6 @@ def test_a_result_keeps_all_that_a_reader_decided(tmp_path: Path) -> None:
     assert list(held) == [field.name for field in fields(Reading)]
 
 
-@pytest.mark.parametrize(
-    ("place", "value", "expected"),
-    [
-        ("nonsense", 1, "log.reading.nonsense: extra inputs are not permitted, found 1"),
-        ("offsets", [1.0], r"log.reading.offsets.1: field required, found \[1.0\]"),
-        (
-            "joints_told",
-            "nobody",
-            (
-                "log.reading.joints_told: expected 'flag', 'profile', 'names' or 'order', found "
-                "'nobody'"
-            ),
-        ),
-    ],
-)
-def test_a_reading_that_is_none_is_refused_by_its_place(
-    tmp_path: Path, place: str, value: object, expected: str
-) -> None:
-    made = build(tmp_path / "a.algid", duration=1.0)
-    content = made.model_copy(
-        update={"log": made.log.model_copy(update={"reading": READING})}
-    ).model_dump(mode="json")
-    *folders, name = place.split(".")
-    inner = content["log"]["reading"]
-    for folder in folders:
-        inner = inner[folder]
-    inner[name] = value
-    file = tmp_path / "result.json"
-    file.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(
-        ResultError, match=rf"^{file}: {expected}; identify again with this version$"
-    ):
-        algid.read_result(file)
-
-
 def other(**changes: Any) -> list[str]:
     """The clauses that tell `READING` from one with `changes`; those of a channel are its own."""
     channel = {
@@ -230,17 +162,6 @@ def test_readings_differ_by_what_decides_the_estimates() -> None:
     assert other(unit="N m") == ["tau1 in mN m instead of N m"]
     assert other(factor=1e-3) == ["tau1 with the other sign"]
     assert other(offset=0.5) == ["tau1 offset by 0.25 instead of 0.5"]
-
-
-def test_readings_of_other_words_for_the_same_numbers_do_not_differ() -> None:
-    assert other(joints=None, topics=("/three",), clock="header", start=None, accepted=()) == []
-    assert other(factor=-2.0) == []
-    assert other(offset=0.25 + 5e-10) == []
-    assert other(offset=0.25 + 2e-9) == ["tau1 offset by 0.25 instead of 0.25"]
-    assert (
-        list(READING.differences(Reading(zero="hanging", second_angle="absolute", drive="base")))
-        == []
-    )
 
 
 def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() -> None:
@@ -376,14 +297,6 @@ def test_columns_in_memory_are_read_as_a_file_of_them(
     assert [notice.code for notice in found.notices] == [notice.code for notice in of_file.notices]
 
 
-def test_matrices_are_taken_either_way_round(columns: dict[str, Any]) -> None:
-    log = algid.read_log(
-        {"t": columns["time"], "q": np.ones((2, columns["time"].size)), "tau": np.ones((2001, 2))}
-    )
-    assert log.theta.shape == log.tau.shape == (2, 2001)
-    assert log.origin.mapping["theta2"] == "q[1]"
-
-
 def test_several_logs_in_memory_are_pooled_and_a_twin_counts_once(columns: dict[str, Any]) -> None:
     frame = pl.DataFrame(columns)
     pooled = algid.identify(
@@ -391,16 +304,6 @@ def test_several_logs_in_memory_are_pooled_and_a_twin_counts_once(columns: dict[
     )
     assert [log.rows for log in pooled.logs] == [1000, 2001]
     assert "SAME_LOG" in [notice.code for notice in pooled.notices]
-
-
-@pytest.mark.parametrize("made", [pl.DataFrame, pa.table, _pandas])
-def test_rows_of_a_frame_that_lack_a_value_go_with_a_notice(
-    made: Callable[[dict[str, Any]], object], columns: dict[str, Any]
-) -> None:
-    torque = [None if row == 7 else value for row, value in enumerate(columns["tau2"].tolist())]
-    log = algid.read_log(made(columns | {"tau2": torque}))
-    assert len(log) == 2000
-    assert "NOT_FINITE" in [notice.code for notice in log.notices]
 
 
 @pytest.mark.parametrize(
@@ -451,27 +354,6 @@ def test_what_is_no_log_is_refused(verb: Callable[[Any], object], given: object)
         LogError, match="expected a path, a Log, a frame or a dict of arrays, found"
     ):
         verb(given)
-
-
-def test_a_log_is_read_with_settings_as_keywords(columns: dict[str, Any]) -> None:
-    plain, turned = algid.read_log(columns), algid.read_log(columns, zero="hanging")
-    assert np.allclose(turned.theta[0], plain.theta[0] - np.pi / 2)
-    assert turned.origin.reading == algid.read_log(columns, {"zero": "hanging"}).origin.reading
-    with pytest.raises(SettingError, match="zer"):
-        algid.read_log(columns, zer="hanging")  # type: ignore[call-arg]
-
-
-def test_settings_are_keywords_as_they_are_flags(columns: dict[str, Any]) -> None:
-    frame = pl.DataFrame(columns)
-    asked = algid.Settings(
-        estimator="weak", model="coulomb", gravity=9.8, poles=(-80, -390, -391, -392, -393, -394)
-    )
-    poles = "-80,-390,-391,-392,-393,-394"
-    for given in (poles, [-80, -390, -391, -392, -393, -394]):
-        found = algid.identify(frame, estimator="weak", model="coulomb", gravity=9.8, poles=given)
-        assert found.parameters == algid.identify(frame, settings=asked).parameters
-    over = algid.identify(frame, settings=asked, model="plain")
-    assert (over.settings["model"], over.settings["gravity"]) == ("plain", 9.8)
 
 
 def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(

@@ -5,18 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import polars as pl
 import pytest
 
-import algid
 from algid.base.errors import LogError, OutputError
 from algid.base.stores import list_urls, object_stat, open_store, reading
-from algid.batches.discover import jobs_of
-from algid.batches.records import JobStatus
-from algid.batches.run import Batch, BatchConfig
-from algid.settings import Settings
-from algid.synth.sensors import Sensors
-from tests.batches.test_run import Here
 from tests.objects import Served, s3
 
 
@@ -24,31 +16,6 @@ from tests.objects import Served, s3
 def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
     with s3(monkeypatch) as running:
         yield running
-
-
-def test_a_batch_reads_and_writes_objects(served: Served, tmp_path: Path) -> None:
-    unloaded, _ = algid.synthesise(
-        "case1", duration=1.5, torque="wide", sensors=Sensors(1e-4, 1e-3)
-    )
-    algid.write_log(tmp_path / "a.mcap", unloaded)
-    store = open_store(served.url("logs"))
-    store.write("r1/a.mcap", (tmp_path / "a.mcap").read_bytes())
-    store.write("bad.csv", b"junk")
-    out = served.url("out")
-    recipe = BatchConfig(out, Settings(estimator="weak"), lambda _file: None, report=False)
-    jobs = jobs_of([served.url("logs")], out)
-    ended = Batch(open_store(out), recipe, Here(), 1, lambda *_: None).run(jobs)
-    assert [(record.job.name, record.status) for record in ended.records] == [
-        ("bad", JobStatus.FAILED),
-        ("r1/a", JobStatus.OK),
-    ]
-    assert Batch(open_store(out), recipe, Here(), 1, lambda *_: None).run(jobs).ran == 0
-    (tmp_path / "result.json").write_bytes(open_store(out).read("r1/a.algid/result.json") or b"")
-    assert algid.read_result(tmp_path / "result.json").log.path.startswith(
-        f"s3://{served.bucket}/logs/r1/a.mcap"
-    )
-    (tmp_path / "jobs.parquet").write_bytes(open_store(out).read("jobs.parquet") or b"")
-    assert pl.read_parquet(tmp_path / "jobs.parquet")["status"].to_list() == ["failed", "ok"]
 
 
 @pytest.fixture(params=["folder", "objects"])
@@ -116,17 +83,3 @@ def test_a_listing_is_bounded(served: Served, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("algid.base.stores.MOST_LISTED", 2)
     with pytest.raises(OutputError, match="expected at most 2 objects, found 3; name a prefix"):
         list_urls(served.url("logs"))
-
-
-def test_a_changed_object_is_done_again(served: Served, tmp_path: Path) -> None:
-    store, out = open_store(served.url("logs")), str(tmp_path / "out")
-    store.write("bad.csv", b"junk")
-    jobs = jobs_of([served.url("logs")], out)
-    recipe = BatchConfig(out, Settings(estimator="weak"), lambda _file: None, report=False)
-
-    def ran() -> int:
-        return Batch(open_store(out), recipe, Here(), 1, lambda *_: None).run(jobs).ran
-
-    assert (ran(), ran()) == (1, 0)
-    store.write("bad.csv", b"more junk")
-    assert (ran(), ran()) == (1, 0)

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import errno
-import math
 import os
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from algid.base.errors import SettingError
 from algid.batches.discover import jobs_of
 from algid.batches.job import redacted
 from algid.batches.jobs import Job, name_fault
-from algid.batches.manifest import is_manifest, label_of
-from algid.readers.formats import SUFFIXES
+from algid.batches.manifest import is_manifest
 from tests.processes import Outcome
 
 JOB = "[[job]]\nname = 'x'\nlogs = 'a.csv'\n"
@@ -58,18 +54,6 @@ def test_a_glob_and_a_file_name_jobs_by_their_stems(tmp_path: Path) -> None:
     assert job == Job("a", logs=(str(tmp_path / "x/a.mcap"),))
     (job,) = jobs_of([str(tmp_path / "x/a.mcap")], "out", alone="loaded")
     assert job == Job("a", loaded=(str(tmp_path / "x/a.mcap"),))
-
-
-def test_a_folder_is_searched_for_every_format_that_is_read(tmp_path: Path) -> None:
-    _touch(
-        tmp_path,
-        *(f"log{number}{suffix.upper()}" for number, suffix in enumerate(SUFFIXES)),
-        "readme.md",
-    )
-    assert [job.name for job in jobs_of([str(tmp_path)], "out")] == sorted(
-        f"log{one}" for one in range(len(SUFFIXES))
-    )
-    assert {".npz", ".mat", ".feather", ".bag", ".db3"} < set(SUFFIXES)
 
 
 def test_two_logs_of_one_name_fail_alone(tmp_path: Path) -> None:
@@ -280,22 +264,6 @@ def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
         jobs_of([str(tmp_path / "m.csv")], "out")
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_a_csv_file_is_a_manifest_by_its_columns_whatever_ends_its_lines(
-    tmp_path: Path, end: str
-) -> None:
-    path = tmp_path / "m.csv"
-    for header, expected in (
-        *(("name,logs", True), ("loaded,payload,name", True), ("\ufeffname,loaded", True)),
-        *(("name,log", False), ("logs,loaded", False), ("t,theta1", False), ("", False)),
-    ):
-        path.write_bytes(f"{header}{end}x,a.csv{end}".encode())
-        assert is_manifest(path) == expected, header
-    assert [job.name for job in jobs_of([str(path)], "out")] == ["m"]
-    path.write_bytes(f"name,logs{end}x,a.csv{end}y,b.csv{end}".encode())
-    assert [job.name for job in jobs_of([str(path)], "out")] == ["x", "y"]
-
-
 def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text(
@@ -307,13 +275,6 @@ def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
     assert job.robot == "7"
     assert job.labels == {"payload": 0.5, "runs": 3, "good": True, "at": "2026-01-31"}
     assert (job.profile, job.time, job.loaded) == (None, None, ())
-
-
-@given(st.floats())
-def test_a_label_that_reads_like_a_finite_number_is_one(value: float) -> None:
-    found = label_of(repr(value))
-    assert found == (value if math.isfinite(value) else repr(value))
-    assert type(found) is (float if math.isfinite(value) else str)
 
 
 @pytest.mark.parametrize(
@@ -397,23 +358,3 @@ def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
         f"a: two jobs of one name ({tmp_path}/a.csv, {tmp_path}/other/a.csv)"
     )
     assert (other.name, other.trouble) == ("b", None)
-
-
-@pytest.mark.parametrize(
-    ("stem", "name", "loaded"),
-    [
-        ("a-loaded", "a", True),
-        ("a_unloaded", "a", False),
-        ("a-b_loaded", "a-b", True),
-        ("a-loaded-2", "a-loaded-2", False),
-        ("loaded", "loaded", False),
-        ("a.loaded", "a.loaded", False),
-        ("a-Loaded", "a-Loaded", False),
-    ],
-)
-def test_a_role_is_the_last_word_of_a_name(
-    tmp_path: Path, stem: str, name: str, *, loaded: bool
-) -> None:
-    _touch(tmp_path, f"{stem}.csv")
-    (job,) = jobs_of([str(tmp_path)], "out")
-    assert (job.name, bool(job.loaded)) == (name, loaded)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import io
 import json
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +16,6 @@ import polars as pl
 import pytest
 
 import algid
-from algid.api.batch import watched
 from algid.base.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.base.stores import connect, list_urls, open_store, put_folder
 from algid.batches.discover import jobs_of
@@ -29,7 +27,6 @@ from algid.synth.sensors import Sensors
 from tests.batches.test_run import Here
 from tests.objects import Served, s3
 from tests.processes import Outcome
-from tests.readers.mcaps import write_mcap
 
 ODD = (
     "run%41.csv",
@@ -212,38 +209,6 @@ def test_an_object_that_may_not_be_read_fails_alone(
     )
 
 
-def test_a_log_that_cannot_be_looked_at_for_a_while_loses_no_result(
-    served: Served, log: bytes
-) -> None:
-    for name in ("a", "b"):
-        open_store(served.url("logs")).write(f"{name}.csv", log)
-    _run(served)
-    served.denied = lambda method, path: method == "HEAD" and path.endswith("/a.csv")
-    ended = _run(served)
-    assert (_ends(ended), ended.ran) == ({"a": JobStatus.FAILED, "b": JobStatus.OK}, 0)
-    served.denied = lambda _method, _path: False
-    ended = _run(served)
-    assert (_ends(ended), ended.ran) == ({"a": JobStatus.OK, "b": JobStatus.OK}, 0)
-
-
-def test_a_log_without_joints_is_refused_by_its_url(served: Served, tmp_path: Path) -> None:
-    write_mcap(
-        tmp_path / "a.mcap", [("/x", 1, b"\0\1\0\0\7")], {"/x": ("a/B", "ros2msg", b"int8 x")}
-    )
-    open_store(served.url("logs")).write("a.mcap", (tmp_path / "a.mcap").read_bytes())
-    (record,) = _run(served).records
-    assert re.match(rf"s3://{served.bucket}/logs/a\.mcap\S*: no topic holds", record.reason)
-
-
-def test_a_record_that_may_not_be_read_counts_as_none(served: Served, log: bytes) -> None:
-    for name in ("a", "b"):
-        open_store(served.url("logs")).write(f"{name}.csv", log)
-    _run(served)
-    served.denied = lambda method, path: method == "GET" and path.endswith(".jobs/a.json")
-    ended = _run(served)
-    assert (_ends(ended), ended.ran) == ({"a": JobStatus.OK, "b": JobStatus.OK}, 1)
-
-
 def test_a_result_that_may_not_be_written_says_so(served: Served, log: bytes) -> None:
     for name in ("a", "b"):
         open_store(served.url("logs")).write(f"{name}.csv", log)
@@ -277,31 +242,6 @@ def test_what_a_batch_wrote_below_its_source_is_no_log(
             1,
             lambda *_: None,
         ).run(jobs)
-
-
-def test_a_store_that_is_away_for_a_while_does_not_end_a_watched_prefix(
-    served: Served,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("algid.batches.run.LOOK_EVERY", 0.0)
-    open_store(served.url("logs")).write("bad.csv", b"junk")
-    out, looks = str(tmp_path / "out"), 0
-    batch = Batch(open_store(out), replace(CONFIG, out=out), Here(), 1, lambda *_: None)
-
-    def denied(_method: str, path: str) -> bool:
-        """Listings 1 and 2 are refused; the batch is stopped once the log is done."""
-        nonlocal looks
-        looks += path.rstrip("/") == f"/{served.bucket}"
-        if "bad" in batch.records or looks > 20:
-            batch.stop.set()
-        return looks in (1, 2) and path.rstrip("/") == f"/{served.bucket}"
-
-    served.denied = denied
-    heard: list[str] = []
-    ended = watched(batch, [served.url("logs")], out, "logs", False, heard.append)
-    assert _ends(ended) == {"bad": JobStatus.FAILED}
-    assert sum("its objects cannot be listed" in line for line in heard) == 1
 
 
 def _folder(place: Path, *names: str) -> Path:

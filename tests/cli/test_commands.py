@@ -56,36 +56,6 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
     assert bad.out.splitlines()[1].startswith("ok    k2")
 
 
-def test_export_writes_beside_the_result_what_report_would(logs: Path, tmp_path: Path) -> None:
-    found = Outcome(
-        "identify",
-        logs / "case1-unloaded.csv",
-        "-o",
-        tmp_path,
-        "-q",
-        "--export",
-        "mcap",
-        "--model",
-        "plain",
-    )
-    assert (found.code, found.out, found.err) == (0, "", "")
-    exported = tmp_path / "case1-unloaded.algid" / "estimates.mcap"
-    ours = exported.read_bytes()
-    Outcome("report", exported.parent, "--export", "mcap")
-    assert exported.read_bytes() == ours
-    without = Outcome(
-        "identify",
-        logs / "case1-unloaded.csv",
-        "-o",
-        tmp_path / "x",
-        "--export",
-        "mcap",
-        "--no-report",
-    )
-    assert (without.code, without.err.count("\n")) == (2, 1)
-    assert "leave --no-report out" in without.err
-
-
 def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Path) -> None:
     found = Outcome(
         "identify",
@@ -133,14 +103,6 @@ def test_bad_logs_get_one_line_and_nothing_is_written(
     assert len(found.err.strip().splitlines()) == 1
     assert found.err.startswith(f"algid: {path}")
     assert not list(out.iterdir()) if out.exists() else True
-
-
-def test_unwritable_folder_is_told(logs: Path, tmp_path: Path) -> None:
-    file = tmp_path / "file"
-    file.write_text("")
-    found = Outcome("identify", logs / "case1-unloaded.csv", "-o", file / "below")
-    assert found.code == 2
-    assert "cannot write" in found.err
 
 
 def test_swapped_logs_are_told(logs: Path, tmp_path: Path) -> None:
@@ -368,11 +330,3 @@ def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> Non
         assert (wrong.code, wrong.out) == (2, "")
         # the file at fault, not its log
         assert wrong.err.startswith(f"algid: {path}: the result "), wrong.err
-
-
-def test_cross_validation_of_one_log_is_a_wrong_call(logs: Path, tmp_path: Path) -> None:
-    found = Outcome("identify", logs / "case1-unloaded.csv", "--cross-validate", "-o", tmp_path)
-    assert (found.code, found.out) == (2, "")
-    expected = "expected two unloaded logs or more, found one; give more, or leave it out"
-    assert found.err == f"algid: --cross-validate: {expected}\n"
-    assert list(tmp_path.iterdir()) == []

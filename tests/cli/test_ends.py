@@ -15,16 +15,14 @@ import pytest
 
 from algid.api.batch import Batched, answer, watched
 from algid.api.compare import labels_of as labels
-from algid.api.design import campaign_of, noise_of
+from algid.api.design import noise_of
 from algid.base.errors import SettingError
 from algid.batches.jobs import Job
 from algid.batches.records import JobRecord, JobStatus
 from algid.batches.run import BatchOutcome
 from algid.cli.output import shown
 from algid.designs.prior import PriorKnowledge, prior_of
-from algid.designs.request import request
 from algid.estimators.whitening import NoiseLevels
-from algid.synth.cases import load_case
 from tests.cli.commands import call
 
 
@@ -178,23 +176,6 @@ def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame
     return pl.read_csv(folder / f"case1-{role}.csv")
 
 
-def test_velocities_are_in_a_log_only_where_its_angles_are_exact(tmp_path: Path) -> None:
-    exact = synthetic(tmp_path / "exact")
-    assert exact.columns == ["t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2"] or {
-        "omega1"
-    } < {*exact.columns}
-    for name, flags in {
-        "noise": ("--position-noise", "1e-4"),
-        "encoder": ("--set", "encoder_bits=12"),
-    }.items():
-        assert "omega1" not in synthetic(tmp_path / name, *flags).columns
-    step = 2 * math.pi / 2**12
-    for name in ("theta1", "theta2"):
-        counts = pl.read_csv(tmp_path / "encoder" / "case1-unloaded.csv")[name].to_numpy() / step
-        assert counts == pytest.approx(np.rint(counts), abs=1e-9)
-        assert np.rint(exact[name].to_numpy() / step) == pytest.approx(counts, abs=1e-9)
-
-
 def test_a_drive_holds_or_ramps_the_torque(tmp_path: Path) -> None:
     """The log holds what was commanded at its stamps, whatever the drive does between.
 
@@ -286,17 +267,3 @@ def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None
         SettingError, match=r"^--torque-noise: arm does not tell how noisy the sensors are; give it"
     ):
         noise_of(known, None, None, None)  # type: ignore[arg-type]
-
-
-def test_a_campaign_takes_what_is_asked_and_else_its_defaults() -> None:
-    limits = {"range": "1.2", "speed": "3", "torque": "1.5"}
-    noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    plain = campaign_of(prior(), request(None, limits), noise, None, 0.05, 4)
-    assert (plain.duration, plain.experiment.rate, plain.margin, plain.seed) == (10, 1000, 0.05, 4)
-    assert plain.experiment.runs == ((1, 1) if load_case("case1").payload else (1, 0))
-    asked = request(None, limits | {"duration": 2.0, "rate": 100.0, "runs": "3,0"})
-    other = campaign_of(prior(), asked, noise, "k1, k3", 0.1, 0)
-    assert (other.duration, other.experiment.rate, other.experiment.runs) == (2, 100, (3, 0))
-    assert other.margin == 0.1
-    assert plain.asked.wanted.all()
-    assert np.flatnonzero(other.asked.wanted).tolist() == [0, 2]  # k1 and k3

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from algid.arm import inverse_dynamics
-from algid.base.errors import AlgidError, SettingError
+from algid.base.errors import AlgidError
 from algid.designs.belief import objective_of
 from algid.designs.campaign import Campaign, Design, plan
 from algid.designs.information import Experiment
@@ -234,18 +234,3 @@ def test_a_rate_at_which_noise_hides_the_torque_is_refused(tmp_path: Path) -> No
     assert text.startswith("--rate: at 100000 Hz the noise of the angles, differentiated")
     assert "\n" not in text
     assert list(tmp_path.iterdir()) == []
-
-
-def test_an_arm_of_lengths_and_masses_has_uniform_links(tmp_path: Path) -> None:
-    file = tmp_path / "arm.toml"
-    file.write_text("[arm]\nm1 = 2.0\nm2 = 1.0\nl1 = 0.4\nl2 = 0.3\n", encoding="utf-8")
-    belief = prior_of(str(file), None, PriorKnowledge()).belief
-    value = dict(zip(belief.shared.names, belief.mean, strict=True))
-    assert value["k3"] == pytest.approx(1.0 * 0.3**2 / 3)  # a rod about its end
-    assert value["k5"] == pytest.approx(2.0 * 0.4**2 / 3 + 1.0 * 0.4**2)
-    assert "m_p" not in value
-    asked = objective_of(belief, None, "arm")
-    # no friction is known, so none is asked for
-    assert not asked.wanted[belief.shared.names.index("k6")]
-    with pytest.raises(SettingError, match="cannot tell it from zero"):
-        objective_of(belief, ["k6"], "arm")

@@ -4,8 +4,6 @@ whole matrices.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -114,45 +112,3 @@ def test_information_is_that_of_the_whole_covariance(sigma: float, runs: tuple[i
         S / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=1e-6
     )
     np.testing.assert_allclose(S, S.T, rtol=1e-9, atol=1e-9 * np.abs(S).max())
-
-
-def test_a_delay_is_told_by_the_slope_of_the_torque_and_takes_of_the_rest() -> None:
-    noise = NoiseLevels(np.full(2, 1e-12), np.array([0.02, 0.05]))
-    one, delayed = motion(), replace(SHARED, delay=True)
-    q = len(SHARED.model.names)
-    beta = np.insert(BETA, q, 1e-3)
-    slopes = Sensitivities(SHARED.model, one, RATE)
-    S = Information(Experiment(delayed, (2, 0), noise, RATE), beta, slopes).S
-    tau = np.einsum("aqn,q->an", slopes.Y, BETA[:q])
-    columns = np.concatenate([slopes.Y, np.gradient(tau, 1 / RATE, axis=1)[:, None]], axis=1)
-    expected = 2 * np.einsum("aqn,arn,a->qr", columns, columns, noise.tau**-2.0)
-    np.testing.assert_allclose(
-        S[: q + 1, : q + 1], expected, rtol=0, atol=1e-6 * np.abs(expected).max()
-    )
-    size = len(delayed.names)
-    A = np.eye(size)
-    information = Information(Experiment(delayed, (1, 1), noise, RATE), beta, slopes)
-    assert information.gradient(A).shape == (6, one.theta.shape[1])
-    assert S.shape == (size, size)
-
-
-def test_slopes_by_the_motion_are_those_of_the_torque_by_hand() -> None:
-    one = motion()
-    slopes = Sensitivities(SHARED.model, one, RATE)
-    c = BETA[:9]
-    signals = np.concatenate([one.theta, one.omega, one.alpha])
-    for component in range(6):
-        pair = []
-        for step in (1e-5, -1e-5):
-            moved = signals.copy()
-            moved[component] += step
-            pair.append(torque_by_hand(BETA, moved[:2], moved[2:4], moved[4:], False))
-        expected = (pair[0] - pair[1]) / 2e-5
-        found = np.einsum("aqn,q->an", slopes.dY[component], c)
-        np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max() + 1e-9)
-    # second derivatives are symmetric: ∂²τ/∂θ1∂ω2 by either road
-    second = slopes.dP(c)
-    for first in range(6):
-        for other in range(6):
-            one_way = second[first, other // 2, :, other % 2]
-            np.testing.assert_allclose(one_way, second[other, first // 2, :, first % 2], atol=1e-6)

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from algid.arm import FloatArray
-from algid.designs.position import Fourier, middles
+from algid.designs.position import Fourier
 
 
 def by_sympy(wave: str) -> list[Callable[..., FloatArray]]:
@@ -52,19 +52,3 @@ def test_waves_and_their_derivatives_are_those_of_sympy(duration: float) -> None
             np.testing.assert_allclose(
                 flat[order, half], getattr(np, wave)(turned) * omega ** (order - 1.0), atol=1e-9
             )
-
-
-def test_the_gradient_is_the_transpose_of_the_motion() -> None:
-    """The motion is linear in x: for any weights, ⟨weights, motion(x)⟩ = ⟨gradient(weights), x⟩."""
-    family, rng = Fourier(3.0), np.random.default_rng(8)
-    basis = family.basis(middles(3.0, 40.0))
-    weights = rng.standard_normal((5, 6, 120))
-    x = rng.standard_normal(family.size)
-    motion = family.motion(x, basis)
-    signals = np.concatenate([motion.theta, motion.omega, motion.alpha])
-    np.testing.assert_allclose(
-        family.gradient(weights, basis) @ x, np.einsum("bcn,cn->b", weights, signals), rtol=1e-10
-    )
-    np.testing.assert_allclose(
-        family.gradient(weights[2], basis), family.gradient(weights, basis)[2], rtol=1e-12
-    )

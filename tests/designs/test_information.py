@@ -4,8 +4,6 @@ differences.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -93,17 +91,6 @@ def test_gradient_by_the_motion_is_that_of_differences() -> None:
         assert gradient[place] == pytest.approx(slope, rel=1e-4, abs=1e-6)
 
 
-def test_parts_of_the_motion_add_up() -> None:
-    belief, rate = belief_of("case1"), 50.0
-    slopes = Sensitivities(
-        belief.shared.model, motion_at(drawn(3), middles(FAMILY.duration, rate)), rate
-    )
-    information = Information(experiment(belief), belief.mean, slopes)
-    np.testing.assert_allclose(
-        information.parts(60).sum(axis=0), information.S, rtol=1e-9, atol=1e-9 * information.S.max()
-    )
-
-
 def limits_for(belief: Belief) -> Limits:
     return Limits(
         low=np.array([-2.8, -1.2]),
@@ -138,32 +125,3 @@ def test_usage_derivatives_are_those_of_differences() -> None:
         np.testing.assert_allclose(
             gradient[:, place], slope, rtol=1e-4, atol=1e-4 * np.abs(slope).max()
         )
-
-
-def test_no_arm_of_a_box_asks_for_more_torque_than_the_largest_told() -> None:
-    belief = belief_of("case2")
-    motion = motion_at(drawn(5), middles(FAMILY.duration, 50.0))
-    Y = Sensitivities(belief.shared.model, motion, 50.0).Y
-    corners = np.array(np.meshgrid(*[[-1, 1]] * belief.spread.shape[1])).reshape(
-        belief.spread.shape[1], -1
-    )
-    for loaded in (False, True):
-        load = belief.load(loaded)
-        torque, more, _ = load.largest(Y)
-        arms = [
-            belief.shared.coefficients(belief.mean + belief.spread @ u, loaded) for u in corners.T
-        ]
-        worst = np.max([np.abs(np.einsum("aqn,q->an", Y, c)) for c in arms], axis=0)
-        # reached at a corner, so that the bound is no larger than it must be; its corners are
-        # rounded by 1e-6
-        np.testing.assert_allclose(np.abs(torque) + more, worst, rtol=0, atol=1e-5 * worst.max())
-
-
-@pytest.mark.parametrize("box", [True, False])
-def test_an_arm_that_asks_for_no_torque_has_no_largest_torque_and_no_slope(box: bool) -> None:
-    belief = replace(belief_of("case1"), box=box)
-    # at rest in a horizontal plane
-    torque, more, slope = belief.load(False).largest(np.zeros((2, 7, 3)))
-    np.testing.assert_array_equal(torque, 0.0)
-    assert np.all(more < 1e-90)
-    np.testing.assert_array_equal(slope, 0.0)

@@ -97,24 +97,6 @@ def test_the_torque_is_that_of_the_worst_arm_on_either_side(box: bool) -> None:
     assert torque[1, True] == pytest.approx(1.0 / 2.5, abs=1e-4)
 
 
-def test_a_margin_is_taken_off_each_side() -> None:
-    kept = TIGHT.within(0.1)
-    np.testing.assert_allclose([kept.low, kept.high], [[-1.9, -0.8], [-0.1, 2.8]])
-    np.testing.assert_allclose([kept.speed, kept.torque], [[1.8, 3.6], [4.5, 2.25]])
-    np.testing.assert_allclose(kept.acceleration, [9.0, 18.0])
-    assert kept.height == pytest.approx(-0.2)  # a tenth of the metre between it and the reach
-    np.testing.assert_array_equal(kept.lengths, TIGHT.lengths)
-    free = FREE.within(0.1)
-    np.testing.assert_array_equal([free.low, free.high], [[-np.inf] * 2, [np.inf] * 2])
-    assert free.height == -np.inf
-    # what uses all of the kept limits uses 0.9 of the whole ones
-    state = at((-0.1, 2.8), (1.8, 3.6), (9.0, 18.0))
-    whole, less = (usage(one, state, (), derivatives=False) for one in (TIGHT, kept))
-    upper = [row.upper and row.limit != "tip-height" for row in whole.rows]
-    np.testing.assert_allclose(whole.most[upper], 0.9)
-    np.testing.assert_allclose(less.most[upper], 1.0)
-
-
 def test_a_weak_arm_rests_where_it_needs_least() -> None:
     loads = [load(0.05 * np.diag(K), box=True)]
     weak = replace(TIGHT, torque=np.array([3.0, 2.5]), height=-np.inf)
@@ -171,13 +153,3 @@ def test_what_no_posture_keeps_is_named_with_what_it_misses() -> None:
         resting(
             replace(flat, torque=np.array([9.0, 0.5])), Model(), [load(np.zeros((7, 1)), box=True)]
         )
-
-
-@pytest.mark.parametrize(("limit", "central"), [(5.0 / 0.69, True), (5.0 / 0.71, False)])
-def test_the_middle_will_do_up_to_seven_tenths_of_a_limit(limit: float, central: bool) -> None:
-    """Outstretched, the middle of this range, the arm asks for k4 + k2 = 5 N m."""
-    around = replace(
-        FREE, low=np.full(2, -1.0), high=np.full(2, 1.0), torque=np.array([limit, np.inf])
-    )
-    rest = resting(around, Model(), [load(np.zeros((7, 1)), box=True)])
-    assert (np.abs(rest).max() < 1e-12) == central

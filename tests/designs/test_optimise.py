@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy.special import logsumexp
@@ -84,30 +82,6 @@ def test_a_search_that_is_broken_off_gives_the_best_so_far(after: int) -> None:
     assert found.interrupted
     assert np.abs(found.x).max() <= 1.0
     assert found.score == problem.score(found.x)
-
-
-@pytest.mark.parametrize(
-    "broken",
-    [
-        lambda e: Evaluation(np.nan, e.gradient, e.room, e.room_gradient),
-        lambda e: Evaluation(e.figure, e.gradient, np.full_like(e.room, np.inf), e.room_gradient),
-        None,
-    ],
-)
-def test_a_step_of_which_nothing_can_be_said_is_shortened(
-    broken: Callable[[Evaluation], Evaluation] | None,
-) -> None:
-    class Walled(Ball):
-        def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:
-            found = super().evaluate(x, stage)
-            if np.abs(x).max() <= 1.5:
-                return found
-            if broken is None:
-                raise np.linalg.LinAlgError("not positive definite")
-            return broken(found)
-
-    found = optimise(Walled(TARGET), 100.0, 0)
-    np.testing.assert_allclose(found.x, np.clip(TARGET, -1, 1), atol=1e-4)
 
 
 def test_a_motion_is_drawn_back_to_exactly_what_it_may_use() -> None:

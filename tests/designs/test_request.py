@@ -16,7 +16,6 @@ from algid.designs.request import limits_of, request
 from algid.options import flag
 
 LENGTHS = np.array([0.4, 0.3])
-LIMITS = "--limits; inf is no limit at all"
 GIVEN: dict[str, Any] = {"range": "1.2", "speed": "3", "torque": "5"}
 
 
@@ -125,40 +124,3 @@ def test_limits_are_a_pair_of_joints_and_infinite_where_none_is_told() -> None:
     np.testing.assert_array_equal([whole.low, whole.high], [[-np.inf] * 2, [np.inf] * 2])
     np.testing.assert_array_equal(whole.middle, [-np.pi / 2, 0])
     assert whole.height == 0.1
-
-
-@pytest.mark.parametrize(
-    ("flags", "lengths", "message"),
-    [
-        *(
-            ({name: None}, LENGTHS, (f"--{name}: it must be given, or `{name} = …` in the file of "
-                                    f"{LIMITS}"))
-            for name in ("range", "speed", "torque")
-        ),
-        ({"range": "1:-1,0:1"}, LENGTHS, "--range: expected LOW:HIGH with LOW below"),
-        ({"range": "0:1,2:2"}, LENGTHS, "--range: expected LOW:HIGH with LOW below"),
-        (
-            {"range": "-inf:1,-1:1"},
-            LENGTHS,
-            "--range: expected LOW:HIGH with LOW below",
-        ),
-        (
-            {"range": "inf", "speed": "inf", "torque": "inf"},
-            LENGTHS,
-            "--range: without any limit no motion is the best, found inf for all; give one",
-        ),
-        ({"tip_height": 0.7}, LENGTHS, ("--set tip_height: expected less than the arm's reach, "
-                                       "0.7 m, found 0.7 m")),
-        (
-            {"tip_height": -0.1},
-            np.array([0.4, np.nan]),
-            "--set tip_height: the link lengths are not known; give --l1 and --l2",
-        ),
-    ],
-)  # fmt: skip
-def test_limits_that_make_no_sense_are_refused(
-    flags: dict[str, Any], lengths: Any, message: str
-) -> None:
-    with pytest.raises(SettingError) as refused:
-        limits_of(request(None, {**GIVEN, **flags}), lengths)
-    assert str(refused.value).startswith(message)

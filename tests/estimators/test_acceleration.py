@@ -7,17 +7,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.arm import FloatArray, forward_dynamics
+from algid.arm import FloatArray
 from algid.model import (
-    COLUMN_NAMES,
     TERMS,
     Model,
     Motion,
     acceleration,
     damping,
-    gains,
-    load,
-    regressor,
     torque,
 )
 from tests.estimators.test_model import VALUES
@@ -50,29 +46,6 @@ def test_accelerations_are_those_whose_torque_it_is(terms: tuple[str, ...], grav
     np.testing.assert_allclose(found, alpha, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("gravity", [9.81, 0.0])
-@pytest.mark.parametrize("terms", MODELS, ids=lambda terms: "+".join(terms) or "plain")
-def test_a_load_is_what_its_columns_make_of_the_coefficients(
-    terms: tuple[str, ...], gravity: float
-) -> None:
-    model = Model(terms, gravity, coulomb_speed=0.5)
-    motion = Motion(*_states())
-    c, loads = _constants(model), list(model.compiled.loads)
-    amplified = np.einsum("aqn,q->an", regressor(model, motion, c)[:, loads], c[loads])
-    expected = amplified / np.array(gains(model, c))[:, None]
-    np.testing.assert_allclose(load(model, c, motion), expected, rtol=1e-9, atol=1e-12)
-
-
-def test_without_terms_it_is_the_arms_forward_dynamics() -> None:
-    theta, omega, tau = _states(1)
-    c = _constants(Model())
-    np.testing.assert_allclose(
-        acceleration(Model(), c, theta, omega, tau),
-        forward_dynamics(c, theta, omega, tau),
-        rtol=1e-9,
-    )
-
-
 def test_a_load_whose_sign_turns_is_found_from_either_side() -> None:
     """Friction by load of a third: loads near nothing have the sign of the torque left for them,
     or the other.
@@ -97,17 +70,3 @@ def test_damping_at_rest_is_the_torques_difference(terms: tuple[str, ...]) -> No
     c, still, step = _constants(model), np.zeros((2, 1)), 1e-6
     both = [torque(model, c, Motion(still, still + sign * step, still)) for sign in (1, -1)]
     np.testing.assert_allclose(damping(model, c), (both[0] - both[1])[:, 0] / (2 * step), atol=1e-8)
-
-
-def test_what_a_model_lacks_is_nothing_in_the_order_of_all_columns() -> None:
-    model = Model(("rotor",), gravity=0.0)
-    full = model.expand(np.arange(1.0, 7.0))
-    assert dict(zip(COLUMN_NAMES, full.tolist(), strict=True)) == model.values(np.arange(1.0, 7.0))
-    assert {name: value for name, value in model.values(np.arange(1.0, 7.0)).items() if value} == {
-        "k1": 1.0,
-        "k3": 2.0,
-        "k5": 3.0,
-        "k6": 4.0,
-        "k7": 5.0,
-        "j2": 6.0,
-    }

@@ -10,97 +10,20 @@ from algid.arm import inverse_dynamics
 from algid.estimators import combine as combine_module
 from algid.estimators import weak
 from algid.estimators.combine import (
-    MOST_BLOCKS,
     BlockSums,
     LogInformation,
-    long_run_variance,
 )
 from algid.estimators.diagnostics import (
     broken_bounds,
     repeatability,
 )
 from algid.estimators.fit import finish
-from algid.estimators.identifiability import examine, sizes
 from algid.estimators.parametrisation import Shared
-from algid.estimators.prediction import motion_of, score
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.identification.by_likelihood import Fitted
-from algid.identification.checks import remarks
 from algid.model import Model
-from algid.signals.segments import Segment
-from algid.signals.shift import TorqueShift
-from algid.synth.cases import load_case
 from tests.intervals import holds_95
 
 from .conftest import DT, Bench
-
-
-def test_a_perfect_fit_of_an_arm_that_turns_round_explains_all_torque() -> None:
-    k = load_case("case1").arm.constants()
-    t = 1e-3 * np.arange(6001)
-    # six turns a second, swings of 2 Hz
-    theta = np.stack([40 * t + np.sin(9 * t), 3 * np.sin(14 * t)])
-    omega = np.stack([40 + 9 * np.cos(9 * t), 42 * np.cos(14 * t)])
-    alpha = np.stack([-81 * np.sin(9 * t), -588 * np.sin(14 * t)])
-    log = Segment(0.0, 1e-3, theta, inverse_dynamics(k, theta, omega, alpha))
-    assert np.all(score(Model(), k, [log]).r2 > 0.9999)
-    # a torque acts 20 ms after its stamp
-    late = replace(log, theta=log.theta[:, :-20], tau=log.tau[:, 20:])
-    assert np.all(score(Model(), k, [late], TorqueShift(delay=0.02)).r2 > 0.9999)
-    assert np.all(score(Model(), k, [late]).r2 < 0.99)
-
-
-def test_a_parameters_size_is_the_largest_of_its_class() -> None:
-    """Of friction a tenth of √(inertia × gravity) at least, of a payload what loads the arm as it
-    loads itself.
-    """
-    names = ("k1", "k2", "k3", "k4", "k5", "k6", "k7", "f1", "j2", "delay")
-    values = np.array([-0.02, 3.0, 0.05, -4.0, 0.03, 0.001, 0.002, 0.5, 1e-3, 1e-5])
-    inertia, gravity, damping = 0.05, 4.0, 0.1 * np.sqrt(0.05 * 4.0)
-    expected = [
-        inertia,
-        gravity,
-        inertia,
-        gravity,
-        inertia,
-        damping,
-        damping,
-        gravity,
-        inertia,
-        1e-3,
-    ]
-    np.testing.assert_allclose(sizes(names, values), expected, rtol=1e-12)
-    rubbing = values.copy()
-    rubbing[6] = -7.0
-    assert sizes(names, rubbing)[[5, 6]].tolist() == [7.0, 7.0]
-    turned = values[[2, 1, 4, 3, 0, *range(5, 10)]]  # whichever of its class is the largest
-    np.testing.assert_allclose(sizes(names, turned), expected, rtol=1e-12)
-    np.testing.assert_allclose(
-        sizes(("k1", "k4", "m_p"), np.array([0.3, 9.81, 0.01])), [0.3, 9.81, 1.0]
-    )
-    np.testing.assert_allclose(
-        sizes(("k1", "k4", "m_p", "l1"), np.array([0.3, 9.81, 0.01, 0.2]))[2:], [0.01, 0.2]
-    )
-
-
-def test_what_is_hardly_told_widens_what_it_mixes_with() -> None:
-    """Friction with a Coulomb column where there is none: its variance is that of the inverse,
-    nothing dropped.
-    """
-    S = np.array([[4e4, 3.8e4], [3.8e4, 4e4]])
-    known = examine(("k6", "f1"), np.array([0.1, 1e-5]), S, np.array([1.0, 1.0]))
-    assert np.allclose(known.covariance, np.linalg.inv(S), rtol=1e-10)
-
-
-def test_block_sums_stay_bounded_and_lose_nothing() -> None:
-    sums, total = BlockSums(), 0.0
-    rng = np.random.default_rng(0)
-    for _ in range(60):
-        block = rng.standard_normal((701, 2))
-        sums.add(block)
-        total = total + block.sum(axis=0)
-    assert sums.values().shape[0] <= 2 * MOST_BLOCKS + 1
-    assert np.allclose(sums.values().sum(axis=0), total)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -122,18 +45,6 @@ def test_block_sums_are_of_stretches_one_after_the_other(
     assert 8 < found.size <= 17
     expected = [sum(told[first : first + factor]) for first in range(0, len(told), factor)]
     np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
-def test_long_run_variance_of_an_autoregression() -> None:
-    rng = np.random.default_rng(0)
-    noise = rng.standard_normal((20000, 1))
-    scores = np.zeros_like(noise)
-    for step in range(1, noise.size):
-        scores[step] = 0.6 * scores[step - 1] + noise[step]
-    variance, lags = long_run_variance(scores)
-    assert lags > 5
-    # spectrum at zero
-    assert variance[0, 0] / noise.size == pytest.approx(1 / (1 - 0.6) ** 2, rel=0.15)
 
 
 def test_intervals_of_a_few_logs_hold_where_runs_differ() -> None:
@@ -192,28 +103,6 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     )
 
 
-def test_constants_of_no_length_and_exchanged_logs_break_bounds(bench: Bench) -> None:
-    """k1 k2 = m2² g l1 lc2² (Table 1); logs in each other's place make a payload below nothing."""
-    fit = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
-    turned = replace(fit, values=fit.values * np.array([1, -1, 1, 1, 1, 1, 1]))
-    (broken,) = [bound for bound in broken_bounds(turned) if bound.bound == "k1 k2 >= 0"]
-    assert broken.distance is not None
-    assert broken.distance > 20
-    assert not [bound for bound in broken_bounds(fit) if bound.bound == "k1 k2 >= 0"]
-    # det M is positive again
-    inside_out = replace(fit, values=fit.values * np.array([1, 1, -1, 1, -1, 1, 1]))
-    (broken,) = [bound for bound in broken_bounds(inside_out) if bound.bound == "k5 >= 0"]
-    assert broken.distance == pytest.approx(fit.values[4] / fit.std[4])
-    both = weak.fit(
-        Problem([lambda: [bench.log(loaded=True, sigma=1e-3)]], [lambda: [bench.log(sigma=1e-3)]])
-    )
-    assert any(warning.code == "LOGS_APART" for warning in remarks(Fitted(both)))
-    right = weak.fit(
-        Problem([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(loaded=True, sigma=1e-3)]])
-    )
-    assert not any(warning.code == "LOGS_APART" for warning in remarks(Fitted(right)))
-
-
 @pytest.mark.parametrize("rotor", [0.0, 0.02])
 def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
     bench: Bench, rotor: float
@@ -252,18 +141,3 @@ def test_a_mass_matrix_that_is_not_positive_definite_breaks_its_bound(
             assert by_name["M22 > 0"] == pytest.approx(k3 + rotor)
         seen |= set(by_name)
     assert seen == {*ends, "M22 > 0"}
-
-
-def test_motion_by_five_points_is_exact_for_a_cubic_and_repeats_itself_at_the_ends() -> None:
-    dt = 0.1
-    t = dt * np.arange(12)
-    motion = motion_of(np.stack([t**3 - t, 2 * t**2]), dt)
-    inner, ends = slice(2, -2), [0, 1, -2, -1]
-    np.testing.assert_allclose(
-        motion.omega[:, inner], np.stack([3 * t**2 - 1, 4 * t])[:, inner], atol=1e-12
-    )
-    np.testing.assert_allclose(
-        motion.alpha[:, inner], np.stack([6 * t, np.full_like(t, 4)])[:, inner], atol=1e-10
-    )
-    np.testing.assert_array_equal(motion.omega[:, ends], motion.omega[:, [2, 2, -3, -3]])
-    np.testing.assert_array_equal(motion.alpha[:, ends], motion.alpha[:, [2, 2, -3, -3]])

@@ -107,12 +107,6 @@ def test_a_torque_that_acts_late_or_early_is_a_delay_and_no_lag(bench: Bench, sa
     assert late.late == pytest.approx(samples * log.dt, abs=5e-2 * log.dt)
 
 
-def test_a_joint_without_a_motor_has_no_gain_to_choose(bench: Bench) -> None:
-    log = bench.log(sigma=1e-3)
-    passive = replace(log, tau=log.tau * np.array([[1.0], [0.0]]))
-    assert [one.term for one in _of(passive, candidates=("gain", "rotor")).trials] == ["rotor"]
-
-
 def test_torque_that_no_term_explains_refutes_the_first_pass(bench: Bench) -> None:
     log = bench.log(sigma=1e-4)
     slow = 0.3 * np.sign(np.sin(2 * np.pi * 1.3 * bench.bare.t))

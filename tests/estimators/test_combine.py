@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 
 from algid.arm import Arm, FloatArray
 from algid.estimators.combine import (
-    BlockSums,
     LogInformation,
     Prior,
     combine,
@@ -51,16 +50,6 @@ def test_units_leave_a_pseudo_inverse_as_it_is(exponents: list[float]) -> None:
     found = scaled_pinv(hilbert(5) * np.outer(size, size)) * np.outer(size, size)
     # rounding times a condition number of 5e5
     np.testing.assert_allclose(found, invhilbert(5, exact=True), rtol=1e-9)
-
-
-def test_what_counts_as_nothing_is_left_out_of_a_pseudo_inverse() -> None:
-    S = np.diag([4.0, 0.0, 1e-40, 2.0])
-    S[3, 1] = S[1, 3] = 0.0
-    np.testing.assert_allclose(scaled_pinv(S), np.diag([0.25, 0.0, 1e40, 0.5]), rtol=1e-12)
-    # the sum is known alone: half of its variance for each
-    both = np.array([[1.0, 1.0], [1.0, 1.0]])
-    np.testing.assert_allclose(scaled_pinv(both), both / 4, rtol=1e-12)
-    np.testing.assert_array_equal(scaled_pinv(np.zeros((3, 3))), 0.0)
 
 
 def test_the_slope_of_the_likelihood_is_its_gradient_and_its_value_that_of_the_squares() -> None:
@@ -118,13 +107,6 @@ def test_directions_without_information_keep_their_values_and_nothing_finite_end
     np.testing.assert_array_equal(held, 9.0)  # every step is refused, however short
 
 
-def test_knowledge_of_an_estimate_is_the_inverse_of_its_covariance() -> None:
-    covariance = np.array([[4.0, 1.0, 0.0], [1.0, 9.0, 0.0], [0.0, 0.0, 0.0]])
-    prior = Prior.of(("k1", "k2", "k3"), np.ones(3), covariance)
-    np.testing.assert_allclose(prior.precision[:2, :2] @ covariance[:2, :2], np.eye(2), atol=1e-14)
-    assert not prior.precision[2].any()  # a variance of nothing is taken for none
-
-
 def test_a_jackknife_by_kind_is_wolters_sum() -> None:
     """Σ_h (n_h − 1)/n_h Σ_i (β_(hi) − β̄_h)² written out for three unloaded and two loaded logs,
     and one alone.
@@ -151,26 +133,6 @@ def test_a_jackknife_by_kind_is_wolters_sum() -> None:
     np.testing.assert_allclose(one, other, rtol=1e-12)
 
 
-def test_what_is_left_out_tells_nothing() -> None:
-    """Weighted means: of the logs' own optima by the information of all but one."""
-    flat = Shared(Model(gravity=0.0))
-    rng = np.random.default_rng(6)
-    logs, optima, weights = [], [], []
-    for _ in range(4):
-        A = rng.standard_normal((8, 5))
-        weights.append(A.T @ A)
-        optima.append(rng.standard_normal(5))
-        logs.append(
-            LogInformation(False, np.zeros(5), weights[-1][None], (weights[-1] @ optima[-1])[None])
-        )
-    for place, found in enumerate(left_out(flat, logs, np.zeros(5))):
-        rest = [number for number in range(4) if number != place]
-        total = sum(weights[number] for number in rest)
-        np.testing.assert_allclose(
-            found, np.linalg.solve(total, sum(weights[n] @ optima[n] for n in rest)), rtol=1e-9
-        )
-
-
 def test_what_is_left_out_is_what_the_others_tell_however_much_a_log_tells() -> None:
     """Of two kinds, at coefficients of their own, one 1e18 times as sure as the others."""
     flat = Shared(Model(gravity=0.0), payload=True)
@@ -185,8 +147,3 @@ def test_what_is_left_out_is_what_the_others_tell_however_much_a_log_tells() -> 
         rest = [*logs[:place], *logs[place + 1 :]]
         expected, _, _ = combine(flat, rest, beta)
         np.testing.assert_allclose(found, expected, rtol=1e-6)
-
-
-def test_no_blocks_have_no_sums() -> None:
-    with pytest.raises(ValueError, match="no blocks were added"):
-        BlockSums().values()

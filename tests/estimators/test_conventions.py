@@ -14,9 +14,6 @@ from algid.arm import FloatArray
 from algid.estimators.convention_search import (
     Judgement,
     Recorded,
-    _demands,
-    _least,
-    _trials,
     judge,
     judge_together,
 )
@@ -242,29 +239,6 @@ def test_an_arm_with_one_motor_tells_its_convention(
     np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
 
 
-@pytest.mark.parametrize(("gravity", "passive"), [(True, None), (False, None), (True, 2)])
-def test_conventions_that_share_a_fit_have_what_a_fit_of_their_own_gives(
-    bench: Bench, gravity: bool, passive: int | None
-) -> None:
-    theta, tau = measured(bench.bare)
-    if passive is not None:
-        tau[passive - 1] = 0.0
-    trials = _trials([Recorded(theta, tau, DT, passive)], gravity)
-    assert trials is not None
-    every = list(trials.discrete())
-    assert len({one.convention for one in every}) == len(every)
-    for shared in every[::7]:  # every turn of the zeros, with every sign
-        own = trials.under(shared.convention)
-        size = np.sqrt(np.diag(own.covariance))
-        np.testing.assert_allclose(shared.k / size, own.k / size, rtol=0, atol=1e-6)
-        scale = np.outer(size, size)
-        np.testing.assert_allclose(
-            shared.covariance / scale, own.covariance / scale, rtol=0, atol=1e-6
-        )
-        np.testing.assert_allclose(shared.left, own.left, rtol=1e-9, atol=1e-13)
-        assert shared.score == pytest.approx(own.score, abs=1e-9)
-
-
 def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:
     theta, tau = measured(bench.bare)
     k1, k2, k4 = (bench.truth[place] for place in (0, 1, 3))
@@ -283,60 +257,3 @@ def test_logs_that_cannot_tell() -> None:
     assert judge(theta, tau, 1e-3) is None
     assert judge(theta, tau, 1.0) is None
     assert judge(np.repeat(theta, 10, axis=1), np.zeros((2, 9000)), 1e-3) is None
-
-
-@pytest.mark.parametrize("gravity", [True, False])
-def test_demands_are_in_standard_deviations(gravity: bool) -> None:
-    """Each demand's value over its error by the slopes of differences, at random constants and
-    covariances.
-    """
-    names = [n for n in ZEROED if gravity or n not in ("k2", "k4")]
-    rng = np.random.default_rng(11)
-    speed = np.array([1.3, 2.1])
-
-    def values(c: np.ndarray) -> dict[str, float]:
-        k = dict(zip(names, c.tolist(), strict=True))
-        mass = np.array([[k["k5"], k["k1"]], [k["k1"], k["k3"] + k["j2"]]])
-        found = {
-            "M22 > 0": k["k3"] + k["j2"],
-            "k5 > 0": k["k5"],
-            # of M at the angle where k1 cos θ2 couples nothing else, and what the rotor adds to it
-            "det M > 0": float(np.linalg.det(mass)) + k["k3"] * k["j2"],
-            "friction of joint 1 > 0": k["k6"] * speed[0] + k["f1"],
-            "friction of joint 2 > 0": k["k7"] * speed[1] + k["f2"],
-        }
-        return found | {f"{name} > 0": k[name] for name in (("k2", "k4") if gravity else ("k1",))}
-
-    for _ in range(20):
-        c = rng.standard_normal(len(names))
-        root = rng.standard_normal((len(names), len(names)))
-        covariance = root @ root.T
-        expected = {}
-        for name, value in values(c).items():
-            slope = [
-                (values(c + e)[name] - values(c - e)[name]) / 2e-6
-                for e in 1e-6 * np.eye(len(names))
-            ]
-            expected[name] = value / np.sqrt(slope @ covariance @ slope)
-        if gravity:
-            k1, k2 = (
-                c[names.index(name)] / covariance[(names.index(name),) * 2] ** 0.5
-                for name in ("k1", "k2")
-            )
-            expected["k1 k2 > 0"] = np.sign(k1 * k2) * min(abs(k1), abs(k2))
-        found = _demands(dict(zip(names, c.tolist(), strict=True)), covariance, speed)
-        assert found == pytest.approx(expected, rel=1e-5)
-
-
-@pytest.mark.parametrize("start", [(0.0, 0.0), (1.0, -1.0)])
-def test_two_angles_are_found_where_a_function_of_both_is_least(
-    start: tuple[float, float],
-) -> None:
-    """A narrow valley across both axes, whose lowest point is known."""
-
-    def valley(at: FloatArray) -> FloatArray:
-        along, across = at[:, 0] + at[:, 1] - 0.3, at[:, 0] - at[:, 1] + 0.7
-        return 0.01 * np.square(along) + np.square(across)
-
-    found = _least(valley, np.array(start))
-    np.testing.assert_allclose(found, [-0.2, 0.5], atol=1e-4)

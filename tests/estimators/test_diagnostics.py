@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,14 +21,11 @@ from algid.estimators.diagnostics import (
     constrained,
     length_by_constants,
     payload_distance,
-    ratio_of_joints,
-    repeatability,
     term_worths,
 )
-from algid.estimators.excitation import UNLIKE
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.problem import Problem
 from algid.model import Model
 from algid.notices import Notice
 
@@ -76,24 +72,6 @@ def test_a_friction_held_at_nothing_moves_the_others_as_conditional_normals(brok
     )
     before = Notice("BEFORE", "before")
     assert constrained(replace(fit, notes=(before,))).notes == (before, note)
-
-
-def test_bounds_that_no_point_keeps_leave_the_free_estimates(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    values = K.copy()
-    values[5] = -0.05
-    fit = replace(fit_of(values), status=("OK", "NOT_IDENTIFIABLE", *("OK",) * 5))
-    stuck = {"nothing": np.full(7, np.nan), "where it was": np.zeros(7)}
-    for x in stuck.values():
-        monkeypatch.setattr(scipy.optimize, "minimize", lambda *_, x=x, **__: SimpleNamespace(x=x))
-        found = constrained(fit)
-        assert not found.converged
-        assert found.status == ("NOT_CONVERGED", "NOT_IDENTIFIABLE", *("NOT_CONVERGED",) * 5)
-        np.testing.assert_array_equal(found.values, fit.values)
-        (note,) = found.notes
-        assert note.code == "BROKEN_BOUND"
-        assert note.text.startswith("--set constrain cannot obey k6 >= 0 (")
 
 
 def test_a_bound_is_broken_by_what_is_known_alone() -> None:
@@ -185,43 +163,3 @@ def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Ben
     start = np.array([bench.payload, bench.arm.l1, bench.arm.l2])
     squares = 2 * scipy.optimize.least_squares(left, start, x_scale=start).cost
     assert payload_distance(fit) == pytest.approx(norm.isf(chi2.sf(squares, 4)), rel=1e-3)
-
-
-def test_a_payload_that_one_kind_of_log_cannot_tell_has_no_distance(bench: Bench) -> None:
-    bare: Source = partial(list, [bench.log(sigma=1e-3)])
-    fit = weak.fit(Problem([bare], [partial(list, [bench.log(True, 1e-3)])]))
-    assert payload_distance(fit) is not None
-    assert payload_distance(weak.fit(Problem([bare]))) is None
-    first, second = fit.logs
-    S = second.S.copy()
-    S[:, 6] = S[:, :, 6] = 0.0  # nothing of k7
-    assert payload_distance(replace(fit, logs=(first, replace(second, S=S)))) is None
-    assert payload_distance(replace(fit, logs=(second,))) is None
-
-
-def test_a_loaded_log_that_tells_no_mass_has_no_repeatability(bench: Bench) -> None:
-    lengths = {"l1": bench.arm.l1, "l2": bench.arm.l2}
-    burdened = [lambda: [bench.log(True, 1e-3, 1)], lambda: [bench.log(True, 1e-3, 2)]]
-    fit = weak.fit(Problem([lambda: [bench.log(sigma=1e-3)]], burdened, lengths=lengths))
-    assert repeatability(fit) is not None
-    empty = replace(fit.logs[2], S=np.zeros_like(fit.logs[2].S))
-    assert repeatability(replace(fit, logs=(*fit.logs[:2], empty))) is None
-
-
-def test_joints_of_an_arm_in_a_plane_are_held_against_each_other_too(bench: Bench) -> None:
-    """Without gravity k1 and k3 are left to compare.
-
-    Torques that differ by less than half contradict nothing.
-    """
-    flat = WeakSettings(model=Model(gravity=0.0))
-    k = bench.arm.constants()
-    theta1, both = bench.bare.theta[0], bench.bare.theta.sum(axis=0)
-    weight = np.stack([k[3] * np.cos(theta1) + k[1] * np.cos(both), k[1] * np.cos(both)])
-    log = bench.log(sigma=1e-4)
-    log = replace(log, tau=log.tau - weight)
-    for share, told in ((1.0, False), (0.7, False), (0.3, True)):
-        scaled = replace(log, tau=log.tau * np.array([[1.0], [share]]))
-        normal = weak.normal_equations(partial(list, [scaled]), flat)
-        assert normal is not None
-        found = ratio_of_joints([normal], flat.model, UNLIKE)
-        assert found == (pytest.approx(share, rel=0.05) if told else None)

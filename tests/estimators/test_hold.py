@@ -38,13 +38,6 @@ def test_the_prior_of_both_makes_errors_as_large_as_it_says(share: float, true: 
     assert np.mean(np.abs(z) < 1.96) > 0.945
 
 
-def test_a_delay_of_five_milliseconds_is_no_hold() -> None:
-    late = Lateness(5e-3, 1e-5, HALF)
-    assert late.decided
-    assert late.another
-    assert late.hold == "foh"
-
-
 def test_half_a_sample_that_moves_nothing_is_left_alone() -> None:
     late = Lateness(0.0, 10 * HALF, HALF, effect=0.05 / HALF)
     assert late.share == pytest.approx(0.05)
@@ -83,9 +76,3 @@ def test_no_faster_controller_is_thought_of_where_it_cannot_matter(
     half: float, effect: float
 ) -> None:
     assert not Lateness(0.0, 0.1 * half, half, effect).faster
-
-
-def test_a_log_that_holds_its_own_torque_has_no_faster_controller() -> None:
-    late = Lateness(5e-3, 5e-4, 5e-3, effect=1e3)
-    assert late.determined
-    assert late.hold == "zoh"

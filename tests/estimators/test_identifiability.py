@@ -8,12 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import t as student
 
 from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation
-from algid.estimators.fit import finish, own_estimates, widened
+from algid.estimators.fit import finish, own_estimates
 from algid.estimators.identifiability import examine, open_directions
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
@@ -145,34 +144,3 @@ def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:
     lost = replace(whole, status=("NOT_IDENTIFIABLE", *whole.status[1:]))
     assert np.isinf(lost.std[0])
     assert np.isinf(lost.ci95[0]).all()
-
-
-def test_a_covariance_is_widened_and_its_correlations_stay() -> None:
-    robust = np.array([[4.0, 1.2, 0.0], [1.2, 9.0, 0.0], [0.0, 0.0, 0.0]])
-    least = np.diag([16.0, 1.0, 5.0])
-    expected = np.array([[16.0, 2.4, 0.0], [2.4, 9.0, 0.0], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(widened(robust, least), expected, rtol=1e-12)
-
-
-def test_a_part_that_repeats_has_the_freedom_of_few_logs(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Satterthwaite 1946: 1 / ν = a² / (n − 1) + (1 − a)² / ν_w, with a the jackknife's share of
-    the variance.
-    """
-    shared = Shared(Model(gravity=0.0))
-    rng = np.random.default_rng(1)
-    logs = []
-    for _ in range(5):
-        S = np.repeat(4.0 * np.eye(5)[None], 40, axis=0)
-        g = rng.standard_normal((40, 5)) * 2.0 + S @ (0.3 * rng.standard_normal(5))
-        logs.append(LogInformation(False, np.zeros(5), S, g))
-    fit = finish("weak", shared, logs, np.zeros(5), MOVED, coloured=True)
-    monkeypatch.setattr("algid.estimators.fit.jackknife", lambda *_: np.zeros((5, 5)))
-    within = finish("weak", shared, logs, np.zeros(5), MOVED, coloured=True)
-    # nothing differs: sandwich alone
-    assert within.quantile == pytest.approx(student.ppf(0.975, fit.freedom), rel=1e-6)
-    share = np.mean(1 - np.diag(within.covariance) / np.diag(fit.covariance))
-    assert 0.2 < share < 0.99
-    freedom = 1 / (share**2 / 4 + (1 - share) ** 2 / fit.freedom)
-    assert fit.quantile == pytest.approx(student.ppf(0.975, freedom), rel=1e-9)

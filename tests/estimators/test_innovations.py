@@ -5,8 +5,6 @@ known to be white.
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from scipy.signal import periodogram
 from scipy.stats import binom
 
 from algid.arm import FloatArray
@@ -41,36 +39,6 @@ def test_the_bands_hold_95_percent_of_white_noise_and_tell_it_from_90() -> None:
         assert inside > binom.ppf(0.999, count, 0.90)
 
 
-def test_rows_that_overlap_have_a_band_of_their_own() -> None:
-    """White noise through windows that overlap eight-fold: a moving average, uncorrelated from
-    eight rows on.
-    """
-    rng = np.random.default_rng(7)
-    kernel = np.hanning(10)[1:-1]
-    count = inside = 0
-    for _ in range(60):
-        e = np.stack([np.convolve(row, kernel, "valid") for row in rng.normal(size=(2, 2007))])
-        r = autocorrelation(residual_sums(e, 0.05, stride=8, lags=80))
-        assert r.lag[0] == pytest.approx(0.4, rel=1e-12)
-        count, inside = count + r.correlation.size, inside + _inside(r.correlation, -r.half, r.half)
-    low, high = binom.interval(0.999, count, 0.95)
-    assert low <= inside <= high, (count, inside)
-    assert inside > binom.ppf(0.999, count, 0.90)
-
-
-def test_the_density_holds_the_variance() -> None:
-    """Parseval: the mean over all frequencies, by scipy's periodogram and ours, and the variance
-    are one number.
-    """
-    w = np.random.default_rng(0).normal(size=(2, 3000))
-    sums = residual_sums(w, DT)
-    _, P = periodogram(w, 1 / DT, window="hann")
-    # scipy halves the last line, which has no partner at negative frequencies; our first two are
-    # left out
-    ours = 2 * DT * sums.power.sum(axis=1)
-    np.testing.assert_allclose(ours, P[:, 2:].sum(axis=1) + P[:, -1], rtol=1e-9)
-
-
 def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
     rng = np.random.default_rng(1)
     count = inside = 0
@@ -94,14 +62,6 @@ def test_the_density_of_coloured_noise_is_that_of_its_filter() -> None:
     low, high = binom.interval(0.999, count, 0.95)
     assert low <= inside <= high, (count, inside)
     assert inside > binom.ppf(0.999, count, 0.90)
-
-
-def test_logs_of_another_rate_are_left_out() -> None:
-    w = np.random.default_rng(2).normal(size=(2, 400))
-    alone = pooled([residual_sums(w, DT), residual_sums(w, 3 * DT)])
-    assert alone is not None
-    assert alone.pairs[0] == 400
-    assert pooled([]) is None
 
 
 def test_a_residual_that_is_nothing_is_no_number() -> None:

@@ -10,14 +10,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from algid.estimators import instruments, refined, terms, weak
+from algid.estimators import instruments, refined, weak
 from algid.estimators.combine import Prior
 from algid.estimators.modulating_functions import Windows
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.model import Model, Motion, acceleration, torque
+from algid.model import Model
 from algid.signals.segments import Segment
-from algid.synth.cases import load_case
-from algid.synth.simulator import simulate
 from pipelines.disturbed import DT, scene
 
 from .conftest import Bench
@@ -85,48 +83,6 @@ def test_the_estimate_is_that_of_two_stages_of_least_squares() -> None:
     np.testing.assert_allclose(start + np.linalg.solve(S, g), two_stages, rtol=1e-9)
 
 
-@pytest.mark.parametrize(("late", "order"), [(0.0, 3.7), (3.0, 3.7), (2.4, 1.7)])
-def test_windows_are_simulated_to_the_order_of_their_torque(late: float, order: float) -> None:
-    """From the measured start, by the torque that acted: each sample against the simulator, whose
-    steps are its own.
-
-    Between samples the torque is a straight line: then of second order, else of fourth.
-    """
-    # less friction: a motion less stiff
-    k = load_case("case1").arm.constants() * np.array([1, 1, 1, 1, 1, 0.05, 0.01])
-    errors = []
-    for dt in (5e-3, 2.5e-3):
-        t = np.arange(round(4 / dt)) * dt
-        motion = simulate(
-            k, lambda now: np.stack([0.6 * np.sin(3 * now), 0.2 * np.cos(4 * now)]), t
-        )
-        shift = late * dt
-        # acts `shift` after its stamp
-        tau = np.stack([0.6 * np.sin(3 * (t + shift)), 0.2 * np.cos(4 * (t + shift))])
-        piece = Segment(0.0, dt, motion.theta, tau, motion.omega)
-        windows = Windows(dt, 0.32, shift, None)
-        cut = instruments._cut(piece, windows)
-        every = np.full(cut.theta.shape[1], dt)
-        moved = instruments._simulated(Model(), k, every, cut)
-        simulated, good = moved.end_to_end(slice(None), dt), moved.good
-        length, first = 8 * windows.step, windows.margin
-        starts = first + 2 * windows.step * np.arange(good.size)
-        at = (starts[:, None] + np.arange(length)).ravel()
-        assert good.all()
-        assert starts[-1] + length <= t.size - first < starts[-1] + length + 2 * windows.step
-        np.testing.assert_allclose(
-            simulated.tau, motion.tau[:, at], atol=1e-9 if late % 1 == 0 else 6 * dt**2 / 8
-        )
-        assert simulated.omega is not None
-        off = np.abs(
-            np.stack([simulated.theta - motion.theta[:, at], simulated.omega - motion.omega[:, at]])
-        )
-        # steps, and what lies between them
-        errors.append([off[..., parity::2].max(axis=2) for parity in (0, 1)])
-    slopes = np.log2(errors[0]) - np.log2(errors[1])
-    assert np.all(slopes > order), slopes
-
-
 def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench: Bench) -> None:
     k, log = bench.arm.constants(), bench.log()
     windows = Windows(log.dt, 0.2, 0.0, None)
@@ -151,14 +107,6 @@ def test_coefficients_that_move_no_arm_and_windows_that_run_away_are_told(bench:
     )
 
 
-def test_windows_move_as_the_model_says_under_a_load_whose_sign_its_inertia_turns() -> None:
-    model = Model(("coulomb", "load"))
-    c = np.array([0.1, 0.4, 0.3, 3.0, 0.9, 0.1, 0.2, 0.15, 0.08, 0.05, 0.05])
-    theta, omega, tau = np.random.default_rng(0).normal(size=(3, 2, 200))
-    alpha = acceleration(model, c, theta, omega, tau)
-    np.testing.assert_allclose(torque(model, c, Motion(theta, omega, alpha)), tau, atol=1e-12)
-
-
 def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     log = bench.log(sigma=1e-3)
     least = weak.fit(Problem([lambda: [log]]))
@@ -174,20 +122,6 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4
-
-
-def test_of_many_logs_some_are_looked_at(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Evenly spread, for the choice of terms."""
-    monkeypatch.setattr(terms, "_MOST_LOGS", 2)
-    looked_at: list[int] = []
-
-    def source(number: int) -> list[Segment]:
-        looked_at.append(number)
-        return [bench.log(sigma=1e-3, seed=number)]
-
-    sources: list[Source] = [partial(source, number) for number in range(4)]
-    assert not terms.select(Problem(sources, [], WeakSettings())).model.terms
-    assert looked_at == [0, 2]
 
 
 def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:

@@ -4,8 +4,6 @@ dense algebra.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,15 +12,11 @@ from algid.estimators.noise import (
     Components,
     VarianceScore,
     first_guess,
-    floored,
-    largest_change,
-    log_ratio,
-    newton_step,
     quantum,
     roughness,
     variance_score,
 )
-from algid.estimators.whitening import Linearised, NoiseLevels, adjoint, linearise
+from algid.estimators.whitening import Linearised, NoiseLevels, linearise
 from algid.model import Model
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment
@@ -140,80 +134,6 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
         < 4.5 * traces.std(axis=0, ddof=1) / np.sqrt(30) + 1e-9
     )
     assert traces.mean(axis=0).sum() == pytest.approx(len(V), rel=0.03)  # Σ V_i = V
-
-
-def test_the_likeliest_angles_follow_the_noise_levels(linear: Linearised) -> None:
-    """Σ_θ Hᵀ V⁻¹e in dense algebra, by central differences in each log σ²."""
-    parts, columns = _parts(linear)
-
-    def angles(log_sigma2: FloatArray) -> FloatArray:
-        V = np.einsum("i,ixy->xy", np.exp(log_sigma2), np.array(parts))
-        multiplier = np.linalg.solve(V, columns[:, -1]).reshape(-1, 2).T
-        back = adjoint(linear.H, multiplier, linear.first, ANGLES)
-        return LEVELS.theta[:, None] * np.exp(log_sigma2[:2, None]) * back
-
-    h = 1e-4
-    slopes = np.array([(angles(h * axis) - angles(-h * axis)) / (2 * h) for axis in np.eye(4)])
-    multiplier = linear.solve_transposed(linear.columns[-1:])[0]
-    found = Components.of(linear, multiplier, ANGLES).response(linear, LEVELS)
-    # dense algebra of held torques, whose V is the worse conditioned, rounds to 2e-6
-    np.testing.assert_allclose(found, slopes, atol=1e-5 * np.abs(slopes).max())
-
-
-def test_a_newton_step_goes_along_the_slope_of_the_restricted_likelihood(
-    linear: Linearised,
-) -> None:
-    """−½ log|V| − ½ log|YᵀV⁻¹Y| − ½ eᵀPe (Patterson & Thompson 1971), by central differences in
-    each log σ².
-    """
-    parts, columns = _parts(linear)
-    Y, e = columns[:, :-1] / np.abs(columns[:, :-1]).max(axis=0), columns[:, -1]
-
-    def restricted(log_sigma2: FloatArray) -> float:
-        V = np.einsum("i,ixy->xy", np.exp(log_sigma2), np.array(parts))
-        inverse = np.linalg.inv(V)
-        S = Y.T @ inverse @ Y
-        rest = e - Y @ np.linalg.solve(S, Y.T @ inverse @ e)
-        return -0.5 * float(
-            np.linalg.slogdet(V)[1] + np.linalg.slogdet(S)[1] + rest @ inverse @ rest
-        )
-
-    h = 1e-4
-    slope = np.array(
-        [(restricted(h * axis) - restricted(-h * axis)) / (2 * h) for axis in np.eye(4)]
-    )
-    # The score is that of the residual as it is: taken where the coefficients fit best.
-    S = linear.columns[:-1] @ linear.columns[:-1].T
-    best = np.linalg.solve(S, linear.columns[:-1] @ linear.columns[-1])
-    settled = replace(
-        linear,
-        columns=np.vstack([linear.columns[:-1], linear.columns[-1] - best @ linear.columns[:-1]]),
-    )
-    score = _scored(settled)
-    V = sum(parts[1:], parts[0])
-    score = replace(score, trace=np.array([np.trace(np.linalg.solve(V, part)) for part in parts]))
-    before = NoiseLevels(np.ones(2), np.ones(2))
-    after = newton_step(before, score, S)
-    step = 2 * np.log(np.concatenate([after.theta, after.tau]))
-    curvature = score.average + np.diag(0.05 * np.maximum(np.diag(score.average), 1.0))
-    np.testing.assert_allclose(curvature @ step, slope, atol=1e-4 * np.abs(slope).max() + 1e-5)
-    far = newton_step(before, replace(score, power=1e9 * score.power), S)
-    most = np.maximum(2.0, -0.5 * np.log(np.diag(score.average)))  # to an information of 1
-    assert np.all(np.abs(2 * np.log(np.concatenate([far.theta, far.tau]))) <= most + 1e-12)
-
-
-def test_changes_count_in_their_own_deviations_and_levels_keep_their_floor(
-    linear: Linearised,
-) -> None:
-    score = replace(_scored(linear), average=np.diag([4.0, 9.0, 16.0, 25.0]))
-    before = NoiseLevels(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
-    for place, deviations in enumerate((2.0, 3.0, 4.0, 5.0)):
-        level = np.array([1.0, 2.0, 3.0, 4.0])
-        level[place] *= np.exp(-0.05)  # the variance by 0.1
-        step = log_ratio(before, NoiseLevels(level[:2], level[2:]))
-        assert largest_change(step, score) == pytest.approx(0.1 * deviations)
-    held = floored(before, NoiseLevels(np.array([1.5, 1.5]), np.array([3.5, 3.5])))
-    assert [*held.theta, *held.tau] == [1.5, 2.0, 3.5, 4.0]
 
 
 def test_a_torque_that_is_none_has_a_share_of_the_others_as_noise() -> None:

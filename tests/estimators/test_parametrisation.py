@@ -69,18 +69,6 @@ def test_a_loaded_log_has_the_constants_of_table_2(
     )
 
 
-def test_without_a_payload_the_parameters_are_those_of_a_log() -> None:
-    shared = Shared(Model(("rotor",)), delay=True)
-    assert (
-        shared.names
-        == shared.log_names
-        == (*(f"k{number}" for number in range(1, 8)), "j2", "delay")
-    )
-    beta = np.arange(9.0)
-    shared.coefficients(beta, False)[0] = 99.0
-    assert beta[0] == 0.0  # what is handed out is no view of what was handed in
-
-
 @pytest.mark.parametrize("body", [(), ("J_p",), ("y_p",), ("y_p", "J_p")], ids="+".join)
 def test_a_body_and_phasors_follow_from_the_complex_form(body: tuple[str, ...]) -> None:
     """Kinetic and potential energy of a body carried along, against the coefficients and their

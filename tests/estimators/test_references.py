@@ -56,19 +56,6 @@ def test_the_motion_that_the_reference_makes_is_found_without_the_disturbance() 
     assert np.std(motion.tau[:, settled]) < 0.35 * np.std(piece.tau[:, settled])
 
 
-def test_velocities_are_those_of_the_explained_motion() -> None:
-    piece, _ = log(0, disturbance=0.0)
-    piece = replace(piece, omega=np.gradient(piece.theta, DT, axis=1))
-    found = followed(Problem(sources_of(piece), settings=SETTINGS))
-    assert found is not None
-    motion = found.motion(piece)
-    assert motion is not None
-    assert motion.omega is not None
-    assert motion.omega[:, 300:-300] == pytest.approx(
-        np.gradient(motion.theta, DT, axis=1)[:, 300:-300]
-    )
-
-
 def test_what_the_arm_does_not_follow_is_no_instrument() -> None:
     piece, _ = log(0)
     assert followed(Problem(sources_of(piece), settings=SETTINGS)) is not None
@@ -76,28 +63,6 @@ def test_what_the_arm_does_not_follow_is_no_instrument() -> None:
     assert followed(Problem(sources_of(replace(piece, reference=other)), settings=SETTINGS)) is None
     held = replace(piece, reference=np.zeros_like(piece.theta))
     assert followed(Problem(sources_of(held), settings=SETTINGS)) is None
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
-def test_where_a_reference_is_missing_it_stands_still(value: float) -> None:
-    piece, _ = log(0)
-    assert piece.reference is not None
-    holed = piece.reference.copy()
-    holed[1, :300] = value  # the controller had not begun
-    held = piece.reference.copy()
-    held[:, :300] = held[:, 300:301]
-    found, same = (
-        followed(Problem(sources_of(replace(piece, reference=one)), settings=SETTINGS))
-        for one in (holed, held)
-    )
-    assert found is not None
-    assert same is not None
-    assert np.array_equal(found.B, same.B)
-    holed[:, : len(piece) // 2 + 1] = value
-    assert (
-        followed(Problem(sources_of(piece, replace(piece, reference=holed)), settings=SETTINGS))
-        is None
-    )
 
 
 def test_logs_without_a_reference_have_no_such_instrument() -> None:

@@ -1,15 +1,14 @@
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
 
 from algid.arm import inverse_dynamics
 from algid.estimators import log_likelihood as evidence
-from algid.estimators import noise, refined, weak
-from algid.estimators.combine import LogInformation, Prior
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators import refined
+from algid.estimators.combine import Prior
+from algid.estimators.problem import Problem, WeakSettings
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
 from algid.signals.differences import POINTS
@@ -140,66 +139,6 @@ def test_unmodelled_dynamics_hand_back_the_weak_estimate(bench: Bench) -> None:
     assert fit.intervals == "sandwich"
 
 
-@pytest.mark.parametrize("sigma", [1e-5, 1e-4, 1e-3])
-def test_few_passes_end_close_to_where_many_would(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, sigma: float
-) -> None:
-    """Within the hundredth of a deviation that the steps left out add up to."""
-    logs: list[Source] = [partial(list, [bench.log(sigma=sigma, seed=seed)]) for seed in range(3)]
-    few = refined.fit(Problem(logs))
-    monkeypatch.setattr(refined, "SETTLED", 1e-6)
-    monkeypatch.setattr(refined, "_REST", 0.0)
-    many = refined.fit(Problem(logs))
-    assert few.iterations <= 3 < many.iterations
-    assert np.all(np.abs(few.values - many.values) < 0.01 * many.std)
-    np.testing.assert_allclose(few.std, many.std, rtol=2e-3)
-
-
-def test_a_pass_tells_what_one_at_its_better_noise_levels_would(bench: Bench) -> None:
-    """To first order: where levels are a hundredth off, what is left is a hundredth of that."""
-    source: Source = partial(list, [bench.log(sigma=1e-3)])
-    start = weak.fit(Problem([source]))
-    (log,) = evidence.opened(Problem([source], []), start.shared)
-    for _ in range(4):
-        log.train(start.values)
-    levels = log.noise
-    log.noise = NoiseLevels(1.01 * levels.theta, 0.99 * levels.tau)
-    S0, g0 = log.train(start.values, free=False).information.total
-    log.noise = NoiseLevels(1.01 * levels.theta, 0.99 * levels.tau)
-    S1, g1 = log.train(start.values).information.total
-    S2, g2 = log.train(start.values, free=False).information.total
-    size = np.sqrt(np.diag(S2))
-    scaled = np.outer(size, size)
-    assert np.abs((S1 - S2) / scaled).max() < 0.1 * np.abs((S0 - S2) / scaled).max()
-    assert np.abs((g1 - g2) / size).max() < 0.1 * np.abs((g0 - g2) / size).max()
-
-
-def test_noise_levels_of_many_logs_that_have_settled_are_not_scored_again(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    logs: list[Source] = [partial(list, [bench.log(sigma=1e-4, seed=seed)]) for seed in range(3)]
-    scored: list[int] = []
-
-    def counted(*about: Any) -> noise.VarianceScore:
-        scored.append(1)
-        return noise.variance_score(*about)
-
-    monkeypatch.setattr(evidence, "variance_score", counted)
-    each_time = refined.fit(Problem(logs))
-    assert len(scored) == 3 * each_time.iterations
-    scored.clear()
-    monkeypatch.setattr(refined, "_MOST_SCORED", 2)
-    settled = refined.fit(Problem(logs))
-    assert len(scored) < 3 * settled.iterations
-    # Estimates have settled to a fiftieth of a deviation. A noise level's own deviation is 2 % and
-    # more in logs this short; it stays once it has changed by a fifth of that.
-    assert np.all(np.abs(settled.values - each_time.values) < 0.02 * each_time.std)
-    np.testing.assert_allclose(settled.std, each_time.std, rtol=1e-2)
-    for one, other in zip(settled.noise or (), each_time.noise or (), strict=True):
-        np.testing.assert_allclose(one.tau, other.tau, rtol=2e-2)
-        np.testing.assert_allclose(one.theta, other.theta, rtol=1e-2)
-
-
 def test_long_logs_take_one_more_pass_and_agree(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,22 +176,3 @@ def test_a_joint_at_rest_leaves_its_friction_open_and_the_rest_known() -> None:
     (left_open,) = found.unidentifiable
     assert left_open.text == "k7 is not determined: joint 2 never moved"
     assert np.all(np.abs(found.values[:6] - k[:6]) < 4.5 * found.std[:6])
-
-
-def test_what_a_log_leaves_open_is_held_within_its_size(bench: Bench) -> None:
-    start = weak.fit(Problem([lambda: [bench.log()]]))
-    size = 2.0
-    values = np.array(
-        [*start.values[:5], size, size]
-    )  # largest in k6 + k7, which the information leaves open
-    S = np.diag(1e4 / np.maximum(np.abs(values), 1e-3) ** 2)
-    S[5:, 5:] = 1e4 / size**2 * np.array([[1, -1], [-1, 1]])
-    information = LogInformation(False, values, S[None], np.zeros((1, 7)))
-    prior = refined._anchored(replace(start, values=values, logs=(information,)))
-    assert prior is not None
-    along = np.array([0, 0, 0, 0, 0, 1, 1]) / np.sqrt(2)
-    assert abs(along @ (prior.mean / size)) == pytest.approx(1.0)  # from √2
-    assert abs(along @ values / size) == pytest.approx(np.sqrt(2))
-    np.testing.assert_allclose(prior.mean[:5], values[:5], rtol=1e-9)
-    held = along / size / 1e-3  # to a thousandth of the size, and in this direction alone
-    np.testing.assert_allclose(prior.precision, np.outer(held, held), atol=1e-6 * held.max() ** 2)

@@ -11,9 +11,6 @@ import pytest
 
 from algid.estimators import refined, weak
 from algid.estimators.problem import Problem, Source
-from algid.estimators.whitening import Linearised, covariance_factor
-from algid.model import Motion
-from algid.signals.differences import POINTS
 from algid.signals.segments import Segment
 
 from .conftest import DT, Bench
@@ -45,26 +42,6 @@ def test_a_factor_that_does_not_exist_leaves_the_weak_estimate(
     fit = refined.fit(Problem([lambda: [still]]))
     assert (fit.estimator, fit.refuted, fit.iterations) == ("weak", True, 0)
     assert set(fit.status) == {"OK", "NOT_IDENTIFIABLE"}
-
-
-def test_a_covariance_that_is_none_has_no_factor() -> None:
-    H = np.zeros((2, 2, POINTS, 12))
-    H[0, :, 2, 7] = (
-        1e9  # both joints' rows the same in floating point: their own noise is lost beside it
-    )
-    H[1, :, 2, 7] = 1e9
-    with pytest.raises(np.linalg.LinAlgError, match=r"not positive definite \(row 16\)"):
-        covariance_factor(H)
-
-
-def test_a_factor_without_a_pivot_solves_nothing() -> None:
-    factor = covariance_factor(np.zeros((2, 2, POINTS, 12)))
-    factor[-1, 5] = 0.0
-    none, H = np.zeros((2, 12)), np.zeros((2, 2, POINTS, 12))
-    linear = Linearised(np.zeros((1, 24)), factor, H, 0, none, Motion(none, none, none))
-    for solve in (linear.solve, linear.solve_transposed):
-        with pytest.raises(np.linalg.LinAlgError, match="substitution failed with info 6"):
-            solve(np.ones((1, 24)))
 
 
 def test_stretches_too_short_to_tell_are_left_out_and_each_step_is_told(bench: Bench) -> None:

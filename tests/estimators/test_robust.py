@@ -5,7 +5,6 @@ endogenous torque and of feedback, each with the estimate or the warning that it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -15,12 +14,12 @@ import pytest
 from algid.arm import FloatArray
 from algid.base.criteria import AT_REST
 from algid.estimators import instruments, robust, weak
-from algid.estimators.combine import LogInformation, Prior, joined, sandwich, scatters
+from algid.estimators.combine import LogInformation, Prior, sandwich, scatters
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.robust import Expected, RobustProblem, _crossed, dispersion, shrink
-from algid.model import TERMS, Model
+from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.disturbed import DT, NAMES, Scene, scene
 from pipelines.race_peers import even
@@ -63,36 +62,6 @@ def test_terms_are_drawn_to_what_is_expected_and_constants_are_not() -> None:
     np.testing.assert_allclose(
         beta[7:], weight * estimate[7:] + (1 - weight) * EXPECTED.mean, rtol=1e-9
     )
-
-
-def test_the_spread_is_a_fixed_point_of_expectation_and_maximisation() -> None:
-    information = np.full(9, 400.0)
-    estimate = np.array([*np.ones(7), 0.13, 0.02])
-    beta, share = shrink(SHARED, EXPECTED, None, [_log(information, estimate)], START)
-    variance = 1 / (information[7:] + 1 / (share * EXPECTED.spread) ** 2)
-    squares = ((beta[7:] - EXPECTED.mean) ** 2 + variance) / EXPECTED.spread**2
-    np.testing.assert_allclose(share**2, (squares.sum() + 0.25) / 3, rtol=5e-3)
-    assert share[0] == share[1] < 0.5  # one spread a term
-
-
-def test_what_is_expected_of_a_term_has_the_scale_of_the_arm() -> None:
-    """Of torques of 2 and 3 N m (RMS): shares of a joint's torque, of k3, of a moment, or of 1."""
-    shared = Shared(Model(tuple(name for name, term in TERMS.items() if term.spread)))
-    gram = np.zeros((1, 2, 1, 1))
-    gram[0, :, 0, 0] = 10 * np.array([2.0, 3.0]) ** 2
-    normal = weak.Normal(gram, 1e-3, 1000, np.array([10.0, 10.0]), np.ones(2))
-    beta = np.zeros(len(shared.names))
-    for name, value in (("k1", 0.1), ("k2", 0.5), ("k3", 0.02), ("k4", 4.0)):
-        beta[shared.names.index(name)] = value
-    expected = robust.expectation(shared, [normal], WeakSettings(shared.model), beta)
-    spreads = dict(zip(expected.names, expected.spread.tolist(), strict=True))
-    assert spreads["f1"] == pytest.approx(0.3 * 2)
-    assert spreads["f2"] == pytest.approx(0.3 * 3)
-    assert spreads["o2"] == pytest.approx(0.02 * 3)
-    assert spreads["j2"] == pytest.approx(0.02)
-    assert spreads["e1"] == spreads["e2"] == spreads["gain2"] == pytest.approx(0.03)
-    assert spreads["k2s"] == pytest.approx(0.5 * 0.5)
-    assert spreads["k4s"] == pytest.approx(0.5 * 4)
 
 
 def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
@@ -140,16 +109,6 @@ def test_covariances_of_one_log_and_of_many() -> None:
     )
 
 
-def test_two_priors_know_what_each_knows() -> None:
-    first = Prior(("k1", "k2"), np.array([1.0, 2.0]), np.array([[4.0, 1.0], [1.0, 3.0]]))
-    both = joined(first, EXPECTED.prior(np.ones(2)))
-    assert both.names == ("k1", "k2", "o1", "o2")
-    np.testing.assert_array_equal(both.precision[:2, :2], first.precision)
-    np.testing.assert_allclose(np.diag(both.precision)[2:], [25.0, 6.25])
-    assert not both.precision[:2, 2:].any()
-    assert joined(None, first) is first
-
-
 def least_squares(sources: Sequence[Source], settings: WeakSettings) -> Fit:
     return RobustProblem.of(Problem(sources, (), settings)).least_squares()
 
@@ -183,25 +142,6 @@ def test_least_squares_with_the_same_prior_gives_the_same(bench: Bench) -> None:
     np.testing.assert_allclose(found.values[:7], bench.truth[:7], rtol=5e-3)
     friction = [found.values[found.names.index(name)] for name in ("f1", "f2")]
     np.testing.assert_allclose(friction, [0.05, 0.02], rtol=0.1)
-
-
-def test_a_joint_that_stands_says_nothing(bench: Bench) -> None:
-    """Joint 2 is held by friction for a while: its torque is then what it happens to be, and moves
-    no estimate.
-    """
-    log = bench.log(sigma=1e-5)
-    held = log.theta.copy()
-    held[1, 2000:] = held[1, 2000]
-    torques = log.tau.copy()
-    found = []
-    for held_by in (0.0, 0.3):
-        torques[1, 2000:] = held_by
-        piece = Segment(0.0, log.dt, held, torques.copy())
-        normal = weak.normal_equations(partial(list, [piece]), WeakSettings(rest=(0.0, 0.5)))
-        assert normal is not None
-        assert 0.3 * normal.rows[0] < normal.rows[1] < 0.6 * normal.rows[0]
-        found.append(normal.gram[-len(normal.gram) // 4 :, 1])
-    np.testing.assert_array_equal(found[0], found[1])
 
 
 def coloured(rng: np.random.Generator, keep: float, count: int) -> FloatArray:
@@ -301,29 +241,6 @@ def test_an_arm_without_unmodelled_torque_keeps_least_squares() -> None:
     assert found.notes == ()
     assert found.values == pytest.approx(least.values)
     assert found.endogeneity is not None
-
-
-def rubbing(bench: Bench) -> Source:
-    """A log whose torque has a disturbance that no term holds."""
-    log = bench.log(sigma=1e-4)
-    disturbed = replace(log, tau=log.tau + 0.02 * np.sin(40 * log.theta))
-    return lambda: [disturbed]
-
-
-def test_the_covariance_grows_by_the_mean_square_of_what_other_windows_move(bench: Bench) -> None:
-    problem = RobustProblem.of(Problem([rubbing(bench)], (), WeakSettings()))
-    least = problem.least_squares()
-    found = problem.with_window_scatter(least, least)
-    moved = [problem.least_squares(window).values - least.values for window in (0.5, 2.0)]
-    grown = found.covariance - least.covariance
-    assert grown == pytest.approx((np.outer(*2 * moved[:1]) + np.outer(*2 * moved[1:])) / 2)
-    assert np.array_equal(found.values, least.values)
-    many = replace(least, intervals="jackknife")
-    assert problem.with_window_scatter(many, least) is many
-    open_ = replace(least, status=("NOT_IDENTIFIABLE", *least.status[1:]))
-    grown = problem.with_window_scatter(open_, open_).covariance - open_.covariance
-    assert not grown[0].any()
-    assert grown[1, 1] > 0
 
 
 @pytest.mark.slow

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from algid.estimators import refined, weak
-from algid.estimators.combine import combine
-from algid.estimators.fit import Fit, Status
+from algid.estimators.fit import Fit
 from algid.estimators.problem import Problem
 from algid.estimators.running import has_running, running
 from algid.estimators.whitening import NoiseLevels
@@ -45,22 +44,6 @@ def test_it_ends_where_the_fit_does(bench: Bench, estimator: str) -> None:
     assert np.isfinite(found.beta[-1]).all()
 
 
-def test_a_log_that_begins_at_rest_begins_with_nothing(bench: Bench) -> None:
-    log = bench.log()
-    still = np.zeros((2, 2000))
-    rest = Segment(
-        0.0,
-        log.dt,
-        np.concatenate([still, log.theta], axis=1),
-        np.concatenate([still, log.tau], axis=1),
-    )
-    found = running(
-        weak.fit(Problem([_source(rest)])), [6.0], 30
-    )  # pytest makes an overflow an error
-    assert np.isnan(found.beta[0]).any()
-    assert np.isfinite(found.beta[-1]).all()
-
-
 def test_half_way_it_is_what_half_of_the_log_tells(bench: Bench) -> None:
     """Its value and its band are those of a fit of that half alone, whose intervals hold the truth
     19 times of 20.
@@ -85,26 +68,3 @@ def test_a_fit_held_within_bounds_has_none(bench: Bench) -> None:
     fit = _fit(bench, "weak", 1, loaded=False)
     assert not has_running(replace(fit, values=fit.values * 1.01))
     assert not has_running(replace(fit, converged=False))
-
-
-def test_a_fit_that_averages_models_has_one(bench: Bench) -> None:
-    """Its values lie beside where one model's likelihood is largest, by less than its errors."""
-    from dataclasses import replace
-
-    fit = _fit(bench, "weak", 1, loaded=False)
-    beta, S, _ = combine(fit.shared, fit.logs, fit.values, fit.prior)
-    away = np.linalg.solve(np.linalg.cholesky(S).T, np.eye(beta.size)[1])  # one deviation
-    assert has_running(replace(fit, values=beta + 0.3 * away))
-    assert not has_running(replace(fit, values=beta + away))
-
-
-def test_what_the_fit_calls_open_has_no_running_estimate(bench: Bench) -> None:
-    from dataclasses import replace
-
-    fit = _fit(bench, "weak", 1, loaded=False)
-    status: tuple[Status, ...] = tuple(
-        "NOT_IDENTIFIABLE" if name == "k3" else "OK" for name in fit.names
-    )
-    found = running(replace(fit, status=status), [4.0], 10)
-    assert np.isnan(found.beta[:, fit.names.index("k3")]).all()
-    assert np.isfinite(found.beta[-1, fit.names.index("k4")])

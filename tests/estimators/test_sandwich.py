@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import t as student
 
 from algid.arm import FloatArray
-from algid.estimators.combine import LogInformation, long_run_variance, sandwich, scatters
+from algid.estimators.combine import LogInformation, long_run_variance
 from algid.estimators.fit import Fit, finish
 from algid.estimators.parametrisation import Shared
 from algid.model import Model
@@ -87,17 +87,3 @@ def test_lags_are_those_of_andrews() -> None:
     assert lags == 2
     assert total[0, 0] == pytest.approx(_bartlett(np.ones((8, 1)), 2)[0, 0])
     assert long_run_variance(np.zeros((8, 2)))[1] == 0
-
-
-def test_each_logs_scores_are_its_own() -> None:
-    (X1, y1), (X2, y2) = _regression(40, seed=3), _regression(30, seed=4)
-    logs = [_information(X1, y1), _information(X2, y2)]
-    beta = np.full(Q, 2.0)
-    meat, free = sandwich(scatters(SHARED, logs, beta))
-    parts, stretches = np.zeros((Q, Q)), 0
-    for X, y in ((X1, y1), (X2, y2)):
-        scores = X * (y - X @ beta)[:, None]
-        _, lags = long_run_variance(scores)
-        parts, stretches = parts + _bartlett(scores, lags), stretches + len(X) // (lags + 1)
-    assert free == stretches - Q
-    np.testing.assert_allclose(meat, parts * stretches / free, rtol=1e-10)

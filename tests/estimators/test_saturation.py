@@ -109,11 +109,6 @@ def test_a_torque_that_another_arm_moves_by_tells_nothing() -> None:
     assert known.sound == frozenset()
 
 
-def test_too_few_samples_tell_nothing() -> None:
-    assert saturation_of([log("sensor", 0.6).part(0, 40)]).limits == ()
-    assert saturation_of([]).limits == ()
-
-
 LIMITS = (Limit(0, -np.inf, 1.0), Limit(1, -2.0, 2.0))
 
 
@@ -160,11 +155,6 @@ def test_stretches_do_not_depend_on_how_the_segments_were_cut(size: int) -> None
     for one, other in zip(cut, expected, strict=True):
         np.testing.assert_array_equal(one.theta, other.theta)
         np.testing.assert_array_equal(one.tau, other.tau)
-
-
-def test_without_limits_nothing_changes() -> None:
-    whole = ramp()
-    assert list(sound([whole], ())) == [whole]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 1.0])

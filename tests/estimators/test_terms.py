@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
@@ -137,11 +135,3 @@ def test_terms_that_are_not_linear_are_found_under_a_payload_too(
         fit.std
         < 0.05 * np.array([1.0 if UNITS[n] in ("1", "rad") else known[n] for n in fit.names])
     )
-
-
-def test_an_estimated_term_leaves_the_logs_as_they_were(bench: Bench) -> None:
-    log = term_log(bench, Model(), term_values(bench, ()))
-    before = replace(log, theta=log.theta.copy(), tau=log.tau.copy())
-    _fit("refined", Model(("phases", "gain", "load", "lag")), log)
-    assert np.array_equal(log.theta, before.theta)
-    assert np.array_equal(log.tau, before.tau)

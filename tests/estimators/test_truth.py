@@ -16,7 +16,6 @@ import pytest
 from algid.arm import mass_matrix, passive_torque, with_payload
 from algid.estimators import instruments, refined, weak
 from algid.estimators.fit import Fit
-from algid.estimators.prediction import cross_validate, score
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.model import TERMS as MODEL_TERMS
 from algid.model import Model
@@ -148,21 +147,6 @@ def test_long_delays_are_found_by_both_estimators(
     fit = _fit(estimator, "delay", [lambda: [late]], [])
     assert fit.estimator == estimator
     assert abs(fit.values[-1] - samples * DT) < 5 * fit.std[-1]
-
-
-def test_cross_validation_counts_a_found_delay_once(cases: dict[tuple[str, bool], Case]) -> None:
-    sources: list[Source] = [
-        lambda seed=seed: [cases["delay", False].log(seed)]  # type: ignore[misc]
-        for seed in range(3)
-    ]
-    fit = _fit("weak", "delay", sources, [])
-    found = cross_validate(fit, sources)
-    assert found is not None
-    exact = [
-        score(Model(), _truth(fit)[:7], source(), TorqueShift(delay=TRUE["delay"])).residual
-        for source in sources
-    ]
-    assert np.allclose(found.residual, np.sum(exact, axis=0), rtol=0.05)
 
 
 def _arrays(thing: object) -> Iterator[np.ndarray]:

@@ -1,17 +1,13 @@
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from algid.arm import Arm, FloatArray, with_payload
+from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators import weak as normal
-from algid.estimators.combine import LogInformation, Prior
-from algid.estimators.parametrisation import Shared
-from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.model import Model
+from algid.estimators.problem import Problem, WeakSettings
 from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
@@ -76,63 +72,3 @@ def test_a_gap_starts_new_windows(bench: Bench) -> None:
     first, second = log.part(0, 1800), replace(log.part(2300, 4001), continues=False)
     fit = weak.fit(Problem([lambda: [first, second]]))
     assert np.allclose(fit.values, bench.truth[:7], rtol=1e-3)
-
-
-@pytest.mark.parametrize("delay", [False, True])
-@pytest.mark.parametrize("known", [False, True])
-def test_what_is_told_without_a_log_is_what_the_others_tell(
-    bench: Bench, known: bool, delay: bool
-) -> None:
-    """The jackknife's estimates against fits of the other logs, with unloaded logs or an earlier
-    result beside them.
-    """
-    settings = WeakSettings(estimate_delay=delay)
-    cut = [0, 1300, 2600, 4001]
-    bare: list[Source] = [
-        partial(list, [bench.log(False, 1e-4).part(*ends)]) for ends in pairwise(cut)
-    ]
-    burdened: list[Source] = [
-        partial(list, [bench.log(True, 1e-4, seed).part(*cut[:3:2])]) for seed in range(4)
-    ]
-    prior = None
-    if known:
-        before = weak.fit(Problem(bare))
-        prior, bare = Prior.of(before.names, before.values, before.covariance), []
-    fit = weak.fit(Problem(bare, burdened, settings, prior=prior))
-    assert fit.intervals == "jackknife"
-    assert fit.without is not None
-    assert len(fit.without) == len(bare) + len(burdened)
-    for place, told in enumerate(fit.without):
-        rest = [source for number, source in enumerate(bare) if number != place]
-        rest_loaded = [
-            source for number, source in enumerate(burdened) if len(bare) + number != place
-        ]
-        alone = weak.fit(Problem(rest, rest_loaded, settings, prior=prior))
-        # a delay found anew is linearised anew
-        assert np.all(np.abs(told - alone.values) < (0.02 if delay else 1e-4) * fit.std)
-
-
-@pytest.mark.parametrize("lengths", [{}, {"l1": None}, {"l1": None, "l2": None}], ids=len)
-def test_a_first_payload_is_the_one_that_the_loaded_constants_hold(
-    lengths: dict[str, None],
-) -> None:
-    """Arms drawn at random, each with its payload: all its constants from the bare ones by Table
-    2.
-    """
-    rng = np.random.default_rng(7)
-    for _ in range(40):
-        m1, m2, l1, l2, i1, i2 = rng.uniform(0.1, 1.0, 6)
-        arm = Arm(4 * m1, 4 * m2, l1 / 2, l2 / 2, l1, l2, i1 / 10, i2 / 10, 0.1, 0.1)
-        mass = float(10 ** rng.uniform(-1.5, 0.7))
-        known = {name: {"l1": l1, "l2": l2}[name] for name in lengths}
-        shared = Shared(Model(), False, True, known)
-        bare = arm.constants()
-        X = rng.standard_normal((40, 7)) / bare
-        S = X.T @ X * 1e6
-        loaded = LogInformation(
-            True, with_payload(bare, arm.payload_constants(mass)), S[None], np.zeros((1, 7))
-        )
-        truth = np.concatenate(
-            [bare, [{"m_p": mass, "l1": l1, "l2": l2}[name] for name in shared.names[7:]]]
-        )
-        np.testing.assert_allclose(weak.first_payload(shared, bare, loaded), truth, rtol=1e-3)

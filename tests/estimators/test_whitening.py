@@ -3,7 +3,6 @@ together.
 """
 
 import numpy as np
-import pytest
 
 from algid.estimators.whitening import (
     NoiseLevels,
@@ -11,9 +10,8 @@ from algid.estimators.whitening import (
     covariance_factor,
     forward,
     linearise,
-    trajectory,
 )
-from algid.model import Model, regressor
+from algid.model import Model
 from algid.signals.differences import HELD, POINTS, Stencil
 from algid.signals.segments import Segment
 
@@ -95,35 +93,3 @@ def _lower(factor: np.ndarray) -> np.ndarray:
     return np.asarray(
         sum(np.diag(factor[-1 - below, below:], -below) for below in range(2 * POINTS))
     )
-
-
-@pytest.mark.parametrize("smooth", [False, True])
-def test_columns_stand_at_the_motion_that_it_names(bench: Bench, smooth: bool) -> None:
-    """So that a torque beside them is held against columns of the same motion."""
-    log = bench.log(sigma=1e-3)
-    piece = Segment(0.0, log.dt, log.theta[:, 1000:1120], log.tau[:, 1000:1120])
-    k, truth = bench.arm.constants(), bench.bare.theta[:, 1000:1120]
-    at = truth if smooth else None
-    linear = linearise(Model(), k, piece.theta, piece, Stencil(log.dt), NOISE, smooth=at)
-    rows = (regressor(Model(), linear.motion) / NOISE.tau[:, None, None]).transpose(1, 2, 0)
-    expected = linear.solve(np.ascontiguousarray(rows).reshape(len(k), -1))
-    np.testing.assert_allclose(linear.columns[:-1], expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize("shift", [-100.0, 100.0])
-def test_a_torque_that_acts_outside_the_angles_is_no_equation(bench: Bench, shift: float) -> None:
-    """As where an estimate of the delay runs away: the likelihood does not converge."""
-    log, k = bench.log(sigma=1e-3), bench.arm.constants()
-    with pytest.raises(np.linalg.LinAlgError, match="no torque acts within the angles"):
-        linearise(Model(), k, log.theta, log, Stencil(log.dt, shift), NOISE)
-
-
-def test_the_trajectory_moves_towards_the_truth(bench: Bench) -> None:
-    log = bench.log(sigma=1e-3)
-    levels = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-    linear = linearise(
-        Model(), bench.arm.constants(), bench.bare.theta, log, Stencil(log.dt), levels
-    )
-    found = trajectory(log, linear, linear.solve_transposed(linear.columns[-1:])[0], levels)
-    assert np.std(found - bench.bare.theta) < 0.4 * 1e-3  # a fraction of the measured noise is left
-    assert abs(np.std(linear.columns[-1]) - 1) < 0.05  # white with unit variance; 8000 innovations

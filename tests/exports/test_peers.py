@@ -17,8 +17,6 @@ from algid.exports.description import coefficients_of
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.model import Model, Motion, acceleration, torque
-from algid.synth.excitation import SampledTorque
-from algid.synth.simulator import simulate
 from tests.estimators.test_model import FULL, VALUES
 from tests.exports.arms import ODD, UNIFORM, result_of, states, values_of
 
@@ -62,13 +60,6 @@ def test_mujocos_inverse_dynamics_is_algids(arm: Arm, known: dict[str, float]) -
     value = values_of(arm, j2=0.004)
     model = Model(("rotor",))
     assert_close(by_mujoco(text_of("mjcf", value, model, **known)), wanted(value, model), CLOSE)
-
-
-def test_an_arm_without_gravity_lies_in_mujocos_plane() -> None:
-    model = Model(gravity=0.0)
-    value = values_of(Arm(**{**vars(ODD), "g": 0.0}))
-    assert_close(by_mujoco(text_of("mjcf", value, model, l1=0.4)), wanted(value, model), CLOSE)
-    assert_close(by_pinocchio(text_of("urdf", value, model, l1=0.4)), wanted(value, model), CLOSE)
 
 
 def by_mujoco(text: str) -> FloatArray:
@@ -145,25 +136,6 @@ def test_bent_links_in_a_plane_and_of_a_length_that_is_given() -> None:
     assert 9.81 * abs(K1) == pytest.approx(0.41 * abs(K2), rel=1e-14)
     text = text_of("mjcf", value, BENT, l1=0.41)
     assert_close(by_mujoco(text), wanted(dict(found.value), BENT), CLOSE)
-
-
-def test_mujocos_simulation_follows_algids() -> None:
-    mujoco = pytest.importorskip("mujoco")
-    value = values_of(ODD)
-    model = mujoco.MjModel.from_xml_string(text_of("mjcf", value))
-    data = mujoco.MjData(model)
-    t = np.arange(round(1 / model.opt.timestep) + 1) * model.opt.timestep
-    tau = np.stack([9 * np.sin(5 * t), 3 * np.cos(7 * t)])
-    ours = simulate(
-        np.array(list(value.values())), SampledTorque(t, tau, "zoh"), t, np.array([-1.0, 0.4])
-    )
-    data.qpos[:] = ours.theta[:, 0]
-    found = [data.qpos.copy()]
-    for data.ctrl[:] in tau.T[:-1]:
-        mujoco.mj_step(model, data)
-        found.append(data.qpos.copy())
-    assert np.ptp(ours.theta, axis=1).min() > 0.5
-    np.testing.assert_allclose(np.array(found).T, ours.theta, rtol=0, atol=1e-5)
 
 
 def test_mujoco_slides_against_coulomb_friction() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
@@ -93,21 +92,6 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
         "fleet.html",
     }
     assert pl.read_parquet(tmp_path / "page/fleet.parquet").height == 4
-
-
-def test_json_holds_what_was_found(tmp_path: Path) -> None:
-    _batch(tmp_path)
-    content = json.loads(
-        CliRunner().invoke(app, ["report", str(tmp_path), "--format", "json"]).stdout
-    )
-    assert [(row["robot"], row["logs"], row["tested"]) for row in content["robots"]] == [
-        ("r0", 10, True),
-        ("r1", 10, True),
-    ]
-    drift, label = content["findings"]
-    assert (drift["kind"], drift["robot"], drift["parameter"]) == ("drift", "r0", "k6")
-    assert (label["kind"], label["job"], label["expected"]) == ("payload", "r0/0", 0.5)
-    assert content["untested"] == []
 
 
 def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:

@@ -111,18 +111,6 @@ def test_every_window_is_weighted_least_squares_with_students_test(
     assert found["drift"].any() == (growth / scatter > 0.001 and growth > 0)
 
 
-@pytest.mark.parametrize(("factor", "alarm"), [(0.999, False), (1.001, True)])
-def test_the_alarm_is_at_nine_in_ten_thousand(factor: float, alarm: bool, tmp_path: Path) -> None:
-    """On a line without scatter the intervals alone count: t is slope × √Σ(t - t̄)² / std."""
-    t = np.arange(20) / MONTH
-    critical = stats.t.isf(0.01 / 22, 18) * 0.01 / math.sqrt(np.sum((t - t.mean()) ** 2))
-    (row,) = followed(table((2 - factor * critical * t).tolist()), tmp_path).rows(named=True)
-    p = 2 * stats.t.sf(factor * stats.t.isf(0.01 / 22, 18), 18)
-    assert row["p"] == pytest.approx(p, rel=1e-6)
-    assert row["drift"] == alarm
-    assert row["slope"] == pytest.approx(-factor * critical, rel=1e-8)
-
-
 def test_estimates_without_an_error_bar_count_for_nothing(tmp_path: Path) -> None:
     good = [1.0, 1.1, 0.9, 1.05, 0.95, 1.02, 0.98, 1.01]
     jobs = table([*good, 50.0, math.nan, 50.0], [*[0.01] * 8, 0.0, 0.01, math.nan])
@@ -189,33 +177,6 @@ def test_a_label_is_wrong_once_in_a_million(payload: float, told: bool, tmp_path
             0.5,
         )
         assert found["sigmas"][0] == pytest.approx((payload - 0.5) / 0.001, rel=1e-9)
-
-
-def test_labels_are_judged_robot_by_robot_and_only_where_there_are_any(tmp_path: Path) -> None:
-    payloads = {"m_p": [0.5, 0.51, 0.49, 0.52, 0.48, 0.56], "m_p_std": [0.001] * 6}
-    wild = table([1.0] * 6, **payloads, label_payload=[0.5] * 6)
-    calm = table(
-        [1.0] * 6,
-        robot=["s"] * 6,
-        m_p=[0.5] * 5 + [0.51],
-        m_p_std=[0.001] * 6,
-        label_payload=[0.5] * 6,
-    )
-    found = standing_out(pl.concat([wild, calm]), tmp_path, "payload")
-    # 10 of its own are; 60 where one is 14.8 are not
-    assert found.select("robot", "job").rows() == [("s", "j5")]
-    some = wild.with_columns(label_payload=pl.when(pl.col("job") == "j5").then(0.5).otherwise(None))
-    assert standing_out(some, tmp_path, "payload")["job"].to_list() == ["j5"]
-    without = (
-        wild.drop("label_payload"),
-        wild.drop("m_p", "m_p_std"),
-        wild.with_columns(label_payload=pl.lit("heavy")),
-    )
-    for jobs in without:
-        nothing = standing_out(jobs, tmp_path, "payload")
-        assert nothing.height == 0
-        assert nothing.columns == found.columns
-        assert nothing.schema == found.schema
 
 
 def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_path: Path) -> None:

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 import algid
-from algid.arm import with_payload
 from algid.base.errors import ResultError
 from algid.identification.identify import identify
 from algid.identification.known import (
     contradictions,
     first_length,
-    has_error_bar,
     model_of,
     prior_of,
     shift_of,
@@ -23,10 +21,7 @@ from algid.identification.known import (
 from algid.model import Model
 from algid.results import Estimate, Result, Status
 from algid.settings import Settings
-from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
-
-NAMES = [f"k{n}" for n in range(1, 8)]
 
 
 @pytest.fixture(scope="module")
@@ -46,20 +41,6 @@ def changed(result: Result, group: str, name: str, **values: object) -> Result:
 
 def without_fit(result: Result, **settings: object) -> Result:
     return result.model_copy(update={"fit": None, "settings": result.settings | settings})
-
-
-def test_the_model_is_the_fits_or_that_of_the_settings(weighed: Result) -> None:
-    assert (model_of(weighed).terms, model_of(weighed).gravity) == (("coulomb",), 9.81)
-    assert weighed.fit is not None
-    assert weighed.fit.model is not None
-    other = weighed.fit.model.model_copy(
-        update={"coulomb_speed": 0.77, "stribeck_speed": 0.55, "terms": ["rotor"]}
-    )
-    kept = weighed.model_copy(update={"fit": weighed.fit.model_copy(update={"model": other})})
-    assert model_of(kept) == Model(("rotor",), 9.81, 0.77, 0.55)
-    assert model_of(without_fit(weighed)) == Model(("coulomb",))
-    asked = without_fit(weighed, model="rotor,delay", gravity=1.6)
-    assert model_of(asked) == Model(("rotor",), 1.6)
 
 
 @pytest.mark.parametrize(("hold", "share"), [("foh", 0.0), ("zoh", 0.5)])
@@ -150,24 +131,6 @@ def test_a_loaded_logs_constants_hold_the_payload(weighed: Result) -> None:
     )
 
 
-def test_given_lengths_go_before_those_of_the_result(weighed: Result) -> None:
-    result = weighed.model_copy(update={"settings": weighed.settings | {"l1": 0.3, "l2": 0.2}})
-    value = {
-        name: one.estimate or 0.0 for name, one in (result.parameters | result.payload).items()
-    }
-    k = np.array([value[name] for name in NAMES])
-    m = value["m_p"]
-    expected = with_payload(k, m * np.array([0.09, 0.04, 0.06, 9.81 * 0.3, 9.81 * 0.2]))
-    found = dict(
-        zip(
-            model_of(result).names,
-            torque_constants(result, model_of(result), "loaded", "r"),
-            strict=True,
-        )
-    )
-    assert [found[name] for name in NAMES] == pytest.approx(expected.tolist(), rel=1e-12)
-
-
 @pytest.mark.parametrize(
     ("group", "name", "role"), [("parameters", "k6", "unloaded"), ("payload", "l2", "loaded")]
 )
@@ -182,38 +145,6 @@ def test_a_constant_that_is_needed_and_open_is_named(
         torque_constants(result, model_of(result), role, "r.json")  # type: ignore[arg-type]
     if role == "loaded":
         assert torque_constants(result, model_of(result), "unloaded", "r.json").size == 9
-
-
-def test_the_first_length_is_that_of_table_1_with_its_propagated_error(weighed: Result) -> None:
-    assert weighed.fit is not None
-    found = first_length(weighed)
-    assert found is not None
-    k1, k2 = (weighed.parameters[name].estimate or 0.0 for name in ("k1", "k2"))
-    assert found[0] == pytest.approx(9.81 * k1 / k2, rel=1e-12)
-    draws = np.random.default_rng(0).standard_normal((2, 40_000))
-    places = [weighed.fit.covariance_names.index(name) for name in ("k1", "k2")]
-    root = np.linalg.cholesky(
-        np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    )
-    drawn = np.array([[k1], [k2]]) + root @ draws
-    # 8 standard errors
-    assert found[1] == pytest.approx(float(np.std(9.81 * drawn[0] / drawn[1])), rel=0.03)
-    assert abs(found[0] - load_case("case1").arm.l1) < 4.5 * found[1]
-
-
-def test_no_length_follows_from_constants_that_are_not_sound(weighed: Result) -> None:
-    assert first_length(without_fit(weighed)) is None
-    assert (
-        first_length(weighed.model_copy(update={"settings": weighed.settings | {"gravity": 0.0}}))
-        is None
-    )
-    for name in ("k1", "k2"):
-        assert first_length(changed(weighed, "parameters", name, estimate=0.0)) is None
-        assert first_length(changed(weighed, "parameters", name, status=Status.IMPLAUSIBLE)) is None
-    assert has_error_bar(weighed, "k1")
-    assert has_error_bar(weighed, "l2")
-    assert not has_error_bar(changed(weighed, "parameters", "k1", std=None), "k1")
-    assert not has_error_bar(weighed, "k99")
 
 
 def test_lengths_that_far_off_contradict_the_result(weighed: Result) -> None:

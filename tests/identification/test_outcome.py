@@ -14,16 +14,13 @@ from scipy.stats import norm
 
 from algid.estimators.combine import LogInformation
 from algid.estimators.fit import Fit
-from algid.estimators.identifiability import Whiteness
 from algid.estimators.prediction import PredictionScore
 from algid.estimators.terms import Selection
-from algid.estimators.whitening import NoiseLevels
 from algid.identification import checks
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import Check, doubted, fit_notes, remarks
 from algid.identification.open_logs import open_source
 from algid.identification.outcome import (
-    distrusted,
     estimate,
     outcome_of,
     table_rows,
@@ -75,22 +72,6 @@ def test_an_estimate_has_its_interval_and_one_that_is_open_has_nothing_but_its_u
     assert lost == unknown("kg")
     assert (lost.estimate, lost.std, lost.ci95, lost.unit) == (None, None, (None, None), "kg")
     assert estimate(np.nan, 1.0, 1.0, "kg", "OK").estimate is None
-
-
-def test_distrust_takes_ok_and_leaves_what_was_no_better() -> None:
-    group = {
-        "a": estimate(1, 1, 1, "kg", "OK"),
-        "b": unknown("kg"),
-        "c": estimate(1, 1, 1, "kg", "NOT_CONVERGED"),
-    }
-    found = distrusted(group)
-    assert [one.status for one in found.values()] == [
-        "IMPLAUSIBLE",
-        "NOT_IDENTIFIABLE",
-        "NOT_CONVERGED",
-    ]
-    assert found["a"].ci95 == group["a"].ci95
-    assert group["a"].status is Status.OK
 
 
 def test_parameters_are_within_the_fits_quantile_of_their_deviations() -> None:
@@ -145,13 +126,6 @@ def test_rows_of_what_the_logs_leave_open_are_left_out() -> None:
     assert list(rows) == [*UNLOADED_ROWS]
 
 
-def test_loaded_rows_of_a_fit_that_did_not_settle_say_so() -> None:
-    found = outcome_of(Fitted(replace(fit_of(), converged=False), survey()))
-    assert {one.status for one in found.loaded.values()} == {Status.NOT_CONVERGED}
-    assert list(found.loaded) == list(LOADED_ROWS)
-    assert found.loaded["k4+z4"].ci95 is not None
-
-
 def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_none() -> None:
     for k6, status in ((-2.9, Status.OK), (-3.2, Status.IMPLAUSIBLE)):
         fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
@@ -159,17 +133,6 @@ def test_a_bound_broken_by_far_spoils_every_estimate_and_one_broken_by_chance_no
         assert {one.status for one in (found.parameters | found.payload).values()} == {status}
         assert found.fit is not None
         assert [one.bound for one in found.fit.broken_bounds] == ["k6 >= 0"]
-
-
-def test_noise_is_the_root_mean_square_over_logs() -> None:
-    levels = (
-        NoiseLevels(np.array([3.0, 1.0]), np.array([0.0, 2.0])),
-        NoiseLevels(np.array([4.0, 7.0]), np.zeros(2)),
-    )
-    assert summed(replace(fit_of(), noise=levels)).noise == pytest.approx(
-        {"theta1": math.sqrt(12.5), "theta2": 5.0, "tau1": 0.0, "tau2": math.sqrt(2)}
-    )
-    assert summed(fit_of()).noise == {}
 
 
 def test_the_covariance_is_null_where_a_parameter_is_open() -> None:
@@ -180,17 +143,6 @@ def test_the_covariance_is_null_where_a_parameter_is_open() -> None:
         for column, value in enumerate(values):
             expected = None if place in (row, column) else fit.covariance[row, column]
             assert value == (None if expected is None else pytest.approx(expected))
-
-
-def test_whiteness_goes_by_joint() -> None:
-    tests = Whiteness(np.array([0.2, 0.001]), np.array([0.01, 0.4]), np.zeros(2), (True, False))
-    found = summed(replace(fit_of(), whiteness=tests)).whiteness
-    assert list(found) == ["tau1", "tau2"]
-    assert [(one.white, one.p_value, one.lag1_correlation) for one in found.values()] == [
-        (True, 0.2, 0.01),
-        (False, 0.001, 0.4),
-    ]
-    assert summed(fit_of()).whiteness == {}
 
 
 @pytest.mark.parametrize(("statistic", "endogenous"), [(0.5, False), (3.2, None), (7.0, True)])
@@ -231,16 +183,6 @@ def test_the_torques_gain_is_the_known_mass_over_the_found_one(known: float) -> 
     assert found.std == pytest.approx(0.01 * known / PAYLOAD, rel=1e-12)
     ends = (known / (PAYLOAD * (1 + 0.01 * QUANTILE)), known / (PAYLOAD * (1 - 0.01 * QUANTILE)))
     assert found.ci95 == pytest.approx(ends, rel=1e-12)
-
-
-def test_a_mass_not_told_from_zero_tells_no_gain() -> None:
-    for fit in (with_stds(fit_of(), m_p=PAYLOAD / QUANTILE), with_stds(fit_of(), m_p=np.inf)):
-        assert summed(fit, payload_mass=1.0).torque_gain == unknown("1")
-    assert summed(
-        with_stds(fit_of(), m_p=0.99 * PAYLOAD / QUANTILE), payload_mass=1.0
-    ).torque_gain != unknown("1")
-    assert summed(fit_of(payload=False), payload_mass=1.0).torque_gain is None
-    assert summed(fit_of()).torque_gain is None
 
 
 def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> None:
@@ -290,30 +232,12 @@ def test_a_length_that_the_constants_contradict_is_named() -> None:
     )
 
 
-def test_a_negative_mass_by_far_says_exchanged() -> None:
-    for mass, told in ((-0.099 * ACCUSED, False), (-0.101 * ACCUSED, True)):
-        fit = with_stds(with_values(fit_of(), m_p=mass), m_p=0.1)
-        assert bool(found(fit, "LOGS_APART")) is told
-
-
-def test_notes_of_a_fit_are_repeated_with_what_the_intervals_lack() -> None:
-    note = Notice("REFUTED", numbers={"case": "noise", "kept": "weak"})
-    assert list(remarks(Fitted(replace(fit_of(), notes=(note,))))) == [note]
-
-
 def notes(**changes: Any) -> list[Notice]:
     summary = FitSummary(
         noise={}, covariance_names=[], covariance=[], iterations=0, converged=True,
         **({"intervals": "likelihood"} | changes),
     )  # fmt: skip
     return list(fit_notes(summary))
-
-
-def test_what_one_run_leaves_out_is_noted_once() -> None:
-    assert [(one.code, one.note) for one in notes(intervals="sandwich")] == [
-        ("REPEATABILITY", True)
-    ]
-    assert notes() == notes(intervals="jackknife") == []
 
 
 def test_repeatability_and_gain_are_told_in_numbers() -> None:
@@ -351,14 +275,6 @@ def test_an_interval_that_contains_zero_is_never_ok() -> None:
             assert low is not None
             assert high is not None
             assert (one.status is Status.OK) is not (low <= 0 <= high)
-
-
-def test_a_bound_is_mentioned_from_the_level_of_the_intervals_on() -> None:
-    for k6, mentioned in ((-0.7, False), (-1.9, False), (-2.9, True)):
-        fit = with_stds(with_values(fit_of(), k6=k6), k6=1.0)
-        outcome = outcome_of(Fitted(fit, survey()))
-        assert outcome.fit is not None
-        assert bool(outcome.fit.broken_bounds) is mentioned
 
 
 def test_that_what_is_only_rounding_is_zero_and_can_be_read_back() -> None:

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from algid.arm import FloatArray
 from algid.identification.identify import identify
-from algid.identification.phases import phase_note
 from algid.log import Log, Origin
-from algid.model import SINES, Model
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
@@ -100,29 +95,3 @@ def test_a_large_payload_on_a_bent_arm_is_no_other_convention() -> None:
     result = drawn("arm23", Row(30.0, 0.15, 20.0), 0)
     assert result.verdict.grade == "good"
     assert "WRONG_CONVENTION" not in {one.code for one in result.notices}
-
-
-def test_phases_that_are_shrunk_to_nothing_bring_no_note(shared_data: Path) -> None:
-    """A symmetric arm whose likelihood is refuted: its fit has every term, and straight links."""
-    log = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[0]
-    result = identify(log, report=False)
-    assert result.fit is not None
-    assert result.fit.model is not None
-    assert "k1s" in result.fit.model.shrunk
-    assert not [one for one in result.notices if one.code.startswith("PHASES")]
-
-
-@pytest.mark.parametrize("distance", [0.5, 6.0])
-def test_phases_of_a_shrunk_fit_are_told_where_chance_does_not_make_them(distance: float) -> None:
-    """Sine parts that many of their own standard deviations from nothing."""
-    model = Model(("phases",))
-    fit = SimpleNamespace(
-        names=model.names,
-        values=np.array([0.01 * distance if name in SINES else 1.0 for name in model.names]),
-        covariance=1e-4 * np.eye(len(model.names)),
-        shrinkage=object(),
-        absent=(),
-        quantile=1.96,
-        shared=SimpleNamespace(model=model),
-    )
-    assert (phase_note(fit) is None) == (distance < 1)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import algid
-from algid.arm import Arm, FloatArray
+from algid.arm import Arm
 from algid.base.errors import AlgidError
 from algid.estimators.fit import Fit
 from algid.identification.prior import Statement, drawn_covariance, with_prior
@@ -73,19 +73,6 @@ def test_both_are_weighed_by_their_information() -> None:
     np.testing.assert_array_equal(both.values[others], fit.values[others])
 
 
-def test_what_correlates_with_a_constant_follows_it() -> None:
-    """k6 with correlation 0.6, as the conditional normal distribution has it."""
-    fit = fit_of(payload=False)
-    covariance = np.diag(np.full(len(fit.names), 1.0))
-    k5, k6 = fit.names.index("k5"), fit.names.index("k6")
-    covariance[k5, k6] = covariance[k6, k5] = 0.6
-    fit = replace(fit, covariance=covariance * 1e-8)
-    exact = Statement("arm.urdf", ("k5",), K[4:5] + 1e-4, np.array([[1e-20]]))
-    both = with_prior(fit, exact)
-    assert both.values[k6] - fit.values[k6] == pytest.approx(0.6e-4, rel=1e-6)
-    assert both.covariance[k6, k6] == pytest.approx(0.64e-8, rel=1e-6)
-
-
 @pytest.mark.parametrize(("share", "own"), [(1e-9, True), (0.2, False)])
 def test_what_the_prior_knows_better_is_its_own(share: float, own: bool) -> None:
     fit = fit_of(payload=False)
@@ -111,18 +98,6 @@ def test_an_arm_at_rest_tells_its_weight_and_no_inertia() -> None:
     fit = replace(fit_of(payload=False), moved=np.full(2, 5e-3))
     both = with_prior(fit, said(fit, 0.2))
     assert both.status == ("FROM_PRIOR", "OK", "FROM_PRIOR", "OK", "FROM_PRIOR", "OK", "OK")
-
-
-@pytest.mark.parametrize(("off", "told"), [(3.0, False), (5.0, True)])
-def test_a_contradiction_beyond_chance_leaves_the_prior_out(off: float, told: bool) -> None:
-    fit = fit_of(payload=False)
-    both = with_prior(fit, said(fit, 0.2, off))
-    notices = [one for one in both.notes if one.code == "OTHER_ARM"]
-    assert bool(notices) is told
-    if told:
-        np.testing.assert_array_equal(both.values, fit.values)
-        assert notices[0].numbers["distance"] == pytest.approx(off, rel=5e-3)  # the log errs too
-        assert "arm.urdf k" in notices[0].text
 
 
 @pytest.mark.parametrize("estimator", ["refined", "weak", "instruments"])
@@ -216,13 +191,6 @@ def test_what_cannot_be_meant_is_refused(
     }
     with pytest.raises(AlgidError, match=message):
         algid.identify(log, **given)  # type: ignore[arg-type]
-
-
-def test_a_horizontal_arm_has_no_weight_in_its_prior(cad: Path) -> None:
-    level: FloatArray = replace(ARM, g=0.0).constants()
-    log = log_of(replace(ARM, g=0.0), "rich", SEED)
-    result = algid.identify(log, gravity=0.0, prior=cad)
-    assert result.parameters["k5"].estimate == pytest.approx(level[4], rel=0.05)
 
 
 def test_an_export_says_what_is_from_the_prior(cad: Path) -> None:

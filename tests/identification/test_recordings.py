@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 
 from algid.base.errors import LogError
-from algid.base.files import sha256_of
-from algid.identification import open_logs
 from algid.identification.open_logs import (
     Staged,
     open_source,
@@ -106,12 +104,6 @@ def test_a_summary_holds_what_the_whole_log_showed() -> None:
     assert (seen.rows, seen.first_ns, seen.last_ns) == (601, 5_000_000_000, 5_600_000_000)
 
 
-def test_a_log_of_one_sample_has_no_rate() -> None:
-    source = open_source(moving(samples=1), "unloaded")
-    summary = Recordings([source]).summary(source)
-    assert (summary.rows, summary.duration, summary.rate) == (1, 0.0, 0.0)
-
-
 def test_hashes_are_those_of_the_bytes(tmp_path: Path) -> None:
     log = moving()
     write_log(tmp_path / "log.csv", log)
@@ -124,14 +116,6 @@ def test_hashes_are_those_of_the_bytes(tmp_path: Path) -> None:
     arrays = b"".join(array.tobytes() for array in (log.stamp_ns, *log.theta, *log.tau))
     memory = open_source(log, "unloaded")
     assert Recordings([memory]).summary(memory).sha256 == hashlib.sha256(arrays).hexdigest()
-
-
-def test_a_folders_hash_is_that_of_its_files_by_name(tmp_path: Path) -> None:
-    (tmp_path / "inner").mkdir()
-    (tmp_path / "inner" / "not.txt").write_text("no")
-    (tmp_path / "b.txt").write_bytes(b"second" * 300_000)  # more than is read at once
-    (tmp_path / "a.txt").write_bytes(b"first")
-    assert sha256_of(tmp_path) == hashlib.sha256(b"first" + b"second" * 300_000).hexdigest()
 
 
 def test_twins_count_once_and_others_of_their_length_stay() -> None:
@@ -162,37 +146,6 @@ def test_logs_of_lengths_of_their_own_are_not_hashed_before_the_first_pass() -> 
     assert with_twins_marked([one], [two]) == [one, two]
     with pytest.raises(AssertionError, match="hashed"):
         with_twins_marked([one], [replace(two, promised=300)])
-
-
-def test_files_of_lengths_of_their_own_are_opened_without_hashing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hashed: list[Path] = []
-
-    def sha256_of(path: Path) -> str:
-        hashed.append(path)
-        return str(path)
-
-    monkeypatch.setattr(open_logs, "sha256_of", sha256_of)
-    files = [tmp_path / f"{name}.parquet" for name in "abc"]
-    for file, samples in zip(files, (300, 301, 300), strict=True):
-        write_log(file, moving(samples=samples))
-    assert len(open_sources(files[:2], "unloaded", None, 9.81)) == 2
-    assert hashed == []
-    open_sources(files, "unloaded", None, 9.81)
-    assert hashed == [files[0], files[2]]
-
-
-def test_a_loaded_twin_of_an_unloaded_log_tells_so_and_stays() -> None:
-    bare = open_source(moving("bare.csv"), "unloaded")
-    loaded = [
-        open_source(moving("twin.csv"), "loaded"),
-        open_source(moving("own.csv", samples=601), "loaded"),
-    ]
-    found = with_twins_marked([bare], loaded)
-    assert [source.name for source in found] == ["bare.csv", "twin.csv", "own.csv"]
-    assert [len(source.notices) for source in found] == [0, 1, 0]
-    assert found[1].notices[0].text.startswith("twin.csv is bare.csv, byte for byte")
 
 
 @pytest.mark.parametrize(("cuts", "alone"), [([], True), ([599], False), ([300], False)])
@@ -246,14 +199,3 @@ def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None
     survey.begin("series", [other])
     list(survey.segments(other))
     assert [told[0], told[-1]] == [("series", 0, 300), ("series", 300, 300)]
-
-
-def test_a_log_of_unknown_length_has_no_total_before_its_end() -> None:
-    told: list[tuple[str, int, int]] = []
-    source = in_blocks(moving(), [200], 0)
-    survey = Recordings([source], lambda *what: told.append(what))
-    list(survey.segments(source))
-    assert told == [("reading", 0, 0), ("reading", 200, 0), ("reading", 600, 0)]
-    told.clear()
-    list(survey.segments(source))
-    assert told[-1] == ("fitting", 600, 600)

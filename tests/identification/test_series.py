@@ -17,27 +17,20 @@ from scipy.signal import butter, filtfilt
 from algid.arm import FloatArray, with_payload
 from algid.estimators.combine import LogInformation
 from algid.estimators.innovations import residual_sums
-from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import score
-from algid.identification import series
 from algid.identification.by_likelihood import Fitted
 from algid.identification.open_logs import open_source
 from algid.identification.recordings import Recordings
 from algid.identification.series import (
     START_KEY,
     information_blocks,
-    innovation_rows,
     scored_blocks,
-    series_blocks,
     torque_blocks,
-    torque_coefficients,
-    torque_shift,
     write_columns,
     write_fit_series,
 )
 from algid.log import Log, Origin
 from algid.model import Model
-from algid.settings import Settings
 from algid.signals.shift import AT_ONCE, TorqueShift
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
@@ -88,36 +81,6 @@ def test_blocks_become_one_file_with_the_first_stamps_beside_them(tmp_path: Path
         pq.ParquetFile(tmp_path / "some.parquet").metadata.row_group(0).column(1).compression
         == "ZSTD"
     )
-
-
-def test_a_block_that_fails_leaves_a_file_that_is_closed(tmp_path: Path) -> None:
-    def blocks() -> Iterator[dict[str, object]]:
-        yield {"t": np.array([1.0])}
-        raise RuntimeError("the log broke off")
-
-    with pytest.raises(RuntimeError, match="broke off"):
-        write_columns(tmp_path / "some.parquet", blocks(), [0])
-    assert pq.read_table(tmp_path / "some.parquet")["t"].to_pylist() == [1.0]
-
-
-@pytest.mark.parametrize(("rows", "sizes"), [(1, [2, 3, 4]), (5, [5, 4]), (100, [9])])
-def test_windows_are_gathered_into_blocks_of_so_many_rows(
-    rows: int, sizes: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(series, "ROWS", rows)
-    windows, first = [], 0
-    for n in (2, 3, 4):
-        t = np.arange(first, first + n, dtype=np.float64)
-        windows.append(PaperSeries(t, np.stack([t + 0.1, -t]), n))
-        first += n
-    found = list(series_blocks(windows, ["k1", "k2"]))
-    assert [block["t"].size for block in found] == sizes
-    assert list(found[0]) == ["t", "k1", "k2"]
-    np.testing.assert_array_equal(np.concatenate([block["k2"] for block in found]), -np.arange(9.0))
-    np.testing.assert_array_equal(
-        np.concatenate([block["k1"] for block in found]), np.arange(9.0) + 0.1
-    )
-    assert list(series_blocks([], ["k1"])) == []
 
 
 def test_the_predicted_torque_is_that_of_the_equation_of_motion(
@@ -174,42 +137,6 @@ def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
     assert len(both[0][0]) == len(early) + 5
 
 
-def test_a_stretch_of_a_few_samples_has_no_prediction(
-    both: tuple[tuple[Log, FloatArray], object],
-) -> None:
-    (block,) = torque_blocks(
-        Recordings([open_source(both[0][0].part(0, 15), "unloaded")]),
-        Model(),
-        {"unloaded": K},
-        AT_ONCE,
-    )
-    assert np.isnan(block["tau1_predicted"]).all()
-    assert np.isnan(block["omega2"]).all()
-    assert block["theta1"].tolist() == both[0][0].theta[0, :15].tolist()
-
-
-def test_noise_narrows_what_is_shown_of_the_torque(
-    both: tuple[tuple[Log, FloatArray], object],
-) -> None:
-    """White noise of σ has σ √(2 dt B/5) (2π B)² of acceleration below B.
-
-    Its inertia torque stays below 5 %.
-    """
-    log = both[0][0]
-    sigma = 3e-3
-    noise = np.random.default_rng(0).normal(0, sigma, log.theta.shape)
-    survey = Recordings([open_source(replace(log, theta=log.theta + noise), "unloaded")])
-    (block,) = torque_blocks(survey, Model(), {"unloaded": K}, AT_ONCE)
-    band = []
-    for inertia, tau in zip((K[4] + K[2] + 2 * K[0], K[2]), log.tau, strict=True):
-        allowed = 0.05 * np.sqrt(np.mean(tau**2))
-        band.append((allowed / (inertia * sigma * np.sqrt(0.4 * DT) * (2 * np.pi) ** 2)) ** 0.4)
-    assert 4 < min(band) < 25  # neither end of the range
-    reach = np.flatnonzero(~np.isnan(block["tau1_predicted"]))[0]
-    # half a kernel is 2.5 periods; σ is estimated
-    assert reach == pytest.approx(2.5 / (min(band) * DT), rel=0.1)
-
-
 def test_information_is_added_up_by_second_and_carried_to_the_shared_parameters() -> None:
     """Eight stretches in four seconds, two a second, of a loaded log: JᵀSJ with dz/dm_p by hand."""
     fit = fit_of()
@@ -227,25 +154,6 @@ def test_information_is_added_up_by_second_and_carried_to_the_shared_parameters(
     l1, l2, g = CASE.arm.l1, CASE.arm.l2, 9.81
     slope = np.array([l1**2, l2**2, l1 * l2, g * l1, g * l2])
     np.testing.assert_allclose(second["m_p"], 2 * scale * (slope @ slope), rtol=1e-12)
-
-
-def test_coefficients_of_a_loaded_log_hold_the_payload_and_no_delay() -> None:
-    fit = fit_of()
-    np.testing.assert_array_equal(torque_coefficients(fit, "unloaded"), K)
-    np.testing.assert_allclose(torque_coefficients(fit, "loaded"), LOADED_K, rtol=1e-12)
-    delayed = fit_of()
-    shared = replace(delayed.shared, delay=True)
-    values = np.insert(delayed.values, 7, 0.003)
-    with_delay = replace(
-        delayed,
-        shared=shared,
-        values=values,
-        covariance=np.eye(values.size),
-        status=tuple("OK" for _ in values),
-    )
-    assert torque_coefficients(with_delay, "loaded").size == 7
-    assert torque_shift(Settings(torque_hold="zoh"), with_delay).at(0.01) == pytest.approx(0.008)
-    assert torque_shift(Settings(delay=0.002), fit).at(0.01) == 0.002
 
 
 def test_a_fits_series_stand_in_its_folder(
@@ -316,23 +224,3 @@ def test_a_fit_held_within_bounds_or_of_fewer_logs_lacks_what_it_cannot_tell(
     fit = fit_of()
     write_fit_series(tmp_path, Fitted(replace(fit, logs=fit.logs[:1]), survey), None)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scored.parquet", "torque.parquet"]
-
-
-def test_innovations_of_white_noise_lie_in_their_band() -> None:
-    """A whitened residual: every frequency and lag a row, shares of white noise about one."""
-    residual = residual_sums(np.random.default_rng(1).standard_normal((2, 20_000)), DT)
-    rows = list(innovation_rows(residual, whitened=True))
-    assert [(block["quantity"][0], block["joint"][0]) for block in rows] == [  # type: ignore[index]
-        ("whitened spectrum", 1),
-        ("whitened spectrum", 2),
-        ("autocorrelation", 1),
-        ("autocorrelation", 2),
-    ]
-    for block in rows:
-        value, low, high = (np.asarray(block[name]) for name in ("value", "low", "high"))
-        kept = np.isfinite(value)
-        inside = np.mean((low <= value)[kept] & (value <= high)[kept])
-        assert inside > 0.85  # of 40 to 100 bins, 95 % each
-    lags = np.asarray(rows[2]["x"])
-    assert np.diff(lags) == pytest.approx(DT)
-    np.testing.assert_array_equal(np.asarray(rows[2]["low"]), -np.asarray(rows[2]["high"]))

@@ -4,7 +4,6 @@ motion.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -99,18 +98,6 @@ def test_a_hold_out_score_is_that_of_scipys_filters_on_the_true_motion(
     )
 
 
-def test_all_logs_together_weigh_by_their_samples(motions: list[SimulatedMotion]) -> None:
-    one, other = logged(motions[0], 1), logged(motions[1], 2).part(0, 700)
-    both = validate(known(K), survey((one, "unloaded"), (other, "unloaded")))
-    assert both.total is not None
-    first, second = both.logs["log1"], both.logs["log2"]
-    assert first is not None
-    assert second is not None
-    counts = np.array([1001 - 2 * EDGE, 700 - 2 * EDGE])
-    squares = np.array([first.rmse, second.rmse]) ** 2
-    np.testing.assert_allclose(both.total.rmse, np.sqrt(counts @ squares / counts.sum()), rtol=1e-2)
-
-
 def test_a_log_too_short_to_judge_is_none_and_does_not_count(
     motions: list[SimulatedMotion],
 ) -> None:
@@ -195,14 +182,3 @@ def test_a_prediction_without_a_constant_is_refused_by_the_results_own_file(
             ResultError, match=r"^arm\.algid/result\.json: the result has no m_p; identify"
         ):
             work(judge, survey((log, "loaded")))
-
-
-def test_simulations_by_the_true_constants_stay_on_the_log(motions: list[SimulatedMotion]) -> None:
-    exact = replace(logged(motions[0], 1), tau=motions[0].tau).part(0, 400)
-    right = simulate(known(K), survey((exact, "unloaded")))
-    wrong = simulate(known(1.2 * K), survey((exact, "unloaded")))
-    assert list(right.logs) == ["log1"]
-    # of joints that turn by radians; integration and differences
-    assert np.all(right.total.rmse[:2] < 2e-3)
-    assert np.all(wrong.total.rmse[:2] > 30 * right.total.rmse[:2])
-    assert np.isnan(right.total.rmse[2]).all()  # no start is so long before the log's end

@@ -17,7 +17,6 @@ from algid.identification.velocities import with_velocities
 from algid.log import Log, Origin
 from algid.settings import Settings
 from algid.signals.filters import differentiator, half_length
-from algid.signals.observers import LuenbergerObserver
 from algid.signals.segments import Segment, append
 
 DT = 1e-3
@@ -64,38 +63,6 @@ def test_the_differentiator_does_not_see_blocks_and_starts_anew_behind_a_gap(row
         np.testing.assert_array_equal(found.theta, log.theta[:, own])
         np.testing.assert_allclose(found.omega, differentiated(log.theta[:, own]), atol=1e-9)
     assert second.start == pytest.approx(6.1, abs=1e-9)
-
-
-@pytest.mark.parametrize("length", [4, 30, REACH, REACH + 1, REACH + 2, 2 * REACH + 1])
-def test_a_stretch_shorter_than_the_kernel_has_numpys_gradient_and_a_longer_one_the_kernels(
-    length: int,
-) -> None:
-    log = log_at(np.concatenate([np.arange(500.0), 600 + np.arange(float(length))]))
-    _, second = observed(log, 10_000)
-    theta = log.theta[:, 500:]
-    short = length <= REACH
-    assert second.omega is not None
-    np.testing.assert_allclose(
-        second.omega, np.gradient(theta, DT, axis=1) if short else differentiated(theta), atol=1e-9
-    )
-
-
-def test_the_papers_observer_starts_at_rest_behind_a_gap() -> None:
-    log = log_at(TWO)
-    first, second = observed(log, 700, luenberger=True)
-    for found, own in ((first, slice(0, 6000)), (second, slice(6000, None))):
-        assert found.omega is not None
-        expected = LuenbergerObserver(DT).velocities(log.theta[:, own])
-        np.testing.assert_allclose(found.omega, expected, rtol=1e-9, atol=1e-6)
-
-
-def test_poles_that_are_set_are_the_observers() -> None:
-    poles = (-20.0, -30.0, -40.0, -25.0, -35.0, -45.0)
-    (found,) = observed(log_at(np.arange(300.0)), 300, luenberger=True, poles=poles)
-    assert found.omega is not None
-    np.testing.assert_allclose(
-        found.omega, LuenbergerObserver(DT, poles).velocities(found.theta), atol=1e-9
-    )
 
 
 def test_measured_velocities_are_the_logs_whatever_the_observer() -> None:

@@ -14,7 +14,7 @@ import pytest
 from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.inspection import channels
-from algid.inspection.checks import examine, noticed
+from algid.inspection.checks import noticed
 from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling
 from algid.log import ChannelReading, IntArray, Log, Origin, Reading
 from algid.notices import Notice, of_codes
@@ -124,15 +124,6 @@ def test_a_slow_publisher_is_told_from_a_torque_that_drops_out(repeated: int, de
     assert bool([*channels.dead_efforts(logged(tau=tau))]) == dead
 
 
-def test_a_torque_at_rest_at_its_largest_or_smallest_is_at_a_limit() -> None:
-    tau = np.stack([np.sin(40 * T), np.sin(40 * T)])
-    tau[0, 500:900], tau[1, 500:900] = 1.5, -1.5
-    assert [*channels.dead_efforts(logged(tau=tau))] == []
-    # with fewer than twenty changes nothing is usual
-    few = np.repeat(np.arange(19.0) % 7, 110)[:ROWS]
-    assert [*channels.dead_efforts(logged(tau=np.stack([few, few])))] == []
-
-
 @pytest.mark.parametrize("turns", [1, 3])
 def test_wraps_are_counted(turns: int) -> None:
     angle = np.linspace(0, 2 * math.pi * turns + 1, ROWS)
@@ -159,18 +150,6 @@ def test_a_jump_is_a_wrap_where_it_is_a_turn_within_a_tenth(jump: float, wraps: 
     theta = np.stack([np.sin(T), 0.1 * T])
     theta[1, 700:] += jump * 2 * math.pi
     assert ([one.code for one in channels.angles(logged(theta))] == ["WRAPPED_ANGLE"]) == wraps
-
-
-def test_an_arm_that_makes_half_a_radian_a_sample_may_make_a_turn() -> None:
-    steps = np.full(ROWS - 1, 0.51)
-    steps[100] = 2 * math.pi
-    theta = np.concatenate([[0.0], np.cumsum(steps)])
-    assert [*channels.angles(logged(np.stack([np.sin(T), theta])))] == []
-    steps[steps == 0.51] = 0.49
-    theta = np.concatenate([[0.0], np.cumsum(steps)])
-    assert [one.code for one in channels.angles(logged(np.stack([np.sin(T), theta])))] == [
-        "WRAPPED_ANGLE"
-    ]
 
 
 @pytest.mark.parametrize(("length", "told"), [(21, True), (20, False)])
@@ -285,17 +264,6 @@ def test_spikes_are_counted_in_every_channel(name: str) -> None:
     assert only([*channels.spikes(log)]).text == f"{name} has 3 spikes, the first at t = 0.25 s"
 
 
-def test_a_step_and_a_short_log_have_no_spikes() -> None:
-    draw = np.random.default_rng(2)
-    stepped = np.stack([np.sin(T), np.sin(T)]) + draw.normal(0, 1e-3, (2, ROWS))
-    stepped[0, 800:] += 1.0
-    assert [*channels.spikes(logged(stepped))] == []
-    short = draw.normal(0, 1e-3, (2, 40))
-    short[0, 9] = 1.0
-    assert len([*channels.spikes(logged(short))]) == 1
-    assert [*channels.spikes(logged(short[:, :19]))] == []
-
-
 @pytest.mark.parametrize("period", [math.sqrt(53), math.sqrt(137), math.sqrt(1623)])
 def test_samples_in_a_period_are_those_of_the_faster_joint(period: float) -> None:
     count = np.arange(20_000)
@@ -323,13 +291,6 @@ def test_steps_twice_as_long_are_counted(lost: int, told: int) -> None:
     )
     place = 1e-3 * np.concatenate([[0.0], np.cumsum(steps)])
     assert lost_steps(logged(np.stack([place, -2 * place]))) == 0
-
-
-def test_one_joint_alone_that_jumps_has_lost_nothing() -> None:
-    steps = np.ones(ROWS - 1)
-    steps[20 + 40 * np.arange(40)] = 2.0
-    place = 1e-3 * np.concatenate([[0.0], np.cumsum(steps)])
-    assert lost_steps(logged(np.stack([place, 2e-3 * np.arange(ROWS)]))) == 0
 
 
 def codes(log: Log) -> dict[str, str]:
@@ -365,15 +326,6 @@ def test_jitter_is_told_with_what_resampling_costs() -> None:
         assert one.note is note
     for late, jitters in ((0.022e-3, False), (0.0228e-3, True)):
         assert ("UNEVEN_STAMPS" in codes(logged(stamps=T + late * tenth))) == jitters
-
-
-def test_stamps_on_top_of_one_another_are_counted() -> None:
-    stamps = np.sort(np.concatenate([T, T[[100, 700, 701]] + 1e-5]))
-    theta = np.stack([np.sin(stamps), np.cos(stamps)])
-    told = codes(logged(theta, stamps=stamps))["UNEVEN_STAMPS"]
-    assert told.startswith(
-        "3 samples follow the one before by less than 0.3 of a period of 1 ms, as receipt times do"
-    )
 
 
 def test_a_log_of_a_second_is_long_enough() -> None:
@@ -414,21 +366,6 @@ def test_rest_lasts_until_a_thousandth_of_the_way(
         assert one.note
 
 
-def test_a_joint_that_creeps_does_not_rest_and_one_that_never_moves_has_no_end_of_rest() -> None:
-    assert [*rests(held(0.6, 0.7, creep=1e-2), True)] == []
-    still = logged(np.zeros((2, ROWS)))
-    assert [*rests(still, True)] == []
-    assert [*rests(held(0.0, 0.7), False)] == []  # a part may end where the arm stands
-
-
-def test_fewer_than_four_samples_are_not_looked_at() -> None:
-    three = np.zeros((2, 3))
-    assert examine(logged(three, three)) == ()
-    assert "EFFORT_ZERO" in [
-        one.code for one in examine(logged(np.zeros((2, 4)), np.zeros((2, 4))))
-    ]
-
-
 def test_of_the_beginning_of_a_log_nothing_is_refused_and_the_place_is_told() -> None:
     log = logged(tau=np.zeros((2, ROWS)))
     with pytest.raises(
@@ -440,33 +377,6 @@ def test_of_the_beginning_of_a_log_nothing_is_refused_and_the_place_is_told() ->
     assert all(
         one.code == "EFFORT_ZERO" and one.text.endswith(" (in its first 2 s)") for one in told
     )
-
-
-def test_a_log_that_is_refused_is_not_asked_for_its_physics(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def asked(*_: object, **__: object) -> None:
-        raise AssertionError("conventions are sought in a log without torques")
-
-    for name in ("judged", "dynamic_figures"):
-        monkeypatch.setattr(f"algid.inspection.checks.{name}", asked)
-    assert [one.code for one in examine(logged(tau=np.zeros((2, ROWS))))] == [
-        "EFFORT_ZERO",
-        "EFFORT_ZERO",
-    ]
-
-
-def test_an_arm_in_a_horizontal_plane_is_not_asked_for_gravity(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    asked: list[Log] = []
-    monkeypatch.setattr("algid.inspection.checks.judged", lambda *_, **__: None)
-    monkeypatch.setattr("algid.inspection.checks.dynamic_figures", asked.append)
-    log = logged()
-    assert examine(log, gravity=0) == ()
-    assert asked == []
-    assert examine(log) == ()
-    assert asked == [log]
 
 
 def slowed(tau: FloatArray, every: IntArray) -> FloatArray:
@@ -485,13 +395,6 @@ def test_a_held_torque_is_told_with_what_it_is_late(step: int) -> None:
     assert found[0].numbers["held"] == pytest.approx(step)
     assert found[0].numbers["late"] == pytest.approx((step - 1) / 2)  # mean of 0 … step - 1 samples
     assert not any(one.note or one.refuse for one in found)
-
-
-def test_a_torque_that_comes_nearly_in_step_is_held_too() -> None:
-    log = logged()
-    every = 10 * np.arange(T.size // 10) + np.random.default_rng(0).integers(0, 2, T.size // 10)
-    every[0] = 0
-    assert len(list(channels.held_efforts(replace(log, tau=slowed(log.tau, every))))) == 2
 
 
 def test_coarse_counts_and_logs_that_are_slow_as_a_whole_are_not_held() -> None:

@@ -148,14 +148,6 @@ def test_encoder_step_and_noise_floor() -> None:
     assert signal_figures(smooth).step == 0
 
 
-def test_a_recorded_run_tells_its_zero(shared_data: Path) -> None:
-    run = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))[0]
-    assert {"WRONG_ZERO", "WRONG_CONVENTION"} & set(codes(read_log(run)))
-    assert not {"WRONG_ZERO", "WRONG_CONVENTION"} & set(
-        codes(read_log(run, Profile(zero="hanging")))
-    )
-
-
 @pytest.mark.slow
 def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
     runs = sorted((shared_data / "dfki" / "C1_sysid").glob("*.csv"))

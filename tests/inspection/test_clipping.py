@@ -45,14 +45,6 @@ def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
     assert survey.whole(survey.logs[0]).rows == len(log)
 
 
-def test_a_second_pass_leaves_the_same_out() -> None:
-    survey = surveyed(cut_off())
-    first, second = (
-        [(piece.start, len(piece)) for piece in survey.segments(survey.logs[0])] for _ in range(2)
-    )
-    assert first == second
-
-
 def test_they_are_lost_data_and_used_where_that_is_accepted() -> None:
     log = cut_off()
     known = saturation(log)
@@ -102,13 +94,3 @@ def test_a_limit_that_leaves_little_of_the_motion_is_confirmed_by_nothing(limit:
     doubts = [one for one in found if one.code == "SATURATED_EFFORT"]
     assert doubts
     assert not any(one.note for one in doubts)
-
-
-@pytest.mark.parametrize("channel", ["tau1", "tau2"])
-def test_the_channel_is_named_as_the_file_names_it(channel: str) -> None:
-    log = cut_off()
-    named = replace(log, origin=replace(log.origin, mapping={channel: "effort[0]"}))
-    texts = [one.text for one in clipped(named, saturation(log).limits)]
-    assert any("effort[0]" in text for text in texts) == (
-        int(channel[-1]) - 1 in {one.joint for one in saturation(log).limits}
-    )

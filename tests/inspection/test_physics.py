@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 
 from algid.arm import Arm, inverse_dynamics
-from algid.estimators.conventions import AS_READ, Convention
+from algid.estimators.conventions import Convention
 from algid.inspection.conventions import Mend, advised, is_right, judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.dynamics import DynamicFigures, dynamic_figures, gravity_findings
@@ -143,27 +143,6 @@ def test_inertia_tells_torques_that_are_turned_from_an_arm_seen_from_behind(
     assert remedy.settings == settings
 
 
-def test_the_zero_of_an_advice_has_its_number() -> None:
-    log = swung(math.radians(70), gain=-1)
-    suspicion = gravity_findings(figures_of(log))
-    assert suspicion is not None
-    (remedy,) = advised(log, suspicion).remedies
-    assert remedy.complete
-    assert [remedy.settings[f"tau{joint}.sign"] for joint in (1, 2)] == [-1, -1]
-    # 0.6° is what the sums over windows at 125 Hz leave
-    assert remedy.settings["offsets"] == pytest.approx([math.radians(-70), 0.0], abs=0.01)
-
-
-@pytest.mark.parametrize(("turn", "named"), [(65.0, True), (115.0, True), (58.0, False)])
-def test_a_named_zero_stands_for_the_turn_of_a_rough_fit(turn: float, named: bool) -> None:
-    """Rough fits of real runs are up to 25° off; 47° would be no advice for a zero at 90°."""
-    log = swung(math.radians(90))
-    suspicion = gravity_findings(figures_of(log))
-    assert suspicion is not None
-    rough = replace(suspicion, notice=replace(suspicion.notice, numbers={"turn": turn}))
-    assert [one.settings for one in advised(log, rough).remedies] == [{"zero": "hanging"}] * named
-
-
 def test_an_advice_that_helps_nothing_is_not_given() -> None:
     """Torques of noise: whatever the suspicion, no convention shows an arm in them."""
     log = swung()
@@ -176,20 +155,6 @@ def test_an_advice_that_helps_nothing_is_not_given() -> None:
     assert weightless is not None
     assert len(advised(swung(weight=False), weightless).remedies) == 2
     assert advised(noise, weightless).remedies == ()
-
-
-def test_a_torque_the_other_way_round_pulls_upwards_and_says_so() -> None:
-    told = gravity_findings(figures_of(swung(gain=-1)))
-    assert told is not None
-    assert told.notice.code == "FLIPPED_SIGN"
-    assert told.notice.text.startswith(f"gravity pulls upwards (k4 = {-K[3]:.3g} N m)")
-    sideways = gravity_findings(figures_of(swung(math.radians(-90))))
-    assert sideways is not None
-    assert re_turn(sideways.notice.text) == pytest.approx(-90, abs=1)
-
-
-def re_turn(text: str) -> float:
-    return float(text.removeprefix("gravity is turned by about ").partition("°")[0])
 
 
 def test_an_arm_without_weight_and_one_that_stands_still() -> None:
@@ -216,15 +181,6 @@ def test_noise_is_not_gravitys() -> None:
     assert 0.2 < found.explained < 0.9
     # four columns of some thousands explain one in a thousand by chance
     assert 0 <= found.gravity_share < 0.01
-
-
-@pytest.mark.parametrize(("rows", "told"), [(39, False), (40, True)])
-def test_forty_samples_at_a_hundred_hertz_are_enough(rows: int, told: bool) -> None:
-    log = swung(rate=100.0)
-    assert (dynamic_figures(log.part(0, rows)) is not None) == told
-    fast = swung(rate=400.0)
-    assert (dynamic_figures(fast.part(0, 4 * rows)) is not None) == told
-    assert (dynamic_figures(fast.part(0, 4 * rows - 1)) is not None) == (told and rows > 40)
 
 
 SURE = DynamicFigures(
@@ -384,40 +340,6 @@ def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
     } == found.settings
 
 
-def test_an_arm_seen_from_behind_says_so() -> None:
-    turned = mended(Convention(signs=(-1, -1), torque_signs=(-1, -1)))
-    assert turned.words.startswith(
-        "both joints count the other way round, or θ1 counts from the other horizontal"
-    )
-    assert turned.settings == {"signs": [-1, -1]}
-    assert turned.another
-
-
-@pytest.mark.parametrize(("off", "another"), [(0.099, False), (0.78, False), (0.79, True)])
-def test_zeros_that_are_a_little_off_are_no_other_convention(off: float, another: bool) -> None:
-    assert mended(Convention(zero=(0.0, off))).another == another
-    assert mended(Convention(zero=(0.0, off), base=True)).another
-
-
-def test_settings_are_over_those_that_the_log_was_read_by() -> None:
-    joints = mended(
-        Convention(swapped=True, torques_swapped=True), Reading(joints=("shoulder", "elbow"))
-    )
-    assert joints.remedy.flags == ("--joints", "elbow,shoulder")
-    signs = mended(Convention(signs=(-1, 1), torque_signs=(-1, 1)), Reading(signs=(-1, 1)))
-    assert signs.settings == {"signs": [1, 1]}
-    hanging = mended(Convention(zero=(HALF, 0.0)), Reading(zero="hanging"))
-    assert hanging.settings == {"zero": "horizontal"}
-
-
-def test_a_right_log_and_one_that_does_not_tell_are_left_alone() -> None:
-    assert mend(read_by(), None) is None
-    assert mend(read_by(), judgement(AS_READ)) is None
-    assert mend(read_by(), judgement(Convention(base=True), alone=False)) is None
-    still = moving_log()
-    assert judged(replace(still, tau=np.stack([still.tau[0], 0 * still.tau[1]]))) is None
-
-
 def test_what_contradicts_is_the_worst_that_is_broken() -> None:
     broken = {"k1 > 0": -5.4, "k3 > 0": -60.2, "k5 > 0": -7.0}
     found = mend(read_by(), judgement(Convention(base=True), broken=broken))
@@ -461,25 +383,6 @@ def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_pat
     (tmp_path / "algid.toml").write_text(text, encoding="utf-8")
     found = read_log(tmp_path / "arm.mcap", load_profile(tmp_path / "algid.toml"))
     assert found.origin.mapping["theta1"] == f"/{name}: position[{name}]"
-
-
-def test_a_draft_of_a_log_that_tells_its_sources_is_that_reading(tmp_path: Path) -> None:
-    log = moving_log(200)
-    rows = {
-        "time": log.t,
-        "q1": log.theta[0],
-        "q2": log.theta[1],
-        "tau1": log.tau[0],
-        "tau2": log.tau[1],
-    }
-    pl.DataFrame(rows).write_csv(tmp_path / "arm.csv")
-    text = draft_profile(tmp_path / "arm.csv")
-    (tmp_path / "algid.toml").write_text(text)
-    profile = load_profile(tmp_path / "algid.toml")
-    assert (profile.time, profile.theta1.source, profile.tau2.source) == ("time", "q1", "tau2")
-    assert np.array_equal(
-        read_log(tmp_path / "arm.csv", profile).theta, read_log(tmp_path / "arm.csv").theta
-    )
 
 
 def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(

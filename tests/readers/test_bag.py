@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
@@ -18,7 +17,7 @@ from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.bags import open_bag
 from tests.readers.large import write_db3
-from tests.readers.logs import EPOCH_NS, noise_log, same
+from tests.readers.logs import EPOCH_NS, noise_log
 
 TYPE = "sensor_msgs/msg/JointState"
 
@@ -38,27 +37,6 @@ def message(store: Any, log: Log, row: int, *, first: bool) -> Any:
         velocity=log.omega[:, row].copy(),
         effort=log.tau[:, row].copy(),
     )
-
-
-def test_bags_of_both_generations_read_the_same(tmp_path: Path) -> None:
-    log = noise_log(200, start_ns=EPOCH_NS)
-    store = get_typestore(Stores.ROS1_NOETIC)
-    with Writer1(tmp_path / "one.bag") as writer:
-        channel = writer.add_connection("/joint_states", TYPE, typestore=store)
-        for row, stamp in enumerate(log.stamp_ns.tolist()):
-            writer.write(
-                channel, stamp, store.serialize_ros1(message(store, log, row, first=True), TYPE)
-            )
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    with Writer2(tmp_path / "two", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer2:
-        channel2 = writer2.add_connection("/joint_states", TYPE, typestore=store)
-        for row, stamp in enumerate(log.stamp_ns.tolist()):
-            data = store.serialize_cdr(message(store, log, row, first=False), TYPE)
-            writer2.write(channel2, stamp, data)
-    for name in ("one.bag", "two"):
-        found = read_log(tmp_path / name)
-        assert same(found, log)
-        assert found.origin.mapping["tau2"] == "/joint_states: effort[j2]"
 
 
 def two(folder: Path, topics: tuple[str, ...] = ("/joint_states",)) -> Log:
@@ -205,14 +183,6 @@ def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_pat
     assert read_log(path, Profile(clock="log")).stamp_ns.tolist() == [
         10**9 + row for row in (0, 2, 4)
     ]
-
-
-def test_velocities_are_read_only_where_they_are_wanted(tmp_path: Path) -> None:
-    path = states(tmp_path / "bag", *[{**PAIR, "velocity": [3, 4]}] * 3)
-    log = read_log(path)
-    assert log.omega is not None
-    assert log.omega.tolist() == [[4] * 3, [3] * 3]
-    assert read_log(path, Profile(velocity=False)).omega is None
 
 
 @pytest.mark.parametrize(

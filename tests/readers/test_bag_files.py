@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -19,9 +18,7 @@ from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.bags import ros1_file
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import write_mcap
 from tests.readers.test_bag import TYPE, message, two
 
 LOG = noise_log(400, start_ns=EPOCH_NS)
@@ -59,27 +56,6 @@ def poked(path: Path, place: int, form: str, value: int) -> None:
 
 def codes(log: Log) -> dict[str, bool]:
     return {notice.code: notice.lossy for notice in log.notices}
-
-
-@pytest.mark.parametrize(
-    "packing", [None, Writer.CompressionFormat.BZ2, Writer.CompressionFormat.LZ4]
-)
-@pytest.mark.parametrize("imu", [False, True])
-def test_every_packing_reads_the_same_as_with_the_library(
-    packing: Packing, imu: bool, tmp_path: Path
-) -> None:
-    path = ros1(tmp_path / "a.bag", packing, imu=imu)
-    found = read_log(path)
-    assert same(found, LOG)
-    assert found.notices == ()
-    with AnyReader([path]) as reader:
-        wanted = [one for one in reader.connections if one.topic == "/joint_states"]
-        theirs = [
-            reader.deserialize(raw, one.msgtype)
-            for one, _, raw in reader.messages(connections=wanted)
-        ]
-    efforts = [one.effort for one in theirs]  # type: ignore[attr-defined]
-    assert np.array_equal(found.tau, np.array(efforts).T)
 
 
 def head_field(content: bytes, name: bytes) -> int:
@@ -125,49 +101,6 @@ def test_a_bag_is_read_up_to_its_first_damaged_chunk(tmp_path: Path) -> None:
     (notice,) = found.notices
     assert (notice.code, notice.lossy) == ("DAMAGED", True)
     assert f"{len(LOG) - len(found)} messages are missing" in notice.text
-
-
-def test_times_durations_and_empty_parts_of_ros1_stand_where_the_library_has_them(
-    tmp_path: Path,
-) -> None:
-    """In an MCAP file, as recorders of ROS 1 write it: the encoding is the bag's."""
-    text = (
-        "time stamp\nduration wait\nbyte[3] raw\nstd_msgs/Empty none\nfloat32[] q\nduration[] "
-        "list\nfloat64[2] tau\n"
-        "int32 LIMIT=5\nstring note\nuint8 tail\n" + "=" * 80 + "\nMSG: std_msgs/Empty\n"
-    )
-    note = b"xyz"
-    messages = []
-    for row in range(30):
-        body = struct.pack("<IIii3b", 7, row, -1, 500, 1, 2, 3)
-        body += struct.pack("<I2f", 2, row * 0.5, row * 0.25) + struct.pack("<I4i", 2, 1, 2, 3, 4)
-        body += (
-            struct.pack("<2d", 10.0 + row, 20.0 - row)
-            + struct.pack("<I", len(note))
-            + note
-            + b"\x09"
-        )
-        messages.append(("/arm", row * 10**6, body))
-    write_mcap(
-        tmp_path / "a.mcap",
-        messages,
-        {"/arm": ("lab/Arm", "ros1msg", text.encode())},
-        encoding="ros1",
-    )
-    places = {"theta1": "q[0]", "theta2": "q[1]", "tau1": "tau[0]", "tau2": "tau[1]"}
-    profile = {"topic": "/arm", **{name: {"source": source} for name, source in places.items()}}
-    found = read_log(tmp_path / "a.mcap", Profile.model_validate(profile))
-    assert found.stamp_ns.tolist() == [7 * 10**9 + row for row in range(30)]
-    assert found.theta.tolist() == [
-        [row * 0.5 for row in range(30)],
-        [row * 0.25 for row in range(30)],
-    ]
-    assert found.tau.tolist() == [
-        [10.0 + row for row in range(30)],
-        [20.0 - row for row in range(30)],
-    ]
-    odd = Profile.model_validate({**profile, "tau2": {"source": "tail"}})
-    assert read_log(tmp_path / "a.mcap", odd).tau[1].tolist() == [9.0] * 30
 
 
 def database(tmp_path: Path) -> tuple[Path, Log]:
@@ -243,22 +176,6 @@ def test_a_database_that_is_no_bag_is_refused(
     assert "\n" not in str(refused.value)
 
 
-def test_what_is_not_in_the_database_yet_is_read_from_beside_it(tmp_path: Path) -> None:
-    """A recorder that was killed leaves the last rows in a file of their own."""
-    file, log = database(tmp_path)
-    base = sqlite3.connect(file)
-    base.execute("PRAGMA journal_mode = WAL")
-    base.execute("PRAGMA wal_autocheckpoint = 0")
-    base.execute("UPDATE messages SET timestamp = timestamp + 1")
-    base.execute("DELETE FROM messages WHERE rowid > 120")
-    base.commit()
-    assert file.with_name(f"{file.name}-wal").stat().st_size > 0
-    assert len(read_log(file)) == 120
-    base.close()
-    assert len(read_log(file)) == 120
-    assert len(log) == 200
-
-
 def test_a_type_whose_definition_the_file_lacks(tmp_path: Path) -> None:
     """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags
     package.
@@ -297,13 +214,6 @@ def test_a_type_of_every_file_needs_no_package(
     changed(file, "DROP TABLE message_definitions")
     monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
     assert same(read_log(file), log)
-
-
-def test_channels_of_bags_are_listed(tmp_path: Path) -> None:
-    file = ros1_file(ros1(tmp_path / "a.bag", imu=True))
-    counts = {one.topic: file.counts[number] for number, one in file.channels.items()}
-    assert counts == {"/joint_states": 400, "/tick": 480}
-    assert file.span_ns == (int(LOG.stamp_ns[0]), int(LOG.stamp_ns[-1]))
 
 
 OPENERS: list[Callable[[Path], Path]] = [

@@ -18,7 +18,6 @@ from algid.log import IntArray
 from algid.notices import Notice
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.table import SampleTable, stack
-from tests.readers.logs import EPOCH_NS
 
 MS = 1_000_000
 HORIZON = 1024
@@ -121,13 +120,6 @@ def test_a_repeated_stamp_is_a_loss_where_its_values_are_others(cut: int | None)
         assert (said.text, said.lossy) == (text, other != 5.0)
 
 
-def test_what_empty_tables_tell_is_kept() -> None:
-    first, last = Notice("ONE", "first"), Notice("TWO", "last")
-    found = ordered(table([], first), table([1, 2]), table([], last))
-    assert (found.stamp_ns.tolist(), found.notices) == ([1, 2], (first, last))
-    assert list(in_order("log", iter([]))) == []
-
-
 def test_memory_is_bounded_where_tables_overlap() -> None:
     """Each table reaches a little into the one before, so that all are merged, and still none is
     held back for long.
@@ -143,26 +135,6 @@ def test_memory_is_bounded_where_tables_overlap() -> None:
 
 def series(stamps: IntArray, **columns: FloatArray) -> Series:
     return Series("/other", table(stamps, **columns))
-
-
-@pytest.mark.parametrize("start", [0, EPOCH_NS])
-@pytest.mark.parametrize("step", [MS, 3 * MS])
-def test_the_error_told_is_that_of_a_parabola(step: int, start: int) -> None:
-    """Between samples h apart a line misses a t² by a h²/4 at most, in the middle: what the notice
-    says of it.
-    """
-    stamps = start + np.arange(200) * step
-    seconds = (stamps - start) * 1e-9
-    other = series(stamps, tau1=3 * seconds**2, tau2=-2 * seconds)
-    middle = stamps[:-1] + step // 2
-    missed = other.at(middle)["tau1"] - 3 * ((middle - start) * 1e-9) ** 2
-    # differences of squares of up to 0.36 s² lose 1e-16 of these
-    assert np.abs(missed - 0.75 * (step * 1e-9) ** 2).max() < 1e-14
-    assert (
-        other.error()
-        == f"tau1 {0.75 * (step * 1e-9) ** 2:.2g}, tau2 {float(other.error().split()[-1]):.2g}"
-    )
-    assert float(other.error().split()[-1]) < 1e-15
 
 
 def test_samples_three_periods_apart_are_bridged_and_no_further() -> None:
@@ -218,20 +190,6 @@ def test_alignment_does_not_depend_on_the_clock_or_the_tables(shift: int, cut: i
     assert texts["interpolated"].text.startswith(
         "'/other' (333.333 Hz) was interpolated; error, root mean square"
     )
-
-
-def test_all_topics_must_cover_a_sample() -> None:
-    own = np.arange(30) * MS
-    early, late = (
-        series(own[part], **{name: own[part] * 1.0})
-        for part, name in ((slice(0, 20), "tau1"), (slice(10, 30), "tau2"))
-    )
-    early = Series("/early", early.table.noting(Notice("LATE", "of the other topic")))
-    found = stack(list(aligned(iter([table(own, theta1=own * 1.0)]), [early, late])))
-    assert found.stamp_ns.tolist() == own[10:20].tolist()
-    assert found.columns.keys() == {"theta1", "tau1", "tau2"}
-    # samples of the same stamps are taken as they are
-    assert [notice.code for notice in found.notices] == ["ALIGNED", "LATE"]
 
 
 def test_a_topic_is_read_whole_in_order_or_refused() -> None:

@@ -127,15 +127,6 @@ def sorted_stamps(*tables: list[int]) -> tuple[list[int], list[str]]:
     return stamps, [notice.code for table in found for notice in table.notices]
 
 
-def test_late_samples_are_put_in_place_also_across_tables() -> None:
-    first, second = list(range(0, 100, 2)), [99, *range(100, 200, 2)]
-    first[40], first[41] = first[41], first[40]
-    second[0] = 95
-    stamps, codes = sorted_stamps(first, second)
-    assert stamps == sorted({*first, *second})
-    assert codes == ["UNEVEN_STAMPS"]
-
-
 def test_two_recordings_in_one_file_are_not_mixed() -> None:
     with pytest.raises(LogError, match="time goes backwards"):
         sorted_stamps([*range(0, 6000, 2), *range(1, 6000, 2)])

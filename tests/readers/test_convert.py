@@ -17,9 +17,8 @@ from algid.base.units import CURRENT, TORQUE, VELOCITY
 from algid.log import ChannelReading, Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
-from algid.readers.convert import QUANTITIES, Conversion, SampleBuffer
 from algid.readers.log_reader import Unwrapper
-from algid.readers.table import CHANNELS, SampleTable
+from algid.readers.table import CHANNELS
 from tests.readers.headers import opened
 
 TURN = 2 * np.pi
@@ -166,41 +165,6 @@ def test_zero_and_reference_of_the_angles() -> None:
     assert np.allclose(absolute.reference.sum(axis=0), SIGNALS[7], atol=1e-14)
     assert np.all(converted(passive=1).tau[0] == 0)
     assert np.all(converted(passive=1, drive="base").tau == SIGNALS[3])
-
-
-def test_factor_and_offset_of_a_channel() -> None:
-    samples = SampleTable(np.arange(50), dict(zip(CHANNELS, SIGNALS, strict=True)))
-    channels = {
-        name: ChannelReading(name, "", factor=place - 1.5, offset=1.0 - place)
-        for place, name in enumerate(CHANNELS)
-    }
-    signals = dict(zip(QUANTITIES[:2], np.empty((2, 2, 50)), strict=True))
-    Conversion(channels).apply(samples, signals)
-    wanted = [(place - 1.5) * SIGNALS[place] + 1.0 - place for place in range(4)]
-    assert np.allclose([*signals["theta"], *signals["tau"]], wanted, rtol=1e-15, atol=1e-15)
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    sizes=st.lists(st.integers(0, 40), min_size=1, max_size=8),
-    expected=st.integers(0, 60) | st.just(1 << 45),
-    count=st.integers(2, 4),
-)
-def test_a_buffer_keeps_what_was_put_in(sizes: list[int], expected: int, count: int) -> None:
-    """Whatever number of samples was expected, also none, or what takes a petabyte."""
-    buffer = SampleBuffer(expected, QUANTITIES[:count])
-    total = sum(sizes)
-    wanted = np.random.default_rng(total).normal(size=(count, 2, total))
-    for size in sizes:
-        rows = slice(buffer.used, buffer.used + size)
-        stamps, signals = buffer.more(size)
-        stamps[:] = np.arange(rows.start, rows.stop)
-        for own, values in zip(signals.values(), wanted, strict=True):
-            own[:] = values[:, rows]
-    stamps, signals = buffer.filled()
-    assert stamps.tolist() == list(range(total))
-    assert list(signals) == list(QUANTITIES[:count])
-    assert all(map(np.array_equal, signals.values(), wanted))
 
 
 @settings(max_examples=40, deadline=None)

@@ -5,8 +5,6 @@ at other joints.
 from __future__ import annotations
 
 import struct
-import subprocess
-import sys
 from collections.abc import Callable
 from datetime import UTC, datetime, time, timedelta
 from pathlib import Path
@@ -71,29 +69,6 @@ def test_other_joints_are_looked_at_in_the_first_samples_only(
         assert len(found) == told
         assert all(f"3 by 0.8 rad (in the first {LOOKED:,} samples)" in text for text in found)
         assert len(read_log(path, Profile(joints=("1", "2")))) == ROWS
-
-
-@pytest.mark.parametrize("separator", [",", " "])
-def test_other_joints_of_text_are_looked_at_in_the_first_rows_only(
-    separator: str, tmp_path: Path
-) -> None:
-    path, lines = tmp_path / "log.csv", arm().write_csv(separator=separator).splitlines()
-    for row, told in ((ROWS, 1), (5000, 0)):
-        cells = lines[row].split(separator)
-        path.write_text(
-            "\n".join(
-                [*lines[:row], separator.join([*cells[:3], "torn", *cells[4:]]), *lines[row + 1 :]]
-            )
-        )
-        assert len(other_joints(path)) == told
-
-
-def test_of_other_joints_those_are_looked_at_that_hold_numbers(tmp_path: Path) -> None:
-    frame = arm(300, 4).with_columns(q3=pl.lit("n/a"))
-    for form, write in WRITERS.items():
-        write(frame, tmp_path / f"log.{form}")
-        (text,) = other_joints(tmp_path / f"log.{form}")
-        assert text.startswith("1 other joint moves meanwhile: 4 by")
 
 
 START = datetime(2024, 3, 1, 23, 59, 59, 500_000, tzinfo=UTC)
@@ -208,35 +183,6 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
     assert read_log(path, Profile(time_unit="s")).notices == ()
 
 
-@pytest.mark.parametrize(
-    ("gaps", "code", "text"),
-    [
-        ([29], "CUT_OFF", "the last row, row 30, breaks off and was dropped"),
-        ([15], "NOT_FINITE", "1 of 30 rows dropped for want of a value"),
-        ([15, 29], "NOT_FINITE", "2 of 30 rows dropped for want of a value"),
-        (list(range(20, 30)), "NOT_FINITE", "10 of 30 rows dropped for want of a value"),
-        (list(range(10)), "NOT_FINITE", "10 of 30 rows dropped for want of a value"),
-    ],
-)
-def test_rows_that_lack_a_value_are_dropped_and_told(
-    gaps: list[int], code: str, text: str, tmp_path: Path
-) -> None:
-    """Also where a whole table of the pass is lost, the first or the last."""
-    frame = arm(30, 2).with_columns(
-        pl.when(pl.int_range(30).is_in(gaps)).then(None).otherwise(pl.col("q2")).alias("q2")
-    )
-    # in ms, as nobody says
-    frame.with_columns(t=pl.int_range(30)).write_ipc(tmp_path / "log.feather")
-    tables = list(open_log(tmp_path / "log.feather").tables(10))
-    kept = [row for row in range(30) if row not in gaps]
-    assert [
-        row for table in tables for row in np.rint(table.stamp_ns * 1e-6).astype(int).tolist()
-    ] == kept
-    assert [
-        (one.code, one.text, one.lossy) for table in tables for one in table.notices if one.lossy
-    ] == [(code, text, True)]
-
-
 def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
     """A list of a hundred numbers is no arm's; a row that is shorter than others lacks a value."""
     rows = [[0.1 * place for place in range(100)]] * 9
@@ -253,18 +199,3 @@ def test_of_wide_lists_the_first_places_are_taken(tmp_path: Path) -> None:
         )
         assert np.allclose(log.theta[0], 6.2, rtol=1e-12)
         assert [notice.code for notice in log.notices if notice.lossy] == ["CUT_OFF"]
-
-
-def test_polars_is_not_imported_for_plain_parquet(tmp_path: Path) -> None:
-    arm(joints=2).write_parquet(tmp_path / "log.parquet")
-    script = (
-        "import sys; from algid.readers import read_log; "
-        "print(len(read_log(sys.argv[1])), 'polars' in sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script, tmp_path / "log.parquet"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == [str(ROWS), "False"]

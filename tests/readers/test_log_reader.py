@@ -134,22 +134,6 @@ def test_a_torque_of_a_joint_called_passive_is_warned_of(share: float) -> None:
     assert "PASSIVE_TORQUE" not in codes(replace(log, origin=shared).whole())
 
 
-def test_a_torque_of_a_joint_called_passive_is_found_however_tables_are_cut() -> None:
-    """The arm rests at first: of those samples alone noise would be a torque."""
-    rows = np.arange(200)
-    driven, noise = np.where(rows < 100, 0.001, 1.0), np.full(200, 0.001)
-    for sizes in ((200,), (100, 100), (50, 150)):
-        log = reader(*sizes, tau1=driven, tau2=noise, settings={"passive": 2}).whole()
-        assert "PASSIVE_TORQUE" not in codes(log)
-        assert len(log) == 200
-
-
-def test_large_numbers_are_no_error() -> None:
-    """The sum of squares is large before any of them is too large."""
-    values = np.full(10, 9e29)
-    assert np.all(reader(10, theta1=values).whole().theta[0] == 9e29)
-
-
 def test_tables_are_cut_with_their_notices_first() -> None:
     parts = list(cut(tables(7, 2), 3))
     assert [len(part) for part in parts] == [3, 3, 1, 2]

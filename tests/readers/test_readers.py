@@ -17,7 +17,7 @@ from algid.base.errors import LogError
 from algid.log import Log, Origin
 from algid.readers import read_log
 from algid.writers import FORMATS, write_log
-from tests.readers.logs import EPOCH_NS, noise_log, same
+from tests.readers.logs import same
 
 CSV = "t,theta1,theta2,tau1,tau2\n"
 
@@ -42,32 +42,6 @@ def test_any_finite_log_survives(
         write_log(path, log)
         found = read_log(path)
     assert same(found, log)
-
-
-def test_mcap_reads_the_same_in_mcap_ros2_and_rosbags(tmp_path: Path) -> None:
-    from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
-    from rosbags.highlevel import AnyReader
-
-    log = noise_log(300, start_ns=EPOCH_NS)
-    path = tmp_path / "log.mcap"
-    write_log(path, log)
-    with path.open("rb") as stream:
-        reading = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
-        decoded = [message.decoded_message for message in reading]
-    assert np.array_equal(np.array([one.position for one in decoded]).T, log.theta)
-    assert np.array_equal(np.array([one.effort for one in decoded]).T, log.tau)
-    stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in decoded]
-    assert stamps == log.stamp_ns.tolist()
-    assert all(one.name == ["joint1", "joint2"] for one in decoded)
-    with AnyReader([path]) as reader:
-        messages = [
-            reader.deserialize(data, connection.msgtype)
-            for connection, _, data in reader.messages()
-        ]
-    velocities = np.array([one.velocity for one in messages]).T  # type: ignore[attr-defined]
-    assert log.omega is not None
-    assert np.array_equal(velocities, log.omega)
 
 
 def test_recorded_mcap_and_csv_of_one_run_agree(shared_data: Path) -> None:

@@ -77,13 +77,6 @@ def test_seconds_that_are_no_time_late_in_json_are_refused(seconds: float, tmp_p
     assert same(read_log(tmp_path / "log.mcap", Profile(clock="log")), log)
 
 
-def test_seconds_with_a_fraction_are_taken_whole(tmp_path: Path) -> None:
-    log = noise_log(20, start_ns=10**18, velocity=False)
-    stamp = {"header": {"stamp": {"sec": int(log.stamp_ns[3]) // 10**9 + 0.5, "nanosec": 0}}}
-    write_json(tmp_path / "log.mcap", json_messages(log, row3=stamp)[:4])
-    assert read_log(tmp_path / "log.mcap").stamp_ns[-1] == 10**18 + 500_000_000
-
-
 @pytest.mark.parametrize("names", [["a1", "a1"], ["1", "1"]])
 def test_a_joint_named_twice_is_refused_and_read_by_its_place(
     names: list[str], tmp_path: Path

@@ -72,20 +72,6 @@ def test_dates_as_times(first: str, second: str, tmp_path: Path) -> None:
     assert log.origin.reading.time_unit == "ns"
 
 
-@pytest.mark.parametrize("blank", [",", " ,", ", "])
-def test_rows_with_empty_cells_are_dropped_and_counted(blank: str, tmp_path: Path) -> None:
-    rows = [",".join(map(str, row)) for row in ROWS]
-    text = (
-        "time,q1,q2,tau1,tau2\n"
-        + "\n".join([*rows, "0.003,,1,2,3", "0.004,1,,,", "0.005,1,2,3,4"])
-        + "\n"
-    )
-    log = read_log(written(tmp_path, text.replace(",", blank)))
-    assert log.stamp_ns.tolist() == [0, 1_000_000, 2_000_000, 5_000_000]
-    (said,) = [one for one in log.notices if one.lossy]
-    assert (said.code, said.text[:11]) == ("NOT_FINITE", "2 of 6 rows")
-
-
 def test_topics_that_share_no_row_are_refused(tmp_path: Path) -> None:
     rows = [f"{place * 1e-3:g},{'1,2,,' if place % 2 else ',,3,4'}" for place in range(10)]
     with pytest.raises(LogError, match="no row has a value in every column"):

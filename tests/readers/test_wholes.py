@@ -116,11 +116,6 @@ def test_an_array_that_stands_twice_in_an_archive_is_refused(tmp_path: Path) -> 
         read_log(path)
 
 
-def test_brackets_within_texts_are_none(tmp_path: Path) -> None:
-    rows = [{**row, "text": "[{" * 40, "many": [[1]] * 40} for row in nested()]
-    assert len(read_log(lines(tmp_path / "a.jsonl", rows))) == 60
-
-
 @pytest.mark.parametrize("text", ["{\n}\n", "{1}\n{2}\n", '{"a": 1}'])
 def test_other_text_is_no_json_lines(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(text)

@@ -16,7 +16,6 @@ from algid.report.figures import (
     closeup,
     correlation,
     figures,
-    figures_of_paper,
     inertia,
     intervals,
     residual,
@@ -24,7 +23,7 @@ from algid.report.figures import (
     shares_of_time,
     torque,
 )
-from algid.report.plot import Panels, Plot, label, packed
+from algid.report.plot import Plot, label, packed
 from algid.report.series import Drawn, drawn
 from algid.results import Result
 from tests.report.folders import estimate
@@ -151,14 +150,6 @@ def test_the_mass_matrix_has_the_spread_of_draws(result: Result, raw: Drawn) -> 
     assert half == pytest.approx(NORMAL * (draws @ factors).std(), rel=0.03)
 
 
-def test_convergence_shows_result_and_truth(case_folder: Path, result: Result) -> None:
-    plots = figures_of_paper(case_folder, result)
-    assert [one.key for one in plots] == ["estimates", "loaded"]
-    shapes = plots[0].figure.layout["shapes"]
-    levels = [shape["y0"] for shape in shapes if shape["xref"] == "x domain"]
-    assert levels[0] == next(iter(result.parameters.values())).estimate
-
-
 @pytest.mark.parametrize(
     ("name", "lost"),
     [
@@ -176,23 +167,6 @@ def test_what_is_absent_is_not_drawn_and_what_is_broken_is_refused(
     (folder / f"{name}.parquet").write_bytes(b"PAR1")
     with pytest.raises(ResultError, match=rf"{name}\.parquet: cannot read it as Parquet"):
         figures(folder, result, raw)
-
-
-def test_panels_lie_beside_and_below_one_another() -> None:
-    panels = Panels(["a", "b", "c"], 2, 100, together=True)
-    domains = [[panels.axes(place)[way]["domain"] for way in (0, 1)] for place in range(3)]
-    (one, two, three) = domains
-    assert one[0][1] < two[0][0]
-    assert one[1] == two[1]
-    assert three[0] == one[0]
-    assert three[1][1] <= one[1][0]
-    panels.band(0, np.arange(5.0), np.array([0, 0, np.nan, 0, 0]), np.ones(5), "band")
-    assert len(panels.data) == 2  # it breaks at gaps
-    panels.line(1, y=2.0)
-    panels.stretch(2, 1.0, 3.0)
-    line, stretch = panels.layout["shapes"]
-    assert (line["xref"], line["yref"], line["y0"], line["y1"]) == ("x2 domain", "y2", 2.0, 2.0)
-    assert (stretch["xref"], stretch["yref"], stretch["x1"]) == ("x3", "y3 domain", 3.0)
 
 
 def test_numbers_travel_in_single_precision_unless_steps_would_be_lost() -> None:

@@ -59,20 +59,3 @@ def test_the_arm_stands_as_the_log_begins_and_moves_as_it_does(result: Result, r
     assert drawing.payload.startswith("payload of 0.35")
     long = ArmDrawing(1, 1, np.linspace(0, 1e4, 10_000), np.zeros((2, 10_000)), "")
     assert long.frames[0].size == 6001
-
-
-def test_a_bent_arm_stands_by_gravity(result: Result, raw: Drawn) -> None:
-    """K1 at 20°, K2 at 25°, K4 at 15°: θ1's zero is off by 5°."""
-    moments = {"k1": (0.2, 20.0), "k2": (7.0, 25.0), "k4": (20.0, 15.0)}
-    parameters = dict(result.parameters)
-    for name, (size, angle) in moments.items():
-        K = size * np.exp(1j * np.radians(angle))
-        parameters |= {
-            name: Estimate(estimate=float(K.real), unit=""),
-            f"{name}s": Estimate(estimate=float(K.imag), unit=""),
-        }
-    payload = {**result.payload, "y_p": Estimate(estimate=0.05, unit="m")}
-    bent = arm(result.model_copy(update={"parameters": parameters, "payload": payload}), raw)
-    start = np.degrees(raw.samples["theta1"][0])
-    assert bent.start[0] == pytest.approx(-start - 5, abs=1e-3)
-    assert bent.aside == 0.05

@@ -10,7 +10,7 @@ import pytest
 
 from algid.base.errors import ResultError
 from algid.report import series
-from algid.report.series import between, blocks, by_log, drawn
+from algid.report.series import between, blocks, drawn
 
 RATE = 100.0
 
@@ -92,12 +92,6 @@ def test_what_lies_between_two_moments_is_read_alone(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found["tau1"], wanted["tau1"].to_numpy())
     ends = between(tmp_path / "a.parquet", 0, 49.9, 60.0)["t"]
     np.testing.assert_allclose(ends, [49.9 + 0.01 * place for place in range(10)])
-
-
-def test_blocks_are_split_where_the_log_changes(tmp_path: Path) -> None:
-    write(tmp_path / "a.parquet", (50, 60))
-    parts = list(by_log(blocks(tmp_path / "a.parquet", ["log", "t"], 40)))
-    assert [(log, part["t"].size) for log, part in parts] == [(0, 40), (0, 10), (1, 30), (1, 30)]
 
 
 def test_what_is_no_series_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -7,8 +7,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
-from scipy.signal import cont2discrete, lfilter
 
 from algid.signals.observers import (
     C_OBS,
@@ -16,7 +14,6 @@ from algid.signals.observers import (
     A,
     C,
     LuenbergerObserver,
-    _exponential,
     observer_gain,
 )
 
@@ -56,22 +53,6 @@ def test_pieces_give_the_same_bits_as_the_whole() -> None:
     np.testing.assert_allclose(np.concatenate(parts, axis=1), whole, rtol=1e-12, atol=1e-9)
 
 
-@pytest.mark.parametrize("poles", [PAPER_POLES, (-30 + 40j, -30 - 40j, -50, -20, -25, -90)])
-def test_the_recursion_is_scipys_first_order_hold_of_each_joints_transfer_function(
-    poles: tuple[complex, ...],
-) -> None:
-    theta = np.cumsum(np.random.default_rng(2).normal(0, 0.01, (2, 400)), axis=1)
-    theta -= theta[:, :1]
-    found = LuenbergerObserver(DT, poles).velocities(theta)
-    for joint, own in enumerate((poles[:3], poles[3:])):
-        _, l1, l2, l3 = np.poly(np.array(own)).real
-        numerator, denominator, _ = cont2discrete(
-            ([l2, l3, 0.0], [1.0, l1, l2, l3]), DT, method="foh"
-        )
-        expected = lfilter(np.ravel(numerator), denominator, theta[joint])
-        np.testing.assert_allclose(found[joint], expected, atol=1e-6 * np.abs(expected).max())
-
-
 def test_after_a_reset_the_observer_starts_at_rest_where_it_is() -> None:
     rng = np.random.default_rng(3)
     first, second = np.cumsum(rng.normal(size=(2, 2, 200)), axis=2)
@@ -94,13 +75,3 @@ def test_poles_on_the_axis_too_many_or_not_conjugate_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=r"poles.*got \("):
         observer_gain(poles)
-
-
-@pytest.mark.parametrize("scale", [1e-3, 0.3, 1.0, 30.0])
-@pytest.mark.parametrize("seed", range(3))
-def test_the_exponential_is_that_of_another_library(scale: float, seed: int) -> None:
-    matrix = scale * np.random.default_rng(seed).normal(size=(5, 5))
-    expected = expm(matrix)
-    np.testing.assert_allclose(
-        _exponential(matrix), expected, rtol=0, atol=1e-12 * np.abs(expected).max()
-    )

@@ -40,11 +40,3 @@ def test_segments_do_not_depend_on_the_blocks(stamps: np.ndarray, rows: int) -> 
     assert [part.start for part in cut if not part.continues] == [
         part.start for part in whole if not part.continues
     ]
-
-
-def test_jittered_samples_are_put_on_the_time_base() -> None:
-    for part in segments([log_at(JITTERED)]):
-        t = part.t + JITTERED[0] * 1e-9
-        # the cubic's error, (7 h)^4 / 24 with stamps up to 2 h apart
-        np.testing.assert_allclose(part.theta[0], np.sin(7 * t), atol=1e-8)
-        np.testing.assert_allclose(part.tau[1], t**3, atol=1e-9)

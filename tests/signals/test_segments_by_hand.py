@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BarycentricInterpolator
 
 from algid.log import Log, Origin
-from algid.signals.segments import PERIOD_SAMPLES, Segment, append, pieces, segments
+from algid.signals.segments import Segment, append, pieces, segments
 
 MS = 1_000_000  # ns
 
@@ -53,17 +53,6 @@ def test_a_log_is_cut_where_more_than_five_periods_lack_samples(
     stretches = found([*range(10), *(9 + gap + n for n in range(12))])
     assert [one.start for one in stretches] == pytest.approx(starts, abs=1e-12)
     assert [one.dt for one in stretches] == pytest.approx([1e-3] * len(starts), rel=1e-12)
-
-
-def test_both_sides_of_a_gap_hold_their_own_samples_and_nothing_between() -> None:
-    first, second = found([*range(10), *range(30, 45)], omega=True)
-    log = log_at([*range(10), *range(30, 45)], omega=True)
-    for name in ("theta", "tau", "omega"):
-        np.testing.assert_array_equal(getattr(first, name), getattr(log, name)[:, :10])
-        np.testing.assert_array_equal(getattr(second, name), getattr(log, name)[:, 10:])
-    assert [first.start, second.start] == pytest.approx([0.0, 0.030], abs=1e-12)
-    assert not first.continues
-    assert not second.continues
 
 
 def test_fewer_than_four_samples_between_gaps_are_left_out() -> None:
@@ -121,54 +110,6 @@ def test_the_period_is_the_mean_of_the_steps_near_the_usual_one() -> None:
     steps = [1.0, 1.1] * 50 + [4.0] + [1.0, 1.1] * 50
     (whole,) = found(np.concatenate([[0.0], np.cumsum(steps)]).tolist())
     assert whole.dt == pytest.approx(1.05e-3, rel=1e-9)
-
-
-def test_the_period_is_told_by_the_first_samples() -> None:
-    steps = np.concatenate([np.full(PERIOD_SAMPLES - 1, 1.0), np.full(3000, 1.002)])
-    parts = list(segments([log_at(np.concatenate([[0.0], np.cumsum(steps)]).tolist())]))
-    assert [part.dt for part in parts] == pytest.approx([1e-3] * len(parts), rel=1e-12)
-
-
-def test_velocities_come_along_or_stay_away() -> None:
-    ms = [n + 0.2 * (n % 3 == 1) for n in range(20)]
-    log = log_at(ms, omega=True)
-    for part in segments([log]):
-        assert part.omega is not None
-        # the cubic through a line is the line
-        line = np.stack([0.25 * part.t + 4.0, 4.0 * part.t - 0.25])
-        np.testing.assert_allclose(part.omega, line, atol=1e-9)
-    assert all(part.omega is None for part in segments([replace(log, omega=None)]))
-
-
-def numbered(
-    length: int, *, start: float = 2.0, continues: bool = False, omega: bool = True
-) -> Segment:
-    values = np.stack([np.arange(length), -np.arange(length)]).astype(np.float64)
-    return Segment(start, 0.5, values, 10 * values, 100 * values if omega else None, continues)
-
-
-def test_a_part_is_a_view_that_knows_its_time_and_what_it_continues() -> None:
-    whole = numbered(8)
-    begin, rest = whole.part(0, 3), whole.part(3, 8)
-    assert (begin.start, begin.continues, len(begin)) == (2.0, False, 3)
-    assert (rest.start, rest.continues, len(rest)) == (3.5, True, 5)
-    assert rest.t.tolist() == [3.5, 4.0, 4.5, 5.0, 5.5]
-    assert rest.omega is not None
-    assert rest.omega[1].tolist() == [-300.0, -400.0, -500.0, -600.0, -700.0]
-    assert np.shares_memory(rest.tau, whole.tau)
-    assert numbered(8, continues=True).part(0, 2).continues
-
-
-def test_two_segments_are_one_after_the_other_and_lose_velocities_that_one_lacks() -> None:
-    one, other = numbered(3), numbered(2, start=3.5, continues=True)
-    both = append(one, other)
-    assert (both.start, both.dt, both.continues) == (2.0, 0.5, False)
-    assert both.theta[0].tolist() == [0, 1, 2, 0, 1]
-    assert both.tau[1].tolist() == [0, -10, -20, 0, -10]
-    assert both.omega is not None
-    assert both.omega[0].tolist() == [0, 100, 200, 0, 100]
-    assert append(one, numbered(2, omega=False)).omega is None
-    assert append(numbered(2, omega=False), one).omega is None
 
 
 def stretches(lengths: list[list[int]]) -> Iterator[Segment]:

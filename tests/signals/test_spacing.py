@@ -10,17 +10,11 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.identification.identify import identify
-from algid.log import Log, Origin, join, usual_period
-from algid.settings import Settings
+from algid.log import Log, Origin, join
 from algid.signals.segments import segments
 from algid.signals.spacing import spaced
-from algid.synth.cases import load_case
-from algid.synth.excitation import wide_multi_sine
-from algid.synth.simulator import HANGING, simulate
 
 PERIOD = 1e-3
-PLAIN = Settings(model="plain")
 ROWS = 4000
 RANDOM = np.random.default_rng(8)
 
@@ -122,57 +116,3 @@ def test_blocks_make_no_difference(
     assert parts.stamp_ns.tolist() == whole.stamp_ns.tolist()
     assert np.array_equal(parts.theta, whole.theta)
     assert np.array_equal(parts.tau, whole.tau)
-
-
-def test_the_period_of_bursts_is_their_mean_pace() -> None:
-    assert usual_period(np.rint(batches()[1] * 1e9).astype(np.int64)) == pytest.approx(
-        PERIOD, rel=0.01
-    )
-    assert usual_period(np.rint(regular() * 1e9).astype(np.int64)) == pytest.approx(
-        PERIOD, rel=1e-12
-    )
-
-
-def simulated(extra: FloatArray, late: FloatArray) -> Log:
-    """Four seconds of the first case with noise.
-
-    `extra` samples follow 2 µs after theirs, `late` come one too late.
-    """
-    case = load_case("case1")
-    t = regular()
-    times = np.unique(np.concatenate([t, t[extra] + 2e-6]))
-    motion = simulate(case.arm.constants(), wide_multi_sine(case.arm), times, HANGING, np.zeros(2))
-    noise = (
-        np.random.default_rng(3).standard_normal((2, 2, ROWS))
-        * np.array([3e-4, 1e-2])[:, None, None]
-    )
-    own = np.searchsorted(times, t)
-    theta, tau = motion.theta, motion.tau
-    theta[:, own] += noise[0]
-    tau[:, own] += noise[1]
-    more = np.setdiff1d(np.arange(times.size), own)
-    theta[:, more] += 3e-4 * np.random.default_rng(4).standard_normal((2, more.size))
-    tau[:, more] += 1e-2 * np.random.default_rng(5).standard_normal((2, more.size))
-    stamps = times.copy()
-    stamps[own[late]] = t[late + 1] - 2e-6
-    return Log(np.rint(stamps * 1e9).astype(np.int64), theta, tau, Origin("log", "test", {}))
-
-
-@pytest.mark.slow
-def test_pairs_two_microseconds_apart_leave_the_estimates_alone() -> None:
-    nothing = np.array([], np.int64)
-    four = np.array([500, 1400, 2300, 3700])
-    clean, *others = (
-        identify(simulated(*pairs), settings=PLAIN, report=False)
-        for pairs in ((nothing, nothing), (four, nothing), (nothing, four))
-    )
-    for found in others:
-        assert found.estimator == clean.estimator
-        assert any("UNEVEN_STAMPS" in warning for warning in found.warnings)
-        for name, wanted in clean.parameters.items():
-            estimate = found.parameters[name]
-            if wanted.estimate is not None and wanted.std:
-                assert estimate.estimate is not None
-                assert estimate.std is not None
-                assert abs(estimate.estimate - wanted.estimate) < estimate.std
-                assert estimate.std < 1.1 * wanted.std

@@ -48,15 +48,6 @@ def test_a_sample_that_comes_with_its_successor_goes_back_to_its_own_period() ->
     assert found.theta[0].tolist() == [0, 1, 2, 3, 4]
 
 
-def test_two_samples_of_one_instant_after_a_gap_are_one() -> None:
-    """As many periods lack samples as in the case above, but the angle did not move between the
-    two.
-    """
-    found = settled(log_of([0, 1000, 2998, 3000, 4000], [0.0, 1.0, 2.98, 3.02, 4.0]))
-    assert (found.stamp_ns // US).tolist() == [0, 1000, 2999, 4000]
-    assert found.theta[0].tolist() == pytest.approx([0, 1, 3, 4], abs=1e-12)
-
-
 def test_a_late_cluster_fills_as_many_periods_as_lack_samples_and_no_other() -> None:
     """Three samples of 2, 3, 4 ms come at once at 4 ms.
 
@@ -67,18 +58,6 @@ def test_a_late_cluster_fills_as_many_periods_as_lack_samples_and_no_other() -> 
     other = settled(log_of([0, 1000, 4996, 4998, 5000, 6000], [0.0, 1.0, 2.0, 3.0, 4.0, 6.0]))
     assert (other.stamp_ns // US).tolist() == [0, 1000, 4998, 6000]
     assert other.theta[0].tolist() == pytest.approx([0, 1, 3, 6], abs=1e-12)
-
-
-def test_no_late_sample_is_put_behind_its_stamp() -> None:
-    """The pair at 2.9 ms would go to 2 and 3 ms; the second keeps its stamp."""
-    found = settled(log_of([0, 1000, 2898, 2900, 4000], [0.0, 1.0, 2.0, 3.0, 4.0]))
-    assert (found.stamp_ns // US).tolist() == [0, 1000, 2000, 2900, 4000]
-
-
-def test_of_samples_at_once_at_the_begin_only_the_last_one_stays() -> None:
-    found = settled(log_of([0, 2, 4, 1004, 2004], [7.0, 8.0, 1.0, 2.0, 3.0]))
-    assert (found.stamp_ns // US).tolist() == [4, 1004, 2004]
-    assert found.theta[0].tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize(("step", "count"), [(300, 0), (299, 1)])

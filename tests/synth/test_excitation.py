@@ -13,8 +13,7 @@ import pytest
 from algid.arm import Arm
 from algid.base.errors import SettingError
 from algid.synth.cases import case_names, load_case
-from algid.synth.excitation import Hold, MultiSine, SampledTorque, wide_multi_sine
-from algid.synth.run import held
+from algid.synth.excitation import Hold, SampledTorque, wide_multi_sine
 
 ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
 
@@ -52,17 +51,6 @@ def test_a_sampled_torque_is_held_or_joined(
     found = torque(np.array([-1.0, 0.0, 0.5, 1.0 - 1e-12, 1.0, 3.0, 9.0]))
     expected = np.array([[1, -2], [1, -2], between, just_before, [3, 2], [5, 4], [5, 4]]).T
     np.testing.assert_allclose(found, expected, atol=1e-11)
-
-
-@pytest.mark.parametrize("hold", ["zoh", "foh"])
-def test_a_drive_is_commanded_at_its_rate(hold: Hold) -> None:
-    wave = MultiSine(((1.0,), (2.0,)), ((0.5,), (0.25,)), ((0.0,), (0.0,)))
-    driven = held(wave, 10.0, 1.05, hold)
-    np.testing.assert_allclose(driven.t, np.arange(11) / 10)  # 10.5 rounds to even
-    np.testing.assert_array_equal(driven.tau, wave(driven.t))
-    middle = driven(np.array([0.25]))
-    ends = wave(np.array([0.2, 0.3]))
-    np.testing.assert_allclose(middle[:, 0], ends[:, 0] if hold == "zoh" else ends.mean(axis=1))
 
 
 def test_the_cases_are_those_of_table_3() -> None:

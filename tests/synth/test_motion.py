@@ -11,31 +11,7 @@ from algid.arm import FloatArray, energy, forward_dynamics, mass_matrix
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.model import Model
-from algid.synth.simulator import simulate
 from tests.exports.arms import ODD, result_of, values_of
-
-START = np.array([0.5, -1.0]), np.array([2.0, -3.0])
-
-
-def test_angular_momentum_is_kept_in_a_horizontal_plane() -> None:
-    k = np.array([0.05, 0.0, 0.03, 0.0, 0.2, 0.0, 0.3])  # friction in joint 2 is an inner torque
-    motion = simulate(k, lambda t: np.stack([0 * t, np.sin(3 * t)]), np.linspace(0, 2, 41), *START)
-    m11, m12, _ = mass_matrix(k, motion.theta)
-    momentum = m11 * motion.omega[0] + m12 * motion.omega[1]
-    assert np.ptp(motion.omega[1]) > 1
-    np.testing.assert_allclose(momentum, momentum[0], rtol=1e-9)
-
-
-def test_an_arm_without_coupling_is_two_bodies_in_closed_form() -> None:
-    """With k1 = 0 and no weight, k5 θ̈1 = τ1 − τ2 and k3 (θ̈1 + θ̈2) = τ2."""
-    k = np.array([0.0, 0.0, 0.5, 0.0, 2.0, 0.0, 0.0])
-    t = np.linspace(0, 2, 41)
-    motion = simulate(
-        k, lambda now: np.stack([3 * np.cos(2 * now), 1.0 + 0 * now]), t, np.zeros(2), np.zeros(2)
-    )
-    first = (3 * (1 - np.cos(2 * t)) / 4 - t**2 / 2) / 2.0
-    whole = t**2 / 2 / 0.5
-    np.testing.assert_allclose(motion.theta, [first, whole - first], atol=1e-11)
 
 
 def states(count: int = 40) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -74,14 +74,6 @@ def test_an_encoder_rounds_to_the_nearest_of_its_lines(bits: int) -> None:
         assert abs(error.mean()) < 5 * np.sqrt(1 / 12 / error.size)
 
 
-def test_stamps_are_whole_nanoseconds_from_the_start() -> None:
-    log = record(motion(5), Sensors(start_ns=10**18), Truth(CASE.arm, 0.2, "case1"), "it")
-    assert log.stamp_ns.dtype == np.int64
-    np.testing.assert_array_equal(log.stamp_ns - 10**18, 10**6 * np.arange(5))
-    assert log.origin.truth == Truth(CASE.arm, 0.2, "case1")
-    assert (log.origin.path, log.origin.format) == ("it", "synthetic")
-
-
 def test_jitter_is_as_large_as_asked_and_keeps_the_order() -> None:
     rate, std = 1000.0, 1e-4
     t = sample_times(rate, 20.0, Sensors(jitter=std, seed=2))
@@ -105,16 +97,3 @@ def test_as_many_samples_are_lost_as_asked_but_not_the_ends(share: float) -> Non
     np.testing.assert_allclose(t, places / 1000, atol=1e-9)
     lost = np.diff(places) > 1  # at random: what is lost does not tell whether the next is
     assert abs(lost.mean() - share) < 5 * np.sqrt(share * (1 - share) / lost.size)
-
-
-def test_jitter_and_losses_leave_the_noise_alone() -> None:
-    short = Sensors(torque_noise=1.0, seed=5)
-    plain, uneven = (
-        sample_times(100.0, 1.0, one)
-        for one in (short, Sensors(torque_noise=1.0, seed=5, jitter=1e-3))
-    )
-    assert plain.size == uneven.size == 101
-    zero = np.zeros((2, 101))
-    still = [SimulatedMotion(t, zero, zero, zero) for t in (plain, uneven)]
-    logs = [record(one, short, Truth(CASE.arm, 0.0), "it").tau for one in still]
-    np.testing.assert_array_equal(logs[0], logs[1])

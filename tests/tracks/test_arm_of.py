@@ -93,19 +93,6 @@ def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Seg
         arm_of(result.model_copy(update={"fit": None}), first)
 
 
-def test_the_torque_acts_after_its_delay_and_half_its_hold(result: Result, first: Segment) -> None:
-    assert arm_of(_with(result, delay=0.0, torque_hold="foh"), first)[0].shift == 0.0
-    assert arm_of(_with(result, delay=0.004, torque_hold="foh"), first)[0].shift == 0.004
-    assert arm_of(_with(result, delay=0.004, torque_hold="zoh"), first)[0].shift == pytest.approx(
-        0.004 + first.dt / 2
-    )
-    found = _with(result, model="delay", torque_hold="foh")
-    assert arm_of(found, first)[0].shift == 0.0
-    delay = result.parameters["k1"].model_copy(update={"estimate": 0.007, "unit": "s"})
-    estimated = found.model_copy(update={"parameters": {**result.parameters, "delay": delay}})
-    assert arm_of(estimated, first)[0].shift == 0.007
-
-
 def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
     result: Result, first: Segment
 ) -> None:

@@ -75,19 +75,6 @@ def test_a_kilogram_at_the_tip_adds_table_2_to_the_constants() -> None:
     assert ARM.tip_equivalent == pytest.approx(CASE.arm.constants()[2] / l2**2)
 
 
-def test_scores_shift_with_constants_and_lengths_by_their_derivatives() -> None:
-    """Against central differences of the change that a mass makes to the constants."""
-    cells, mass = numbered(3), np.array([0.2, 0.5, 1.1])
-    T = cells.sensitivity(ARM, mass)
-    assert T.shape == (3, 9)
-    np.testing.assert_array_equal(T[:, :7], cells.S)
-    step = 1e-5
-    for column, name in ((7, "l1"), (8, "l2")):
-        more, less = (replace(ARM, **{name: getattr(ARM, name) + sign * step}) for sign in (1, -1))
-        slope = (more.unit - less.unit) / (2 * step)
-        np.testing.assert_allclose(T[:, column], mass * (cells.S @ slope), rtol=1e-8)
-
-
 @pytest.mark.parametrize("mass", [0.0, 0.3])
 @pytest.mark.parametrize("about", [0.0, 0.25])
 def test_cells_weigh_the_payload_wherever_they_are_linearised(mass: float, about: float) -> None:

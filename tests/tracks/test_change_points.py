@@ -16,9 +16,7 @@ from algid.arm import FloatArray
 from algid.tracks.cells import CELL, Cells
 from algid.tracks.change_points import (
     CHANCE,
-    PENALTY,
     SHORTEST,
-    Starts,
     cuts,
     excess,
     first_segmentation,
@@ -80,61 +78,6 @@ def test_cuts_are_the_best_of_all(seed: int, count: int, shortest: int, penalty:
     ] + rng.standard_normal(count)
     shortest = min(shortest, count)
     assert cuts(A, B, penalty, shortest) == brute(A, B, penalty, shortest)
-
-
-def unpruned(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[int]:
-    """The best cut by dynamic programming that drops no start."""
-    a, b = np.concatenate([[0.0], np.cumsum(A)]), np.concatenate([[0.0], np.cumsum(B)])
-    best, last = np.full(A.size + 1, np.inf), np.zeros(A.size + 1, dtype=int)
-    best[0] = -penalty
-    for end in range(shortest, A.size + 1):
-        start = np.arange(end - shortest + 1)
-        information = np.maximum(a[end] - a[start], 1e-300)
-        cost = best[start] - (b[end] - b[start]) ** 2 / information
-        last[end] = np.argmin(cost)
-        best[end] = cost[last[end]] + penalty
-    found = [int(last[-1])]
-    while found[-1] > 0:
-        found.append(int(last[found[-1]]))
-    return found[-2::-1]
-
-
-@settings(max_examples=60)
-@given(
-    seed=st.integers(0, 10_000),
-    count=st.integers(10, 300),
-    changes=st.integers(0, 20),
-    empty=st.booleans(),
-    penalty=st.floats(0.1, 60.0),
-)
-def test_no_start_is_dropped_that_would_serve(
-    seed: int, count: int, changes: int, empty: bool, penalty: float
-) -> None:
-    rng = np.random.default_rng(seed)
-    places = np.sort(rng.integers(0, count, changes))
-    masses = rng.normal(0, 2, changes + 1)[np.searchsorted(places, np.arange(count), "right")]
-    A = rng.uniform(0.1, 3.0, count) * (rng.random(count) > 0.3 if empty else 1.0)
-    B = A * masses + np.sqrt(A) * rng.standard_normal(count)
-    assert cuts(A, B, penalty, 10) == unpruned(A, B, penalty, 10)
-
-
-def test_few_starts_are_kept_where_nothing_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of 20,000 starts; what a search costs grows with those that it keeps."""
-    kept, prune = list[int](), Starts.prune
-
-    def counted(starts: Starts, leading: int) -> None:
-        prune(starts, leading)
-        kept.append(starts.place.size)
-
-    monkeypatch.setattr(Starts, "prune", counted)
-    A = np.full(20_000, 4.0)
-    assert cuts(A, 2 * np.random.default_rng(8).standard_normal(A.size), PENALTY, SHORTEST) == []
-    assert max(kept) < 300
-
-
-def test_cells_without_information_do_not_stop_the_cut() -> None:
-    A = np.where(np.arange(60) % 3 == 0, 0.0, 1.0)
-    assert cuts(A, A * np.repeat([0.0, 5.0, 1.0], 20), 10.0, 5) == pytest.approx([20, 40], abs=1)
 
 
 @pytest.mark.parametrize("robust", [True, False])

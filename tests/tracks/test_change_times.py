@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,21 +9,20 @@ from algid.estimators.whitening import Linearised, NoiseLevels, covariance_facto
 from algid.log import Log
 from algid.model import Model, Motion
 from algid.signals.differences import POINTS, Stencil
-from algid.signals.segments import Segment, segments
+from algid.signals.segments import segments
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.change_times import (
     Changes,
     ChangeTime,
     Confirmation,
     Rows,
-    cut_to,
     place,
     rows_of,
     step_response,
     windows,
 )
 from algid.tracks.drift import Drift
-from tests.tracks.folders import CASE, RUBBING, noisy, rubbing
+from tests.tracks.folders import CASE, noisy
 
 ARM = IdentifiedArm(
     Model(),
@@ -84,13 +81,6 @@ def test_a_sliver_beside_a_change_is_made_one_with_it_and_a_change_of_nothing_go
     assert [one.time for one in found] == pytest.approx([1.5, 3.0], abs=0.05)
 
 
-def test_a_window_too_short_for_candidates_leaves_a_change_where_it_was(picking: Log) -> None:
-    log = noisy(picking.part(1460, 1530), np.random.default_rng(2))
-    changes = Changes(rough(0.04), (0.0, 0.05))
-    evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 0.07), 60.0, 1.0)
-    assert evidence.of(changes) == list(changes.places)
-
-
 def test_rows_do_not_depend_on_how_a_log_was_cut(picking: Log) -> None:
     log = noisy(picking, np.random.default_rng(3))
     spans = [(0.5, 1.9), (1.7, 3.4)]
@@ -115,35 +105,6 @@ def test_the_residual_of_the_arm_and_its_payload_is_white(picking: Log) -> None:
     behind = left[np.repeat((rows.t > 1.45) & (rows.t < 1.7), 2)]
     assert np.mean(behind**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / behind.size))
     assert place(rows, 1.3, 1.7, 1.0).time == pytest.approx(1.5, abs=0.03)
-
-
-def test_the_residual_is_white_too_where_friction_changed(picking: Log) -> None:
-    """The angles' noise passes through the friction that is there, not through the arm's own."""
-    log = noisy(rubbing(picking, 0.1), np.random.default_rng(4))
-    (piece,) = (piece for _, piece in windows(segments([log]), [(0.1, 1.4)], 0.0))
-    k = np.append(ARM.k, [0.0, 0.0])
-    phi = np.tile([0.0, 0.0, 0.1, 0.1], (2, 1))
-    drift = Drift(np.array([0.0, 4.5]), phi, np.zeros((8, 8)))
-    left = rows_of(piece, replace(ARM, model=RUBBING, k=k), drift, [], [0.0]).e
-    assert np.mean(left**2) == pytest.approx(1.0, abs=5 * np.sqrt(2 / left.size))
-
-
-@pytest.mark.parametrize("shift", [0.0, 0.004, 0.0125, -0.007])
-@pytest.mark.parametrize("dt", [1e-3, 2e-3])
-def test_the_torques_of_a_cut_are_those_of_its_stretch(dt: float, shift: float) -> None:
-    n = 2000
-    segment = Segment(5.0, dt, np.zeros((2, n)), np.arange(2.0 * n).reshape(2, n))
-    start, end = 5.0 + 300 * dt, 5.0 + 1100 * dt
-    part = cut_to(segment, start, end, shift)
-    assert part is not None
-    told = Stencil(dt, shift).torques(len(part))
-    assert part.start + told.start * dt == pytest.approx(start, abs=1e-9)
-    assert part.start + told.stop * dt == pytest.approx(end, abs=1e-9)
-    assert part.tau[0, told.start] == 300
-    whole = cut_to(segment, 0.0, 100.0, shift)
-    assert whole is not None
-    assert len(whole) == n
-    assert cut_to(segment, 0.0, 4.0, shift) is None
 
 
 @pytest.mark.parametrize("alike", [1, 200])

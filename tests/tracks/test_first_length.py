@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 import algid
@@ -13,7 +12,6 @@ from algid.results import Result
 from algid.signals.segments import Segment
 from algid.synth.sensors import Sensors
 from algid.tracks.arm import arm_of
-from tests.tracks.folders import without_coulomb
 
 
 @pytest.fixture(scope="module")
@@ -53,16 +51,3 @@ def test_the_better_of_constants_and_payload_is_taken(weighed: Result) -> None:
     ]
     assert lengths == [told, pytest.approx(by_constants[0])]
     assert arm_of(unsure, segment(), l1=0.3)[0].l1 == 0.3
-
-
-def test_a_length_of_constants_errs_as_they_do(weighed: Result) -> None:
-    by_constants = first_length(weighed)
-    assert by_constants is not None
-    _, covariance = without_coulomb(
-        arm_of(with_payload_std(weighed, by_constants[1] * 2), segment())
-    )
-    assert covariance[-2, -2] == pytest.approx(by_constants[1] ** 2)
-    assert covariance == pytest.approx(covariance.T, rel=1e-6)
-    deviations = np.sqrt(np.diag(covariance))
-    correlation = covariance / np.outer(deviations, deviations)
-    assert np.abs(correlation).max() <= 1 + 1e-9

@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from algid.arm import FloatArray, inverse_dynamics, with_payload
+from algid.arm import FloatArray, inverse_dynamics
 from algid.estimators import paper
 from algid.estimators.paper import (
     PaperSeries,
     Summary,
     columns,
-    payload,
-    stack_rows,
     stage1_series,
     stage2_series,
     wanders,
@@ -70,43 +68,6 @@ def test_columns_are_the_integrals_of_polynomial_motions(start: float) -> None:
     for name, expected in exact.items():
         # Simpson's dt⁴ and rounding
         np.testing.assert_allclose(getattr(found, name), expected, atol=1e-8)
-
-
-def test_coupling_and_gravity_are_integrated_to_fourth_order() -> None:
-    """Halved steps leave a sixteenth of the error; the truth by steps eight times as fine again."""
-
-    def at(rate: int) -> FloatArray:
-        t = np.arange(rate + 1) / rate
-        theta = np.stack([np.sin(3 * t), 0.4 + np.cos(5 * t)])
-        omega = np.stack([3 * np.cos(3 * t), -5 * np.sin(5 * t)])
-        found = columns(theta, omega, np.stack([np.sin(7 * t), np.cos(2 * t)]), 1 / rate)
-        names = ("coupling1", "coupling2", "gravity1", "gravity12", "torque1", "torque2")
-        return np.stack([getattr(found, name)[:: rate // 50] for name in names])
-
-    truth = at(6400)
-    errors = [np.linalg.norm(at(rate) - truth, axis=1) for rate in (200, 400)]
-    assert np.all(np.abs(np.log2(errors[0] / errors[1]) - 4) < 0.3)
-
-
-def test_rows_are_integrals_of_the_row_before() -> None:
-    dt = 0.01
-    t = dt * np.arange(101)
-    rows = stack_rows(np.stack([np.ones_like(t), t**2]), dt, 4)
-    for n in range(4):
-        np.testing.assert_allclose(rows[n, 0], t**n / float(sp.factorial(n)), atol=1e-9)
-        np.testing.assert_allclose(
-            rows[n, 1], 2 * t ** (n + 2) / float(sp.factorial(n + 2)), atol=1e-9
-        )
-
-
-def test_the_payload_is_that_of_table_2() -> None:
-    case = load_case("case2")
-    k, z = case.arm.constants(), case.arm.payload_constants(0.3)
-    k1, k2, k3, k4, k5, _, _ = with_payload(k, z)
-    l1, m_p = payload(np.array([k5 + k3, k1, k3, k4, k2]), k, case.arm.g)
-    assert (float(l1), float(m_p)) == pytest.approx((case.arm.l1, 0.3), rel=1e-12)
-    bare = np.array([k[4] + k[2], k[0], k[2], k[3], k[1]])
-    assert np.isnan(payload(bare, k, case.arm.g)).all()  # no payload has no length: 0 / 0
 
 
 def test_joint_2_at_rest_leaves_k7_open_and_its_condition_infinite() -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from algid.arm import with_payload
 from algid.estimators.paper import (
-    EPSILON,
     STAGE1_SERIES,
     Summary,
     solve_scaled,
@@ -18,7 +17,7 @@ from algid.estimators.paper import (
 )
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
-from algid.synth.excitation import no_torque, wide_multi_sine
+from algid.synth.excitation import no_torque
 from algid.synth.simulator import SimulatedMotion, simulate
 
 DT = 1e-3
@@ -49,23 +48,6 @@ def test_exact_velocities_give_every_row_within_a_thousandth_of_a_percent(case: 
     np.testing.assert_allclose(second.x[:, -1], [k5 + k3, k1, k3, k4, k2], rtol=1e-5)
     assert second.m_p[-1] == pytest.approx(case.payload, rel=1e-5)
     assert second.l1[-1] == pytest.approx(case.arm.l1, rel=1e-5)
-
-
-def test_estimates_are_absent_before_epsilon(case: Case) -> None:
-    bare = motion(case)
-    found = stage1(bare.theta, bare.omega, bare.tau, DT)
-    before = T < EPSILON - 1e-9
-    assert np.isnan(found.k[:, before]).all()
-    assert np.isfinite(found.k[:, ~before]).mean() > 0.9
-
-
-def test_initial_conditions_do_not_matter() -> None:
-    case = load_case("case1")
-    k = case.arm.constants()
-    moving = simulate(k, wide_multi_sine(case.arm), T, np.array([0.4, -1.0]), np.array([2.0, -3.0]))
-    found = stage1(moving.theta, moving.omega, moving.tau, DT)
-    # fast motion at 1 kHz: the integrals' own error
-    np.testing.assert_allclose(found.k[:, -1], k, rtol=1e-3)
 
 
 def test_an_arm_that_hangs_still_is_singular_everywhere() -> None:
@@ -103,15 +85,6 @@ def test_systems_of_any_scale_are_solved_alike() -> None:
     np.testing.assert_allclose(found.x * columns[:, None], x, rtol=1e-10)
     expected = np.linalg.cond(np.moveaxis(matrix, -1, 0))
     assert np.all(found.condition < 200 * expected)
-
-
-def test_singular_systems_are_told_apart() -> None:
-    matrix = np.repeat(np.eye(3)[..., None], 2, axis=2)
-    matrix[2, 2, 1] = 0.0
-    found = solve_scaled(matrix, np.ones((3, 2)))
-    np.testing.assert_array_equal(found.x[:, 0], 1.0)
-    assert np.isnan(found.x[:, 1]).all()
-    assert np.isinf(found.condition[1])
 
 
 def test_a_condition_that_leaves_less_than_a_percent_is_singular() -> None:
