@@ -570,7 +570,7 @@ def _selected(
     base = settings.shift.delay
     first = FirstPass(logs, shared, at, base)
     before: list[str] | None = None
-    for _ in range(_ROUNDS):
+    for left in reversed(range(_ROUNDS)):
         offered = first.columns(everything)
         refuted = first.refuted(offered)
         scale = first.mean_square(offered)
@@ -587,12 +587,12 @@ def _selected(
             break
         at, before = after, terms
         first = FirstPass(logs, shared, at, base)
-        if abs(late) > 1 and far and late < 0 and _LAG:
+        if left and abs(late) > 1 and far and late < 0 and _LAG:  # what is found has another round
             other = _lagging(logs, shared, at, base)
             others = [term for term in terms if term not in _DELAY]
-            left, column = first.columns(terms), other.columns([*others, *_LAG])
+            plain, column = first.columns(terms), other.columns([*others, *_LAG])
             scale = other.mean_square(column)
-            less = (first.solve(left)[1] - other.solve(column)[1]) / scale
+            less = (first.solve(plain)[1] - other.solve(column)[1]) / scale
             # the noise of a torque whose low-pass is undone is larger
             if less + first.determinant - other.determinant > 2 * SURE:
                 first, shared = other, other.shared

@@ -130,14 +130,17 @@ def _reasons(result: Result, failure: str | None) -> Iterator[Notice]:
     yield from _broken_bounds(fit)
     if fit is not None:
         coloured = [visible(name) for name, test in fit.whiteness.items() if not test.white]
-        if coloured and fit.intervals == "likelihood":
+        likely = fit.intervals == "likelihood"
+        if coloured and likely:
             yield Notice("NOT_WHITE", numbers={"names": coloured})
-    if fit is not None and fit.prediction is not None:
-        for joint, r2 in enumerate(fit.prediction.r2, start=1):
-            part = {"case": "part", "percent": 100 * r2, "band": fit.prediction.band}
-            if r2 < LEAST_R2:
-                kind = part if r2 >= 0 else {"case": "mean"}
-                yield Notice("LITTLE_EXPLAINED", numbers=kind | {"joint": joint})
+        # where the likelihood stands, what is left of a torque is its sensors' noise
+        least = 0.0 if likely and not coloured else LEAST_R2
+        if fit.prediction is not None:
+            for joint, r2 in enumerate(fit.prediction.r2, start=1):
+                if r2 < least:
+                    part = {"case": "part", "percent": 100 * r2, "band": fit.prediction.band}
+                    kind = part if r2 >= 0 else {"case": "mean"}
+                    yield Notice("LITTLE_EXPLAINED", numbers=kind | {"joint": joint})
     far = []
     for row in result.table4:
         if row.truth is not None and row.estimate is not None and row.std:

@@ -13,6 +13,7 @@ from algid.log import Log
 from algid.model import Model, Motion, link_motion, load, sensitivity, torque
 from algid.results import Result
 from algid.signals.segments import Segment
+from pipelines import conventions
 from tests.estimators.conftest import DT, Bench
 from tests.estimators.test_terms import term_log, term_values
 
@@ -96,3 +97,11 @@ def test_what_a_coefficient_turns_the_links_by_is_a_difference(
         moved = link_motion(ELASTIC, further, flexed(ELASTIC, further, motion, DT, tau))
         found = (moved.theta - link_motion(ELASTIC, c, bent).theta) / step
         np.testing.assert_allclose(found, turn[0], atol=0.01 * np.abs(turn[0]).max())
+
+
+def test_a_lag_that_the_last_round_would_find_leaves_the_choice_whole() -> None:
+    _, motion = conventions.motion_of("arm22")
+    swapped = conventions.log_of(motion, conventions.ROWS["joints swapped"], friction=True)
+    result = identify(swapped, report=False)
+    assert result.verdict.failed
+    assert "WRONG_CONVENTION" in {one.code for one in result.notices}

@@ -126,7 +126,11 @@ CASES = {
         "good", [], "explains 91.00 % of joint 1's torque and 93.00 % of joint 2's",
     ),
     "R² of 89 %": Case(
-        lambda r: with_fit(r, **predicted(0.89, 0.99)), codes=["LITTLE_EXPLAINED"], words="89 %"
+        lambda r: with_fit(r, intervals="sandwich", **predicted(0.89, 0.99)),
+        codes=["LITTLE_EXPLAINED"], words="89 %",
+    ),
+    "R² of 55 % by noise": Case(
+        lambda r: with_fit(r, intervals="likelihood", whiteness={}, **predicted(0.55, 0.99)), "good"
     ),
     "worse than the mean": Case(
         lambda r: with_fit(r, **predicted(-0.14, 0.99)), "failed", ["UNKNOWN_CAUSE"], "joint 1"
