@@ -88,30 +88,6 @@ def without(*kinds: type) -> Callable[[Records], Records]:
     return lambda records: [one for one in records if not isinstance(one, kinds)]
 
 
-def unindexed(records: Records) -> Records:
-    """No message indexes, so that the counts cannot be compared."""
-    for one in records:
-        if isinstance(one, ChunkIndex):
-            one.message_index_length, one.message_index_offsets = 0, {}
-    return records
-
-
-def hiding(records: Records) -> Records:
-    """The second chunk is in no list, and the statistics do not count it either."""
-    chunks = [one for one in unindexed(records) if isinstance(one, ChunkIndex)]
-    return [one for one in records if one is not chunks[1]]
-
-
-def overlapping(records: Records) -> Records:
-    """The second chunk is listed in place of the third too."""
-    chunks = [one for one in unindexed(records) if isinstance(one, ChunkIndex)]
-    chunks[2].chunk_start_offset, chunks[2].chunk_length = (
-        chunks[1].chunk_start_offset,
-        chunks[1].chunk_length,
-    )
-    return records
-
-
 def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
     """A record of a kind stands there twice, and not the same."""
 
@@ -123,18 +99,12 @@ def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
 
 
 WRONG: dict[str, Callable[[Records], Records]] = {
-    "a chunk of another length": changing(ChunkIndex, lambda one: setattr(one, "chunk_length", 9)),
-    "an index behind the end": changing(
-        ChunkIndex, lambda one: setattr(one, "message_index_length", 1 << 40)
-    ),
     "a count": changing(
         Statistics, lambda one: one.channel_message_counts.update({1: len(LOG) - 1})
     ),
     "a count of another channel": changing(
         Statistics, lambda one: one.channel_message_counts.update({7: 1})
     ),
-    "chunks over one another": overlapping,
-    "a chunk in no list": hiding,
     "a channel without definition": changing(Channel, lambda one: setattr(one, "id", 5)),
     "a schema twice": redefined(Schema, data=b"int8 x"),
     "a channel twice": redefined(Channel, topic="/other"),
@@ -153,21 +123,18 @@ def test_a_summary_that_does_not_agree_with_the_file_loses_nothing_unseen(
             read_log(path)
         return
     found = read_log(path)
-    told = {notice.code: notice.lossy for notice in found.notices}
-    assert told
-    assert same(found, LOG) or any(told.values())
-    assert same(found, LOG) == ("DAMAGED_INDEX" in told)
+    assert same(found, LOG)
+    assert "DAMAGED_INDEX" in {notice.code for notice in found.notices}
 
 
 @pytest.mark.parametrize(
     ("edit", "codes"),
     [
         (lambda records: records, []),
-        (unindexed, []),
         (redefined(Schema), []),
         (redefined(Channel), []),
         (without(Statistics), ["DAMAGED_INDEX"]),
-        (without(ChunkIndex), ["DAMAGED_INDEX"]),
+        (without(ChunkIndex), []),
         (without(Statistics, ChunkIndex, Channel, Schema), ["DAMAGED_INDEX"]),
     ],
 )
@@ -341,15 +308,16 @@ def test_a_flipped_bit_costs_its_chunk_and_is_told(tmp_path: Path) -> None:
         assert missing in lost(found)["DAMAGED"]
 
 
-@pytest.mark.parametrize("offset", [31, 1 << 40, -8])
-def test_a_message_index_that_lies_is_not_believed(offset: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("place", "value"), [(23, 31), (23, 1 << 40), (23, -8), (9, 7)])
+def test_a_message_index_that_lies_is_not_believed(place: int, value: int, tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     write_mcap(path, messages_of(LONG), compression=PLAIN, chunk_size=1 << 15)
     (index,) = chunks_of(path)[0].message_index_offsets.values()
-    path.write_bytes(poked(path.read_bytes(), index + 15 + 8, "<q", offset))  # the first message's
+    # the offset of the first message, or the channel
+    path.write_bytes(poked(path.read_bytes(), index + place, "<h" if place == 9 else "<q", value))
     found = read_log(path)
     assert same(found, LONG)
-    assert found.notices == ()
+    assert [one.code for one in found.notices] == ["DAMAGED_INDEX"] * (place == 9)
 
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:
@@ -395,7 +363,7 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
     path.write_bytes(content[:place] + bytes(64) + content[place + 64 :])
     found = read_log(path)
     assert (same(found, LOG), found.origin.truth) == (True, None)
-    assert [one.code for one in found.notices] == ["DAMAGED_INDEX", "DAMAGED"]
+    assert {"DAMAGED"} <= {one.code for one in found.notices}
     path.write_bytes(content.replace(b'"arm"', b'"mra"'))
     with pytest.raises(
         LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"

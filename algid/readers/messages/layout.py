@@ -19,7 +19,7 @@ from algid.base.blocks import concatenated, rows_of
 from algid.base.limits import LIMITS
 from algid.base.words import counted
 from algid.log import IntArray
-from algid.readers.messages.message_file import Messages, gather, padding
+from algid.readers.messages.message_file import Messages, gather
 
 
 class MisfitError(Exception):
@@ -276,9 +276,9 @@ class ColumnDecoder(Decoder):
             if pattern.places is None:
                 self.without(pattern.lacks, int(np.count_nonzero(fits)))
             elif fits.all() and left.size == rows.size:
-                yield rows, pattern.read(table, padding(size))
+                yield rows, pattern.read(table, _padding(size))
             elif fits.any():
-                yield rows[left[fits]], pattern.read(table[left[fits]], padding(size))
+                yield rows[left[fits]], pattern.read(table[left[fits]], _padding(size))
             left = left[~fits]
 
     def _new(self, payload: bytes) -> _Pattern | None:
@@ -290,7 +290,7 @@ class ColumnDecoder(Decoder):
             return None
         for path, text in layout.labels.items():
             self.label(path, text)
-        lead = padding(len(payload))
+        lead = _padding(len(payload))
         mask = np.zeros(lead + len(payload), np.uint8)
         for start, end in layout.fixed:
             mask[lead + start : lead + end] = 0xFF
@@ -317,14 +317,15 @@ def _by_size(sizes: IntArray) -> Iterator[NDArray[np.intp]]:
     yield from filter(len, np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1))
 
 
+def _padding(size: int) -> int:
+    """Bytes to take before a payload of `size` bytes: whole words (8 bytes), one at least."""
+    return -size % 8 if size else 8
+
+
 def _words(octets: NDArray[np.uint8], starts: IntArray, size: int) -> NDArray[np.uint64]:
-    """Messages of one size as rows (N, words), each behind its lead: see `Messages.compacted`."""
-    firsts = starts - padding(size)  # every row lies within the records, behind a head
-    width = size + padding(size)
-    if np.any(np.diff(firsts) != width):
-        rows = gather(octets, firsts, f"V{width}")
-    else:
-        rows = octets[firsts[0] : firsts[-1] + width]
+    """Messages of one size as rows (N, words): whole words (8 bytes), the first ones padded."""
+    lead = _padding(size)  # it lies within the records, behind a head
+    rows = gather(octets, starts - lead, f"V{lead + size}")
     return rows.view(np.uint64).reshape(starts.size, -1)
 
 

@@ -29,23 +29,9 @@ class Messages:
     def __len__(self) -> int:
         return int(self.starts.size)
 
-    def compacted(self) -> Messages:
-        """Copy messages of equal size into an aligned array, so that their chunk can be freed.
-
-        A row of whole words (8 bytes) each; messages of several sizes stay as they are.
-        """
-        if not len(self) or np.any(self.sizes != self.sizes[0]):
-            return self
-        size = int(self.sizes[0])
-        lead = padding(size)
-        rows = gather(self.content, self.starts - lead, f"V{lead + size}").view(np.uint8)
-        starts = lead + (lead + size) * np.arange(len(self), dtype=np.int64)
-        return Messages(rows, starts, self.sizes, self.log_ns)
-
-
-def padding(size: int) -> int:
-    """Bytes to take before a payload of `size` bytes: whole words (8 bytes), one at least."""
-    return -size % 8 if size else 8
+    def take(self, rows: slice | NDArray[np.intp]) -> Messages:
+        """Some of the messages."""
+        return Messages(self.content, self.starts[rows], self.sizes[rows], self.log_ns[rows])
 
 
 def gather(octets: NDArray[np.uint8], places: IntArray, kind: str) -> NDArray[np.generic]:
