@@ -27,8 +27,6 @@ from algid.readers.messages.message_file import MessageBatch, MessageChannel, Me
 from algid.readers.messages.reader import MessageLog
 
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
-_PAD = 8
-"""Bytes before the first message, which decoders want to have there."""
 _NAME_AND_NUMBER = re.compile(r"(.*?)(?:_(\d+))?$")
 
 
@@ -228,21 +226,14 @@ def _batches(
             payloads.append(data)
             size += len(data)
             if size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS:
-                yield MessageBatch(_gathered(stamps, payloads), checked=True)
+                yield MessageBatch(Messages.of(payloads, np.array(stamps, np.int64)), checked=True)
                 stamps, payloads, size = [], [], 0
     except Exception as error:  # rosbags raises what its parts do
         broken = _reason(error)
     if stamps:
-        yield MessageBatch(_gathered(stamps, payloads), checked=True)
+        yield MessageBatch(Messages.of(payloads, np.array(stamps, np.int64)), checked=True)
     if odd:
         text = f"{wrong} for a time or a message in the table 'messages'"
         yield MessageBatch(None, checked=True, reason=text, rows=odd)
     if broken:
         yield MessageBatch(None, checked=True, reason=f"{broken}; of what follows nothing is read")
-
-
-def _gathered(stamps: list[int], payloads: list[bytes]) -> Messages:
-    sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
-    ends = _PAD + np.cumsum(sizes)
-    content = np.frombuffer(b"".join([bytes(_PAD), *payloads]), np.uint8)
-    return Messages(content, ends - sizes, sizes, np.array(stamps, np.int64))

@@ -67,6 +67,10 @@ _LOOSE_BYTES = 1 << 23
 _BUFFER_BYTES = 1 << 9
 """What is read of a chunk to know its head."""
 _SMALL_BYTES = 1 << 13
+Definitions = list[tuple[int, bytes]]
+"""Code and content of each."""
+Listed = tuple[IntArray, Definitions, int]
+"""Offsets of messages, definitions, and where the last whole record ends."""
 
 
 def open_mcap(paths: Sequence[Path]) -> MessageLog:
@@ -103,7 +107,7 @@ class _Contents:
     """From which byte on a channel or schema is another than before: messages there are not read,
     since nobody knows which definition they follow."""
 
-    def define(self, others: Sequence[tuple[int, bytes]], place: int) -> None:
+    def define(self, others: Definitions, place: int) -> None:
         """Take in the records of a part at a byte: the first one of an id holds."""
         for code, content in others:
             kind, name = _KINDS[code]
@@ -117,7 +121,7 @@ class _Contents:
         for part in self.parts:
             if part.loose == loose:
                 try:
-                    _, numbers, others = _records(stream, part)
+                    _, numbers, others, *_ = _records(stream, part)
                     self.define(others, part.start)
                     part.counts = Counter(numbers.tolist())
                 except Exception as error:  # what the libraries raise
@@ -248,7 +252,7 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
             found.parts.append(_Part(place + _FRAME.size, left - _FRAME.size, torn=True))
 
 
-def _summary(stream: IO[bytes], size: int) -> list[tuple[int, bytes]]:
+def _summary(stream: IO[bytes], size: int) -> Definitions:
     """Code and content of what a file's summary defines: nothing where it has none.
 
     Raises
@@ -275,8 +279,10 @@ def _summary(stream: IO[bytes], size: int) -> list[tuple[int, bytes]]:
 
 def _records(
     stream: IO[bytes], part: _Part
-) -> tuple[MessageBatch, NDArray[np.uint16], list[tuple[int, bytes]]]:
-    """The messages of a part, the channel (M,) of each, and code and content of its definitions.
+) -> tuple[Messages, NDArray[np.uint16], Definitions, bool, tuple[int, int] | None]:
+    """The messages of a part, the channel (M,) of each, and its definitions.
+
+    And whether it is checked, and of a torn chunk the bytes that are there and that should be.
 
     Raises
     ------
@@ -307,7 +313,7 @@ def _records(
     log_ns = heads["log_ns"].astype(np.int64)
     messages = Messages(octets[:end], offsets + _HEAD_BYTES, sizes, log_ns)
     # nothing vouches for what is there of a torn chunk, which CUT_OFF says
-    return MessageBatch(messages, checked or bool(torn), torn=torn), heads["channel"], others
+    return messages, heads["channel"], others, checked or torn is not None, torn
 
 
 def _unpacked(chunk: Chunk) -> bytes:
@@ -333,10 +339,6 @@ def _unpacked(chunk: Chunk) -> bytes:
     return chunk.data[: size + 1]
 
 
-Listed = tuple[IntArray, list[tuple[int, bytes]], int]
-"""Offsets of messages, code and content of definitions, and where the last whole record ends."""
-
-
 def _one_by_one(content: bytes, place: int, stop: int) -> Listed:
     """The whole records in [place, stop), found by their lengths.
 
@@ -345,7 +347,7 @@ def _one_by_one(content: bytes, place: int, stop: int) -> Listed:
     ValueError
         If a message is shorter than its head.
     """
-    offsets, others = list[int](), list[tuple[int, bytes]]()
+    offsets, others = list[int](), Definitions()
     unpack = _FRAME.unpack_from
     while place + 9 <= stop:
         code, length = unpack(content, place)
@@ -396,14 +398,13 @@ def _batches(path: Path, found: _Contents, channels: frozenset[int]) -> Iterator
                 if part.counts is not None and not part.counts.keys() & channels:
                     continue
                 try:
-                    batch, numbers, others = _records(stream, part)
+                    messages, numbers, others, checked, torn = _records(stream, part)
                     found.define(others, part.start)
                     if part.start >= found.redefined:
                         raise ValueError("a channel or its schema is defined anew and differently")
                     # numpy.isin takes longer than all else here
                     ours = reduce(or_, [numbers == one for one in channels])
-                    messages = batch.messages.take(np.flatnonzero(ours))
-                    batch = MessageBatch(messages, batch.checked, torn=batch.torn)
+                    batch = MessageBatch(messages.take(np.flatnonzero(ours)), checked, torn=torn)
                 except Exception as error:  # what the libraries raise of damaged bytes
                     reason = f"{error or 'it breaks off'} (at byte {part.start})"
                     batch = MessageBatch(None, checked=True, reason=reason)

@@ -20,7 +20,7 @@ from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.messages import protobuf
 from algid.readers.messages.definitions import DefinitionError
-from algid.readers.messages.layout import ColumnDecoder, MisfitError
+from algid.readers.messages.layout import Codec, Decoder, MisfitError
 from algid.readers.messages.message_file import Messages
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import TOPIC, joint_state, messages_of, protobuf_schema, write_mcap
@@ -44,7 +44,7 @@ def write_json(path: Path, messages: list[tuple[str, int, bytes]]) -> None:
     write_mcap(path, messages, {TOPIC: ("arm", "jsonschema", b"{}")}, encoding="json")
 
 
-@pytest.mark.parametrize("digits", [20, 400, 5000])
+@pytest.mark.parametrize("digits", [20, 400])
 def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Path) -> None:
     log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
     messages = json_messages(log)
@@ -54,11 +54,7 @@ def test_json_integers_beyond_64_bits_are_no_traceback(digits: int, tmp_path: Pa
         messages[7][2].replace(b'"position": [', b'"position": [' + b"9" * digits + b", "),
     )
     write_json(tmp_path / "log.mcap", messages)
-    if digits > 4300:  # Python refuses to read it: no JSON message
-        found = read_log(tmp_path / "log.mcap")
-        assert len(found) == 19
-        assert any(notice.code == "MESSAGES_LEFT_OUT" and notice.lossy for notice in found.notices)
-    elif digits > 308:
+    if digits > 308:
         with pytest.raises(LogError, match=r"theta1 .* sample 8: expected a finite number"):
             read_log(tmp_path / "log.mcap")
     else:
@@ -150,13 +146,6 @@ def test_messages_that_do_not_fit_are_left_out_and_counted(tmp_path: Path) -> No
         read_log(tmp_path / "log.mcap")
 
 
-def side_by_side(payloads: list[bytes]) -> Messages:
-    """Messages in one content, each behind eight bytes."""
-    sizes = np.array([len(one) for one in payloads], np.int64)
-    content = np.frombuffer(b"".join(bytes(8) + one for one in payloads), np.uint8)
-    return Messages(content, np.cumsum(sizes + 8) - sizes, sizes, np.zeros(sizes.size, np.int64))
-
-
 def test_a_definition_that_cannot_be_read_on_another_topic_does_not_matter(tmp_path: Path) -> None:
     log = noise_log(50, start_ns=EPOCH_NS)
     schema = {"/bad": ("a/msg/B", "ros2msg", b"float64[" + b"9" * 5000 + b"] effort")}
@@ -182,12 +171,12 @@ def descriptors(**types: list[tuple[str, str]]) -> bytes:
 
 def test_a_protobuf_type_that_is_missing_is_refused_where_it_is_needed() -> None:
     data = descriptors(State=[("x", ""), ("other", ".a.Gone")], Fine=[("effort", "")])
-    with pytest.raises(DefinitionError, match=r"type 'a\.Gone' is not defined"):
-        protobuf.parse("a.State", data)
-    assert protobuf.parse("a.Fine", data)["a.Fine"][1].name == "effort"
-    for broken in (data[:-3], b"\xff" * 100):
+    types = protobuf.parse("a.State", data)
+    with pytest.raises(MisfitError, match=r"type '\.a\.Gone', nested too deep or not defined"):
+        protobuf.parse_layout(b"\x12\x00", "a.State", types)
+    for root, broken in (("a.Gone", data), ("a.State", data[:-3]), ("a.State", b"\xff" * 100)):
         with pytest.raises(DefinitionError):
-            protobuf.parse("a.State", broken)
+            protobuf.parse(root, broken)
 
 
 def test_a_protobuf_number_written_in_another_type_is_no_number() -> None:
@@ -239,10 +228,9 @@ def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(
     written = message_factory.GetMessageClass(pool.FindMessageTypeByName("n.N"))
     messages = [written(value=value).SerializeToString() for value in values]
     types = protobuf.parse("n.N", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
-    decoder = ColumnDecoder(
-        {"value": "value"}, parse=lambda data: protobuf.parse_layout(data, "n.N", types)
-    )
-    held, columns = decoder.columns(side_by_side(messages))
+    codec = Codec(lambda data: protobuf.parse_layout(data, "n.N", types))
+    stamps = np.zeros(len(messages), np.int64)
+    held, columns = Decoder({"value": "value"}, codec).columns(Messages.of(messages, stamps))
     assert held.all()
     parsed = [float(written.FromString(one).value) for one in messages]
     assert (

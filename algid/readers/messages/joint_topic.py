@@ -15,8 +15,8 @@ from algid.notices import Notice, Remedy
 from algid.profile import Profile
 from algid.readers.column_names import COMMANDED, CURRENTS, STEMS, choose, units_in_names
 from algid.readers.joints import along_the_arm, reading_of
-from algid.readers.messages.codec import parser_for
-from algid.readers.messages.layout import MessageLayout, MisfitError, has
+from algid.readers.messages.codec import codec_for
+from algid.readers.messages.layout import MessageLayout, MisfitError
 from algid.readers.messages.message_file import MessageFile, channels_by_topic, listed
 from algid.readers.messages.topic import Topic
 from algid.readers.stated import in_json_schema, lines_of, units_in
@@ -183,7 +183,7 @@ def _references(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[s
         names = names_in(layout)
         for positions in _REFERENCES if set(joints) <= set(names) else ():
             paths = [f"{positions}[{names.index(joint)}]" for joint in joints]
-            if has(layout, paths):
+            if layout.has(paths):
                 by_topic[topic] = {
                     name: (topic, path) for name, path in zip(REFERENCES, paths, strict=True)
                 }
@@ -361,7 +361,7 @@ def _stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
     for base in _STAMPS:
         for seconds, nanoseconds in _PARTS:
             pair = (f"{base}.{seconds}", f"{base}.{nanoseconds}")
-            if has(layout, pair):
+            if layout.has(pair):
                 return pair
     return None
 
@@ -403,7 +403,7 @@ def _layouts(file: MessageFile, topic: str) -> Iterator[MessageLayout]:
     channels = channels_by_topic(file).get(topic)
     if not channels:
         return
-    parse = parser_for(file.path, file.channels[min(channels)])
+    codec = codec_for(file.path, file.channels[min(channels)])
     for batch in file.batches(channels):
         messages = batch.messages
         if messages is None:
@@ -411,10 +411,11 @@ def _layouts(file: MessageFile, topic: str) -> Iterator[MessageLayout]:
         if messages is None or not len(messages):
             continue
         fitting, misfit = 0, None
-        for start, size in zip(messages.starts[:_SAMPLES], messages.sizes[:_SAMPLES], strict=True):
+        records = codec.records(messages.take(slice(_SAMPLES)))
+        for start, size in zip(records.starts, records.sizes, strict=True):
             end = start + min(size, LIMITS.message_bytes)
             try:
-                layout = parse(messages.content[start:end].tobytes())
+                layout = codec.parse(records.content[start:end].tobytes())
             except MisfitError as error:
                 misfit = error
                 continue

@@ -8,9 +8,9 @@ for all of them.
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 from algid.base.blocks import concatenated, rows_of
 from algid.base.limits import LIMITS
 from algid.base.words import counted
-from algid.log import IntArray
 from algid.readers.messages.message_file import Messages, gather
+from algid.readers.stated import GROUPS
+
+_BRACKET = re.compile(r"(\[[^\]]*\])")
+_ELEMENT = re.compile(r"(.*)\[(\d{1,9})\]")
 
 
 class MisfitError(Exception):
@@ -31,6 +34,7 @@ class Numbers:
     """`count` numbers side by side at byte `offset`: a NumPy type, or a varint in `width` bytes.
 
     That is "varint" in two's complement, "unsigned", or "zigzag" with the sign in its lowest bit.
+    "zero" stands nowhere.
     """
 
     offset: int
@@ -50,15 +54,14 @@ class MessageLayout:
     """Single texts: all of a JSON message, elsewhere those that name an arm or a recording."""
     flags: list[int] = field(default_factory=list)
     """Bytes of which only the highest bit is fixed: those of a varint."""
-    absent: Callable[[str], bool] = lambda _: False
-    """True for the path of a number which the message leaves out because it is zero."""
+    lacks: tuple[str, ...] = ()
+    """Fields by which a message says itself that it is no measurement."""
 
     def pin(self, start: int, end: int) -> None:
         """Note that the bytes [start, end) fix the layout."""
         if self.fixed and self.fixed[-1][1] == start:
-            self.fixed[-1] = (self.fixed[-1][0], end)
-        else:
-            self.fixed.append((start, end))
+            start = self.fixed.pop()[0]
+        self.fixed.append((start, end))
 
     def find(self, path: str) -> Numbers | None:
         """The number at a path (``wrench.torque.z``, ``data[1]``, ``position[elbow]``), or None.
@@ -66,57 +69,61 @@ class MessageLayout:
         A name in brackets stands for its place in a list of strings beside the indexed one.
         """
         place = ""
-        for part in re.split(r"(\[[^\]]*\])", path):
-            name, parent = part[1:-1], place.rpartition(".")[0]
-            if not part.startswith("["):
-                place += part
-                continue
-            names = self._list_with(name, parent)  # a name first: joints may be called "1" and "2"
-            if names.count(name) > 1:
-                return None
-            if not (names or name.isdigit()):
-                return self.numbers.get(path)  # of JSON, ``q1 [deg]``
-            place += f"[{names.index(name)}]" if names else part
-        if place in self.numbers:
-            numbers = self.numbers[place]
-            return numbers if numbers.count == 1 else None
-        array = re.fullmatch(r"(.*)\[(\d{1,9})\]", place)
-        if array is None or array[1] not in self.numbers:
-            return Numbers(0, "zero") if self.absent(place) else None
-        numbers, index = self.numbers[array[1]], int(array[2])
-        if index >= numbers.count or numbers.kind[0] not in "<>|":
+        for part in _BRACKET.split(path):
+            index = part
+            if part.startswith("["):  # a name first: joints may be called "1" and "2"
+                for at, texts in self.texts.items():
+                    if at.rpartition(".")[0] == place.rpartition(".")[0] and part[1:-1] in texts:
+                        if texts.count(part[1:-1]) > 1:
+                            return None
+                        index = f"[{texts.index(part[1:-1])}]"
+                        break
+            place += index
+        if found := self.numbers.get(place):
+            return found if found.count == 1 else None
+        element = _ELEMENT.fullmatch(place)
+        numbers = self.numbers.get(element[1]) if element else None
+        if element is None or numbers is None or numbers.kind[0] not in "<>|":
             return None
-        return Numbers(numbers.offset + index * int(numbers.kind[-1]), numbers.kind)
+        number = int(element[2])
+        found = Numbers(numbers.offset + number * int(numbers.kind[-1]), numbers.kind)
+        return found if number < numbers.count else None
 
-    def _list_with(self, name: str, parent: str) -> Sequence[str]:
-        """The first list of strings within `parent` that holds a name; empty where none does."""
-        for path, texts in self.texts.items():
-            if path.rpartition(".")[0] == parent and name in texts:
-                return texts
-        return ()
+    def has(self, paths: Iterable[str]) -> bool:
+        """True if the message has the numbers at all of the paths."""
+        return all(self.find(path) is not None for path in paths)
 
-    def missing(self, wanted: Mapping[str, str]) -> tuple[str, ...]:
-        """Names of the `wanted` numbers that the message lacks; none where it is of other joints.
+    def missing(self, wanted: Mapping[str, str]) -> list[str]:
+        """Paths of the `wanted` numbers that the message lacks; none where it is of other joints.
 
         It is if it names joints, and none of those of the paths such as ``effort[elbow]``, or if it
         is empty.
         """
-        joints, lists = set(), set()
-        for path in wanted.values():
-            place, bracket, rest = path.partition("[")
-            if bracket:
-                lists.add(place)
-            if bracket and not rest.partition("]")[0].isdigit():
-                joints.add(rest.partition("]")[0])
+        indexed = [path.partition("]")[0].partition("[") for path in wanted.values()]
+        joints = {name for _, _, name in indexed if name and not name.isdigit()}
+        lists = {place for place, bracket, _ in indexed if bracket}
         named = set().union(*self.texts.values())
         held = (path.partition("[")[0] for path, one in self.numbers.items() if one.count)
         if joints and joints.isdisjoint(named) and (named or lists.isdisjoint(held)):
-            return ()
-        return tuple(name for name, path in wanted.items() if self.find(path) is None)
+            return []
+        return [path for path in wanted.values() if self.find(path) is None]
 
 
-Parser = Callable[[bytes], MessageLayout]
-"""Gives the layout of one payload, or raises `MisfitError`."""
+def _as_they_are(messages: Messages) -> Messages:
+    return messages
+
+
+@dataclass(frozen=True)
+class Codec:
+    """How a channel's messages are read: as what `records`, of which `parse` gives the layout.
+
+    That raises `MisfitError`.
+    """
+
+    parse: Callable[[bytes], MessageLayout]
+    records: Callable[[Messages], Messages] = _as_they_are
+
+
 Columns = dict[str, NDArray[np.generic]]
 
 
@@ -124,15 +131,15 @@ Columns = dict[str, NDArray[np.generic]]
 class _Pattern:
     """Which words fix a layout, their values there, and where each wanted number stands.
 
-    Messages are rows of whole words (8 bytes): see `_words`. `places` is None where a message lacks
-    one of the wanted numbers, `lacks` names those.
+    Messages are rows of whole words (8 bytes), the first ones padded. `places` is None where a
+    message lacks one of the wanted numbers; `left_out` says why.
     """
 
     words: NDArray[np.intp]
     masks: NDArray[np.uint64]
     values: NDArray[np.uint64]
     places: Mapping[str, Numbers] | None
-    lacks: tuple[str, ...] = ()
+    left_out: Mapping[str, str]
 
     def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
         """True for those of the rows (R,) of messages (N, words) that have this layout."""
@@ -169,67 +176,28 @@ class _Pattern:
 
 
 @dataclass
-class Decoder(ABC):
+class Decoder:
     """Reads the wanted numbers out of batches of messages.
 
     Parameters
     ----------
     wanted : mapping
         By name the path of a number; a message without one of them is left out.
+    codec : Codec
 
     Attributes
     ----------
-    skipped, lacking, misfits : int
-        Messages left out so far: those of other joints, those that lack a number wanted, and those
-        that do not fit their schema.
-    lacks : tuple of str
-        Names of the numbers that one of those messages lacks.
-    misfit : str
-        Why the first of the last does not; empty where all fit.
+    left_out : mapping
+        Messages left out so far, as their notice tells: by case ("fields" that they lack, of other
+        "joints", not of their "schema") their count, and what the first one lacks.
     labels : mapping
         By path what a text names that says whose a message is.
     """
 
     wanted: Mapping[str, str]
-    skipped: int = 0
-    lacking: int = 0
-    lacks: tuple[str, ...] = ()
-    misfits: int = 0
-    misfit: str = ""
+    codec: Codec
+    left_out: dict[str, dict[str, Any]] = field(default_factory=dict)
     labels: dict[str, set[str]] = field(default_factory=dict)
-
-    @abstractmethod
-    def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Columns]:
-        """True for the messages (N,) that hold what is wanted; their numbers in file order."""
-
-    def label(self, path: str, text: str) -> None:
-        """Note whose a message is; of very many names a few are enough."""
-        known = self.labels.setdefault(path, set())
-        if len(known) < LIMITS.joints:
-            known.add(text)
-
-    def misfitting(self, why: str, messages: int = 1) -> None:
-        """Count messages that do not fit their schema."""
-        self.misfits += messages
-        self.misfit = self.misfit or why
-
-    def without(self, lacks: tuple[str, ...], messages: int = 1) -> None:
-        """Count messages that lack numbers, by name; none named where they are of other joints."""
-        if lacks:
-            self.lacking += messages
-            self.lacks = self.lacks or lacks
-        else:
-            self.skipped += messages
-
-
-@dataclass
-class ColumnDecoder(Decoder):
-    """The decoder of encodings in which a number's place is known by its message's layout.
-
-    Remembers the layouts it met by their messages' size.
-    """
-
-    parse: Parser = field(kw_only=True)
     _known: dict[int, list[_Pattern]] = field(default_factory=dict)
 
     def columns(self, messages: Messages) -> tuple[NDArray[np.bool_], Columns]:
@@ -237,14 +205,12 @@ class ColumnDecoder(Decoder):
         held = np.zeros(len(messages), np.bool_)
         chosen: list[NDArray[np.intp]] = []
         parts: list[Columns] = []
-        for rows in _by_size(messages.sizes):
-            size = int(messages.sizes[rows[0]])
-            if size > LIMITS.message_bytes:
-                self.misfitting(f"messages of {counted(size, 'byte')}", rows.size)
-                continue
-            for own, columns in self._of_one_size(messages, size, rows):
-                held[own] = True
-                chosen.append(own)
+        records = self.codec.records(messages)
+        order = np.argsort(records.sizes, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(records.sizes[order])) + 1):
+            for own, columns in self._of_one_size(records.take(rows)) if rows.size else ():
+                held[rows[own]] = True
+                chosen.append(rows[own])
                 parts.append(columns)
         if not parts:
             return held, dict.fromkeys(self.wanted, np.empty(0))
@@ -252,17 +218,25 @@ class ColumnDecoder(Decoder):
             return held, parts[0]
         return held, rows_of(concatenated(parts), np.argsort(np.concatenate(chosen)))
 
-    def _of_one_size(
-        self, messages: Messages, size: int, rows: NDArray[np.intp]
-    ) -> Iterator[tuple[NDArray[np.intp], Columns]]:
-        """Numbers of messages of one size by layout, each with the messages that have it."""
-        table = _words(messages.content, messages.starts[rows], size)
+    def leave(self, case: str, count: int, **why: str) -> None:
+        """Count messages that are left out; of the first ones it is told why."""
+        known = self.left_out.setdefault(case, {"count": 0, **why})
+        known["count"] += count
+
+    def _of_one_size(self, messages: Messages) -> Iterator[tuple[NDArray[np.intp], Columns]]:
+        """Numbers of messages of one size by layout, each with the places of the messages."""
+        size = int(messages.sizes[0])
+        if size > LIMITS.message_bytes:
+            self.leave("schema", len(messages), first=f"messages of {counted(size, 'byte')}")
+            return
+        lead = -size % 8 if size else 8  # it lies within the records, behind a head
+        table = gather(messages.content, messages.starts - lead, f"V{lead + size}").view(np.uint64)
+        table = table.reshape(len(messages), -1)
         known = self._known.setdefault(size, [])
-        left, tried = np.arange(rows.size), 0
+        left, tried = np.arange(len(messages)), 0
         while left.size:
             if tried == len(known):
-                start = int(messages.starts[rows[left[0]]])
-                pattern = self._new(messages.content[start : start + size].tobytes())
+                pattern = self._new(table[left[0]].tobytes(), lead)
                 if pattern is None:
                     left = left[1:]
                     continue
@@ -274,61 +248,36 @@ class ColumnDecoder(Decoder):
             fits = pattern.matches(table, left)
             tried += 1
             if pattern.places is None:
-                self.without(pattern.lacks, int(np.count_nonzero(fits)))
-            elif fits.all() and left.size == rows.size:
-                yield rows, pattern.read(table, _padding(size))
+                if fits.any():
+                    self.leave(count=int(np.count_nonzero(fits)), **pattern.left_out)
+            elif fits.all() and left.size == len(messages):
+                yield left, pattern.read(table, lead)
             elif fits.any():
-                yield rows[left[fits]], pattern.read(table[left[fits]], _padding(size))
+                yield left[fits], pattern.read(table[left[fits]], lead)
             left = left[~fits]
 
-    def _new(self, payload: bytes) -> _Pattern | None:
+    def _new(self, row: bytes, lead: int) -> _Pattern | None:
         """The pattern of a message's layout, None where it does not fit its schema."""
         try:
-            layout = self.parse(payload)
+            layout = self.codec.parse(row[lead:])
         except MisfitError as error:
-            self.misfitting(str(error))
+            self.leave("schema", 1, first=str(error))
             return None
         for path, text in layout.labels.items():
-            self.label(path, text)
-        lead = _padding(len(payload))
-        mask = np.zeros(lead + len(payload), np.uint8)
+            known = self.labels.setdefault(path, set())
+            if path.rpartition(".")[2] in GROUPS and len(known) < LIMITS.joints:
+                known.add(text)
+        mask = np.zeros(len(row), np.uint8)
         for start, end in layout.fixed:
             mask[lead + start : lead + end] = 0xFF
         mask[lead + np.array(layout.flags, np.intp)] |= 0x80
         masks = mask.view(np.uint64)
         words = np.flatnonzero(masks)
-        masks = masks[words]
-        values = np.frombuffer(bytes(lead) + payload, np.uint64)[words] & masks
-        places = {}
-        for name, path in self.wanted.items():
-            at = layout.find(path)
-            if at is None:
-                return _Pattern(words, masks, values, None, layout.missing(self.wanted))
-            places[name] = at
-        return _Pattern(words, masks, values, places)
-
-
-def _by_size(sizes: IntArray) -> Iterator[NDArray[np.intp]]:
-    """The places of the messages of each size, in file order."""
-    if sizes.size and not np.any(sizes != sizes[0]):
-        yield np.arange(sizes.size)
-        return
-    order = np.argsort(sizes, kind="stable")
-    yield from filter(len, np.split(order, np.flatnonzero(np.diff(sizes[order])) + 1))
-
-
-def _padding(size: int) -> int:
-    """Bytes to take before a payload of `size` bytes: whole words (8 bytes), one at least."""
-    return -size % 8 if size else 8
-
-
-def _words(octets: NDArray[np.uint8], starts: IntArray, size: int) -> NDArray[np.uint64]:
-    """Messages of one size as rows (N, words): whole words (8 bytes), the first ones padded."""
-    lead = _padding(size)  # it lies within the records, behind a head
-    rows = gather(octets, starts - lead, f"V{lead + size}")
-    return rows.view(np.uint64).reshape(starts.size, -1)
-
-
-def has(layout: MessageLayout, paths: Iterable[str]) -> bool:
-    """True if the message has the numbers at all of the paths."""
-    return all(layout.find(path) is not None for path in paths)
+        values = np.frombuffer(row, np.uint64)[words] & masks[words]
+        places = {name: layout.find(path) for name, path in self.wanted.items()}
+        why = {"case": "joints"}
+        if lacks := [*layout.lacks] or layout.missing(self.wanted):
+            why = {"case": "fields", "fields": ", ".join(lacks)}
+        found = {name: at for name, at in places.items() if at is not None}
+        whole = len(found) == len(places) and not layout.lacks
+        return _Pattern(words, masks[words], values, found if whole else None, why)

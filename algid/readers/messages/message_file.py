@@ -6,7 +6,7 @@ message is read alike, and what is lost of them is counted alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from algid.log import IntArray, Truth
 from algid.notices import Notice
+
+_PAD = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +30,14 @@ class Messages:
 
     def __len__(self) -> int:
         return int(self.starts.size)
+
+    @classmethod
+    def of(cls, payloads: Sequence[bytes], log_ns: IntArray) -> Messages:
+        """Messages with these payloads, behind some bytes that decoders want to have there."""
+        sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
+        ends = _PAD + np.cumsum(sizes)
+        content = np.frombuffer(b"".join([bytes(_PAD), *payloads]), np.uint8)
+        return cls(content, ends - sizes, sizes, log_ns)
 
     def take(self, rows: slice | NDArray[np.intp]) -> Messages:
         """Some of the messages."""

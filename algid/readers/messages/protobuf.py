@@ -12,6 +12,7 @@ bench-ingest` has the figure).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,76 +21,47 @@ from algid.base.limits import LIMITS
 from algid.readers.messages.definitions import DefinitionError
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 
-_FIXED = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
-_VARINTS = dict.fromkeys((3, 5, 8, 13, 14), "varint") | {
-    4: "unsigned",
-    17: "zigzag",
-    18: "zigzag",
-}
+_KINDS = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
+_KINDS |= dict.fromkeys((3, 5, 8, 13, 14), "varint") | {4: "unsigned", 17: "zigzag", 18: "zigzag"}
 _STRING, _MESSAGE, _BYTES, _REPEATED = 9, 11, 12, 3
+_ZERO = Numbers(0, "zero")
 
-
-@dataclass(frozen=True)
-class ProtobufField:
-    """A field: its name, type number, message type where it is one, and whether it repeats.
-
-    `implicit`: it is left out where it is zero.
-    """
-
-    name: str
-    type: int
-    message: str
-    repeated: bool
-    implicit: bool
-
-
-Types = dict[str, dict[int, ProtobufField]]
+Types = dict[str, tuple[dict[int, Any], list[str]]]
+"""By message type its field descriptors by number, and the names of the numbers that it leaves out
+where they are zero."""
 
 
 def parse(root: str, data: bytes) -> Types:
-    """Fields by message type and number, of `root` and all its parts, from a FileDescriptorSet.
+    """The message types of a FileDescriptorSet.
 
     Raises
     ------
     DefinitionError
-        If the bytes are no such set, or a type is missing.
+        If the bytes are no such set, or `root` is not in it.
     """
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
     from google.protobuf.message import DecodeError
 
+    types: Types = {}
     try:
-        known = {}
         for file in FileDescriptorSet.FromString(data).file:
-            for name, message in _messages(file.package, file.message_type):
-                known[name] = message, file.syntax == "proto3"
+            waiting = [(f".{file.package}".rstrip("."), one) for one in file.message_type]
+            while waiting:
+                scope, message = waiting.pop()
+                name = f"{scope}.{message.name}"
+                zeros = []
+                for own in message.field:
+                    # an optional field of proto3 has a oneof of its own
+                    told = own.label == _REPEATED or own.HasField("oneof_index")
+                    if file.syntax == "proto3" and own.type in _KINDS and not told:
+                        zeros.append(own.name)
+                types[name] = {own.number: own for own in message.field}, zeros
+                waiting += [(name, one) for one in message.nested_type]
     except (DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DefinitionError(f"{root}: no set of descriptors ({error})") from error
-    types: Types = {}
-    waiting = [root]
-    while waiting:
-        name = waiting.pop()
-        if name in types:
-            continue
-        if name not in known:
-            raise DefinitionError(f"{root}: the type {name[:80]!r} is not defined")
-        message, proto3 = known[name]
-        types[name] = {}
-        for one in message.field:
-            repeated = one.label == _REPEATED
-            # an optional field of proto3 has a oneof of its own
-            implicit = proto3 and not repeated and not one.HasField("oneof_index")
-            kind = one.type_name.lstrip(".")
-            types[name][one.number] = ProtobufField(one.name, one.type, kind, repeated, implicit)
-            if one.type == _MESSAGE:
-                waiting.append(kind)
+    if f".{root}" not in types:
+        raise DefinitionError(f"{root}: the type is not defined")
     return types
-
-
-def _messages(scope: str, messages: Any) -> Iterator[tuple[str, Any]]:
-    for message in messages:
-        name = f"{scope}.{message.name}" if scope else message.name
-        yield name, message
-        yield from _messages(name, message.nested_type)
 
 
 def _entries(data: bytes, start: int, end: int) -> Iterator[tuple[int, int, int, int]]:
@@ -130,84 +102,64 @@ def parse_layout(payload: bytes, root: str, types: Types) -> MessageLayout:
         If its bytes do not fit the schema.
     """
     walk = _Walk(payload, types)
-    walk.message(0, len(payload), root, "")
-    walk.layout.absent = lambda path: walk.is_absent(root, path)
+    walk.message(0, len(payload), f".{root}", "")
     return walk.layout
 
 
 @dataclass
 class _Walk:
-    """A walk over one message.
-
-    `counts` has by path of a repeated field how many of it there are so far, `there` the paths of
-    messages.
-    """
+    """A walk over one message; `counts` has by path of a repeated field how many there are."""
 
     data: bytes
     types: Types
-    counts: dict[str, int] = field(default_factory=dict)
-    there: set[str] = field(default_factory=set)
+    counts: Counter[str] = field(default_factory=Counter)
     layout: MessageLayout = field(default_factory=MessageLayout)
-    depth: int = 0
-
-    def is_absent(self, kind: str, path: str) -> bool:
-        """True for the path of a number that the message leaves out because it is zero."""
-        *inner, last = path.split(".")
-        for place, part in enumerate(inner, start=1):
-            outer = self._named(kind, part.partition("[")[0])
-            if outer is None or ".".join(inner[:place]) not in self.there:
-                return False
-            kind = outer.message
-        found = self._named(kind, last)
-        return found is not None and found.implicit and found.type in {**_FIXED, **_VARINTS}
-
-    def _named(self, kind: str, name: str) -> ProtobufField | None:
-        return next((one for one in self.types[kind].values() if one.name == name), None)
 
     def message(self, start: int, end: int, kind: str, prefix: str) -> None:
         """Take in the fields of a message of type `kind`, whose bytes are [start, end)."""
-        self.depth += 1
-        if self.depth > LIMITS.definition_depth:
-            raise MisfitError("messages nested too deep")
+        if prefix.count(".") > LIMITS.definition_depth or kind not in self.types:
+            raise MisfitError(f"a message of type {kind[:80]!r}, nested too deep or not defined")
+        fields, zeros = self.types[kind]
         last = start
         for number, wire, first, stop in _entries(self.data, start, end):
             self.layout.pin(last, first)
             last = stop
-            own = self.types[kind].get(number)
-            if own is not None:
-                self._field(own, wire, first, stop, f"{prefix}{own.name}")
+            if number in fields:
+                self.field(fields[number], wire, first, stop, prefix)
             elif wire == 0:
                 self.layout.flags.extend(range(first, stop))
         self.layout.pin(last, end)
-        self.depth -= 1
+        for name in zeros:
+            self.layout.numbers.setdefault(prefix + name, _ZERO)
 
-    def _field(self, own: ProtobufField, wire: int, first: int, stop: int, path: str) -> None:
-        numbers, fixed = self.layout.numbers, _FIXED.get(own.type, "")
-        if own.repeated and wire == 2 and fixed:  # a packed list
-            width = int(fixed[-1])
-            if path in self.counts or (stop - first) % width:
+    def field(self, own: Any, wire: int, first: int, stop: int, prefix: str) -> None:
+        """Take in a field, whose bytes are [first, stop)."""
+        numbers, kind, repeated = (
+            self.layout.numbers,
+            _KINDS.get(own.type, ""),
+            own.label == _REPEATED,
+        )
+        path = place = prefix + own.name
+        width = int(kind[-1]) if kind.startswith("<") else 0
+        packed = repeated and wire == 2 and width > 0
+        if repeated:
+            if path in numbers or (packed and (self.counts[path] or (stop - first) % width)):
                 raise MisfitError(f"the list {own.name!r} comes in parts or has a broken length")
-            self.counts[path] = (stop - first) // width
-            numbers[path] = Numbers(first, fixed, self.counts[path])
-            return
-        place = path
-        if own.repeated:
-            if path in numbers:
-                raise MisfitError(f"the list {own.name!r} comes in parts")
-            place = f"{path}[{self.counts.get(path, 0)}]"
-            self.counts[path] = self.counts.get(path, 0) + 1
-        if wire == 2 and own.type == _MESSAGE:
-            self.there.add(place)
-            self.message(first, stop, own.message, f"{place}.")
+            place = path if packed else f"{path}[{self.counts[path]}]"
+            self.counts[path] += 1
+        if packed:
+            numbers[path] = Numbers(first, kind, (stop - first) // width)
+        elif wire == 2 and own.type == _MESSAGE:
+            self.message(first, stop, own.type_name, f"{place}.")
         elif wire == 2 and own.type == _STRING:
-            if own.repeated:
+            if repeated:
                 self.layout.pin(first, stop)
                 text = self.data[first:stop].decode("utf-8", errors="replace")
                 self.layout.texts[path] = (*self.layout.texts.get(path, ()), text)
-        elif wire == 0 and own.type in _VARINTS:
+        elif wire == 0 and kind and not width:
             self.layout.flags.extend(range(first, stop))
-            numbers[place] = Numbers(first, _VARINTS[own.type], 1, stop - first)
-        elif wire in (1, 5) and fixed and int(fixed[-1]) == stop - first:
-            numbers[place] = Numbers(first, fixed)
-        elif wire != 2 or not (own.type == _BYTES or (own.repeated and own.type in _VARINTS)):
+            numbers[place] = Numbers(first, kind, 1, stop - first)
+        elif wire in (1, 5) and width == stop - first:
+            numbers[place] = Numbers(first, kind)
+        elif wire != 2 or not (own.type == _BYTES or (repeated and kind and not width)):
             raise MisfitError(f"the field {own.name!r} is not encoded as its type says")

@@ -13,7 +13,7 @@ from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
-from algid.readers.messages.codec import decoder_for
+from algid.readers.messages.codec import codec_for
 from algid.readers.messages.layout import Decoder
 from algid.readers.messages.message_file import Losses, MessageFile, channels_by_topic
 from algid.readers.stated import several
@@ -61,7 +61,7 @@ class Topic:
         wanted = dict(self.paths)
         if self.stamp is not None and self.clock != "log":
             wanted |= dict(zip(_STAMP, self.stamp, strict=True))
-        decoder = decoder_for(file.path, file.channels[min(channels)], wanted)
+        decoder = Decoder(wanted, codec_for(file.path, file.channels[min(channels)]))
         losses = Losses()
         parts: list[SampleTable] = []
         size = 0
@@ -70,8 +70,9 @@ class Topic:
             if batch.messages is None or not len(batch.messages):
                 continue
             held, columns = decoder.columns(batch.messages)
-            if decoder.misfits > losses.found / 2:
-                raise LogError(f"{place}: {decoder.misfit}; it cannot be read without guessing")
+            misfits = decoder.left_out.get("schema", {"count": 0})
+            if misfits["count"] > losses.found / 2:
+                raise LogError(f"{place}: {misfits['first']}; it cannot be read without guessing")
             log_ns = batch.messages.log_ns
             stamps = log_ns if held.all() else log_ns[held]
             parts.append(SampleTable(stamps, columns))  # type: ignore[arg-type]
@@ -115,25 +116,17 @@ class Topic:
         self, decoder: Decoder, file: MessageFile, channels: frozenset[int]
     ) -> Iterator[Notice]:
         """Notices of messages that lack a field, do not fit, or are otherwise typed or encoded."""
-        lacks = ", ".join(dict.fromkeys(decoder.wanted.get(n, n) for n in decoder.lacks))
         others = [
             (file.counts.get(number, 0), channel.type or "no schema")
             for number, channel in file.channels.items()
             if number not in channels and channel.topic == self.name
         ]
-        for case, count, numbers in (
-            ("fields", decoder.lacking, {"fields": lacks}),
-            ("joints", decoder.skipped, {}),
-            ("schema", decoder.misfits, {"first": decoder.misfit}),
-            (
-                "type",
-                sum(count for count, _ in others),
-                {"types": ", ".join(sorted({kind for count, kind in others if count})[:4])},
-            ),
-        ):
-            if count:
-                own = {"case": case, "count": count, "topic": self.name} | numbers
-                yield Notice("MESSAGES_LEFT_OUT", numbers=own)
+        if count := sum(count for count, _ in others):
+            types = ", ".join(sorted({kind for count, kind in others if count})[:4])
+            decoder.leave("type", count, types=types)
+        for case, numbers in decoder.left_out.items():
+            own = {"case": case, "topic": self.name} | numbers
+            yield Notice("MESSAGES_LEFT_OUT", numbers=own)
         for path, values in decoder.labels.items():
             if len(values) > 1:
                 yield several(path, values)
