@@ -169,17 +169,24 @@ def _moments(k: FloatArray) -> tuple[Moment, Moment, Moment]:
     return (k[0], k[7]), (k[1], k[8]), (k[3], k[9])
 
 
-def _turned(moment: Moment, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Real and imaginary part of (c + i s) exp(i angle) for a moment (c, s).
+def _cosine(moment: Moment, angle: FloatArray) -> FloatArray:
+    """Real part of (c + i s) exp(i angle) for a moment (c, s).
 
-    They are written out, so that they stay analytic in `moment`: derivatives by complex steps pass
+    It is written out, so that it stays analytic in `moment`: derivatives by complex steps pass
     through.
     """
-    cosine, sine = np.cos(angle), np.sin(angle)
     along, across = moment
     if across is None:
-        return along * cosine, along * sine
-    return along * cosine - across * sine, along * sine + across * cosine
+        return along * np.cos(angle)
+    return along * np.cos(angle) - across * np.sin(angle)
+
+
+def _sine(moment: Moment, angle: FloatArray) -> FloatArray:
+    """Imaginary part of (c + i s) exp(i angle) for a moment (c, s)."""
+    along, across = moment
+    if across is None:
+        return along * np.sin(angle)
+    return along * np.sin(angle) + across * np.cos(angle)
 
 
 def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -189,7 +196,7 @@ def mass_matrix(k: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArra
     """
     first, _, _ = _moments(k)
     k3, k5 = k[2], k[4]
-    coupling, _ = _turned(first, theta[1])
+    coupling = _cosine(first, theta[1])
     return k5 + k3 + 2 * coupling, k3 + coupling, np.full_like(coupling, k3)
 
 
@@ -202,9 +209,9 @@ def passive_torque(k: FloatArray, theta: FloatArray, omega: FloatArray) -> Float
     k6, k7 = k[5], k[6]
     theta1, theta2 = theta
     omega1, omega2 = omega
-    _, k1_s2 = _turned(first, theta2)
-    k2_c12, _ = _turned(second, theta1 + theta2)
-    k4_c1, _ = _turned(fourth, theta1)
+    k1_s2 = _sine(first, theta2)
+    k2_c12 = _cosine(second, theta1 + theta2)
+    k4_c1 = _cosine(fourth, theta1)
     return np.stack(
         [
             -k1_s2 * (2 * omega1 + omega2) * omega2 + k6 * omega1 + k4_c1 + k2_c12,

@@ -170,12 +170,7 @@ def synthesise(
         files = [Path(out) / f"{arm.name}-{role}.{format}" for role in roles]
     for file in files:
         refuse_existing(file, force)
-    if plan is not None:
-        logs = run.rehearse(arm, plan, recording, progress)
-    elif schedule is not None:
-        logs = [run.with_schedule(arm, drive, recording, schedule, progress)]
-    else:
-        logs = [*run.synthesise(arm, drive, recording, progress)][: len(roles)]
+    logs = run.synthesise(arm, plan or drive, recording, progress, schedule)
     if files:
         from algid.writers import write_log
 

@@ -19,6 +19,8 @@ from algid.base.files import read_toml
 from algid.base.limits import PHYSICAL, Range
 from algid.synth.excitation import MultiSine
 
+_CASES = Path(str(resources.files("algid"))) / "cases"
+
 
 def _within(bounds: Range) -> Any:
     return Field(ge=bounds[0], le=bounds[1], allow_inf_nan=False)
@@ -117,11 +119,6 @@ class _TorqueTable(_Table):
     joint1: _JointTorque
     joint2: _JointTorque
 
-    def multi_sine(self) -> MultiSine:
-        """The torque of both joints."""
-        one, two = self.joint1.model_dump(), self.joint2.model_dump()
-        return MultiSine(**{name: (tuple(one[name]), tuple(two[name])) for name in one})
-
 
 class _CaseFile(_Table):
     arm: _ArmTable
@@ -132,8 +129,7 @@ class _CaseFile(_Table):
 
 def case_names() -> list[str]:
     """Names of the cases that ship with algid."""
-    files = [Path(entry.name) for entry in _folder().iterdir()]
-    return sorted(file.stem for file in files if file.suffix == ".toml")
+    return sorted(file.stem for file in _CASES.glob("*.toml"))
 
 
 def load_case(name: str) -> Case:
@@ -144,29 +140,23 @@ def load_case(name: str) -> Case:
     SettingError
         If there is neither such a case nor such a file, or the file does not describe an arm.
     """
-    if name in case_names():
-        with resources.as_file(_folder() / f"{name}.toml") as path:
-            return _read_case(path)
-    if name.endswith(".toml"):
-        return _read_case(Path(name))
-    raise SettingError(
-        f"{name}: no such case; expected {', '.join(case_names())} or a .toml file that describes "
-        "an arm"
-    )
-
-
-def _folder() -> Any:
-    return resources.files("algid") / "cases"
-
-
-def _read_case(path: Path) -> Case:
+    path = _CASES / f"{name}.toml" if name in case_names() else Path(name)
+    if not path.name.endswith(".toml"):
+        raise SettingError(
+            f"{name}: no such case; expected {', '.join(case_names())} or a .toml file that "
+            "describes an arm"
+        )
     content = read_toml(path, _CaseFile)
+    torque = None
+    if content.torque is not None:
+        one, two = content.torque.joint1.model_dump(), content.torque.joint2.model_dump()
+        torque = MultiSine(**{name: (tuple(one[name]), tuple(two[name])) for name in one})
     return Case(
         name=path.stem,
         arm=content.arm.arm(),
         payload=content.payload.m_p,
         place=(content.payload.x, content.payload.y),
         inertia=content.payload.J,
-        torque=None if content.torque is None else content.torque.multi_sine(),
-        paper_error_percent=dict(content.paper_error_percent),
+        torque=torque,
+        paper_error_percent=content.paper_error_percent,
     )

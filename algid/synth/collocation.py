@@ -11,8 +11,9 @@ a by δ, with A = ∂α/∂θ and B = ∂α/∂ω in the window's middle, r = α
     (I − A ⊗ Q² − B ⊗ Q) δ = r + (A ⊗ 1) δθ₀ + (A ⊗ q + B ⊗ 1) δω₀ = r + C δx
 
 so that a piece's δ is N (r + C δx), and the starts follow each other as δx' = E δx + L N r: no
-system is larger than a piece. The method has order 2s, and between the nodes its polynomial, so
-that a sample costs no step.
+system is larger than a piece. The sums over the pieces before, Σ E^j L N r, double their reach at
+each step (Hillis and Steele 1986). The method has order 2s, and between the nodes its polynomial,
+so that a sample costs no step.
 
 ======  =======================================================  ==========
 symbol  name                                                     shape
@@ -28,8 +29,6 @@ t       times at which states are asked for                      (N,)
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 
 import numpy as np
@@ -41,17 +40,16 @@ from algid.base.limits import PHYSICAL
 Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
 """Accelerations (n, M) from angles (n, M) and velocities (n, M), at times set before."""
 
-NODES = 16
+NODES = 12
 TOLERANCE = 1e-12
 LONGEST = 0.05  # s, of a piece: nothing of interest changes unseen within it
 SHORTEST = 1e-9  # s
 TURNS = 10
 """What the iteration of a window may take: more, and it is too long."""
-PIECES, MOST_PIECES = 3, 50
+PIECES, MOST_PIECES = 6, 50
 """Pieces in a window, and between breaks: more cost more turns, or more to carry on, than they
 save in calls."""
 _SLOPE = 1e-6  # rad and rad/s, for the derivatives of α: they only steer the iteration
-
 
 _X, _WEIGHTS = leggauss(NODES)
 _ORDERS = np.arange(NODES)
@@ -69,38 +67,10 @@ def _integrals(x: FloatArray) -> FloatArray:
 _TO_NODES = _integrals(_X) @ _COEFFICIENTS
 
 
-@dataclass(frozen=True)
-class Window:
-    """A window's polynomials: rates (2n, P, s) of the state (2n,) at `edges` (P + 1,)."""
-
-    edges: FloatArray
-    state: FloatArray
-    rates: FloatArray
-
-    @cached_property
-    def half(self) -> FloatArray:
-        """Half the length of each piece (P,), s."""
-        return 0.5 * np.diff(self.edges)
-
-    @cached_property
-    def starts(self) -> FloatArray:
-        """States at the edges (2n, P + 1)."""
-        steps = self.half * (self.rates @ _WEIGHTS)
-        return np.cumsum(np.concatenate([self.state[:, None], steps], axis=1), axis=1)
-
-    def between(self, t: FloatArray) -> FloatArray:
-        """States (2n, N) at the times `t` (N,) within the window."""
-        piece = np.clip(np.searchsorted(self.edges, t, side="left") - 1, 0, self.half.size - 1)
-        x = (t - self.edges[piece]) / self.half[piece] - 1.0
-        coefficients = (self.rates @ _COEFFICIENTS.T)[:, piece]
-        within = np.einsum("jns,ns->jn", coefficients, _integrals(x))
-        return self.starts[:, piece] + self.half[piece] * within
-
-    def resolved(self) -> bool:
-        """Whether the last two of each polynomial's coefficients are below the tolerance."""
-        last = self.half[:, None] * np.abs(self.rates @ _COEFFICIENTS[-2:].T)
-        scale = np.maximum(1.0, np.abs(self.starts).max(axis=1))
-        return bool(np.all(last <= TOLERANCE * scale[:, None, None]))
+def _edges(start: FloatArray, rates: FloatArray, half: FloatArray) -> FloatArray:
+    """The integral (n, P + 1) of rates (n, P, s) where pieces begin and end, from `start` (n,)."""
+    steps = half * (rates @ _WEIGHTS)
+    return np.cumsum(np.concatenate([start[:, None], steps], axis=1), axis=1)
 
 
 def integrate(
@@ -136,34 +106,44 @@ def integrate(
     ArithmeticError
         If the motion grows without bound, or is faster than any arm moves.
     """
-    breaks = np.append(
-        [] if corners is None else corners[(corners > t[0]) & (corners < t[-1])], t[-1]
-    )
+    breaks = t[-1:]
+    if corners is not None:
+        breaks = np.append(corners[(corners > t[0]) & (corners < t[-1])], breaks)
     states = np.empty((start.size, t.size))
     states[:, 0] = state = start
     longest, done, now = LONGEST, 1, float(t[0])
     while done < t.size:
+        # from break to break as far as a piece may reach, or whole pieces before the first one
+        ahead = breaks[np.searchsorted(breaks, now, side="right") :][:MOST_PIECES]
+        ends = ahead[ahead <= now + longest]
+        if not ends.size:
+            count = min(PIECES, int((ahead[0] - now) / longest))
+            ends = now + longest * np.arange(1, count + 1)
+        edges = np.append(now, ends)
+        half = 0.5 * np.diff(edges)
         # a window that is too long may leave all bounds
         with np.errstate(over="ignore", invalid="ignore"):
-            # from break to break as far as a piece may reach, or whole pieces before the first one
-            ahead = breaks[np.searchsorted(breaks, now, side="right") :][:MOST_PIECES]
-            ends = ahead[ahead <= now + longest]
-            if not ends.size:
-                count = min(PIECES, int((ahead[0] - now) / longest))
-                ends = now + longest * np.arange(1, count + 1)
-            window, turns = _solved(accelerate_at, state, np.append(now, ends))
-        if window is None:
+            rates, turns = _rates(accelerate_at, state, edges)
+            starts = _edges(state, rates, half)
+            # the last two coefficients of each polynomial must be below the tolerance
+            last = half[:, None] * np.abs(rates @ _COEFFICIENTS[-2:].T)
+            scale = np.maximum(1.0, np.abs(starts).max(axis=1))
+            resolved = turns < TURNS and np.all(last <= TOLERANCE * scale[:, None, None])
+        if not resolved:
             longest *= 0.5
             if longest < SHORTEST:
                 raise ArithmeticError(f"the motion grows without bound beyond {now:.6g} s")
             continue
-        now, state = float(window.edges[-1]), window.starts[:, -1]
+        now, state = float(edges[-1]), starts[:, -1]
         if np.abs(state[state.size // 2 :]).max() > PHYSICAL.speed[1]:  # steps would become tiny
             raise ArithmeticError(
                 f"the motion is faster than {PHYSICAL.speed[1]:g} rad/s beyond {now:.6g} s"
             )
         until = int(np.searchsorted(t, now, side="right"))
-        states[:, done:until] = window.between(t[done:until])
+        piece = np.searchsorted(edges, t[done:until], side="left") - 1
+        x = (t[done:until] - edges[piece]) / half[piece] - 1.0
+        within = np.einsum("jns,ns->jn", (rates @ _COEFFICIENTS.T)[:, piece], _integrals(x))
+        states[:, done:until] = starts[:, piece] + half[piece] * within
         done = until
         longest = min(LONGEST, longest * (1.25 if turns < TURNS // 2 else 1.0))
         if reached is not None:
@@ -171,83 +151,79 @@ def integrate(
     return states
 
 
-def _solved(
+def _rates(
     accelerate_at: Callable[[FloatArray], Acceleration], state: FloatArray, edges: FloatArray
-) -> tuple[Window | None, int]:
-    """The window between `edges` (P + 1,), and how many turns it took.
+) -> tuple[FloatArray, int]:
+    """Rates (2n, P, s) of the state at the nodes between `edges` (P + 1,), and turns it took.
 
-    None where it is too long.
+    `TURNS` where the iteration does not end.
     """
-    n = state.size // 2
-    half = 0.5 * np.diff(edges)[:, None]
-    times = edges[:-1, None] + half * (1 + _X)
-    accelerate = accelerate_at(times.ravel())
-    inverse, by_start, ends, carry = _newton(accelerate_at, edges, state)
+    n, pieces = state.size // 2, edges.size - 1
+    half = 0.5 * np.diff(edges)
+    accelerate = accelerate_at((edges[:-1, None] + half[:, None] * (1 + _X)).ravel())
+    inverse, by_start, ends, powers = _newton(accelerate_at, edges, state)
 
-    def integral(start: FloatArray, rate: FloatArray) -> FloatArray:
-        """`start` (n,) and ∫ `rate` from the window's start, (n, P, s)."""
-        scaled = half * rate
-        reached = start[:, None] + np.cumsum(scaled @ _WEIGHTS, axis=1)
-        begins = np.concatenate([start[:, None], reached[:, :-1]], axis=1)
-        integrals: FloatArray = scaled @ _TO_NODES.T + begins[:, :, None]
+    def integral(start: FloatArray, rates: FloatArray) -> FloatArray:
+        """`start` (n,) and ∫ `rates` (n, P, s) from the window's start."""
+        begins = _edges(start, rates, half)[:, :-1, None]
+        integrals: FloatArray = (half[:, None] * rates) @ _TO_NODES.T + begins
         return integrals
 
-    alpha = np.zeros((n, *times.shape))
+    alpha = np.zeros((n, pieces, NODES))
     before = inf
     for turn in range(TURNS):
         omega = integral(state[n:], alpha)
         theta = integral(state[:n], omega)
         now = accelerate(theta.reshape(n, -1), omega.reshape(n, -1)).reshape(alpha.shape)
-        rest = (now - alpha).transpose(1, 0, 2).reshape(half.size, -1)
-        starts = (carry @ (rest @ ends.T).ravel()).reshape(half.size, 2 * n)
+        rest = (now - alpha).transpose(1, 0, 2).reshape(pieces, -1)
+        starts = np.concatenate([np.zeros((1, 2 * n)), rest[:-1] @ ends.T])
+        for order, power in enumerate(powers):
+            reach = 2**order
+            starts[reach:] += starts[:-reach] @ power.T
         change = rest @ inverse.T + starts @ by_start.T
-        alpha = alpha + change.reshape(half.size, n, -1).transpose(1, 0, 2)
+        alpha = alpha + change.reshape(pieces, n, -1).transpose(1, 0, 2)
         size = float(np.abs(change).max()) * float(edges[-1] - edges[0])
         if not size < before:  # also where it is no number
             break
         # what is left where each turn shrinks the change as this one did
         left = size * size / (before - size) if before < inf else size
         if left <= TOLERANCE * max(1.0, float(np.abs(omega).max())):
-            rates = np.concatenate([integral(state[n:], alpha), alpha])
-            window = Window(edges, state, rates)
-            return (window, turn) if window.resolved() else (None, turn)
+            return np.concatenate([integral(state[n:], alpha), alpha]), turn
         before = size
-    return None, TURNS
-
-
-def _kron(a: FloatArray, b: FloatArray) -> FloatArray:
-    """A ⊗ B of (i, j) and (k, l): (ik, jl). NumPy's own takes longer than what it is for."""
-    outer: FloatArray = a[:, None, :, None] * b[None, :, None, :]
-    return outer.reshape(a.shape[0] * b.shape[0], -1)
+    return np.concatenate([omega, alpha]), TURNS
 
 
 def _newton(
     accelerate_at: Callable[[FloatArray], Acceleration], edges: FloatArray, state: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, list[FloatArray]]:
     """What a piece makes of its defects r (ns,) and of a change of its start δx (2n,).
 
     N (ns, ns): δ from r; N C (ns, 2n): δ from δx; L N (2n, ns): the change of the next start from
-    r; and (P 2n, P 2n), which carries changes of starts on. They steer the iteration alone, so
-    that all pieces may pass for equally long.
+    r; and E, E², E⁴ … (2n, 2n), which carry changes of starts on. They steer the iteration alone,
+    so that all pieces may pass for equally long.
     """
     n, pieces = state.size // 2, edges.size - 1
     half = 0.5 * (edges[-1] - edges[0]) / pieces
     # in the middle of the window, as far as its start tells where that is
-    middle = np.concatenate([state[:n] + pieces * half * state[n:], state[n:]])[:, None]
-    moved = middle + _SLOPE * np.concatenate([np.zeros((2 * n, 1)), np.eye(2 * n)], axis=1)
+    middle = np.append(state[:n] + pieces * half * state[n:], state[n:])[:, None]
+    moved = np.hstack([middle, middle + _SLOPE * np.eye(2 * n)])
     alpha = accelerate_at(np.full(2 * n + 1, edges[0] + pieces * half))(moved[:n], moved[n:])
     slopes = (alpha[:, 1:] - alpha[:, :1]) / _SLOPE
-    A, B = slopes[:, :n], slopes[:, n:]
-    Q, weights, one = half * _TO_NODES, half * _WEIGHTS[None], np.ones((NODES, 1))
-    inverse = np.linalg.inv(np.eye(n * NODES) - _kron(A, Q @ Q) - _kron(B, Q))
-    by_start = inverse @ np.hstack([_kron(A, one), _kron(A, Q @ one) + _kron(B, one)])
-    ends = np.vstack([_kron(np.eye(n), weights @ Q), _kron(np.eye(n), weights)])
-    still = np.eye(2 * n)
-    still[:n, n:] = 2 * half * np.eye(n)
-    step = still + ends @ by_start
-    powers = [np.zeros_like(step), np.eye(2 * n)]
-    while len(powers) < pieces + 1:
-        powers.append(step @ powers[-1])
-    apart = np.subtract.outer(np.arange(pieces), np.arange(pieces)).clip(0)
-    carry = np.array(powers)[apart].transpose(0, 2, 1, 3).reshape((2 * n * pieces,) * 2)
-    return inverse, by_start, ends @ inverse, carry
+    Q, weights, one = half * _TO_NODES, half * _WEIGHTS, np.ones(NODES)
+
+    def blocks(by_theta: FloatArray, by_omega: FloatArray) -> FloatArray:
+        """A ⊗ `by_theta` + B ⊗ `by_omega`."""
+        A, B = slopes[:, None, :n, None], slopes[:, None, n:, None]
+        return (A * by_theta[:, None] + B * by_omega[:, None]).reshape(n * NODES, -1)
+
+    inverse = np.linalg.inv(np.eye(n * NODES) - blocks(Q @ Q, Q))
+    none = np.zeros((NODES, 1))
+    by_theta, by_omega = blocks(one[:, None], none), blocks((Q @ one)[:, None], one[:, None])
+    by_start = inverse @ np.hstack([by_theta, by_omega])
+    sums = np.stack([weights @ Q, weights])[:, None, None]
+    ends = (np.eye(n)[:, :, None] * sums).reshape(2 * n, -1)
+    step = np.eye(2 * n) + np.diag(np.full(n, 2 * half), n) + ends @ by_start
+    powers = [step]
+    while 2 ** len(powers) < pieces:
+        powers.append(powers[-1] @ powers[-1])
+    return inverse, by_start, ends @ inverse, powers

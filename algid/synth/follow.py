@@ -57,34 +57,29 @@ def read_plan(path: Path) -> Reference:
     Raises
     ------
     SettingError
-        If there is none, or it lacks a column.
+        If there is none, it lacks a column, or it is no motion.
     """
     file = path / "trajectory.csv" if path.is_dir() else path
     try:
-        rows = csv.reader(read_text(file).splitlines())
-        names = next(rows, [])
-        values = np.array([list(map(float, row)) for row in rows], dtype=np.float64).T
+        names, *rows = csv.reader(read_text(file).splitlines())
+        values = np.array([list(map(float, row)) for row in rows]).reshape(-1, len(names)).T
+        column = dict(zip(names, values, strict=True))
+        signals = []
+        for name in ("theta", "omega", "tau", "loaded_tau"):
+            if name == "loaded_tau" and LOADED_COLUMN not in column:
+                name = "tau"
+            signals.append(np.stack([column[f"{name}1"], column[f"{name}2"]]))
+        t = column["t"] - column["t"][:1]
+    except KeyError as error:
+        raise SettingError(f"{file}: no column {error}; give what algid design wrote") from error
     except (OSError, ValueError) as error:
         raise SettingError(
             f"{file}: not the trajectory of a design ({error}); expected what algid design wrote"
         ) from error
-    missing = [name for name in COLUMNS if name not in names]
-    if missing or values.ndim != 2 or values.shape[1] < 2:
-        problem = f"no column {missing[0]}" if missing else "no motion"
-        raise SettingError(
-            f"{file}: expected {', '.join(COLUMNS)}, found {problem}; give what algid design wrote"
-        )
-    column = dict(zip(names, values, strict=True))
-    t = column["t"] - column["t"][0]
-    if not np.all(np.isfinite(values)) or np.any(np.diff(t) <= 0):
+    if t.size < 2 or not np.all(np.isfinite(values)) or np.any(np.diff(t) <= 0):
         raise SettingError(
             f"{file}: expected finite numbers at increasing times; write the design anew"
         )
-    signals = []
-    for name in ("theta", "omega", "tau", "loaded_tau"):
-        if name == "loaded_tau" and LOADED_COLUMN not in column:
-            name = "tau"
-        signals.append(np.stack([column[f"{name}1"], column[f"{name}2"]]))
     return Reference(t, *signals)
 
 

@@ -16,9 +16,6 @@ from algid.synth.follow import Reference, follow
 from algid.synth.sensors import Sensors, record, sample_times
 from algid.synth.simulator import HANGING, SimulatedMotion, simulate
 
-Reached = Callable[[float], None] | None
-"""Called with each time in s that a simulation has come to."""
-
 EXCITATIONS = ("case", "wide", "none")
 
 
@@ -58,99 +55,88 @@ def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTor
 
 
 def synthesise(
-    case: Case, torque: Torque, recording: Acquisition, progress: Progress | None = None
-) -> tuple[Log, Log]:
-    """The unloaded and the loaded log of a case, each with noise of its own.
-
-    `progress` hears how far each is.
-    """
-    initial = np.array(recording.initial)
-
-    def move(payload: float, t: FloatArray, reached: Reached) -> SimulatedMotion:
-        return simulate(case.constants(payload), torque, t, initial[:2], initial[2:], reached)
-
-    unloaded, loaded = _recorded(case, (0.0, case.payload), move, recording, progress)
-    return unloaded, loaded
-
-
-def rehearse(
-    case: Case, plan: Reference, recording: Acquisition, progress: Progress | None = None
-) -> list[Log]:
-    """Logs of a case whose controller follows a plan: unloaded and, with a payload, loaded."""
-    unloaded = case.constants(0.0)
-
-    def move(payload: float, t: FloatArray, reached: Reached) -> SimulatedMotion:
-        return follow(case.constants(payload), plan, t, unloaded, bool(payload), reached)
-
-    payloads = tuple(dict.fromkeys((0.0, case.payload)))
-    return _recorded(case, payloads, move, recording, progress)
-
-
-def _recorded(
     case: Case,
-    payloads: Sequence[float],
-    move: Callable[[float, FloatArray, Reached], SimulatedMotion],
+    drive: Torque | Reference,
     recording: Acquisition,
-    progress: Progress | None,
-) -> list[Log]:
-    """A log of each payload, whose noise is of a seed of its own."""
-    logs = []
-    for place, payload in enumerate(payloads):
-        role = "loaded" if payload else "unloaded"
-        sensors = replace(recording.sensors, seed=recording.sensors.seed + place)
-        t = sample_times(recording.rate, recording.duration, sensors)
-        motion = move(payload, t, _counted(progress, role, recording))
-        truth = Truth(case.arm, payload, case.name)
-        logs.append(record(motion, sensors, truth, f"{case.name}-{role}"))
-    return logs
-
-
-def with_schedule(
-    case: Case,
-    torque: Torque,
-    recording: Acquisition,
-    schedule: Sequence[tuple[float, float]],
     progress: Progress | None = None,
-) -> Log:
-    """A log with changes of payload: pairs of time in s, increasing, and payload in kg from then.
+    schedule: Sequence[tuple[float, float]] | None = None,
+) -> list[Log]:
+    """Logs of a case: unloaded and, with a payload, loaded; or one whose payload changes.
 
-    Before the first time the arm is unloaded. An object is grasped and let go at the tip's own
-    velocity, so that the motion has no step. The truth in the log names the schedule.
+    Parameters
+    ----------
+    case : Case
+    drive : torque, or the plan that a controller follows
+    recording : Acquisition
+        The noise of each log is of a seed of its own.
+    progress : callable
+        Hears in samples how far each log is.
+    schedule : pairs of time in s, increasing, and payload in kg from then, or None
+        Before the first time the arm is unloaded. An object is grasped and let go at the tip's own
+        velocity, so that the motion has no step. The truth in the log names the schedule.
 
     Raises
     ------
     ValueError
         If the times do not increase or a payload is negative.
     """
-    table = np.array(schedule, dtype=np.float64).reshape(-1, 2)
-    times, masses = table.T
-    if not np.all(np.isfinite(table)) or np.any(np.diff(times) <= 0) or np.any(masses < 0):
-        raise ValueError(
-            f"schedule must hold increasing times and payloads of 0 or more, got {list(schedule)}"
-        )
-    t = sample_times(recording.rate, recording.duration, recording.sensors)
+    runs: dict[str, Sequence[tuple[float, float]]] = {"unloaded": [(0.0, 0.0)]}
+    if case.payload:
+        runs["loaded"] = [(0.0, case.payload)]
+    changes: tuple[tuple[float, float], ...] = ()
+    if schedule is not None:
+        table = np.array(schedule, dtype=np.float64).reshape(-1, 2)
+        late, masses = np.diff(table[:, 0]), table[:, 1]
+        if not np.all(np.isfinite(table)) or np.any(late <= 0) or np.any(masses < 0):
+            raise ValueError(
+                "schedule must hold increasing times and payloads of 0 or more, "
+                f"got {list(schedule)}"
+            )
+        changes = tuple((time, mass) for time, mass in table.tolist())
+        runs = {"schedule": [(0.0, 0.0), *changes]}
+    logs = []
+    for place, (role, payloads) in enumerate(runs.items()):
+        sensors = replace(recording.sensors, seed=recording.sensors.seed + place)
+        t = sample_times(recording.rate, recording.duration, sensors)
+        motion = _moved(case, drive, recording, t, payloads, _counted(progress, role, recording))
+        mass = 0.0 if changes else payloads[0][1]
+        truth = Truth(case.arm, mass, case.name, changes)
+        logs.append(record(motion, sensors, truth, f"{case.name}-{role}"))
+    return logs
+
+
+def _moved(
+    case: Case,
+    drive: Torque | Reference,
+    recording: Acquisition,
+    t: FloatArray,
+    payloads: Sequence[tuple[float, float]],
+    reached: Callable[[float], None] | None,
+) -> SimulatedMotion:
+    """The arm's motion at `t` (N,), part by part with each payload from its time on."""
     state, parts = np.array(recording.initial), []
-    edges = np.clip(np.concatenate([[0.0], times, [np.inf]]), 0.0, t[-1])
-    for start, end, mass in zip(edges, edges[1:], np.append(0.0, masses), strict=False):
+    edges = np.clip([*(time for time, _ in payloads), np.inf], 0.0, t[-1])
+    for (_, mass), start, end in zip(payloads, edges, edges[1:], strict=False):
         if end <= start:
             continue
         every = np.unique(np.concatenate([[start], t[(t > start) & (t < end)], [end]]))
-        counted = _counted(progress, "schedule", recording)
-        k = case.constants(float(mass))
-        motion = simulate(k, torque, every, state[:2], state[2:], counted)
+        k = case.constants(mass)
+        if isinstance(drive, Reference):
+            motion = follow(k, drive, every, case.constants(0.0), bool(mass), reached)
+        else:
+            motion = simulate(k, drive, every, state[:2], state[2:], reached)
         rows = np.concatenate([motion.theta, motion.omega, motion.tau])
         state = rows[:4, -1]
         # a sample at the change is the first one with the payload
         own = np.isin(every, t) & ((every < end) | (end == t[-1]))
         parts.append(rows[:, own])
     signals = np.concatenate(parts, axis=1)
-    whole = SimulatedMotion(t, signals[:2], signals[2:4], signals[4:])
-    changes = tuple((time, mass) for time, mass in table.tolist())
-    truth = Truth(case.arm, 0.0, case.name, changes)
-    return record(whole, recording.sensors, truth, f"{case.name}-schedule")
+    return SimulatedMotion(t, signals[:2], signals[2:4], signals[4:])
 
 
-def _counted(progress: Progress | None, stage: str, recording: Acquisition) -> Reached:
+def _counted(
+    progress: Progress | None, stage: str, recording: Acquisition
+) -> Callable[[float], None] | None:
     """Reports in samples the time to which the simulation has come."""
     if progress is None:
         return None

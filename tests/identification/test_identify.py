@@ -382,8 +382,8 @@ def test_a_payload_without_gravity_raises_no_warning_of_numpy() -> None:
     recording = Acquisition(
         rate=500.0, duration=4.0, sensors=Sensors(position_noise=1e-4, torque_noise=1e-3)
     )
-    logs = synthesise(case, wide_multi_sine(flat, 3), recording)
-    result = identify(*logs, WEAK.but(gravity=0.0, l1=flat.l1))
+    unloaded, loaded = synthesise(case, wide_multi_sine(flat, 3), recording)
+    result = identify(unloaded, loaded, WEAK.but(gravity=0.0, l1=flat.l1))
     found = result.payload["m_p"]
     assert found.estimate == pytest.approx(case.payload, rel=0.02)
 

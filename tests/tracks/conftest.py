@@ -3,13 +3,17 @@ from __future__ import annotations
 import pytest
 
 from algid.log import Log
-from algid.synth.run import Acquisition, excitation, with_schedule
+from algid.synth.run import Acquisition, excitation, synthesise
 from tests.tracks.folders import CASE
 
 
 @pytest.fixture(scope="session")
 def picking() -> Log:
     """50 g picked and placed, without noise."""
-    return with_schedule(
-        CASE, excitation(CASE, "wide"), Acquisition(duration=4.5), [(1.5, 0.05), (3.0, 0.0)]
+    (log,) = synthesise(
+        CASE,
+        excitation(CASE, "wide"),
+        Acquisition(duration=4.5),
+        schedule=[(1.5, 0.05), (3.0, 0.0)],
     )
+    return log

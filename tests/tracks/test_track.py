@@ -17,7 +17,7 @@ from algid.identification.identify import identify
 from algid.log import Log
 from algid.model import Model
 from algid.signals.segments import segments
-from algid.synth.run import Acquisition, excitation, with_schedule
+from algid.synth.run import Acquisition, excitation, synthesise
 from algid.tracks import drift
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.cells import CELL
@@ -55,11 +55,11 @@ def test_masses_lie_within_their_intervals() -> None:
     """Those of stretches, and those of m_p(t) at two instants a stretch that have no cell in
     common.
     """
-    log = with_schedule(
+    (log,) = synthesise(
         CASE,
         excitation(CASE, "wide"),
         Acquisition(rate=250.0, duration=4.5),
-        [(1.5, 0.05), (3.0, 0.0)],
+        schedule=[(1.5, 0.05), (3.0, 0.0)],
     )
     rng = np.random.default_rng(0)
     stretches, instants = [], []
@@ -154,8 +154,3 @@ def test_a_log_carries_its_schedule(picking: Log, tmp_path: Path, suffix: str) -
     assert truth.schedule == ((1.5, 0.05), (3.0, 0.0))
     with pytest.raises(LogError, match="the payload changes; weigh it with algid track"):
         identify(path)
-
-
-def test_a_schedule_that_runs_backwards_is_refused() -> None:
-    with pytest.raises(ValueError, match="increasing times"):
-        with_schedule(CASE, excitation(CASE, "wide"), Acquisition(), [(2.0, 0.1), (1.0, 0.0)])
