@@ -15,9 +15,7 @@ from algid.base.files import whole_file
 from algid.base.limits import LIMITS
 from algid.base.progress import Progress
 from algid.base.words import counted
-from algid.fleet.changes import with_stints
-from algid.fleet.drift import FEWEST, SPAN, drifts, windows
-from algid.fleet.outliers import mislabelled, outliers
+from algid.fleet.findings import FEWEST, SPAN, followed
 from algid.notices import Notice
 from algid.physics.terms import ALWAYS, OPTIONAL
 
@@ -34,13 +32,7 @@ def _usual() -> Iterator[str]:
 PARAMETERS = tuple(_usual())
 """Those that most robots have: others would be tested on few logs."""
 MANY, FEW = 4, 2  # robots with so few logs each, which may be sessions of one
-HISTORY = ("robot", "stint")
 FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others
-FINDING = (
-    "kind", "robot", "job", "parameter", "time", "before", "value", "half", "expected", "sigmas"
-)  # fmt: skip
-"""Of a finding: drift, step, payload or outlier; its log and when; what it is, half its 95 %
-interval, what it is judged by, and its distance in standard deviations."""
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
@@ -95,9 +87,7 @@ class History:
 
     Parameters
     ----------
-    windows : as `windows` gives them, of all parameters
-    findings : drifts, steps, and logs that stand out, of each kind the clearest first: see
-        `FINDING`
+    windows, findings : as `algid.fleet.findings.followed` gives them
     roster : a row a robot: robot, logs, undated, first and last (times), latest (job), and
         tested (for drift of anything)
     jobs : every log, the latest of each robot first, as `read_jobs` gives them
@@ -161,7 +151,7 @@ class History:
 def history_of(path: Path, progress: Progress | None = None) -> History:
     """The history in ``jobs.parquet`` at `path`.
 
-    `progress` hears how many parameters have been followed.
+    `progress` hears how many robots have been followed.
 
     Raises
     ------
@@ -181,26 +171,9 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
             "robot's logs a folder "
             "of their own, or name robots in a manifest, and run algid batch again"
         )
-    jobs, steps = with_stints(jobs, names)
-    followed, far = [], [mislabelled(jobs)]
-    for place, name in enumerate(names):
-        if progress is not None:
-            progress("following", place, len(names))
-        followed.append(windows(jobs, name, HISTORY))
-        far.append(outliers(jobs, name, HISTORY))
-    history = pl.concat(followed)
-    roster = _roster(jobs, history)
-    drifting = drifts(history).join(roster.select("robot", job="latest"), on="robot", how="left")
-    standing_out = pl.concat(far).sort(pl.col("sigmas").abs(), descending=True)
-    findings = pl.concat([drifting, steps, standing_out], how="diagonal_relaxed")
-    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
-    nameless = finished.height - jobs.height
-    return History(history, findings.select(FINDING), roster, listed, nameless)
-
-
-def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
-    tested = history.filter(pl.col("p").is_not_nan())["robot"].unique().implode()
-    return (
+    windows, findings = followed(jobs, names, progress)
+    tested = windows.filter(pl.col("p").is_not_nan())["robot"].unique().implode()
+    roster = (
         jobs.group_by("robot")
         .agg(
             pl.len().alias("logs"),
@@ -212,6 +185,8 @@ def _roster(jobs: pl.DataFrame, history: pl.DataFrame) -> pl.DataFrame:
         .with_columns(tested=pl.col("robot").is_in(tested))
         .sort("robot")
     )
+    listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
+    return History(windows, findings, roster, listed, finished.height - jobs.height)
 
 
 def write_history(history: History, out: Path, batch: Path) -> list[Path]:

@@ -18,13 +18,12 @@ from algid.base.significance import NORMAL
 from algid.base.text import ABSENT, joined, significant, unit_text, visible
 from algid.base.verdict import Verdict, graded
 from algid.base.words import counted
-from algid.fleet.changes import ALPHA as CHANGED
-from algid.fleet.drift import ALPHA, SPAN
+from algid.fleet.findings import ALPHA, CHANGED, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
 from algid.notices import Notice
 from algid.report.document import Document, Section, Table
-from algid.report.plot import BLUE, GREY, ORANGE, RED, Panels, Plot
+from algid.report.plot import GREY, ORANGE, RED, Panels, Plot
 
 KINDS = {"drift": "drift", "step": "step", "payload": "payload label", "outlier": "outlier"}
 """Of findings, in words."""
@@ -201,30 +200,24 @@ def overview(history: History) -> Plot | None:
     panels = Panels(titles, 2, 230)
     for place, (robot, name) in enumerate(pairs):
         own = (pl.col("robot") == robot) & (pl.col("parameter") == name)
-        std = pl.col(f"{name}_std")
-        logs = history.jobs.filter(
-            pl.col("robot") == robot, pl.col("time").is_not_null(), std > 0
-        ).head(MOST_POINTS)
+        of_robot = history.jobs.filter(pl.col(f"{name}_std") > 0, robot=robot)
+        logs = of_robot.drop_nulls("time").head(MOST_POINTS)
         half = (NORMAL * logs[f"{name}_std"]).to_list()
         bars = {"type": "data", "array": half, "thickness": 1, "width": 0}
-        dots = _dates(logs["time"]), _numbers(logs[name])
-        panels.dots(place, *dots, "log", BLUE, 5, error_y=bars)
-        days = found.filter(robot=robot, kind="step")["time"].unique().sort()
-        for day in _dates(days).tolist():
+        panels.dots(place, _dates(logs["time"]), _numbers(logs[name]), "log", size=5, error_y=bars)
+        for day in _dates(found.filter(robot=robot, kind="step")["time"].unique().sort()).tolist():
             panels.line(place, x=day, colour=RED)
-        # a window that holds nothing at each change: no line leads across it
         windows = history.windows.filter(own)
-        breaks = pl.DataFrame({"end": days}, schema={"end": windows.schema["end"]})
-        windows = pl.concat([windows, breaks], how="diagonal").sort("end", "month")
-        panels.curve(place, _dates(windows["end"]), _numbers(windows["mean"]), "mean", GREY, 2)
-        drifting = windows.filter("drift")
-        outliers = found.filter(own, kind="outlier").drop_nulls("time")
-        if drifting.height:
-            dots = _dates(drifting["end"]), _numbers(drifting["mean"])
-            panels.dots(place, *dots, "drift", ORANGE, 9, "diamond")
-        if outliers.height:
-            dots = _dates(outliers["time"]), _numbers(outliers["value"])
-            panels.dots(place, *dots, "outlier", RED, 13, "circle-open")
+        for stint in windows.partition_by("stint", maintain_order=True):
+            panels.curve(place, _dates(stint["end"]), _numbers(stint["mean"]), "mean", GREY, 2)
+        drifting, outliers = windows.filter("drift"), found.filter(own, kind="outlier")
+        for marked, end, y, name, colour, size, symbol in (
+            (drifting, "end", "mean", "drift", ORANGE, 9, "diamond"),
+            (outliers.drop_nulls("time"), "time", "value", "outlier", RED, 13, "circle-open"),
+        ):
+            if marked.height:
+                x = _dates(marked[end])
+                panels.dots(place, x, _numbers(marked[y]), name, colour, size, symbol)
         panels.axes(place, {"type": "date"})
     reading = (
         f"A dot is a log ± {NORMAL:.2f} standard deviations, grey the mean of the {SPAN} months "
