@@ -3,54 +3,40 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 from algid.base.errors import LogError
 from algid.log import Log
 from algid.notices import Remedy
-from algid.readers.formats import Entry, entries_at
+from algid.readers.formats import entries_at
 
 _TORQUE = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
 _CURRENT = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
-_COMMANDED = re.compile(r"cmd|command|desired|target|limit|(?<![a-z])des(?![a-z])", re.IGNORECASE)
+_OTHER = re.compile(
+    r"cmd|command|desired|target|limit|(?<![a-z])des(?![a-z])|\(empty\)$", re.IGNORECASE
+)
 _MOST = 3
 
 
 def torques_beside(log: Log, channel: str) -> list[Remedy]:
-    """What else in the log's file may be the torque `channel`, and the settings that take it."""
+    """What else in the log's file may be the torque `channel`, and the settings that take it.
+
+    Torques come before currents, and those of the same joint, by its number, before all others.
+    """
     try:
         entries = entries_at(Path(log.origin.path))
     except LogError:  # a log in memory, or a file that is gone
         return []
-    used = set(log.origin.mapping.values())
-    unused = [(source, one) for source, one in _candidates(entries, channel) if source not in used]
-    # of the same joint first, by its number
-    unused.sort(key=lambda pair: channel[-1] not in pair[0])
-    return [remedy for _, remedy in unused[:_MOST]]
-
-
-def _candidates(entries: tuple[Entry, ...], channel: str) -> Iterator[tuple[str, Remedy]]:
-    """Name and remedy of each channel that may be a torque: torques first, then currents."""
-    places, bare = [], []
-    for entry in entries:
-        for field in entry.fields:
-            places.append((entry.name, field))
-        if not entry.fields:
-            bare.append(("", entry.name))
-    places += bare
+    used, found = set(log.origin.mapping.values()), []
     amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
     for pattern, unit in ((_TORQUE, {}), (_CURRENT, amperes)):
-        for topic, field in places:
-            if (
-                pattern.search(field)
-                and not _COMMANDED.search(field)
-                and not field.endswith("(empty)")
-            ):
+        for entry in entries:
+            for field in entry.fields or (entry.name,):
                 home, source = {}, field
-                if topic:
-                    home, source = {f"{channel}.topic": topic}, f"{topic}: {field}"
-                yield (
-                    source,
-                    Remedy({**home, f"{channel}.source": field, **unit}, "the log also holds"),
-                )
+                if entry.fields:
+                    home, source = {f"{channel}.topic": entry.name}, f"{entry.name}: {field}"
+                if pattern.search(field) and not _OTHER.search(field) and source not in used:
+                    takes = {**home, f"{channel}.source": field, **unit}
+                    found.append((channel[-1] not in source, Remedy(takes, "the log also holds")))
+    found.sort(key=lambda one: one[0])
+    return [remedy for _, remedy in found[:_MOST]]

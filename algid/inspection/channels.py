@@ -42,28 +42,15 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
         if joint == log.origin.reading.passive:
             continue
         name = f"tau{joint}"
-        other = Remedy({f"{name}.source": None}, "name the measured torque")
         largest, what = float(np.abs(tau).max()), _source(log, name)
-        if largest == 0:
-            remedies = tuple(torques_beside(log, name)) or (other,)
-            if log.tau[2 - joint].any() and not log.origin.reading.passive:
-                remedies += (Remedy({"passive": joint}, "for a joint without a motor"),)
-            yield Notice(
-                "EFFORT_ZERO",
-                numbers={"case": "zero", "channel": what},
-                refuse=True,
-                remedies=remedies,
-            )
-        elif largest < _DENORMAL:
-            seen = {"channel": what, "largest": largest}
-            yield Notice(
-                "EFFORT_ZERO", numbers={"case": "tiny"} | seen, refuse=True, remedies=(other,)
-            )
-        elif tau.min() == tau.max():
-            seen = {"channel": what, "value": float(tau[0])}
-            yield Notice(
-                "EFFORT_ZERO", numbers={"case": "constant"} | seen, refuse=True, remedies=(other,)
-            )
+        if largest < _DENORMAL or tau.min() == tau.max():
+            case = "constant" if largest >= _DENORMAL else "tiny" if largest else "zero"
+            seen = {"case": case, "channel": what, "largest": largest, "value": float(tau[0])}
+            remedies = torques_beside(log, name) if case == "zero" else []
+            remedies = remedies or [Remedy({f"{name}.source": None}, "name the measured torque")]
+            if case == "zero" and log.tau[2 - joint].any() and not log.origin.reading.passive:
+                remedies.append(Remedy({"passive": joint}, "for a joint without a motor"))
+            yield Notice("EFFORT_ZERO", numbers=seen, refuse=True, remedies=tuple(remedies))
         elif joint not in cut_off:
             share = saturated_share(tau)
             if share > 0.01:

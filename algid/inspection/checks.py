@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import cache, partial
 
 from algid.base.errors import LogError
+from algid.estimators.convention_search import Judgement
 from algid.estimators.saturation import Saturation
 from algid.inspection.channels import (
     angles,
@@ -17,8 +18,7 @@ from algid.inspection.channels import (
     spikes,
 )
 from algid.inspection.clipping import saturation
-from algid.inspection.conventions import advised, is_right, is_to_scale, judged, mend
-from algid.inspection.dynamics import dynamic_figures, gravity_findings
+from algid.inspection.conventions import doubted, is_to_scale, judged, mend
 from algid.inspection.sampling import rests, sampling
 from algid.log import Log
 from algid.notices import Notice, Remedy
@@ -35,6 +35,7 @@ def examine(
     whole: bool = True,
     alone: bool = True,
     known: Saturation | None = None,
+    tried: Callable[[], Judgement | None] | None = None,
 ) -> tuple[Notice, ...]:
     """Everything that the checks find in a log.
 
@@ -53,6 +54,8 @@ def examine(
         False where the conventions of several logs are judged together: see `mends`.
     known : Saturation
         Limits of torques that the motion shows, where they are known already.
+    tried : callable
+        Gives what all conventions say of the log, where that is asked for elsewhere too.
 
     Returns
     -------
@@ -61,7 +64,7 @@ def examine(
     """
     if len(log) < 4:
         return ()
-    tried = cache(partial(judged, log, gravity=gravity > 0))
+    tried = tried or cache(partial(judged, log, gravity=gravity > 0))
     external = effort == "external"
     if known is None:
         known = saturation(log, gravity=gravity, effort=effort)
@@ -76,27 +79,13 @@ def examine(
     every += sampling(log)
     every += rests(log, whole)
     notices = [yielding(notice, log.origin.reading.accepted) for notice in every]
-    if external or any(notice.refuse for notice in notices):
-        return tuple(notices)
-    if not alone:
+    if external or not alone or any(notice.refuse for notice in notices):
         return tuple(notices)
     mended = mend(log, tried())
     if mended is not None:
-        notices.append(mended.notice)
-    elif gravity > 0 and not is_right(tried()):
-        notices += _of_gravity(log)
-    return tuple(notices)
-
-
-def _of_gravity(log: Log) -> list[Notice]:
-    """What the torque at rest says against how angles were read; empty where nothing does."""
-    figures = dynamic_figures(log)
-    if figures is None:
-        return []
-    suspicion = gravity_findings(figures)
-    if suspicion is None:
-        return []
-    return [advised(log, suspicion)]
+        return *notices, mended.notice
+    doubt = doubted(log, tried()) if gravity > 0 else None
+    return (*notices, doubt) if doubt else tuple(notices)
 
 
 def noticed(

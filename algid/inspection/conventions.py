@@ -7,17 +7,16 @@ that change the reading.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import degrees, isclose, pi, remainder
 from typing import Any, Protocol
 
 import numpy as np
 
 from algid.estimators.convention_search import (
+    EXPLAINED,
     MOST_LOGS,
-    Candidate,
     Judgement,
     Recorded,
     judge_together,
@@ -25,8 +24,8 @@ from algid.estimators.convention_search import (
     zeroed_together,
 )
 from algid.estimators.conventions import AS_READ, Convention
-from algid.inspection.dynamics import Suspicion
 from algid.log import ZEROS, Log, Origin, Reading
+from algid.model import K2, K3, K4, K5
 from algid.notices import Notice, Remedy, flat
 from algid.signals.segments import stretches
 
@@ -35,6 +34,17 @@ _SMALL = np.pi / 4
 _MENTIONED = 0.01  # rad: a zero that is off by less is not mentioned
 _SAME = 1e-3  # of a scale or rad: as good as equal
 _DEGREES, _TURNS = 180 / pi, 1 / (2 * pi)  # scales of angles that are no motor's
+# weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m
+_LEAST_PULL = 1.3
+_OF_WEIGHT = 0.01  # of a torque: what weight must explain to be there
+_CLEAR = 5.0  # of summed log residuals: what sets two conventions apart in the shortest log
+_OTHER_WAY = Convention(torque_signs=(-1, -1))
+GUESSES = (
+    _OTHER_WAY,
+    Convention(signs=(-1, -1), torque_signs=(-1, -1)),
+    *(replace(one, zero=(off, 0.0)) for one in (AS_READ, _OTHER_WAY) for off in (-pi / 2, pi / 2)),
+)
+"""Under which gravity pulls down where it pulls up, or to a side, as the log was read."""
 
 
 class Read(Protocol):
@@ -179,36 +189,40 @@ def mends(
     return own
 
 
-def advised(log: Log, suspicion: Suspicion) -> Notice:
-    """The notice of a suspicion with its remedies: those under which the log shows a real arm."""
-    return replace(suspicion.notice, remedies=tuple(_tried(log, suspicion, recorded(log))))
+def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
+    """What gravity says against a log as it was read, of which no one convention is sure.
 
-
-def _tried(log: Log, suspicion: Suspicion, parts: list[Recorded]) -> Iterator[Remedy]:
-    """The remedies that are physical and explain the torque."""
-    if suspicion.weightless:
+    None where the log is right, or shows a real arm no better under any of `GUESSES` or another
+    zero.
+    """
+    if judgement is None or is_right(judgement):
+        return None
+    as_read, parts = judgement.as_read, recorded(log)
+    k = dict(zip(as_read.names, as_read.k.tolist(), strict=True))
+    left, pull = float(as_read.left.max()), math.hypot(k[K2], k[K4])
+    if left < EXPLAINED and pull < _LEAST_PULL * abs(k[K3] + k[K5]):
         weightless = tried_together(parts, AS_READ, gravity=False)
-        if weightless is not None and weightless.convincing:
-            yield Remedy({"effort": "gravity-compensated"}, "for such a driver")
-            yield Remedy({"gravity": 0}, "for a horizontal plane")
-    together = partial(tried_together, parts)
-    real = [one.convention for one in _tried_of(suspicion, together) if one.convincing]
-    if suspicion.free_zero and not real:
-        zeroed = _tried_of(suspicion, partial(zeroed_together, parts))
-        real = [one.convention for one in zeroed if one.convincing]
-    if not real:  # friction may hide inertia, and not where gravity pulls
-        real = [one.convention for one in _tried_of(suspicion, together) if one.plausible]
-    for convention in real:
-        settings = _settings(convention, log)
-        if settings and suspicion.agrees(convention.zero[0]):
-            yield Remedy(flat(settings))
-
-
-def _tried_of(
-    suspicion: Suspicion, tried: Callable[[Convention], Candidate | None]
-) -> list[Candidate]:
-    """What the log says under each guess; nothing under one that it cannot be tried by."""
-    return [one for guess in suspicion.guesses if (one := tried(guess)) is not None]
+        if weightless and weightless.convincing and weightless.left.max() < left + _OF_WEIGHT:
+            driver = Remedy({"effort": "gravity-compensated"}, "for such a driver")
+            remedies = driver, Remedy({"gravity": 0}, "for a horizontal plane")
+            return Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}, remedies=remedies)
+    guesses = [tried_together(parts, guess) for guess in GUESSES]
+    turned = [zeroed_together(parts, family) for family in (AS_READ, _OTHER_WAY)]
+    turned = [one for one in turned if one and abs(one.zero[0]) > _SMALL]
+    every = [one for one in (*guesses, *turned) if one and one.plausible]
+    best = min((one.score for one in every), default=math.inf)
+    if as_read.plausible and as_read.score < best + _CLEAR:
+        return None
+    near = [one for one in every if one.score < best + _CLEAR]
+    # a named zero or sign before the zeros that fit best
+    named = [one for one in near if one in guesses] or near
+    if not named:
+        return None
+    offered = tuple(Remedy(flat(_settings(one.convention, log))) for one in named)
+    if named[0].zero[0]:
+        turn = {"turn": -degrees(named[0].zero[0])}
+        return Notice("WRONG_ZERO", numbers=turn, remedies=offered)
+    return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
 
 
 def _clauses(convention: Convention) -> Iterator[str]:
@@ -247,8 +261,11 @@ def _clauses(convention: Convention) -> Iterator[str]:
             yield f"the zero of {what} is off by {degrees(off):.4g}°"
 
 
-def _settings(convention: Convention, log: Read) -> dict[str, Any]:
-    """The settings that read the log by `convention`, over those that it was read by."""
+def _settings(convention: Convention, log: Read, off: float = _SAME) -> dict[str, Any]:
+    """The settings that read the log by `convention`, over those that it was read by.
+
+    A named zero stands for one that is `off` by as many rad.
+    """
     reading = log.origin.reading
     mending: dict[str, Any] = dict(_sources(convention, log))
     for joint in (0, 1):
@@ -275,22 +292,14 @@ def _settings(convention: Convention, log: Read) -> dict[str, Any]:
         mending["second_angle"] = "absolute"
     if convention.base:
         mending["drive"] = "base"
-    mending |= _zeros(convention, reading)
+    mending |= _zeros(convention, reading, off)
     return {name: value for name, value in mending.items() if value != {}}
 
 
 def zeroed(log: Read, turn: float, half: float) -> Remedy:
     """What reads θ1 further on by `turn` ± `half` rad, by a named zero that lies within that."""
-    reading = log.origin.reading
-    own = ZEROS[reading.zero] + reading.offsets[0]
-    if "theta1" in reading.channels:
-        own = ZEROS[reading.zero] + reading.channels["theta1"].offset
-    left = min((remainder(own + turn - zero, 2 * pi) for zero in ZEROS.values()), key=abs)
-    if abs(left) <= half:
-        turn -= left
-    else:
-        turn = round(turn, 3)
-    return Remedy(flat(_settings(replace(AS_READ, zero=(turn, 0.0)), log)))
+    convention = replace(AS_READ, zero=(round(turn, 3), 0.0))
+    return Remedy(flat(_settings(convention, log, half)))
 
 
 def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
@@ -316,7 +325,7 @@ def _own_sign(reading: Reading, name: str) -> int:
     return reading.channels[name].sign * reading.signs[int(name[-1]) - 1]
 
 
-def _zeros(convention: Convention, reading: Reading) -> dict[str, Any]:
+def _zeros(convention: Convention, reading: Reading, within: float) -> dict[str, Any]:
     """The profile's zero and offsets, to add to recorded angles once signs and scales are right."""
     own = np.zeros(2)  # what the channels' offsets added as the log was read
     for joint, name in enumerate(("theta1", "theta2")):
@@ -334,8 +343,11 @@ def _zeros(convention: Convention, reading: Reading) -> dict[str, Any]:
     moved = moved + convention.zero
     if np.allclose(moved, read, rtol=1e-9, atol=_SAME) and not convention.absolute:
         return {}
-    zero, offset = _nearest_zero(float(moved[0]), reading.zero)
-    second = float(moved[1])
+    # the nearest of the named zeros, the profile's own first, and what is left of it as an offset
+    lefts = {name: remainder(float(moved[0]) - turned, 2 * pi) for name, turned in ZEROS.items()}
+    near = [name for name in (reading.zero, *ZEROS) if abs(lefts[name]) <= within]
+    zero = near[0] if near else reading.zero
+    offset, second = lefts[zero] * (not near), float(moved[1])
     if convention.absolute:
         second += offset
     added = np.array([offset, remainder(second, 2 * pi)]) - (own - reading.offsets)
@@ -346,17 +358,3 @@ def _zeros(convention: Convention, reading: Reading) -> dict[str, Any]:
     if offsets != list(reading.offsets):
         mending["offsets"] = offsets
     return mending
-
-
-def _nearest_zero(first: float, own: str) -> tuple[str, float]:
-    """The named zero of θ1 at the angle `first` in rad, and what is left of that as an offset.
-
-    That of the profile, `own`, where none is there.
-    """
-    left = {name: remainder(first - turned, 2 * pi) for name, turned in ZEROS.items()}
-    if abs(left[own]) <= _SAME:
-        return own, left[own]
-    for name, offset in left.items():
-        if abs(offset) <= _SAME:
-            return name, offset
-    return own, left[own]

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from algid.base.units import names_of
 from algid.inspection.report import look
-from algid.log import Origin, Reading
 from algid.readers import open_log
 from algid.readers.formats import FORMATS
 from algid.readers.table import CHANNELS
@@ -15,6 +14,11 @@ from algid.readers.table import CHANNELS
 _HEAD = """\
 # What the log's names, units and signs mean: edit what is wrong.
 # Lines behind # are defaults or not known.
+# topic = "/joint_states"    # of bags
+# joints = ["shoulder", "elbow"]  # first joint first
+# clock = "log"              # of bags: the recorder's times, not the messages' own
+# time = "t"                 # of tables
+# time_unit = "s"            # of tables: s, ms, us, ns
 # zero = "hanging"           # θ1 is zero hanging straight down, not horizontal; or "upright"
 # second_angle = "absolute"  # θ2 from the horizontal or vertical, not from link 1
 # drive = "base"             # the second motor stands at the base: its torque acts on θ1 + θ2
@@ -43,6 +47,12 @@ _ENCODER = (
 _ANGLES = ", ".join(names_of("angle"))
 _VELOCITIES = ", ".join(names_of("velocity"))
 _TORQUES = ", ".join(names_of("torque", "current"))
+_CHANNEL = """\
+# topic = "/joint_states"  # where it is another
+# source = "NAME"
+# sign = -1
+# offset = 0.0
+"""
 _UNITS = {
     "theta": f'# unit = "deg"  # {_ANGLES}\n{_ENCODER}# unwrap = true  # where it jumps by a '
     "turn\n",
@@ -69,76 +79,44 @@ def draft_profile(path: Path) -> str:
     LogError
         If there is no such log, or its format is unknown.
     """
-    log = look(path, lambda: open_log(path).origin)
-    head = _HEAD
-    if log.content is None:
-        head += f"# {_safe(log.refused or '')}\n"
-    entries = ""
-    for one in log.entries[:64]:
-        entries += f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
-    return head + _source(log.content, log.format) + entries + _channels(log.content, log.format)
-
-
-def _source(origin: Origin | None, kind: str) -> str:
-    """Lines of topic, joints, clock and time as in the log, behind # where they are not known."""
-    reading = Reading()
-    time = '# time = "t"'
+    kind, entries, origin, refused = look(path, lambda: open_log(path).origin)
+    text = _HEAD
+    if refused:
+        text += f"# {_safe(refused)}\n"
+    for one in entries[:64]:
+        text += f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
+    mapping, topics = dict[str, str](), tuple[str, ...]()
     if origin is not None:
-        reading = origin.reading
-        if "t" in origin.mapping:
-            time = f"time = {_quoted(origin.mapping['t'])}"
-    joints = '# joints = ["shoulder", "elbow"]'
-    if reading.joints:
-        joints = f"joints = [{', '.join(map(_quoted, reading.joints))}]"
-    if kind in _ON_TOPICS:
-        topic = '# topic = "/joint_states"'
-        if reading.topics:
-            topic = f"topic = {_quoted(reading.topics[0])}"
-        clock = "# clock = \"log\"  # the recorder's times, not the messages' own"
-        time = '# time = "t"  # of tables'
-        unit = '# time_unit = "s"  # of tables: s, ms, us, ns'
-    else:
-        topic = '# topic = "/joint_states"  # of bags'
-        clock = '# clock = "log"  # of bags: header or log'
-        unit = '# time_unit = "s"  # s, ms, us, ns'
-        if reading.time_unit:
-            unit = f'time_unit = "{reading.time_unit}"  # s, ms, us, ns'
-    return f"{topic}\n{joints}  # first joint first\n{clock}\n{time}\n{unit}\n"
-
-
-def _channels(origin: Origin | None, kind: str) -> str:
-    """A table for each channel, its topic and source as in the log where they are known."""
-    text = ""
+        mapping = origin.mapping
+        if kind in _ON_TOPICS:
+            topics = origin.reading.topics[:1]
+        for topic in topics:
+            text += f"topic = {_quoted(topic)}\n"
+        if origin.reading.joints:
+            text += f"joints = [{', '.join(map(_quoted, origin.reading.joints))}]\n"
+        if "t" in mapping:
+            text += f"time = {_quoted(mapping['t'])}\n"
+        if origin.reading.time_unit:
+            text += f"time_unit = {_quoted(origin.reading.time_unit)}\n"
     for name in CHANNELS:
-        topic_line = '# topic = "/joint_states"  # where it is another'
-        source_line = '# source = "NAME"'
-        if origin is not None and name in origin.mapping:
-            topic, source = "", origin.mapping[name]
+        text += f"\n[{name}]\n{_CHANNEL}"
+        if name in mapping:
+            topic, source = "", mapping[name]
             if kind in _ON_TOPICS:
                 topic, _, source = source.partition(": ")
-            if topic and topic != origin.reading.topics[0]:
-                topic_line = f"topic = {_quoted(topic)}"
+            if topic and topic not in topics:
+                text += f"topic = {_quoted(topic)}\n"
             if source:
-                source_line = f"source = {_quoted(source)}"
-        text += f"\n[{name}]\n{topic_line}\n{source_line}\n# sign = -1\n# offset = 0.0\n"
+                text += f"source = {_quoted(source)}\n"
         text += _UNITS[name[:-1]]
     return text
 
 
 def _quoted(text: str) -> str:
-    """As a TOML basic string: escapes as in JSON, save those of two surrogates."""
-    escaped = ""
-    for letter in text:
-        if ord(letter) > 0xFFFF:
-            escaped += f"\\U{ord(letter):08x}"
-        else:
-            escaped += json.dumps(letter)[1:-1]
-    return f'"{escaped}"'
+    """As a TOML basic string: escapes as in JSON, and the one control character it leaves."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _safe(text: str) -> str:
     """The text without what cannot be printed."""
-    for letter in set(text):
-        if not letter.isprintable():
-            text = text.replace(letter, "\ufffd")
-    return text
+    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)

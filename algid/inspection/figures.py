@@ -12,7 +12,9 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.criteria import GAP
 from algid.base.quantiles import distinct, median
+from algid.estimators.convention_search import Judgement
 from algid.log import Log
+from algid.model import K2, K3, K4, K5
 from algid.notices import Notice, of_codes
 from algid.readers.clock import PAUSE
 from algid.signals.spacing import near_stamps, spaced
@@ -62,6 +64,44 @@ def signal_figures(values: FloatArray) -> SignalFigures:
     """Figures of a channel (N,)."""
     low, high = float(values.min()), float(values.max())
     return SignalFigures(low, high, noise_floor(values), grid_step(values), saturated_share(values))
+
+
+@dataclass(frozen=True)
+class DynamicFigures:
+    """What the equations of motion say of a log as it was read.
+
+    Parameters
+    ----------
+    condition : float
+        Of the scaled regressor: of its estimates' correlations, the root.
+    explained : float
+        Share of the torque that they explain, of the joint where that is less.
+    weight1, weight2 : float, N m
+        Gravity constants k4 and k2; 0 of an arm in a horizontal plane.
+    inertia : float, kg m^2
+        k3 + k5.
+    """
+
+    condition: float
+    explained: float
+    weight1: float
+    weight2: float
+    inertia: float
+
+
+def dynamic_figures(judgement: Judgement | None) -> DynamicFigures | None:
+    """Figures of what all conventions say of a log; None where they say nothing."""
+    if judgement is None:
+        return None
+    one = judgement.as_read
+    k, std = dict(zip(one.names, one.k.tolist(), strict=True)), np.sqrt(np.diag(one.covariance))
+    return DynamicFigures(
+        condition=float(np.sqrt(np.linalg.cond(one.covariance / np.outer(std, std)))),
+        explained=1 - float(one.left.max()),
+        weight1=k.get(K4, 0.0),
+        weight2=k.get(K2, 0.0),
+        inertia=k[K3] + k[K5],
+    )
 
 
 def noise_floor(values: FloatArray) -> float:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import TypeAdapter
 
@@ -19,8 +20,15 @@ from algid.base.errors import LogError
 from algid.base.faults import during
 from algid.inspection.checks import CONTRADICTIONS, examine
 from algid.inspection.clipping import clipped, saturation
-from algid.inspection.dynamics import DynamicFigures, dynamic_figures
-from algid.inspection.figures import ClockFigures, SignalFigures, clock_figures, signal_figures
+from algid.inspection.conventions import judged
+from algid.inspection.figures import (
+    ClockFigures,
+    DynamicFigures,
+    SignalFigures,
+    clock_figures,
+    dynamic_figures,
+    signal_figures,
+)
 from algid.log import Log
 from algid.notices import Notice, has_code, lossy
 from algid.readers import read_log
@@ -30,30 +38,20 @@ from algid.readers.memory import NAME, open_columns
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Look(Generic[T]):
-    """A log that may be refused: its format and entries, then its content or the refusal."""
-
-    format: str
-    entries: tuple[Entry, ...]
-    content: T | None = None
-    refused: str | None = None
-
-
-def look(log: Any, read: Callable[[], T]) -> Look[T]:
-    """What a log holds, and what `read` makes of it.
+def look(log: Any, read: Callable[[], T]) -> tuple[str, tuple[Entry, ...], T | None, str | None]:
+    """A log's format and entries, and what `read` makes of it or why it is refused.
 
     Raises
     ------
     LogError
-        As `contents`; what `read` raises stands in `refused`.
+        As `contents`.
     """
     with during("opening", _called(log)):
         kind, entries = contents(log)
     try:
-        return Look(kind, entries, content=read())
+        return kind, entries, read(), None
     except LogError as error:
-        return Look(kind, entries, refused=str(error))
+        return kind, entries, None, str(error)
 
 
 def _called(log: Any) -> str:
@@ -140,40 +138,31 @@ def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
             return log
         return read_log(log, profile)
 
-    seen = look(log, samples)
-    if seen.content is None:
-        return Inspection(_called(log), seen.format, seen.entries, refused=seen.refused)
-    path = _called(log)
-    if isinstance(log, Log):
-        path = log.origin.path
+    kind, entries, content, refused = look(log, samples)
+    if content is None:
+        return Inspection(_called(log), kind, entries, refused=refused)
     gravity, effort = 9.81, None
     if profile is not None:
         gravity, effort = profile.gravity, profile.effort
-    known = saturation(seen.content, gravity=gravity, effort=effort)
-    findings = examine(seen.content, gravity=gravity, effort=effort, known=known)
-    findings += tuple(clipped(seen.content, known.limits))
+    known = saturation(content, gravity=gravity, effort=effort)
+    tried = cache(partial(judged, content, gravity=gravity > 0))
+    findings = examine(content, gravity=gravity, effort=effort, known=known, tried=tried)
+    findings += tuple(clipped(content, known.limits))
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
+    signals = {}
+    for name, pair in (("theta", content.theta), ("tau", content.tau), ("omega", content.omega)):
+        for joint, values in enumerate(() if pair is None else pair, start=1):
+            signals[f"{name}{joint}"] = signal_figures(values)
     return Inspection(
-        path=path,
-        format=seen.format,
-        entries=seen.entries,
+        path=content.origin.path if isinstance(log, Log) else _called(log),
+        format=kind,
+        entries=entries,
         refused="; ".join(reasons) or None,
-        mapping=seen.content.origin.mapping,
-        synthetic=seen.content.origin.truth is not None,
-        clock=clock_figures(seen.content),
-        signals=_signals(seen.content),
-        dynamics=dynamic_figures(seen.content),
-        notices=seen.content.notices,
+        mapping=content.origin.mapping,
+        synthetic=content.origin.truth is not None,
+        clock=clock_figures(content),
+        signals=signals,
+        dynamics=dynamic_figures(None if effort == "external" else tried()),
+        notices=content.notices,
         findings=findings,
     )
-
-
-def _signals(log: Log) -> dict[str, SignalFigures]:
-    signals = {}
-    pairs = [("theta", log.theta), ("tau", log.tau)]
-    if log.omega is not None:
-        pairs.append(("omega", log.omega))
-    for name, pair in pairs:
-        for joint, values in enumerate(pair, start=1):
-            signals[f"{name}{joint}"] = signal_figures(values)
-    return signals

@@ -86,8 +86,7 @@ def _figures(found: Inspection) -> Iterator[Table | str]:
     if found.dynamics is not None:
         rough = found.dynamics
         yield (
-            f"excitation: condition number {rough.condition:.4g}; rough fit explains "
-            f"{100 * rough.explained:.3g} % of the torques, "
-            f"gravity {100 * rough.gravity_share:.3g} %: k4 {rough.weight1:.3g} N m, "
-            f"k2 {rough.weight2:.3g} N m, turned by {round(rough.turn)}°"
+            f"excitation: condition number {rough.condition:.4g}; as read, the equations of motion "
+            f"explain {100 * rough.explained:.3g} % of the torques: k4 {rough.weight1:.3g} N m, "
+            f"k2 {rough.weight2:.3g} N m"
         )

@@ -12,8 +12,8 @@ import pytest
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.base.errors import LogError
 from algid.inspection.checks import examine, noticed, yielding
-from algid.inspection.dynamics import dynamic_figures
-from algid.inspection.figures import signal_figures
+from algid.inspection.conventions import judged
+from algid.inspection.figures import dynamic_figures, signal_figures
 from algid.log import Log, Origin
 from algid.notices import Notice
 from algid.profile import Profile
@@ -158,7 +158,7 @@ def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
     for run in runs:
         log = read_log(run, Profile(zero="hanging"))
         assert not turned & set(codes(log))
-        figures = dynamic_figures(log)
+        figures = dynamic_figures(judged(log))
         assert figures is not None
         assert figures.explained > 0.8
 
