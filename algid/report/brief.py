@@ -9,12 +9,11 @@ import textwrap
 from collections.abc import Iterable
 
 from algid.arm import CONSTANT_NAMES as ARM
-from algid.base.text import ABSENT, lines_of, resolved, significant, visible
+from algid.base.text import ABSENT, lines_of, visible
 from algid.base.verdict import MOST_REASONS, Verdict
 from algid.base.words import counted
-from algid.model import DELAYS, SINES
+from algid.model import DELAYS
 from algid.notices import Notice
-from algid.report.phasors import moments
 from algid.results import Result, Status
 from algid.results.rows import rows_of
 from algid.results.verdict import share_text
@@ -67,33 +66,22 @@ def brief(result: Result) -> list[str]:
 
 
 def _estimates(result: Result) -> list[str]:
-    """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning.
-
-    A moment off its link's line has its size and its angle instead.
-    """
-    phasors, lines = moments(result), list[str]()
+    """Constants and payload: estimate, half 95 % interval, unit, known error, and meaning."""
+    lines = list[str]()
     constants = {name: one for name, one in result.parameters.items() if name in ARM}
     for row in rows_of(result, constants | result.payload):
-        name, number, words = row.name, row.with_half, row.meaning.partition(", ")[0]
+        words = row.meaning.partition(", ")[0] if row.status == Status.OK else row.status
         error = f"{row.error} %" if result.truth and row.error != ABSENT else ""
-        if row.status != Status.OK:
-            words = row.status
-        if row.name in phasors:
-            moment, error = phasors[row.name], ""
-            name, words = f"|{name.upper()}|", f"at {moment.angle_text} {words}"
-            number = f"{resolved(moment.size, moment.std)} ± {significant(moment.half, 2)}"
-        line = f"{name:<4}{number:>19} {row.unit:<10}{error:>{8 if result.truth else 0}} "
+        line = (
+            f"{row.name:<4}{row.with_half:>19} {row.unit:<10}{error:>{8 if result.truth else 0}} "
+        )
         lines += lines_of(f"{line}{words if words != ABSENT else ''}", WIDTH, rest=" " * len(line))
     return lines
 
 
 def _terms(result: Result, terms: list[str]) -> list[str]:
-    """The terms of the torque beside eq. (1) with their coefficients, as far as two lines hold.
-
-    The sine part of a moment that is shown as an angle is no coefficient of its own.
-    """
-    shown = {sine for sine, name in SINES.items() if name in moments(result)} | set(ARM)
-    others = {n: one for n, one in result.parameters.items() if n not in shown}
+    """The terms of the torque beside eq. (1) with their coefficients, as far as two lines hold."""
+    others = {name: one for name, one in result.parameters.items() if name not in ARM}
     numbers = ", ".join(f"{row.name} {row.with_half}" for row in rows_of(result, others))
     delays = [name for name in DELAYS if name in result.parameters]
     text = f"Optional torque terms: {', '.join(terms + delays) or 'none'}"

@@ -51,8 +51,8 @@ def figures_of_paper(folder: Path, result: Result) -> list[Plot]:
 
 def _name_logs(panels: Panels, result: Result, rows: Drawn, count: int) -> None:
     """Draw a line where each of several logs begins, and its name in the first panel."""
-    starts = rows.starts if len(rows.logs) > 1 else {}
-    for log, x in starts.items():
+    starts = rows.starts
+    for log, x in starts.items() if len(starts) > 1 else ():
         for place in range(count):
             panels.line(place, x=x, dash="dot")
         if len(starts) <= 6:  # more names would stand on one another
@@ -88,11 +88,10 @@ def torque(folder: Path, result: Result, raw: Drawn) -> Plot:
 def closeup(folder: Path, result: Result, raw: Drawn) -> Plot | None:
     """One second about the largest residual of each joint, every sample."""
     titles, parts = [], []
-    for joint in (1, 2):
-        (size, t), log = max((one.worst[joint - 1], log) for log, one in raw.logs.items())
+    for joint, (size, t, log) in enumerate(raw.worst, start=1):
         if size > 0:
             parts.append((joint, between(folder / "torque.parquet", log, t - HALF, t + HALF)))
-            of = f" of {file_name(result.logs[log].path)}" if len(raw.logs) > 1 else ""
+            of = f" of {file_name(result.logs[log].path)}" if len(raw.starts) > 1 else ""
             titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
     if not parts:
         return None

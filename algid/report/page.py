@@ -26,7 +26,7 @@ from algid.report.tables import (
     result_settings,
     terms_table,
 )
-from algid.results import Result, read_result
+from algid.results import Result, Status, read_result
 from algid.results.verdict import replaced_estimator
 
 
@@ -96,7 +96,7 @@ def result_document(
         Section("settings", "Settings and provenance", made_by, folded=True),
         *([] if leads else [of_paper]),
     ]
-    constants = [one.measured for name, one in result.parameters.items() if name in CONSTANT_NAMES]
+    constants = [one.status for name, one in result.parameters.items() if name in CONSTANT_NAMES]
     seconds = significant(sum(log.duration for log in result.logs), 4)
     return Document(
         title=f"Identification of {names[0]}",
@@ -104,7 +104,7 @@ def result_document(
         sections=tuple(sections),
         kicker="identification of a two-link arm",
         name=names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more",
-        facts=f"{sum(constants)} of {counted(len(constants), 'constant')} identified · "
+        facts=f"{constants.count(Status.OK)} of {counted(len(constants), 'constant')} identified · "
         f"{result.estimator} estimator · {seconds} s of log at "
         f"{significant(result.log.rate, 4)} Hz · "
         f"{counted(sum(log.rows for log in result.logs), 'sample')}",

@@ -21,8 +21,8 @@ BLUE, ORANGE, GREEN, GREY, RED = "#3b82c4", "#d9772b", "#2e9c6a", "#8b95a4", "#d
 """Legible on white and on the dark page."""
 PALE = "rgba(59,130,196,.25)"
 LONGEST = 56
-FRAME, TICKS = 40, 55
-"""Pixels of a figure around its panels, and of a panel below its drawing."""
+FRAME, TICKS = 24, 55
+"""Pixels of a figure around its panels, less those below the last; of a panel below its drawing."""
 
 
 @dataclass(frozen=True)
@@ -53,20 +53,16 @@ class Panels:
         self, titles: Sequence[str], columns: int = 1, height: int = 240, together: bool = False
     ) -> None:
         rows = -(-len(titles) // columns)
+        grid = {"rows": rows, "columns": columns, "pattern": "independent"}
         self.data: list[dict[str, Any]] = []
         self.layout: dict[str, Any] = {
-            "meta": {"columns": columns},
+            "grid": grid | {"xgap": 0.12, "ygap": TICKS / height},
             "shapes": [],
             "annotations": [],
             "height": height * rows + FRAME,
         }
-        width, tall = 1 / columns, 1 / rows
         for place, title in enumerate(titles):
-            row, column = divmod(place, columns)
-            left, top = column * (width + 0.04), 1 - row * tall
-            x, y = self.axes(place)
-            x |= {"domain": [left, left + width - 0.04 * (columns > 1)], "anchor": ref("y", place)}
-            y |= {"domain": [top - tall + TICKS / (height * rows), top], "anchor": ref("x", place)}
+            x, _ = self.axes(place)
             if together and place:
                 x["matches"] = "x"
             self.text(place, title)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -92,28 +92,6 @@ def facts_of(path: Path) -> tuple[list[str], int, dict[bytes, bytes]]:
         return file.schema_arrow.names, file.metadata.num_rows, file.schema_arrow.metadata or {}
 
 
-@dataclass
-class LogFacts:
-    """One log: first and last time and period in s, and each joint's largest residual and when."""
-
-    first: float
-    last: float
-    samples: int = 0
-    period: float = np.nan
-    worst: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)] * 2)
-
-    def add(self, part: Block) -> None:
-        """Take the next samples."""
-        t = part["t"]
-        if np.isnan(self.period) and t.size > 1:
-            self.period = median(np.diff(t))
-        self.samples, self.last = self.samples + t.size, float(t[-1])
-        for joint, worst in enumerate(self.worst, start=1):
-            size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
-            place = int(size.argmax())
-            self.worst[joint - 1] = max(worst, (float(size[place]), float(t[place])))
-
-
 @dataclass(frozen=True, eq=False)
 class Drawn:
     """Every column in few rows, the smallest and the largest value of each bucket in turn.
@@ -121,13 +99,13 @@ class Drawn:
     Parameters
     ----------
     columns : with `x`, the time that runs on from log to log, s, and NaN rows where a line breaks
-    logs : by number
     samples : of angles and velocities, whole rows spread evenly over the logs
+    worst : of either joint the largest residual, when in s, and in which log
     """
 
     columns: Block
-    logs: dict[int, LogFacts]
     samples: Block
+    worst: tuple[tuple[float, float, int], ...]
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
@@ -152,39 +130,43 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     if not path.is_file():
         return None
     total = facts_of(path)[1]
-    size = max(1, -(-2 * total // points))
+    bucket = max(1, -(-2 * total // points))
     step = max(1, total // SAMPLES)
-    parts: list[Block] = []
-    samples: list[Block] = []
-    logs: dict[int, LogFacts] = {}
+    parts, samples, periods, done = list[Block](), list[Block](), [0.0], 0
+    worst = [(0.0, 0.0, 0)] * 2
     for log, part in by_log(blocks(path)):
         with_residuals(part)
-        part["log"] = np.full(part["t"].size, float(log))
-        start = float(part["t"][0])
-        logs.setdefault(log, LogFacts(start, start)).add(part)
+        t = part["t"]
+        part["log"] = np.full(t.size, float(log))
+        if t.size > 1:
+            periods.append(median(np.diff(t)))
+        for joint, before in enumerate(worst, start=1):
+            size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
+            place = int(size.argmax())
+            worst[joint - 1] = max(before, (float(size[place]), float(t[place]), log))
         # which sample of a stretch moves by the golden ratio: never in step with the motion
-        at = np.arange(0, part["t"].size, step)
-        at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), part["t"].size - 1)
+        at = np.arange(0, t.size, step)
+        at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), t.size - 1)
         samples.append({name: part[name][at] for name in ("log", *MOTION) if name in part})
-        parts.append(reduced(part, size))
+        parts.append(reduced(part, bucket))
+        done += t.size
         if progress is not None:
-            progress("report", sum(one.samples for one in logs.values()), total)
+            progress("report", done, total)
     if not parts:
         raise ResultError(f"{path}: it holds no rows; identify again with this version")
     columns = concatenated(parts)
-    columns["x"] = columns["t"].copy()
-    end = None
-    for log, facts in sorted(logs.items()):
-        shift = 0.0 if end is None else 1.01 * end - facts.first
-        columns["x"][columns["log"] == log] += shift
-        end = facts.last + shift
-    longest = CUT * size * max(facts.period for facts in logs.values())
-    apart = (np.diff(columns["t"]) > longest) | (np.diff(columns["log"]) > 0)
-    broken = np.flatnonzero(apart) + 1
+    columns["x"], end = columns["t"].copy(), None
+    for log in np.unique(columns["log"]):
+        own = columns["log"] == log
+        if end is not None:
+            columns["x"][own] += 1.01 * end - columns["t"][own][0]
+        end = columns["x"][own].max()
+    apart = np.diff(columns["t"]) > CUT * bucket * max(periods)
+    broken = np.flatnonzero(apart | (np.diff(columns["log"]) > 0)) + 1
     for name, values in columns.items():
         nothing = values[broken - 1] if name in ("log", "x") else np.nan
         columns[name] = np.insert(values, broken, nothing)
-    return Drawn(columns, logs, concatenated(samples))
+    return Drawn(columns, concatenated(samples), tuple(worst))
 
 
 def reduced(part: Block, size: int) -> Block:
@@ -201,17 +183,12 @@ def reduced(part: Block, size: int) -> Block:
 
 def between(path: Path, log: int, low: float, high: float) -> Block:
     """Every sample of a log with t in [low, high]; row groups elsewhere are not read."""
-    with _parquet(path) as file:
-        names, wanted = file.schema_arrow.names, []
-        for group in range(file.num_row_groups):
-            columns = file.metadata.row_group(group)
-            logs, times = (columns.column(names.index(of)).statistics for of in ("log", "t"))
-            if logs.min <= log <= logs.max and times.min <= high and times.max >= low:
-                wanted.append(group)
-        rows = file.read_row_groups(wanted)
-        block = {name: numbers_of(rows[name].combine_chunks()) for name in rows.column_names}
-    near = (block["log"] == log) & (block["t"] >= low) & (block["t"] <= high)
-    return with_residuals(rows_of(block, near))
+    import pyarrow.parquet
+
+    wanted = [("log", "==", log), ("t", ">=", low), ("t", "<=", high)]
+    rows = pyarrow.parquet.read_table(path, filters=wanted)
+    block: Block = {name: numbers_of(rows[name].combine_chunks()) for name in rows.column_names}
+    return with_residuals(block)
 
 
 def with_residuals(part: Block) -> Block:

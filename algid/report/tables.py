@@ -22,7 +22,6 @@ from algid.base.text import (
 )
 from algid.notices import NAMED
 from algid.report.document import Table
-from algid.report.phasors import moments
 from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
 from algid.results.rows import known_truth, rows_of
 
@@ -60,28 +59,14 @@ def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Resul
 
 
 def arm_tables(result: Result) -> tuple[Table, ...]:
-    """The arm first: its constants, the payload, and the moments of a bent arm."""
+    """The arm first: its constants, its payload and the stiffness of its joints."""
     constants = {name: one for name, one in result.parameters.items() if name in CONSTANT_NAMES}
     stiffness = result.fit.stiffness if result.fit else {}
-    rows = []
-    for name, one in moments(result).items():
-        size, half = resolved(one.size, one.std), significant(one.half, 2)
-        rows.append((f"|{name.upper()}|", size, half, unit_text(one.unit), one.angle_text))
     return (
         estimates_table("Constants", constants, result),
         estimates_table("Payload", result.payload, result),
         estimates_table("Stiffness of elastic joints", stiffness, result),
-        Table(
-            "Moments off the links' lines",
-            {
-                "Moment": "name", "Size": "number", "± 95 %": "number", "Unit": "text",
-                "Angle, 95 %": "number",
-            },
-            tuple(rows),
-            "K = k + i k_s: the angle of K1 is θ2's zero or link 2's centre of mass, that of K2 "
-            "less it θ1's zero, that of K4 less θ1's zero the load of joint 1 off link 1's line.",
-        ),
-    )  # fmt: skip
+    )
 
 
 def nuisance_tables(result: Result) -> tuple[Table, Table]:

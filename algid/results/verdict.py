@@ -55,7 +55,7 @@ def judge(result: Result) -> Verdict:
     for one in _reasons(result, failure):
         if one not in reasons and one.text != failure:
             reasons.append(one)
-    headline = _identified(result) if reasons else "; ".join(_praise(result))
+    headline = _identified(result) if reasons else _praise(result)
     notes, command = notes_of(result.notices), _command(result, reasons)
     return graded(headline, reasons, notes, failure=failure, command=command)
 
@@ -214,32 +214,16 @@ def replaced_estimator(result: Result) -> str | None:
     return None if asked in (None, result.estimator) else str(asked)
 
 
-def _praise(result: Result) -> Iterator[str]:
-    """What speaks for a result: certainty, explained torque, error against the truth."""
+def _praise(result: Result) -> str:
+    """What speaks for a result: how certain its estimates are."""
     praise = f"all {counted(len(result.estimates), 'parameter')} are identified"
     widths = {name: _share(one) for name, one in result.estimates.items() if one.half is not None}
-    if widths:
-        worst = max(widths, key=widths.__getitem__)
-        half = significant(100 * widths[worst], 2)
-        yield f"{praise}, the least certain, {visible(worst)}, to ±{half} % (95 %)"
-    else:
+    if not widths:
         estimator = visible(result.estimator)
-        yield f"{praise}, without error bars, which the {estimator} estimator does not give"
-    if result.fit is not None and result.fit.prediction is not None:
-        one, two = map(share_text, result.fit.prediction.r2)
-        shares = f"{one} of joint 1's torque and {two} of joint 2's"
-        if one == two:
-            shares = f"{one} of the torque of both joints"
-        yield f"the model explains {shares}{result.fit.prediction.band}"
-    errors = {
-        row.parameter: abs(row.error_percent or 0.0)
-        for row in result.table4
-        if row.error_percent is not None
-    }
-    if errors:
-        worst = max(errors, key=errors.__getitem__)
-        largest = significant(errors[worst], 2)
-        yield f"the largest error against the truth is {largest} % ({visible(worst)})"
+        return f"{praise}, without error bars, which the {estimator} estimator does not give"
+    worst = max(widths, key=widths.__getitem__)
+    half = significant(100 * widths[worst], 2)
+    return f"{praise}, the least certain, {visible(worst)}, to ±{half} % (95 %)"
 
 
 def share_text(share: float) -> str:

@@ -105,7 +105,7 @@ class Case:
 
 
 CASES = {
-    "sound": Case(lambda r: r, "good", [], "over 99.99 % of the torque of both joints"),
+    "sound": Case(lambda r: r, "good", [], "all 9 parameters are identified"),
     "one lost": Case(lambda r: of(r, LOST, "k5"), codes=["NOT_IDENTIFIABLE"], words="8 of 9"),
     "half lost": Case(lambda r: of(r, LOST, *NAMES[:4]), codes=["NOT_IDENTIFIABLE"]),
     "most lost": Case(lambda r: of(r, LOST, *NAMES[:5]), "failed", ["NOT_IDENTIFIABLE"], "only 4"),
@@ -121,10 +121,7 @@ CASES = {
     "coloured": Case(coloured, codes=["NOT_WHITE"]),
     "coloured, allowed for": Case(lambda r: coloured(r, "sandwich"), "good"),
     "not converged": Case(lambda r: with_fit(r, converged=False), "failed", [], " iterations"),
-    "R² of 91 %": Case(
-        lambda r: with_fit(r, **predicted(0.91, 0.93)),
-        "good", [], "explains 91.00 % of joint 1's torque and 93.00 % of joint 2's",
-    ),
+    "R² of 91 %": Case(lambda r: with_fit(r, **predicted(0.91, 0.93)), "good"),
     "R² of 89 %": Case(
         lambda r: with_fit(r, intervals="sandwich", **predicted(0.89, 0.99)),
         codes=["LITTLE_EXPLAINED"], words="89 %",

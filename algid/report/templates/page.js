@@ -2,7 +2,7 @@
 (async () => {
   const NARROW = 640, PRINTED = 690; // CSS pixels: of a phone, and of A4 less its margins
   const [LETTER, KEY, LINE] = [6.8, 54, 22]; // pixels of a legend: a letter, the rest of an entry, a line
-  const FRAME = 40; // pixels of a figure around its panels
+  const FRAME = 24; // pixels of a figure around its panels, less those below the last
   const own = document.currentScript.nonce;
   const unpacked = (id) => {
     const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (letter) => letter.charCodeAt(0));
@@ -19,15 +19,11 @@
 
   // Where there is no room for two columns of panels they stand one below the other.
   const stacked = (layout, room) => {
+    const { rows, columns } = layout.grid;
+    if (columns < 2 || room > NARROW) return layout;
     const panels = Object.keys(layout).filter((key) => key.startsWith("yaxis")).length;
-    if (layout.meta.columns < 2 || room > NARROW) return layout;
-    const narrow = { ...layout, height: (layout.height - FRAME) * layout.meta.columns + FRAME };
-    for (let place = 0; place < panels; place += 1) {
-      const [number, top] = [place ? place + 1 : "", 1 - place / panels];
-      narrow["xaxis" + number] = { ...layout["xaxis" + number], domain: [0, 1] };
-      narrow["yaxis" + number] = { ...layout["yaxis" + number], domain: [top - 0.76 / panels, top] };
-    }
-    return narrow;
+    const height = (layout.height - FRAME) / rows * panels + FRAME;
+    return { ...layout, height, grid: { ...layout.grid, rows: panels, columns: 1 } };
   };
   const themed = ({ data, layout }, room) => {
     const style = getComputedStyle(root);
@@ -37,13 +33,13 @@
     const lines = entries.length < 2 ? 0 : Math.ceil(entries.reduce((sum, { name }) => sum + KEY + LETTER * name.length, 0) / room);
     const look = {
       font: { color: ink, size: 12, family: "system-ui, sans-serif" }, xaxis: axis, yaxis: axis, paper_bgcolor: page, plot_bgcolor: page,
-      margin: { l: 56, r: 12, t: 28 + LINE * lines, b: 6 }, modebar: { bgcolor: page, color: muted, orientation: "v" },
+      margin: { l: 56, r: 12, t: 28 + LINE * lines, b: 51 }, showlegend: lines > 0, modebar: { bgcolor: page, color: muted, orientation: "v" },
       hoverlabel: { bgcolor: page, bordercolor: grid, font: { color: ink } }, hovermode: "closest",
       legend: { orientation: "h", x: 0, y: 1, yref: "container", yanchor: "top" },
     };
     const shown = stacked(layout, room);
     return {
-      ...shown, height: shown.height + LINE * Math.max(0, lines - 1), template: { layout: look, data: { heatmap: [{ textfont: { color: ink } }] } }, uirevision: "kept",
+      ...shown, height: shown.height + LINE * lines, template: { layout: look, data: { heatmap: [{ textfont: { color: ink } }] } }, uirevision: "kept",
       dragmode: touch ? false : "zoom", annotations: layout.annotations.map((one) => ({ ...one, bgcolor: page })),
     };
   };
