@@ -65,7 +65,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "quantiles ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
-    "inspection": room("arm criteria errors estimators faults log notices profile quantiles "
+    "inspection": room("arm criteria errors estimators faults log model notices profile quantiles "
                        "readers signals units", "numpy pydantic"),
     "report": room(
         "arm arrow blocks criteria errors files inspection log methods model notices options "
