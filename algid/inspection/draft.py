@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from algid.base.units import names_of
 from algid.inspection.report import look
+from algid.log import Reading
 from algid.readers import open_log
 from algid.readers.formats import FORMATS
 from algid.readers.table import CHANNELS
@@ -85,31 +87,30 @@ def draft_profile(path: Path) -> str:
         text += f"# {_safe(refused)}\n"
     for one in entries[:64]:
         text += f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
-    mapping, topics = dict[str, str](), tuple[str, ...]()
+    mapping, reading = dict[str, str](), Reading()
     if origin is not None:
-        mapping = origin.mapping
-        if kind in _ON_TOPICS:
-            topics = origin.reading.topics[:1]
-        for topic in topics:
-            text += f"topic = {_quoted(topic)}\n"
-        if origin.reading.joints:
-            text += f"joints = [{', '.join(map(_quoted, origin.reading.joints))}]\n"
-        if "t" in mapping:
-            text += f"time = {_quoted(mapping['t'])}\n"
-        if origin.reading.time_unit:
-            text += f"time_unit = {_quoted(origin.reading.time_unit)}\n"
+        mapping, reading = origin.mapping, origin.reading
+    own = "".join(reading.topics[:1])
+    joints = ", ".join(map(_quoted, reading.joints or ()))
+    text = _filled(text, "topic", _quoted(own))
+    text = _filled(text, "joints", joints and f"[{joints}]")
+    text = _filled(text, "time", _quoted(mapping.get("t", "")))
+    text = _filled(text, "time_unit", _quoted(reading.time_unit or ""))
     for name in CHANNELS:
-        text += f"\n[{name}]\n{_CHANNEL}"
-        if name in mapping:
-            topic, source = "", mapping[name]
-            if kind in _ON_TOPICS:
-                topic, _, source = source.partition(": ")
-            if topic and topic not in topics:
-                text += f"topic = {_quoted(topic)}\n"
-            if source:
-                text += f"source = {_quoted(source)}\n"
-        text += _UNITS[name[:-1]]
+        topic, source = own, mapping.get(name, "")
+        if kind in _ON_TOPICS:
+            topic, _, source = source.partition(": ")
+        channel = _filled(_CHANNEL, "source", _quoted(source))
+        channel = _filled(channel, "topic", _quoted(topic if topic != own else ""))
+        text += f"\n[{name}]\n{channel}{_UNITS[name[:-1]]}"
     return text
+
+
+def _filled(text: str, name: str, value: str) -> str:
+    """The text with a key's value in the place of its commented line, where there is one."""
+    if value in ("", '""'):
+        return text
+    return re.sub(rf"(?m)^# {name} = .*", lambda _: f"{name} = {value}", text, count=1)
 
 
 def _quoted(text: str) -> str:
