@@ -165,77 +165,67 @@ def of_arrays(
     import pyarrow as pa
 
     last = {name: name.rpartition(".")[2] for name in arrays}
-    twice = repeated(name for name in last.values())
+    twice = repeated(last.values())
     short = {name: name if last[name] in twice else last[name] for name in arrays}
-    of_columns = {short.get(name, name): dict(one) for name, one in attributes.items()}
-    found, texts = {}, dict(metadata)
     signals = [name for name, one in arrays.items() if one.dtype.kind in "iufbmM" and one.size > 1]
+    said = {short[name]: dict(attributes.get(name, {})) for name in arrays}
+    found, texts, others = {}, dict(metadata), list[str]()
+    timed = longest = 0
     for name, array in arrays.items():
         key, _, column = name.partition(".")
         if column and key.lower() in ATTRIBUTES and array.size == 1:
-            of_columns.setdefault(column, {})[key] = text_of(array)
+            said.setdefault(column, {})[key] = text_of(array)
         elif name.lower() in ATTRIBUTES and array.shape == (len(signals),):
-            for column, value in zip(signals, array, strict=True):
-                if text := text_of(value):
-                    of_columns.setdefault(short[column], {})[name] = text
+            for signal, value in zip(signals, map(text_of, array), strict=True):
+                said[short[signal]] |= {name: value} if value else {}
         elif array.dtype.kind in "iufbmMOUS":
-            found[short[name]] = np.squeeze(array)
-    rows, timed = 0, 0
-    for name, array in found.items():
-        if array.dtype.kind not in "OUS":
-            rows = max(rows, *array.shape, 0)
-        if name.lower() in TIMES and array.ndim == 1:
-            timed = max(timed, array.size)
-    rows = timed or rows
+            array = found[short[name]] = np.squeeze(array)
+            if array.ndim and array.dtype.kind not in "OUS":
+                longest = max(longest, *array.shape)
+            if array.ndim == 1 and short[name].lower() in TIMES:
+                timed = max(timed, array.size)
+    rows = timed or longest
     if rows < 2:
         raise LogError(
             f"{path}: no arrays of two samples or more; found {', '.join(arrays) or 'nothing'}"
         )
-    columns: dict[str, NDArray[Any] | pa.Array] = {}
-    fields, others = [], list[str]()
+    columns: list[pa.Array] = []
+    fields: list[pa.Field] = []
     for name, array in found.items():
-        if array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
-            array = array if array.shape[0] == rows else array.T
-        elif array.shape != (rows,):
-            if array.dtype.kind in "OUS" or array.ndim == 0:
-                texts[name] = text_of(array)
-            else:
-                others.append(f"{name} ({' × '.join(map(str, array.shape))})")
+        if array.shape == (rows,):
+            parts = {name: array}
+        elif array.ndim == 2 and rows in array.shape and min(array.shape) <= LIMITS.list_cells:
+            across = array.T if array.shape[0] == rows else array
+            parts = {f"{name}[{place}]": part for place, part in enumerate(across)}
+        elif array.dtype.kind in "OUS" or not array.ndim:
+            texts[name] = text_of(array)
+            continue
+        else:
+            others.append(f"{name} ({' × '.join(map(str, array.shape))})")
             continue
         try:
-            plain = array.dtype.kind in "iuf"
-            made = _arrow(array[:1] if plain else array)
-        except (pa.ArrowException, TypeError, ValueError, UnicodeError):
+            made = [_column(part) for part in parts.values()]
+        except (pa.ArrowException, TypeError, ValueError):
             others.append(f"{name} (no numbers)")
             continue
-        columns[name] = array if plain else made
-        fields.append(pa.field(name, made.type, metadata=of_columns.get(name)))
-
-    def batches(names: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
-        end = rows if most is None else min(most, rows)
-        for first in range(0, end, BATCH_ROWS):
-            parts = [columns[name][first : min(first + BATCH_ROWS, end)] for name in names]
-            made = [_arrow(one) if isinstance(one, np.ndarray) else one for one in parts]
-            yield pa.RecordBatch.from_arrays(made, names=list(names))
-
-    schema = pa.schema(fields, metadata=texts or None)
-    return TableFile(path, kind, schema, rows, batches, others=tuple(others))
+        columns += made
+        fields += [pa.field(part, made[0].type, metadata=said.get(name)) for part in parts]
+    table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=texts or None))
+    return of_arrow(path, kind, table, others=tuple(others))
 
 
-def _arrow(values: NDArray[Any]) -> pa.Array:
-    """A column of Arrow, which knows this machine's byte order alone; lists of a matrix's rows."""
+def _column(values: NDArray[Any]) -> pa.Array:
+    """A column of Arrow, which knows this machine's byte order alone."""
     import pyarrow as pa
 
-    flat = values.ravel()
-    if flat.dtype.kind in "iuf":
-        flat = flat.astype(flat.dtype.newbyteorder("="), copy=False)
-    if np.ma.isMaskedArray(flat):
-        made = pa.array(flat.data, mask=np.ma.getmaskarray(flat))
-    elif flat.dtype.kind == "S":
-        made = pa.array(np.char.decode(flat, "utf-8").tolist())
-    else:
-        made = column_of(flat.tolist() if flat.dtype.kind in "OU" else flat)
-    return made if values.ndim == 1 else pa.FixedSizeListArray.from_arrays(made, values.shape[1])
+    kind = values.dtype.kind
+    if kind in "iuf":
+        values = values.astype(values.dtype.newbyteorder("="), copy=False)
+    if np.ma.isMaskedArray(values):
+        return pa.array(values.data, mask=np.ma.getmaskarray(values))
+    if kind == "S":
+        values = np.char.decode(values, "utf-8")
+    return column_of(values.tolist() if kind in "OUS" else values)
 
 
 def text_of(value: Any) -> str:
@@ -247,13 +237,13 @@ def text_of(value: Any) -> str:
     return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
-def of_arrow(path: str, kind: str, table: pa.Table, notices: tuple[Notice, ...] = ()) -> TableFile:
-    """A table in memory."""
+def of_arrow(path: str, kind: str, table: pa.Table, **more: Any) -> TableFile:
+    """A table in memory, with `more` of what a `TableFile` has."""
 
     def batches(names: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
         yield from table.select(list(names)).slice(0, most).to_batches(BATCH_ROWS)
 
-    return TableFile(path, kind, table.schema, table.num_rows, batches, notices=notices)
+    return TableFile(path, kind, table.schema, table.num_rows, batches, **more)
 
 
 def is_json_lines(head: bytes) -> bool:
@@ -308,4 +298,4 @@ def open_json_lines(path: Path) -> TableFile:
             ) from error
         # whole numbers that Arrow has not
         frame = frame.with_columns(pl.col(pl.Int128).cast(pl.Float64))
-        return of_arrow(str(path), "jsonl", frame.to_arrow(), notices)
+        return of_arrow(str(path), "jsonl", frame.to_arrow(), notices=notices)

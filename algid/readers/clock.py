@@ -64,10 +64,7 @@ def in_order(
         `segment`.
     """
     run, shift_ns = 1, 0
-    held: SampleTable | None = (
-        None  # this run's last rows in order: late ones may belong among them
-    )
-    waiting: SampleTable | None = None  # late rows at a table's end: perhaps the next run's first
+    held: SampleTable | None = None  # this run's last rows: late ones may belong among them
     counts = np.zeros(3, np.int64)
 
     def moved(table: SampleTable) -> SampleTable:
@@ -80,82 +77,67 @@ def in_order(
             raise LogError(f"{path}: time starts again, and its runs span over 292 years")
         return SampleTable(table.stamp_ns + shift_ns, table.columns, table.notices)
 
-    def settled(part: SampleTable) -> Iterator[SampleTable]:
-        """The rows before which none of this run comes any more; the others are held."""
-        nonlocal held, counts
-        before, own, held = held, part, None
-        if before is not None and len(part) < HORIZON:
-            part, before = stack([before, part]), None
-        ordered, added = _sorted(path, part)
-        counts += added
-        if before is not None and ordered.stamp_ns[0] > before.stamp_ns[-1]:
-            yield moved(before)
-        elif before is not None:
-            ordered, added = _sorted(path, stack([before, ordered]))
-            counts += added
-        last = 0 if ordered is own else max(0, len(ordered) - HORIZON)
-        if last:
-            yield moved(ordered.part(0, last))
-        held = ordered.part(last, len(ordered))
-
-    for table in tables:
-        if not len(table):
-            yield table
+    for rows in tables:
+        if not len(rows):
+            yield rows
             continue
-        rows = table if waiting is None else stack([waiting, table])
-        while (start := _restart(held, rows)) is not None:
-            if start:
-                yield from settled(rows.part(0, start))
-            first_ns, rows = int(rows.stamp_ns[start]), rows.part(start, len(rows))
-            assert held is not None
+        rising = bool(np.all(rows.stamp_ns[1:] > rows.stamp_ns[:-1]))
+        if held is not None and rising and np.all(held.stamp_ns < rows.stamp_ns[0]):
+            ordered, added = _sorted(path, held)
+            counts += added
+            yield moved(ordered)
+        elif held is not None:
+            rows, rising = stack([held, rows]), False
+        if rising:
+            held = rows
+            continue
+        while (start := _restart(rows)) is not None:
+            ordered, added = _sorted(path, rows.part(0, start))
+            last_ns, first_ns = int(ordered.stamp_ns[-1]), int(rows.stamp_ns[start])
             if not runs:
-                raise LogError(_backwards(path, int(held.stamp_ns[-1]), first_ns))
-            yield moved(held)
-            period = _period(held.stamp_ns[-HORIZON:])
-            shift_ns += int(held.stamp_ns[-1]) + max(1, round(PAUSE * period)) - first_ns
-            held, run = None, run + 1
-        on_time = np.flatnonzero(~_late(held, rows.stamp_ns))
-        certain = int(on_time[-1]) + 1 if on_time.size else 0
-        if len(rows) - certain >= _SHORTEST:  # so many would have shown a restart
+                raise LogError(_backwards(path, last_ns, first_ns))
+            counts += added
+            yield moved(ordered)
+            pause = max(1, round(PAUSE * _period(ordered.stamp_ns[-HORIZON:])))
+            shift_ns += last_ns + pause - first_ns
+            rows, run = rows.part(start, len(rows)), run + 1
+        # late rows at the end are perhaps the next run's first; so many would have shown it
+        certain = int(np.flatnonzero(~_late(rows.stamp_ns))[-1]) + 1
+        if len(rows) - certain >= _SHORTEST:
             certain = len(rows)
-        waiting = rows.part(certain, len(rows)) if certain < len(rows) else None
-        if certain:
-            yield from settled(rows.part(0, certain))
-    if waiting is not None:
-        yield from settled(waiting)
+        ordered, added = _sorted(path, rows.part(0, certain))
+        counts += added
+        settled = max(0, len(ordered) - HORIZON)
+        if settled:
+            yield moved(ordered.part(0, settled))
+        held = stack([ordered.part(settled, len(ordered)), rows.part(certain, len(rows))])
     if segment is not None and segment > run:
         last_one, known = Remedy({"segment": run}, "the last one"), counted(run, "run")
         raise LogError(f"{path}: there is no segment {segment}: its time makes {known}; {last_one}")
     if held is not None:
-        yield moved(held)
-    notices = (*_restarts(run, segment), *_mended(*counts.tolist()))
-    if notices:
-        yield remark(*notices)
-
-
-def _mended(late: int, repeated: int, lost: int) -> Iterator[Notice]:
-    """What to say of samples that came late, and of repeated stamps, of which some are lost."""
+        ordered, added = _sorted(path, held)
+        counts += added
+        yield moved(ordered)
+    late, repeated, lost = counts.tolist()
+    notices = []
+    if run > 1:
+        said = "one is read behind another, and no window spans two"
+        remedies: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)
+        if segment is not None:
+            said, remedies = f"number {segment} is read alone", ()
+        joined = run - 1 if segment is None else 0
+        numbers = {"count": run - 1, "runs": run, "said": said, "joined": joined}
+        notices.append(Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=remedies))
     if late:
-        yield Notice("UNEVEN_STAMPS", numbers={"case": "late", "count": late})
+        notices.append(Notice("UNEVEN_STAMPS", numbers={"case": "late", "count": late}))
     if repeated:
         others = ""
         if lost:
             others = f"; {counted(lost, 'with other values is', 'with other values are')} lost"
-        numbers = {"count": repeated, "others": others}
-        yield Notice("UNEVEN_STAMPS", numbers={"case": "repeated"} | numbers, lossy=lost > 0)
-
-
-def _restarts(runs: int, only: int | None) -> Iterator[Notice]:
-    """What to say of several runs."""
-    if runs == 1:
-        return
-    said = "one is read behind another, and no window spans two"
-    remedies: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)
-    if only is not None:
-        said, remedies = f"number {only} is read alone", ()
-    joined = runs - 1 if only is None else 0
-    numbers = {"count": runs - 1, "runs": runs, "said": said, "joined": joined}
-    yield Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=remedies)
+        numbers = {"case": "repeated", "count": repeated, "others": others}
+        notices.append(Notice("UNEVEN_STAMPS", numbers=numbers, lossy=lost > 0))
+    if notices:
+        yield remark(*notices)
 
 
 def _period(stamps: IntArray) -> float:
@@ -163,28 +145,24 @@ def _period(stamps: IntArray) -> float:
     return median(np.diff(stamps)) if stamps.size > 1 else 0.0
 
 
-def _late(held: SampleTable | None, stamps: IntArray) -> NDArray[np.bool_]:
-    """Which stamps (N,) are not above all before them, those of `held` among these."""
+def _late(stamps: IntArray) -> NDArray[np.bool_]:
+    """Which stamps (N,) are not above all before them."""
     late = np.zeros(stamps.size, np.bool_)
     late[1:] = stamps[1:] <= np.maximum.accumulate(stamps)[:-1]
-    if held is not None:
-        late |= stamps <= held.stamp_ns[-1]
     return late
 
 
-def _restart(held: SampleTable | None, table: SampleTable) -> int | None:
+def _restart(table: SampleTable) -> int | None:
     """The row of the table with which the clock starts again; None where it does not.
 
     Rows that merely come late fill a hole, or repeat what stands there. Those of another run lie
     in time of which rows are known without a hole, or before all that is known.
     """
-    late = np.flatnonzero(_late(held, table.stamp_ns))
+    late = np.flatnonzero(_late(table.stamp_ns))
     for rows in np.split(late, np.flatnonzero(np.diff(late) > 1) + 1):
         if rows.size < _RUN:
             continue
-        before = table.part(max(0, rows[0] - HORIZON - rows.size), rows[0])
-        if held is not None:
-            before = stack([held, before])
+        before = table.part(max(0, rows[0] - 2 * HORIZON - rows.size), rows[0])
         order = np.argsort(before.stamp_ns, kind="stable")
         known, own = before.stamp_ns[order], table.stamp_ns[rows]
         first, last = own.min(), own.max()
@@ -195,7 +173,7 @@ def _restart(held: SampleTable | None, table: SampleTable) -> int | None:
             last - first
         ):
             after = np.minimum(np.searchsorted(known, own), known.size - 1)
-            same = (known[after] == own) & _alike(before, order[after], table, rows)
+            same = (known[after] == own) & _alike(table, rows[0] - known.size + order[after], rows)
             if np.count_nonzero(~same) > rows.size / 2:
                 return int(rows[0])
         rising = np.count_nonzero(np.diff(own) > 0) > 0.75 * rows.size
@@ -235,7 +213,7 @@ def _sorted(path: str, table: SampleTable) -> tuple[SampleTable, tuple[int, int,
         )
     kept = order[fresh]
     gone, instead = order[~fresh], kept[np.cumsum(fresh)[~fresh] - 1]
-    lost = gone.size - np.count_nonzero(_alike(table, gone, table, instead))
+    lost = gone.size - np.count_nonzero(_alike(table, gone, instead))
     return table.take(kept), (int(np.count_nonzero(moved > 0)), repeated, int(lost))
 
 
@@ -246,13 +224,11 @@ def _backwards(path: str, last: int, first: int) -> str:
     )
 
 
-def _alike(
-    table: SampleTable, rows: IntArray, other: SampleTable, others: IntArray
-) -> NDArray[np.bool_]:
-    """Which rows (R,) hold what those of the other table hold; missing in both is the same."""
+def _alike(table: SampleTable, rows: IntArray, others: IntArray) -> NDArray[np.bool_]:
+    """Which rows (R,) hold what the others (R,) hold; missing in both is the same."""
     same = np.ones(rows.size, np.bool_)
-    for name, values in table.columns.items():
-        one, two = values[rows], other.columns[name][others]
+    for values in table.columns.values():
+        one, two = values[rows], values[others]
         same &= (one == two) | (np.isnan(one) & np.isnan(two))
     return same
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
+from typing import NamedTuple
 
 from algid.base.limits import LIMITS
 from algid.base.units import CURRENT, is_foreign, unit_of
@@ -101,8 +101,7 @@ _COUNTED = re.compile(r"(?:^|_)(?:joint|axis|dof|actuator)(?=_|\d|$)")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
 
-@dataclass(frozen=True)
-class Name:
+class Name(NamedTuple):
     """A column's name taken apart; `joint` is a number as text, or the joint's own name.
 
     `unit` is in algid's writing; one that no joint's signal has, such as inch, as it stands.
@@ -123,8 +122,7 @@ class Name:
         return (self.joint or "").rpartition("/")[0]
 
 
-@dataclass(frozen=True)
-class ChannelChoice:
+class ChannelChoice(NamedTuple):
     """Columns chosen for a log, by canonical channel; the joints' own names, if they have any."""
 
     columns: dict[str, str]
@@ -188,6 +186,9 @@ def choose(
 ) -> ChannelChoice:
     """Canonical channels found among `columns`; those not found are left out.
 
+    Plain names, such as ``q1``, come before those of state structures, and these before joints'
+    names beside words, such as ``elbow_pos``.
+
     Parameters
     ----------
     columns : iterable of str
@@ -208,55 +209,53 @@ def choose(
         If a quantity stands there for more than two joints and `joints` does not choose, if there
         are no such joints, or if two columns have one name but for its writing.
     """
-    parts = {column: take_apart(column) for column in columns}
+    plain = {column: take_apart(column) for column in columns}
     wanted = set(needed) - set(named)
-    plain = _pairs(parts, joints)
-    chosen, read = plain, parts
-    for others in (_of_states(parts), _worded(parts)):
+    chosen, parts, tried = _pairs(plain, joints), plain, plain
+    for others in (_of_states, _worded):
         if wanted <= chosen.keys():
             break
-        read = parts | others
-        chosen = _pairs(read, joints)
-    else:
-        own = _named_joints(chosen, read)
-        if not (joints or (own and along_the_arm(own)[1] == "names")):
-            chosen, read = plain, parts
+        tried = plain | others(plain)
+        found = _pairs(tried, joints)
+        if len(wanted & found.keys()) > len(wanted & chosen.keys()):
+            chosen, parts = found, tried
     if joints and needed[0] in wanted - chosen.keys():
-        there = list(dict.fromkeys(name.own for name in read.values() if _is_joints(name)))
+        there = dict.fromkeys(one.own for one in tried.values() if one.joint and one.stem in _STEMS)
         raise LookupError(
             f"no columns of the joints {', '.join(joints)}; joints there are: "
-            f"{', '.join(there[:16]) or 'none that their names show'}"
+            f"{', '.join(list(there)[:16]) or 'none that their names show'}"
         )
     if passive and "tau1" not in chosen:
-        torque = _only_torque(read, chosen.get(f"theta{3 - passive}"))
+        torque = _only_torque(parts, chosen.get(f"theta{3 - passive}"))
         if torque is not None:
             chosen[f"tau{3 - passive}"] = torque
-    time = _time(read)
-    if time is not None:
+    angles = [parts[chosen[name]].joint for name in ("theta1", "theta2") if name in chosen]
+    for channel, column in list(chosen.items()):
+        name = parts[column]
+        # drivers mix counting from zero and from one between quantities: the order counts then
+        theirs = angles[int(channel[-1]) - 1] if angles else name.joint
+        if name.joint not in (None, theirs) and not {name.joint, theirs} <= {"0", "1", "2"}:
+            del chosen[channel]  # the torque of another joint is not theirs
+        elif name.joint and channel not in (*named, "q_des1", "q_des2"):
+            for twin, other in parts.items():
+                if twin != column and name[:2] == other[:2]:
+                    raise LookupError(
+                        f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}"
+                    )
+    quantity = "theta" if angles else "tau"
+    columns_of_both = (chosen.get(f"{quantity}1"), chosen.get(f"{quantity}2"))
+    own = [name.own for column, name in parts.items() if column in columns_of_both]
+    numbered = len(own) < 2 or all(name.isdecimal() for name in own)
+    if time := time_among(parts):
         chosen["t"] = time
-    chosen = _of_one_pair(chosen, read)
-    for channel, column in chosen.items():
-        name = read[column]
-        if channel in (*named, "q_des1", "q_des2") or name.joint is None:
-            continue
-        for twin, other in read.items():
-            if twin != column and (other.stem, other.joint) == (name.stem, name.joint):
-                raise LookupError(
-                    f"{column!r} and {twin!r} are both {name.stem} of joint {name.joint}"
-                )
-    return ChannelChoice(chosen, _named_joints(chosen, read))
+    return ChannelChoice(chosen, None if numbered else (own[0], own[1]))
 
 
-def _is_joints(name: Name) -> bool:
-    """Whether a name has a known quantity's stem and a joint."""
-    return bool(name.joint) and name.stem in _STEMS
-
-
-def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
+def _pairs(parts: Mapping[str, Name], joints: tuple[str, str] | None) -> dict[str, str]:
     """Columns by canonical channel, of quantities present for two joints, or for the given two."""
     chosen: dict[str, str] = {}
-    for quantity in STEMS:
-        for stem in STEMS[quantity]:
+    for quantity, stems in STEMS.items():
+        for stem in stems:
             of_stem = {}
             for column, name in parts.items():
                 if name.stem == stem and name.joint:
@@ -268,55 +267,39 @@ def _pairs(parts: dict[str, Name], joints: tuple[str, str] | None) -> dict[str, 
                 raise LookupError(
                     f"{stem!r} stands there for {counted(len(of_stem), 'joint')}: {there}"
                 )
-            pair = _two(of_stem, joints)
-            if pair:
-                chosen |= {f"{quantity}1": pair[0], f"{quantity}2": pair[1]}
+            if joints:
+                pairs = [_of_joint(of_stem, joint) for joint in joints]
+            else:
+                short = {joint.rpartition("/")[2]: column for joint, column in of_stem.items()}
+                of_stem = short if len(short) == len(of_stem) else of_stem
+                order = along_the_arm(list(of_stem))[0] if len(of_stem) == 2 else ()
+                pairs = [[of_stem[joint]] for joint in order]
+            if [len(own) for own in pairs] == [1, 1]:
+                chosen |= {f"{quantity}{place}": own[0] for place, own in enumerate(pairs, 1)}
                 break
     return chosen
 
 
-def _two(by_joint: dict[str, str], joints: tuple[str, str] | None) -> tuple[str, str] | None:
-    """Columns of the two given joints, else of the only two, ordered by name from the base."""
-    if joints:
-        first, second = (_of_joint(by_joint, joint) for joint in joints)
-        if len(first) != 1 or len(second) != 1:
-            return None
-        return first[0], second[0]
-    if len(by_joint) != 2:
-        return None
-    short = {key.rpartition("/")[2]: column for key, column in by_joint.items()}
-    named = short if len(short) == 2 else by_joint
-    (base, tip), _ = along_the_arm(list(named))
-    return named[base], named[tip]
-
-
-def _of_joint(by_joint: dict[str, str], joint: str) -> list[str]:
-    """The columns of a joint as a user names it."""
-    names = _called(joint)
-    columns = []
-    for key, column in by_joint.items():
-        own = key.rpartition("/")[2]
-        number = own.rpartition("_")[2] if joint.strip().isdecimal() else ""
-        if not names.isdisjoint((key, own, number)):
-            columns.append(column)
-    return columns
-
-
-def _called(joint: str) -> set[str]:
-    """Joints of columns for one that a user names: ``Joint_2`` is joint 2 of ``Joint_2_pos``.
+def _of_joint(of_stem: Mapping[str, str], joint: str) -> list[str]:
+    """The columns by joint of one that a user names: ``Joint_2`` is joint 2 of ``Joint_2_pos``.
 
     So is its column, ``dof_pos_2``.
     """
     name = joint.strip().lower()
     names = {name, _COUNTED.sub("_", name).strip("_")}
-    column = {name: take_apart(name)}
-    for part in (*column.values(), *_worded(column).values()):
-        if _is_joints(part):
-            names.add(part.joint or "")
-    numbered = _NUMBERED.match(name)
-    if numbered:
+    plain = {name: take_apart(name)}
+    for part in (*plain.values(), *_worded(plain).values()):
+        if part.joint and part.stem in _STEMS:
+            names.add(part.joint)
+    if numbered := _NUMBERED.match(name):
         names.add(numbered[1].lstrip("0") or "0")
-    return names
+    columns = []
+    for key, column in of_stem.items():
+        own = key.rpartition("/")[2]
+        number = own.rpartition("_")[2] if name.isdecimal() else ""
+        if not names.isdisjoint((key, own, number)):
+            columns.append(column)
+    return columns
 
 
 _NO_NAMES = frozenset(
@@ -329,12 +312,9 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
     """Angle columns by joint of the joints that are not read, named alike those in `angles`."""
     parts = {column: take_apart(column) for column in columns}
     parts |= _worded(parts)
-    kinds, joints = set(), set()
-    for column in angles:
-        name = parts[column]
-        joints.add(name.joint)
-        if name.stem not in _NO_NAMES:
-            kinds.add((name.stem, name.topic))
+    read = [parts[column] for column in angles]
+    joints = {name.joint for name in read}
+    kinds = {(name.stem, name.topic) for name in read if name.stem not in _NO_NAMES}
     others = {}
     for column, name in parts.items():
         if name.joint and name.joint not in joints and (name.stem, name.topic) in kinds:
@@ -342,7 +322,7 @@ def other_joints(columns: Iterable[str], angles: Collection[str]) -> dict[str, s
     return others
 
 
-def _worded(parts: dict[str, Name]) -> dict[str, Name]:
+def _worded(parts: Mapping[str, Name]) -> dict[str, Name]:
     """Parts of columns named by a joint and a stem: ``shoulder_pos``, ``torque elbow``.
 
     A number behind them counts the joints: ``dof_pos_2``, ``arm_torque_2``.
@@ -351,92 +331,49 @@ def _worded(parts: dict[str, Name]) -> dict[str, Name]:
     for column, name in parts.items():
         if name.stem in _STEMS or not (name.joint is None or name.joint.isdecimal()):
             continue
-        text = re.sub(r"\W+", "_", name.stem).strip("_")
+        text = "_" + re.sub(r"\W+", "_", name.stem).strip("_") + "_"
         for stem in _STEMS:
-            joint = text.removesuffix(f"_{stem}")
-            if joint == text:
-                joint = text.removeprefix(f"{stem}_")
-            if joint != text:
+            first, last = text.startswith(f"_{stem}_"), text.endswith(f"_{stem}_")
+            if first or last:
+                joint = text[: -len(stem) - 2] if last else text[len(stem) + 2 :]
                 words = [word for word in _COUNTED.sub("_", joint).split("_") if word]
-                if name.joint is not None:
-                    words.append(name.joint)
+                words += [name.joint] if name.joint else []
                 if words and _NO_JOINTS.isdisjoint(words):
-                    by_words[column] = replace(name, stem=stem, joint="_".join(words))
+                    by_words[column] = name._replace(stem=stem, joint="_".join(words))
                 break
     return by_words
 
 
-def _of_states(parts: dict[str, Name]) -> dict[str, Name]:
+def _of_states(parts: Mapping[str, Name]) -> dict[str, Name]:
     """Parts of columns of state structures: ``state.q[0]`` (libfranka), ``motor_state[0].q``."""
     states = {}
     for column, name in parts.items():
-        one = len(column) <= LIMITS.name_letters and _STATE.match(column.strip().lower())
-        if one:
+        if len(column) <= LIMITS.name_letters and (one := _STATE.match(column.strip().lower())):
             stem, joint = one["stem"] or one["list"], one["joint"] or one["place"]
-            states[column] = replace(name, stem=stem, joint=joint)
+            states[column] = name._replace(stem=stem, joint=joint)
     return states
 
 
-def _named_joints(chosen: dict[str, str], parts: dict[str, Name]) -> tuple[str, str] | None:
-    """The joints' own names as they stand in the log.
-
-    None where they are numbers, or none was found.
-    """
-    places = list(parts)
-    quantity = "theta" if "theta1" in chosen else "tau"
-    own = (f"{quantity}1", f"{quantity}2")
-    pair = sorted((chosen[name] for name in own if name in chosen), key=places.index)
-    names = [parts[column].own for column in pair]
-    if len(names) < 2 or all(name.isdecimal() for name in names):
-        return None
-    return names[0], names[1]
-
-
-def _only_torque(parts: dict[str, Name], angle: str | None) -> str | None:
+def _only_torque(parts: Mapping[str, Name], angle: str | None) -> str | None:
     """The torque of the joint with the angle, or the only torque; the other joint has none."""
     for stem in STEMS["tau"]:
         torques = [column for column, name in parts.items() if name.stem == stem]
-        if angle in parts:
+        if angle:
             joint = parts[angle].joint
-            own = [column for column in torques if parts[column].joint == joint]
-            torques = own or torques
+            torques = [one for one in torques if parts[one].joint == joint] or torques
         if len(torques) == 1:
             return torques[0]
     return None
 
 
-def _of_one_pair(chosen: dict[str, str], parts: dict[str, Name]) -> dict[str, str]:
-    """Keep quantities of the angles' joints only: torques of other joints are not theirs."""
-    if "theta1" not in chosen:
-        return dict(chosen)
-    kept = {}
-    for channel, column in chosen.items():
-        joint = parts[column].joint
-        if channel == "t" or joint is None:
-            kept[channel] = column
-            continue
-        theirs = parts[chosen[f"theta{channel[-1]}"]].joint
-        # drivers mix counting from zero and from one between quantities: the order is what counts
-        # then
-        if joint == theirs or {joint, theirs} <= {"0", "1", "2"}:
-            kept[channel] = column
-    return kept
-
-
-def has_a_time(columns: Iterable[str]) -> bool:
-    """Whether a column is a time by its name."""
-    return _time({column: take_apart(column) for column in columns}) is not None
-
-
-def _time(parts: dict[str, Name]) -> str | None:
+def time_among(columns: Iterable[str]) -> str | None:
+    """The column that is a time by its name; of two alike the first one counts."""
     plain: dict[str, str] = {}
     bare: dict[str, str] = {}
-    for column, part in parts.items():  # of two alike the first one counts
+    for column in columns:
+        part = take_apart(column)
         plain.setdefault(column.strip().strip('"').strip().lower(), column)
         if part.joint is None:
             bare.setdefault(part.stem, column)
-    for known in (plain, bare):
-        for name in TIMES:
-            if name in known:
-                return known[name]
-    return None
+    found = [known[name] for known in (plain, bare) for name in TIMES if name in known]
+    return found[0] if found else None

@@ -45,8 +45,6 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
     LogError
         If the text is no table.
     """
-    import pyarrow as pa
-
     head = head_of(path, kind)
     dialect = detect(path, head, names)
     beside, companion = sidecar(path), Companion(None, {})
@@ -57,17 +55,6 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         raise LogError(
             f"{beside}: the truth beside the log cannot be read ({error}); remove it"
         ) from error
-    fields = []
-    for column in dialect.columns:
-        kind_of = pa.float64()
-        if column in dialect.dates:
-            kind_of = pa.timestamp("ns")
-        elif column in dialect.whole:
-            kind_of = pa.int64()
-        elif column in dialect.texts:
-            kind_of = pa.string()
-        unit = dialect.units.get(column)
-        fields.append(pa.field(column, kind_of, metadata={"unit": unit} if unit else None))
     # rows to expect of plain text: from the length of its first lines, and a tenth more
     expected, whole = 0, False
     source: Path | bytes = path
@@ -76,24 +63,27 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         expected = int(1.1 * path.stat().st_size * head.count(b"\n") / len(head)) + 16
         with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as text:
             whole, quoted = text[-1:] == b"\n", text.find(b'"') >= 0
-    if not (whole and dialect.separator):
+    if dialect.padded or not whole:
         source = b"".join(pieces(path, kind))
         quoted = b'"' in source
         if not source.endswith(b"\n"):  # its last number may lack digits
             source = source[: source.rfind(b"\n") + 1]
             notices = (Notice("CUT_OFF", numbers={"case": "cell"}),)
-        if not dialect.separator:  # runs of blanks become one tab
-            source = re.sub(rb"[ \t]+", b"\t", source)
-            source = re.sub(rb"(?m)^\t|\t(?=\r?$)", b"", source)
+    if dialect.padded and isinstance(source, bytes):  # runs of blanks become one tab
+        mark = dialect.separator.encode()
+        blank = b" " if mark == b"\t" else rb"[ \t]"
+        around = blank + b"*" + re.escape(mark) + blank + b"*" if mark else blank + b"+"
+        source = re.sub(around, mark or b"\t", source)
+        source = re.sub(rb"(?m)^%b+|%b+(?=\r?$)" % (blank, blank), b"", source)
 
     def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
         for frame in _frames(path, source, dialect, columns, most, quoted=quoted):
-            yield from frame.to_arrow().to_batches()
+            yield from frame.to_batches()
 
     return TableFile(
         str(path),
         "csv",
-        pa.schema(fields),
+        dialect.schema,
         0,
         batches,
         companion,
@@ -111,16 +101,19 @@ def _frames(
     most: int | None,
     *,
     quoted: bool,
-) -> Iterator[pl.DataFrame]:
+) -> Iterator[pa.Table]:
     """The columns' numbers; empty lines are no rows."""
     import polars as pl
+    import pyarrow as pa
+    import pyarrow.compute as pc
 
-    done, counted = 0, most is not None
-    scan = _scan(source, dialect, columns, most, quoted=quoted)
+    names, done = dialect.schema.names, 0
+    empty: int | None = None
     try:
+        scan = _scan(source, dialect, columns, most, quoted=quoted)
         for frame in scan.collect_batches(chunk_size=_FRAME_ROWS):
             for name, wrong in (
-                (_EXCESS, f"has more cells than the header's {len(dialect.columns)}"),
+                (_EXCESS, f"has more cells than the header's {len(names)}"),
                 (_SPLIT, "goes on behind its line, for its quotes stay open"),
             ):
                 # in place: `drop` would queue behind the parsing of the next rows
@@ -128,16 +121,25 @@ def _frames(
                     row = done + (found.arg_max() or 0) + 1
                     raise LogError(f"{path}: row {row} {wrong}; mend that row")
             done += frame.height
-            if any(frame.null_count().row(0)):
-                valueless = pl.all_horizontal(pl.all().is_null())
-                if not counted and frame.select(valueless.any()).item():
-                    # rows with cells and no value are told of at once, those to come too
-                    counted = True
-                    every = pl.all_horizontal(pl.col(*columns).is_null())
-                    lost = scan.select(every.sum()).collect().item()
-                    yield frame.clear(lost - _empty_lines(source, dialect))
-                frame = frame.filter(~valueless)
-            yield frame
+            valued = ~pl.all_horizontal(pl.all().is_null())
+            if lost := frame.height - frame.select(valued.sum()).item():
+                # rows of cells without a value are lost, as far as they are more than empty lines
+                empty = _empty_lines(source, dialect) if empty is None else empty
+                lines = min(lost, empty)
+                empty -= lines
+                frame = pl.concat([frame.clear(lost - lines), frame.filter(valued)])
+            table = frame.to_arrow()
+            for place, name in enumerate(columns):
+                kind = dialect.schema.field(names.index(name)).type
+                if pa.types.is_timestamp(kind):
+                    texts = pc.utf8_trim_whitespace(table.column(place).cast(pa.string()))
+                    dates = texts.cast(kind)
+                    table = table.set_column(place, name, dates)
+            yield table
+    except pa.ArrowInvalid as error:
+        raise LogError(
+            f"{path}: past row {done - frame.height}: {error}; expected dates of 1678 to 2261"
+        ) from error
     except pl.exceptions.PolarsError as error:
         reason = str(error).partition("\n")[0][:200]
         wrong_cell = re.search(
@@ -145,8 +147,8 @@ def _frames(
         )
         if wrong_cell is None:
             raise LogError(f"{path}: the table cannot be read past row {done}: {reason}") from error
-        cell, kind, place = wrong_cell.groups()
-        if kind == "str":
+        cell, wanted, number = wrong_cell.groups()
+        if wanted == "str":
             raise LogError(
                 f"{path}: past row {done}: quotes stay open; close them, or save the table "
                 "without quotes"
@@ -154,7 +156,7 @@ def _frames(
         if "\0" in cell:
             raise LogError(f"{path}: past row {done}: {NUL_AMONG_ROWS}") from error
         raise LogError(
-            f"{path}: column {dialect.columns[int(place)]!r}, past row {done}: expected a number, "
+            f"{path}: column {names[int(number)]!r}, past row {done}: expected a number, "
             f"found {cell[:40]!r}; mend the file or name another column"
         ) from error
 
@@ -176,15 +178,17 @@ def _scan(
 ) -> pl.LazyFrame:
     """The columns' numbers; whether a row has more cells than the header, or goes on behind it."""
     import polars as pl
+    import pyarrow as pa
 
     schema: dict[str, type[pl.DataType]] = {}
-    for place, column in enumerate(dialect.columns):
-        kind: type[pl.DataType] = pl.String
-        plain = not (dialect.padded or column in dialect.dates | dialect.texts)
-        if column in columns and plain:
-            exact = column == columns[0] and column in dialect.whole
-            kind = pl.Int64 if exact else pl.Float64
-        schema[str(place)] = kind
+    taken = {}
+    for place, column in enumerate(dialect.schema):
+        schema[str(place)] = pl.String
+        if column.name in columns:
+            taken[column.name] = pl.col(str(place)).alias(column.name)
+            if pa.types.is_floating(column.type) or pa.types.is_integer(column.type):
+                exact = column.name == columns[0] and pa.types.is_integer(column.type)
+                schema[str(place)] = pl.Int64 if exact else pl.Float64
     # polars drops cells past the last column without a word: one more column catches them
     schema[_EXCESS] = pl.String
     frame = pl.scan_csv(
@@ -203,37 +207,9 @@ def _scan(
     split = pl.lit(value=False)
     if quoted:
         # a cell that holds the cells of another row has taken in that row
-        row = rf"\n([^\n]*{re.escape(dialect.separator)}){{{len(dialect.columns) - 1}}}"
+        row = rf"\n([^\n]*{re.escape(dialect.separator)}){{{len(dialect.schema) - 1}}}"
         texts = [name for name, kind in schema.items() if kind is pl.String]
         split = pl.any_horizontal(pl.col(*texts).str.contains(row)).fill_null(value=False)
-    numbers = [_number(dialect, column).alias(column) for column in columns]
-    return frame.select(*numbers, pl.col(_EXCESS).is_not_null(), split.alias(_SPLIT))
-
-
-def _number(dialect: Dialect, column: str) -> pl.Expr:
-    """The number in a cell; of a date its time, in UTC where it names no zone."""
-    import polars as pl
-
-    cell = pl.col(str(dialect.columns.index(column)))
-    if column in dialect.texts:
-        return cell.str.strip_chars()
-    if column in dialect.dates:
-        text = (
-            cell.str.strip_chars().str.replace(" ", "T", literal=True).str.replace(r"Z$", "+00:00")
-        )
-        zoned = (
-            pl.when(text.str.contains(r"[+-]\d{2}:?\d{2}$")).then(text).otherwise(text + "+00:00")
-        )
-        stamps = zoned.str.to_datetime("%Y-%m-%dT%H:%M:%S%.f%z", time_unit="ns", strict=True)
-        # others wrap round: the last moment of int64 is refused as a time
-        within = text.str.slice(0, 4).is_between(pl.lit("1678"), pl.lit("2261"))
-        last = pl.when(text.is_not_null()).then(pl.lit((1 << 63) - 1, pl.Int64))
-        ticks = pl.when(within).then(stamps.dt.timestamp("ns")).otherwise(last)
-        return ticks.cast(pl.Datetime("ns"))
-    if not dialect.padded:
-        return cell
-    text = cell.str.strip_chars(' \t"')
-    text = pl.when(text != "").then(text)
-    if dialect.decimal_comma:
-        text = text.str.replace(",", ".", literal=True)
-    return text.cast(pl.Float64)
+    return frame.select(
+        *(taken[name] for name in columns), pl.col(_EXCESS).is_not_null(), split.alias(_SPLIT)
+    )

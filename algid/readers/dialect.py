@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
@@ -14,6 +15,9 @@ from algid.base.units import is_foreign, unit_of
 from algid.base.words import counted
 from algid.notices import Remedy
 from algid.options import flag
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 COMMENTS = ("#", "%", "//")
 _SEPARATORS = (";", "\t", ",", "|", "")
@@ -23,6 +27,7 @@ _NUMBER = re.compile(
 )
 _WHOLE = re.compile(r"^[+-]?\d{1,19}$")
 _DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
+_ZONED = re.compile(r"(?:Z|[+-]\d{2}:?\d{2})$")
 
 
 class NoHeaderError(LogError):
@@ -33,14 +38,15 @@ class NoHeaderError(LogError):
         self.columns = columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dialect:
     """Dialect of one table.
 
     Parameters
     ----------
-    columns : tuple of str
-        The header's cells, blanks stripped.
+    schema : pyarrow.Schema
+        The header's cells, blanks stripped; integers, dates (ISO 8601), texts or numbers by what
+        the first lines hold; units of a row under the header.
     separator : str
         One character, or "" for runs of blanks.
     decimal_comma : bool
@@ -48,30 +54,19 @@ class Dialect:
         Lines before the first row of data.
     comment : str or None
         What lines begin with that are no data.
-    whole : frozenset of str
-        Columns whose cells are all integers, as far as the first lines tell.
     padded : bool
         Whether blanks stand behind cells.
-    units : mapping
-        By column the unit that a row under the header states.
-    dates : frozenset of str
-        Columns whose cells are dates and times of day (ISO 8601).
-    texts : frozenset of str
-        Columns whose first cell is neither a number nor a date.
+    said : tuple of str
+        Titles and comments among the first lines.
     """
 
-    columns: tuple[str, ...]
+    schema: pa.Schema
     separator: str
     decimal_comma: bool
     skip: int
     comment: str | None
-    whole: frozenset[str]
     padded: bool
-    units: Mapping[str, str] = field(default_factory=dict)
-    dates: frozenset[str] = frozenset()
-    texts: frozenset[str] = frozenset()
     said: tuple[str, ...] = ()
-    """Titles and comments among the first lines."""
 
 
 def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Dialect:
@@ -83,6 +78,8 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
         If there is no header, no data under it, there are not so many columns as names, or the text
         is not UTF-8.
     """
+    import pyarrow as pa
+
     lines = _lines(path, head)
     signs = (sign for sign in COMMENTS if any(line.startswith(sign) for line in lines))
     comment = next(signs, None)
@@ -101,20 +98,19 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     number, header = data[0]
     rows = [line for _, line in data[1:]]
     separator = _separator(path, header, rows[:19])
-    cells, skip = split(header, separator), 1
+    columns, skip = split(header, separator), 1
     above = [line.removeprefix(comment or "").strip() for line in lines[:number]]
-    if all(_is_number(cell) for cell in cells if cell):
+    if all(_is_number(cell) for cell in columns if cell):
         skip, rows = 0, [header, *rows]
         if names is None:
-            cells = _commented_header(path, above, cells, separator)
-        elif len(names) == len(cells):
-            cells = list(names)
+            columns = _commented_header(path, above, columns, separator)
+        elif len(names) == len(columns):
+            columns = list(names)
         else:
             raise LogError(
-                f"{path}: {counted(len(cells), 'column')}, and {counted(len(names), 'name')} for "
+                f"{path}: {counted(len(columns), 'column')}, and {counted(len(names), 'name')} for "
                 f"them: {', '.join(names)[:200]}; name each: {flag('columns')}"
             )
-    columns = tuple(cells)
     units = _units(columns, split(rows[0], separator)) if rows else {}
     if units:
         skip, rows = skip + 1, rows[1:]
@@ -126,30 +122,29 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
             f"{path}: line {data[skip][0] + 1} has {counted(len(found[0]), 'cell')} under a header "
             f"of {len(columns)}; mend the header"
         )
-    behind = re.compile(rf"[ \t]{re.escape(separator)}|[ ]$")
-    whole, dates, texts = set(), set(), set()
-    for column, values in zip(
-        columns, zip(*(one for one in found if len(one) == len(columns)), strict=True), strict=True
-    ):
-        if all(map(_WHOLE.match, values)):
-            whole.add(column)
+    fields = []
+    whole_rows = [one for one in found if len(one) == len(columns)]
+    for column, values in zip(columns, zip(*whole_rows, strict=True), strict=True):
+        kind = pa.float64()
         if all(map(_DATE.match, values)):
-            dates.add(column)
+            kind = pa.timestamp("ns", "UTC" if _ZONED.search(values[0]) else None)
         elif values[0] and not _is_number(values[0]):
-            texts.add(column)
+            kind = pa.string()
+        elif all(map(_WHOLE.match, values)):
+            kind = pa.int64()
+        fields.append(
+            pa.field(column, kind, metadata=units.get(column) and {"unit": units[column]})
+        )
+    behind = re.compile(rf"[ \t]{re.escape(separator)}|[ ]$")
     comments = [line for line in lines[number:] if comment and line.startswith(comment)]
     return Dialect(
-        columns,
+        pa.schema(fields),
         separator,
         decimal_comma=separator != ","
         and any("," in cell and _is_number(cell) for one in found for cell in one),
         skip=data[skip][0],
         comment=comment,
-        whole=frozenset(whole),
-        padded=bool(separator) and any(behind.search(row.rstrip("\r")) for row in rows),
-        units=units,
-        dates=frozenset(dates),
-        texts=frozenset(texts),
+        padded=not separator or any(behind.search(row.rstrip("\r")) for row in rows),
         said=(*filter(None, above), *(line.removeprefix(comment or "") for line in comments)),
     )
 

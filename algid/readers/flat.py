@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,12 @@ from algid.base.arrow import whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.quantiles import median
-from algid.base.units import ANGLE, NANOSECONDS
-from algid.log import IntArray, Origin, add, word_sum
+from algid.base.units import ANGLE, NANOSECONDS, unit_of
+from algid.log import IntArray, Origin, Reading, add, word_sum
 from algid.notices import Notice, Remedy
-from algid.readers.column_names import has_a_time
-from algid.readers.columns import ChannelSources, choose_columns
-from algid.readers.joints import moving_joints
+from algid.readers.column_names import other_joints, time_among, units_in_names
+from algid.readers.columns import choose_columns, doubts
+from algid.readers.joints import moving_joints, reading_of
 from algid.readers.log_reader import TableReader, make_reader
 from algid.readers.stated import lines_of
 from algid.readers.table import SampleTable
@@ -72,60 +72,91 @@ def open_table(table: TableFile, profile: Profile) -> TableReader:
     LogError
         If a channel has no column, or its column holds no numbers.
     """
-    path, rows = table.path, cells_of(table)
-    cells = rows.by_name
+    path, rows, sums = table.path, cells_of(table), table.companion.sums
+    cells, stated = rows.by_name, units_of(rows)
+    gone = [name for name in sums if name not in cells]
+    if gone:
+        raise LogError(
+            f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
+            "changed or damaged; write it again, or remove its truth if it was changed on purpose"
+        )
     index = cells.get(INDEX)
-    if index and index.is_clock and not (profile.time or has_a_time(cells)):
+    if index and index.is_clock and not (profile.time or time_among(cells)):
         profile = profile.model_copy(update={"time": INDEX})
     try:
-        columns = choose_columns(path, list(cells), profile, units_of(rows), table.companion.sums)
+        sources, joints = choose_columns(path, list(cells), profile)
     except LogError as error:
         if not table.others:
             raise
         more = ", ".join(table.others[:_LISTED])
         raise LogError(f"{error}; the log also holds, of another length: {more}") from error
-    for name, source in columns.sources.items():
+    for name, source in sources.items():
         cell = cells[source]
         if not (cell.is_number or (name == "t" and cell.is_clock)):
             held = str(cell.type).removeprefix("large_").removesuffix("_view")[:80]
             raise LogError(f"{path}: column {source!r} for {name} holds {held}; expected numbers")
-    joints = {joint: one for joint, one in columns.others.items() if cells[one].is_number}
-    columns = replace(columns, others=joints)
-    if cells[columns.sources["t"]].is_clock:
-        columns = replace(columns, time_unit="ns", time_stated=True)
-    mapping = dict(columns.sources)
-    if columns.rate is not None:
-        mapping["t"] = f"rows at {columns.rate:g} Hz"
-    reading = replace(columns.reading, clock="column", time_unit=columns.time_unit)
-    origin = Origin(path, table.kind, mapping, table.companion.truth, reading)
+    notices = [*table.notices, *groups_in(table)]
+    named = all(profile.channel(name).column for name in profile.needed)
+    reading = Reading(joints_told="profile" if named else "names")
+    if profile.joints or (joints and not named):
+        reading, order = reading_of(joints or (), profile)
+        notices += order
+    notices += doubts(path, sources, stated, profile)
+    units = units_in_names(sources, stated)
+    unit = profile.time_unit or unit_of(units.pop("t", ""))
+    clock = Clock(unit, unit is not None)
+    mapping = {"t": f"rows at {profile.rate or 0:g} Hz", **sources}
+    if "t" not in sources:  # any column has a cell in each row that is counted
+        sources["t"], clock = sources[profile.needed[0]], Clock("ns", True, profile.rate)
+    elif cells[sources["t"]].is_clock:
+        clock = Clock("ns", True)
+    elif unit is None and all(sources[name] == name for name in ("t", *profile.needed)):
+        clock = Clock("s", False)  # algid's own names mean algid's own units
+    reading = replace(reading, clock="column", time_unit=clock.unit)
 
     def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
-        looked = replace(columns, sources={"t": columns.sources["t"], **others})
-        return samples(rows, looked, {}, _LOOKED)
+        return samples(rows, {"t": sources["t"], **others}, clock, {}, _LOOKED)
 
-    unit = profile.channel("theta1").unit or columns.units.get("theta1", "rad")
+    angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
+    others = other_joints(cells, angles)
+    others = {joint: one for joint, one in others.items() if cells[one].is_number}
     # of counts nobody knows how far they are
-    beside = moving_joints(columns.others, look, ANGLE[unit]) if unit in ANGLE else ()
+    angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
+    notices += moving_joints(others, look, angle) if angle else ()
     return make_reader(
-        origin,
-        lambda _: samples(rows, columns, table.companion.sums),
+        Origin(path, table.kind, mapping, table.companion.truth, reading),
+        lambda _: samples(rows, sources, clock, sums),
         profile,
-        columns.units,
-        (*table.notices, *groups_in(table), *columns.notices, *beside),
+        units,
+        tuple(notices),
         table.rows or table.expected,
         (*table.said, *lines_of(decoded(table.schema.metadata))),
     )
 
 
+class Clock(NamedTuple):
+    """Unit of a time column, whether anybody states it, and rate in Hz of rows without a time."""
+
+    unit: str | None
+    stated: bool
+    rate: float | None = None
+
+
 def samples(
-    rows: TableCells, columns: ChannelSources, sums: Mapping[str, int], most: int | None = None
+    rows: TableCells,
+    sources: Mapping[str, str],
+    clock: Clock,
+    sums: Mapping[str, int],
+    most: int | None = None,
 ) -> Iterator[SampleTable]:
     """The rows that have every value, with their stamps; the last table tells of the others.
 
     Parameters
     ----------
     rows : TableCells
-    columns : ChannelSources
+    sources : mapping
+        Cells by channel, the time's as "t".
+    clock : Clock
     sums : mapping
         Of the words of each column, as they were written.
     most : int, optional
@@ -136,52 +167,47 @@ def samples(
     LogError
         If no row has every value, a time is no time, or the values are not those written.
     """
-    path, unit, clock = rows.table.path, columns.time_unit, rows.by_name[columns.sources["t"]]
-    sources = {"t": columns.sources["t"], **columns.sources}
-    expected = {name: sums[source] for name, source in sources.items() if source in sums}
-    seen = dict.fromkeys(expected, 0)
+    path, unit, column = rows.table.path, clock.unit, sources["t"]
+    sources, time = {"t": column, **sources}, rows.by_name[column].type
+    left = {name: sums[source] for name, source in sources.items() if source in sums}
     count = lost = done = 0
     cut_off = False
     held: SampleTable | None = None
     for arrays in rows.batches(list(sources.values()), most):
         import pyarrow as pa
 
-        count += len(arrays[0])
-        cut_off = False
-        if any(one.null_count for one in arrays):
-            cut_off = not all(one[-1].is_valid for one in arrays)
-            whole = pa.RecordBatch.from_arrays(arrays, names=list(sources)).drop_null()
-            lost += len(arrays[0]) - whole.num_rows
-            arrays = whole.columns
-        channels: dict[str, NDArray[Any]] = {}
-        for name, one in zip(sources, arrays, strict=True):
-            values = whole_column(one)
-            channels[name] = values if name == "t" else values.astype(np.float64, copy=False)
-        times = channels.pop("t")
-        if not np.issubdtype(times.dtype, np.integer):
-            times = times.astype(np.float64, copy=False)
-        for name in seen:
-            seen[name] = add(seen[name], word_sum(times if name == "t" else channels[name]))
-        notices: list[Notice] = []
-        if unit is None and times.size:
-            if not np.all(np.isfinite(times)):
-                raise LogError(f"{path}: a time is not finite; expected a number in every row")
-            unit = time_unit(times)
-            if unit != "s":
-                notices.append(Notice("OTHER_UNIT", numbers={"case": "time", "unit": unit}))
+        batch = pa.RecordBatch.from_arrays(arrays, names=list(sources))
+        whole = batch.drop_null()
+        count += batch.num_rows
+        lost += batch.num_rows - whole.num_rows
+        last = batch.slice(max(0, batch.num_rows - 1))
+        cut_off = last.num_rows > last.drop_null().num_rows
+        channels = {name: whole_column(whole.column(name)) for name in sources}
+        for name, values in channels.items():
+            if name != "t" or not np.issubdtype(values.dtype, np.integer):
+                channels[name] = values.astype(np.float64, copy=False)
+        for name in left:
+            left[name] = add(left[name], -word_sum(channels[name]))
+        times, notices = channels.pop("t"), list[Notice]()
         try:
-            if columns.rate is not None:
-                stamps = np.rint((done + np.arange(times.size)) * (1e9 / columns.rate))
-                stamps = stamps.astype(np.int64)
+            if unit is None and times.size:
+                unit = time_unit(times)
+                if unit != "s":
+                    told = {"case": "time", "unit": unit}
+                    notices.append(Notice("OTHER_UNIT", numbers=told))
+            if clock.rate is None:
+                stamps = to_nanoseconds(times, getattr(time, "unit", unit or "s"))
             else:
-                ticks = clock.type.unit if clock.is_clock else unit or "s"
-                stamps = to_nanoseconds(times, ticks)
+                stamps = np.rint((done + np.arange(times.size)) * (1e9 / clock.rate))
+                stamps = stamps.astype(np.int64)
         except ValueError as error:
-            raise LogError(
-                f"{path}: {error} in column {sources['t']!r}, past row {done}"
-            ) from error
-        if unit and not (done or columns.time_stated):
-            notices += _slow(sources["t"], stamps, unit)
+            raise LogError(f"{path}: {error} in column {column!r}, past row {done}") from error
+        doubtful = unit and not (done or clock.stated)
+        if doubtful and (step := _median_step(stamps - stamps[:1])) > _SLOWEST_NS:
+            likely = _unit_of_step(step / NANOSECONDS[unit or "s"])
+            numbers = {"case": "slow time", "column": column, "unit": unit, "rate": 1e9 / step}
+            other = Remedy({"time_unit": likely}, f"if they are in {likely}")
+            notices.append(Notice("OTHER_UNIT", numbers=numbers, remedies=(other,)))
         done += times.size
         if held is not None:
             yield held
@@ -195,16 +221,16 @@ def samples(
         )
     if lost == 1 and cut_off:
         held = held.noting(Notice("CUT_OFF", numbers={"case": "row", "row": count}))
-    elif lost and columns.rate is not None:
+    elif lost and clock.rate is not None:
         raise LogError(
             f"{path}: rows lack a value, and without a time the rows behind them have none; "
             "fill the cells, or add a column of times"
         )
     elif lost:
-        numbers = {"count": lost, "rows": count}
-        held = held.noting(Notice("NOT_FINITE", numbers={"case": "empty"} | numbers))
+        numbers = {"case": "empty", "count": lost, "rows": count}
+        held = held.noting(Notice("NOT_FINITE", numbers=numbers))
     yield held
-    wrong = [name for name, total in seen.items() if total != expected[name]]
+    wrong = [name for name, rest in left.items() if rest]
     if wrong:
         raise LogError(
             f"{path}: the values of {', '.join(wrong)} are not those that were written: the file "
@@ -225,7 +251,14 @@ def time_unit(times: NDArray[Any]) -> str:
     Times since 1970 tell by their size, where that makes a median step of 20 µs to 10 s. Times
     since the start of a log tell by their median step, for logs between 20 Hz and 20 kHz: below
     0.2 it is seconds, below 50 ms, below 50,000 µs, else ns.
+
+    Raises
+    ------
+    ValueError
+        If a time is not finite.
     """
+    if not np.all(np.isfinite(times)):
+        raise ValueError("a time that is not finite")
     first, step = abs(float(times[0])), _median_step(times)
     for unit, low, high in _EPOCH:
         if low <= first < high and (step == 0 or 2e4 <= step * NANOSECONDS[unit] <= 1e10):
@@ -253,27 +286,12 @@ def to_nanoseconds(times: NDArray[Any], unit: str) -> IntArray:
         If a time is not finite, or out of the 292 years that int64 nanoseconds span.
     """
     factor = NANOSECONDS[unit]
-    whole = np.issubdtype(times.dtype, np.integer)
-    if not (whole or np.all(np.isfinite(times))):
+    if not np.all(np.isfinite(times)):
         raise ValueError("a time that is not finite")
-    if (
-        times.size
-        and max(abs(times.min().item()), abs(times.max().item())) * factor > LIMITS.largest_time_ns
-    ):
+    furthest = max(abs(one.item()) for one in (times.min(), times.max())) if times.size else 0
+    if furthest * factor > LIMITS.largest_time_ns:
         raise ValueError("a time beyond 292 years")
-    if whole:
-        whole_ns = times.astype(np.int64, copy=False)
-        return whole_ns * factor if factor != 1 else whole_ns
+    if np.issubdtype(times.dtype, np.integer):
+        return times.astype(np.int64, copy=False) * factor
     seconds = np.floor(times)
     return seconds.astype(np.int64) * factor + np.rint((times - seconds) * factor).astype(np.int64)
-
-
-def _slow(column: str, stamps: IntArray, unit: str) -> list[Notice]:
-    """What to say where nobody gave the unit of time and samples are too far apart for an arm."""
-    step = _median_step(stamps - stamps[:1])
-    if step <= _SLOWEST_NS:
-        return []
-    likely = _unit_of_step(step / NANOSECONDS[unit])
-    numbers = {"column": column, "unit": unit, "rate": 1e9 / step}
-    other = Remedy({"time_unit": likely}, f"if they are in {likely}")
-    return [Notice("OTHER_UNIT", numbers={"case": "slow time"} | numbers, remedies=(other,))]

@@ -48,20 +48,13 @@ _FROM_BASE_TO_TIP = (
         "outer",
         "stick",
         "second",
+        "secondary",
+        "tilt",
     ),
     ("wrist", "ankle", "hand", "foot", "tip", "bucket", "third"),
 )
-_ALSO_SECOND = ("secondary", "tilt")
 
-
-def _rank_by_word() -> dict[str, int]:
-    ranks = dict.fromkeys(_ALSO_SECOND, 2)
-    for rank, words in enumerate(_FROM_BASE_TO_TIP):
-        ranks |= dict.fromkeys(words, rank)
-    return ranks
-
-
-_RANKS = _rank_by_word()
+_RANKS = {word: rank for rank, words in enumerate(_FROM_BASE_TO_TIP) for word in words}
 _LETTERS = {"a": 1, "b": 2, "i": 1, "ii": 2, "one": 1, "two": 2}
 
 
@@ -80,31 +73,24 @@ def along_the_arm(names: Sequence[str]) -> tuple[tuple[str, str], Literal["names
     return (first, second), "names"
 
 
-def order_notice(
-    names: Sequence[str], chosen: tuple[str, str], by: Literal["names", "order"]
-) -> tuple[Notice, ...]:
-    """What to say of the order: nothing where names and log agree."""
-    first, second = chosen
-    if by == "order":
-        why = "as they stand in the log: their names do not tell"
-    elif list(names) != list(chosen):
-        why = "by their names; the log has them the other way round"
-    else:
-        return ()
-    numbers = {"first": first, "second": second, "why": why}
-    swapped = Remedy({"joints": [second, first]}, "to swap them")
-    note = by == "names"
-    return (
-        Notice("JOINT_ORDER", numbers={"case": "names"} | numbers, remedies=(swapped,), note=note),
-    )
-
-
 def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[Notice, ...]]:
-    """Joints 1 and 2 by the user or else by the two `names`, their source, and notices."""
+    """Joints 1 and 2 by the user or else by the two `names`, their source, and notices.
+
+    Nothing is said where names and log agree.
+    """
     if profile.joints:
         return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
     joints, by = along_the_arm(names)
-    return Reading(joints=joints, joints_told=by), order_notice(names, joints, by)
+    reading = Reading(joints=joints, joints_told=by)
+    if by == "names" and list(names) == list(joints):
+        return reading, ()
+    why = "by their names; the log has them the other way round"
+    if by == "order":
+        why = "as they stand in the log: their names do not tell"
+    numbers = {"case": "names", "first": joints[0], "second": joints[1], "why": why}
+    swapped = Remedy({"joints": list(joints[::-1])}, "to swap them")
+    note = by == "names"
+    return reading, (Notice("JOINT_ORDER", numbers=numbers, remedies=(swapped,), note=note),)
 
 
 def _ranks(first: str, second: str) -> tuple[int, int] | None:
@@ -157,27 +143,18 @@ def moving_joints(
     Where they move, the two-link model lacks their torque. `positions` has by joint the path of
     its position, in `unit` rad.
     """
-    joints, places = {}, {}
-    for number, (joint, place) in enumerate(positions.items()):
-        name = f"joint {number}"  # none is called as a stamp is
-        joints[name], places[name] = joint, place
-    if not joints:
-        return ()
-    table = None
+    names = {f"joint {number}": joint for number, joint in enumerate(positions)}
+    places = dict(zip(names, positions.values(), strict=True))  # none is called as a stamp is
     try:
-        for table in tables(places):
-            if len(table):
-                break
+        table = next((one for one in tables(places) if len(one)), None) if places else None
     except LogError:  # the joints that are read tell of what is wrong
         return ()
-    if table is None or not len(table):
-        return ()
     moved: dict[str, float] = {}
-    for name, values in table.columns.items():
+    for name, values in table.columns.items() if table else ():
         finite = values[np.isfinite(values)]
         if finite.size and unit * np.ptp(finite) > BESIDE_STILL:
-            moved[joints[name]] = unit * float(np.ptp(finite))
-    if not moved:
+            moved[names[name]] = unit * float(np.ptp(finite))
+    if table is None or not moved:
         return ()
     furthest = sorted(moved, key=lambda joint: -moved[joint])
     listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])

@@ -15,23 +15,19 @@ from algid.base.errors import LogError
 from algid.base.faults import during
 from algid.base.limits import LIMITS
 from algid.base.words import counted
-from algid.log import ZEROS, Log, Origin
+from algid.log import IntArray, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order
-from algid.readers.convert import (
-    QUANTITIES,
-    ROWS,
-    Conversion,
-    SampleBuffer,
-    channel_readings,
-    laws_of,
-)
+from algid.readers.convert import Law, channel_readings, convert, laws_of
 from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
 from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, remark
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
+QUANTITIES = ("theta", "tau", "omega", "q_des")
+ROWS = 1 << 16
+"""Rows a table: few enough to stay in a core's cache between decoding and copying."""
 PASSIVE_TORQUE = 0.01
 """Of the other joint's: more than what a torque's noise makes of a joint without a motor."""
 
@@ -49,12 +45,13 @@ class TableReader:
 
     origin: Origin
     tables: Callable[[int], Iterator[SampleTable]]
-    conversion: Conversion
     notices: tuple[Notice, ...] = ()
     rows: int = 0
     """Samples to expect, 0 where the file does not tell."""
     stated_rate: float | None = None
     """Samples a second, as the file states them beside its stamps."""
+    laws: tuple[Law, ...] = (None, None)
+    """Of joints whose torque a controller makes."""
 
     def blocks(self, rows: int = BLOCK_ROWS) -> Iterator[Log]:
         """Blocks of at most `rows` samples.
@@ -86,55 +83,74 @@ class TableReader:
 
     def _gathered(self, most: int) -> Iterator[Log]:
         """Logs of at most `most` samples, each converted from small tables into its arrays."""
-        unwrapper = Unwrapper(self.origin.reading.unwrap)
-        buffer: SampleBuffer | None = None
-        notices, total = self.notices, 0
-        ordered = in_order(
-            self.origin.path, self.tables(ROWS), self.origin.reading.segment, runs=True
-        )
+        origin, last = self.origin, [math.nan, math.nan]
+        # stamps and signals of one log in one piece, which costs nothing until it is written
+        room, recorded = np.empty((0, 0), np.int64), list[str]()
+        notices, total, used = self.notices, 0, 0
+
+        def parts(first: int = 0) -> tuple[IntArray, dict[str, FloatArray]]:
+            part = room[:, first:used]
+            pairs = part[1:].view(np.float64).reshape(len(recorded), 2, -1)
+            return part[0], dict(zip(recorded, pairs, strict=True))
+
+        def log() -> Log:
+            stamps, one = parts()
+            omega, reference = one.get("omega"), one.get("q_des")
+            return Log(stamps, one["theta"], one["tau"], origin, omega, notices, reference)
+
+        ordered = in_order(origin.path, self.tables(ROWS), origin.reading.segment, runs=True)
         for table in cut(self._usable(ordered), min(ROWS, most)):
             if not len(table):
                 notices += table.notices
                 continue
-            if buffer is not None and buffer.used + len(table) > most:
-                yield self._log(buffer, notices)
-                buffer, notices = None, ()
+            first = used
+            if used and used + len(table) > most:
+                yield log()
+                first, notices = 0, ()
             if total < 2 <= len(table):
                 notices += other_rate(self.stated_rate, table.stamp_ns)
             if not total:
                 notices += self._of_passive(table)
-            if buffer is None:
+            used = first + len(table)
+            if not first:
                 recorded = [name for name in QUANTITIES if f"{name}1" in table.columns]
-                buffer = SampleBuffer(min(most, self.rows or len(table)), recorded)
-            stamps, signals = buffer.more(len(table))
+                rows = max(used, min(most, self.rows, LIMITS.reserved_rows))
+                room = np.empty((1 + 2 * len(recorded), rows), np.int64)
+            elif used > room.shape[1]:
+                full, room = room, np.empty((len(room), max(used, 2 * room.shape[1])), np.int64)
+                room[:, :first] = full[:, :first]
+            stamps, signals = parts(first)
             stamps[:] = table.stamp_ns
-            self.conversion.apply(table, signals)
-            unwrapper.run(signals["theta"], signals.get("q_des"))
+            convert(table, signals, origin.reading, self.laws)
+            for joint in np.flatnonzero(origin.reading.unwrap):
+                last[joint] = unwrap(signals["theta"][joint], last[joint])
+                if "q_des" in signals:  # follows within half a turn
+                    away = signals["theta"][joint] - signals["q_des"][joint]
+                    signals["q_des"][joint] += _TURN * np.rint(away / _TURN)
             notices += table.notices
             total += len(table)
         if total < 2:
             worst = min(notices, key=lambda notice: not notice.lossy, default=None)
             why = "" if worst is None else f" ({worst.text})"
             raise LogError(
-                f"{self.origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
+                f"{origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
             )
-        if buffer is not None:
-            yield self._log(buffer, notices)
-
-    def _log(self, buffer: SampleBuffer, notices: tuple[Notice, ...]) -> Log:
-        stamps, signals = buffer.filled()
-        theta, tau = signals["theta"], signals["tau"]
-        omega, reference = signals.get("omega"), signals.get("q_des")
-        return Log(stamps, theta, tau, self.origin, omega, notices, reference)
+        yield log()
 
     def _usable(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
         """The rows from `start` to `end` of the reading, whose numbers are finite.
 
         Where a user accepts others, their rows are left out and counted.
+
+        Raises
+        ------
+        LogError
+            If one is not finite, and the user accepts none.
         """
-        reading = self.origin.reading
+        reading, mapping = self.origin.reading, self.origin.mapping
         start, end = reading.start or 0.0, math.inf if reading.end is None else reading.end
-        whole, accepted = (start, end) == (0.0, math.inf), "NOT_FINITE" in reading.accepted
+        # a joint without a motor has no torque, and nobody need follow a reference always
+        unchecked = (f"tau{reading.passive}", *REFERENCES)
         begin_ns: int | None = None
         outside = dropped = done = 0
         for table in tables:
@@ -142,26 +158,32 @@ class TableReader:
                 yield table
                 continue
             begin_ns = int(table.stamp_ns[0]) if begin_ns is None else begin_ns
-            if not whole:
+            if (start, end) != (0.0, math.inf):
                 since = table.stamp_ns - begin_ns
                 inside = (since >= 1e9 * start) & (since <= 1e9 * end)
                 outside += len(table) - int(np.count_nonzero(inside))
                 table = table.take(inside)
             good = np.ones(len(table), np.bool_)
             for name, values in table.columns.items():
-                # a joint without a motor has no torque, and nobody need follow a reference always
-                if name in (f"tau{reading.passive}", *REFERENCES):
+                # a small sum of squares, which needs no array of its own, has no large term
+                if name in unchecked or np.einsum("i,i->", values, values) < LIMITS.largest_value:
                     continue
-                if accepted:
-                    good &= np.abs(values) < LIMITS.largest_value
-                else:
-                    self._check(name, values, done)
+                good &= np.abs(values) < LIMITS.largest_value
+                if not (good.all() or "NOT_FINITE" in reading.accepted):
+                    row = int(np.argmin(good))
+                    out = Remedy({"start": None, "end": None}, "cut that part out")
+                    accept = Remedy({"accept": "NOT_FINITE"}, "or leave such samples out")
+                    raise LogError(
+                        f"{self.origin.path}: {name} ({mapping.get(name, name)}) in sample "
+                        f"{done + row + 1}: expected a finite number below "
+                        f"{LIMITS.largest_value:g} in size, found {values[row]}; {out}; {accept}"
+                    )
             done += len(table)
             dropped += len(table) - int(np.count_nonzero(good))
             yield table if good.all() else table.take(good)
         if not (reading.start is None and reading.end is None):
-            last = "the end" if reading.end is None else f"{end:g} s"
-            yield remark(Notice("CUT", numbers={"count": outside, "start": start, "end": last}))
+            until = "the end" if reading.end is None else f"{end:g} s"
+            yield remark(Notice("CUT", numbers={"count": outside, "start": start, "end": until}))
         if dropped:
             yield remark(Notice("NOT_FINITE", numbers={"case": "number", "count": dropped}))
 
@@ -178,23 +200,6 @@ class TableReader:
         share = 100 * float(own / other)
         numbers = {"column": mapping[names[0]], "joint": passive, "percent": share}
         return (Notice("PASSIVE_TORQUE", numbers=numbers),)
-
-    def _check(self, name: str, values: FloatArray, first: int) -> None:
-        # one pass without an array of its own: a small sum of squares has no large term, and no NaN
-        if np.einsum("i,i->", values, values) < LIMITS.largest_value:
-            return
-        wrong = np.flatnonzero(~(np.abs(values) < LIMITS.largest_value))
-        if wrong.size:
-            row = int(wrong[0])
-            source = self.origin.mapping.get(name, name)
-            cut = Remedy({"start": None, "end": None}, "cut that part out")
-            accept = Remedy({"accept": "NOT_FINITE"}, "or leave such samples out")
-            raise LogError(
-                f"{self.origin.path}: {name} ({source}) in sample {first + row + 1}: "
-                f"expected a finite number below {LIMITS.largest_value:g} in size, found "
-                f"{values[row]}; "
-                f"{cut}; {accept}"
-            )
 
 
 def make_reader(
@@ -231,7 +236,7 @@ def make_reader(
         from algid.profile import Profile
 
         profile = Profile()
-    channels = channel_readings(origin.path, origin.mapping, profile, stated)
+    channels, of_units = channel_readings(origin.path, origin.mapping, profile, stated)
     reading = replace(
         origin.reading,
         channels=channels,
@@ -247,39 +252,29 @@ def make_reader(
         segment=profile.segment,
         accepted=profile.accept,
     )
-    units = Conversion(
-        channels,
-        zero=ZEROS[profile.zero],
-        absolute=profile.second_angle == "absolute",
-        base=profile.drive == "base",
-        passive=profile.passive,
-        laws=laws_of(origin.path, profile),
+    notices += (
+        *of_units,
+        *unused(said, reading, profile),
+        *settings_unused(profile, reading, origin.mapping),
     )
-    notices += tuple(unused(said, reading, profile))
-    notices += tuple(settings_unused(profile, reading, origin.mapping))
     origin = replace(origin, reading=reading)
-    return TableReader(origin, tables, units, notices, rows, stated_rate(said))
+    laws = laws_of(origin.path, profile)
+    return TableReader(origin, tables, notices, rows, stated_rate(said), laws)
 
 
 _TURN = 2 * math.pi
 
 
-class Unwrapper:
-    """Adds whole turns where an angle jumps, for the joints that a profile says so of."""
+def unwrap(angle: FloatArray, last: float) -> float:
+    """Add whole turns in place where an angle (N,) in rad jumps, from the `last` one or NaN on.
 
-    def __init__(self, joints: tuple[bool, bool]) -> None:
-        self._joints = joints
-        self._last = [math.nan, math.nan]  # each joint's last angle as recorded
-        self._turns = [0.0, 0.0]
-
-    def run(self, theta: FloatArray, reference: FloatArray | None = None) -> None:
-        """Unwrap the next angles (2, N), rad, in place; references follow within half a turn."""
-        for joint in np.flatnonzero(self._joints):
-            if theta.shape[1]:
-                start = theta[joint, 0] if math.isnan(self._last[joint]) else self._last[joint]
-                raw = np.concatenate([[start], theta[joint]])
-                turns = self._turns[joint] - np.cumsum(np.rint(np.diff(raw) / _TURN))
-                self._last[joint], self._turns[joint] = raw[-1], turns[-1]
-                theta[joint] += _TURN * turns
-            if reference is not None:
-                reference[joint] += _TURN * np.rint((theta[joint] - reference[joint]) / _TURN)
+    Returns
+    -------
+    float
+        The last angle.
+    """
+    if not angle.size:
+        return last
+    before = np.concatenate([[angle[0] if math.isnan(last) else last], angle])
+    angle -= _TURN * np.cumsum(np.rint(np.diff(before) / _TURN))
+    return float(angle[-1])

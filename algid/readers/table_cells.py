@@ -9,13 +9,14 @@ told where they have several values.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.base.arrow import column_of, numbers_of, whole_column
+from algid.base.arrow import numbers_of
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.words import repeated
@@ -81,13 +82,13 @@ class TableFile:
 class Cell:
     """A number of each row: a column's, or one within its lists and structures.
 
-    `label` is the column with the joints' names, if the number of `joint` stands beside its name;
-    `fills` are values that stand for a missing one.
+    `steps` are the places in these; `label` is the column with the joints' names, if the number of
+    `joint` stands beside its name; `fills` are values that stand for a missing one.
     """
 
     column: str
     type: pa.DataType
-    steps: tuple[int | str, ...] = ()
+    steps: tuple[int, ...] = ()
     label: str = ""
     joint: str = ""
     fills: tuple[float, ...] = ()
@@ -112,54 +113,44 @@ class Cell:
 
     def of(self, batch: pa.RecordBatch) -> pa.Array:
         """The numbers of a batch: integers, floats, or for a clock ticks of its type."""
-        column = batch.column(self.column)
-        if self.steps or self.label or not _is_plain(self.type):
-            column = self._within(column, batch)
-        if not self.fills and (self.scale, self.offset) == (1.0, 0.0):
-            return column
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        values = column.cast(pa.float64())
+        values = batch.column(self.column)
+        if self.label:
+            values = self._beside_its_name(values, batch.column(self.label))
+        for step in self.steps:
+            if pa.types.is_struct(values.type):
+                values = pc.struct_field(values, [step])
+            else:
+                one = pc.list_slice(values, step, step + 1, return_fixed_size_list=True)
+                values = pc.if_else(values.is_valid(), one.values, None)
+        if self.is_clock:
+            values = values.view(pa.int32() if self.type.bit_width == 32 else pa.int64())
+        elif not _is_plain(values.type):
+            if pa.types.is_dictionary(values.type):
+                values = values.dictionary_decode()
+            if pa.types.is_decimal128(values.type):  # Arrow rounds twice
+                import polars as pl
+
+                values = pl.Series(pl.from_arrow(values)).cast(pl.Float64).to_arrow()
+            values = values.cast(pa.float64())
+        if not self.fills and (self.scale, self.offset) == (1.0, 0.0):
+            return values
+        values = values.cast(pa.float64())
         for fill in self.fills:
             missing = pc.is_nan(values) if np.isnan(fill) else pc.equal(values, fill)
-            values = pc.if_else(missing, pa.scalar(None, pa.float64()), values)
+            values = pc.if_else(missing, None, values)
         return pc.add(pc.multiply(values, self.scale), self.offset)
 
-    def _within(self, column: pa.Array, batch: pa.RecordBatch) -> pa.Array:
-        import pyarrow as pa
-
-        kind = column.type
-        if pa.types.is_fixed_size_list(kind) and _is_plain(kind.value_type) and self.steps:
-            numbers = column.flatten()
-            if not (column.null_count or numbers.null_count):  # a matrix
-                return column_of(whole_column(numbers)[self.steps[0] :: kind.list_size])
-        if pa.types.is_decimal256(self.type):  # polars has none
-            return column.cast(pa.float64())
-        if self.is_clock and not self.steps:
-            return column.view(pa.int32() if self.type.bit_width == 32 else pa.int64())
+    def _beside_its_name(self, values: pa.Array, names: pa.Array) -> pa.Array:
         import polars as pl
 
-        if pa.types.is_dictionary(column.type):
-            column = column.dictionary_decode()
-        values = pl.Series(pl.from_arrow(column))
-        if self.label:
-            names = pl.from_arrow(batch.column(self.label))
-            frame = pl.DataFrame({"values": values, "names": names})
-            mine = pl.col("names").list.eval(pl.element() == self.joint)
-            first = pl.when(mine.list.any()).then(mine.list.arg_max())
-            number = pl.col("values").cast(pl.List(pl.Float64)).list.get(first, null_on_oob=True)
-            return frame.select(number).to_series().to_arrow()
-        for step in self.steps:
-            if isinstance(step, str):
-                values = values.struct.field(step)
-            elif isinstance(values.dtype, pl.Array):
-                values = values.arr.get(step, null_on_oob=True)
-            else:
-                values = values.list.get(step, null_on_oob=True)
-        if self.is_clock:
-            return values.to_physical().to_arrow()
-        return (values if _is_plain(self.type) else values.cast(pl.Float64)).to_arrow()
+        frame = pl.DataFrame({"values": pl.from_arrow(values), "names": pl.from_arrow(names)})
+        mine = pl.col("names").list.eval(pl.element() == self.joint)
+        first = pl.when(mine.list.any()).then(mine.list.arg_max())
+        number = pl.col("values").cast(pl.List(pl.Float64)).list.get(first, null_on_oob=True)
+        return frame.select(number).to_series().to_arrow()
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,55 +195,65 @@ def cells_of(table: TableFile) -> TableCells:
         raise LogError(
             f"{table.path}: the column {twice[0][:80]!r} stands in the file twice; rename one"
         )
-    nested = [one.name for one in table.schema if _holds_more(one.type)]
+    nested = [one.name for one in table.schema if is_list(one.type) or pa.types.is_struct(one.type)]
     first = next(table.batches(nested, BATCH_ROWS), None) if nested else None
     metadata = decoded(table.schema.metadata)
     label, joints = _spoken(table)
     cells: dict[str, Cell] = {}
-
-    def take(name: str, cell: Cell, values: pa.Array | None, said: Mapping[str, str]) -> None:
-        if len(cells) >= LIMITS.columns:
-            raise LogError(
-                f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
-            )
-        if pa.types.is_struct(cell.type):
-            for one in cell.type:
-                inner = replace(cell, steps=(*cell.steps, one.name), type=one.type)
-                within = None if values is None else values.field(one.name)
-                take(f"{name}.{one.name}", inner, within, said)
-        elif is_list(cell.type):
-            size = 0
-            if pa.types.is_fixed_size_list(cell.type):
-                size = cell.type.list_size
-            elif values is not None:
-                size = max(np.diff(whole_column(values.offsets)), default=0)
-            for place in range(min(size, LIMITS.list_cells)):
-                inner = replace(cell, steps=(*cell.steps, place), type=cell.type.value_type)
-                within = None if values is None else values.flatten()
-                take(f"{name}[{place}]", inner, within, said)
-        else:
-            cells[name] = _marked(table.path, cell, said)
-
     for one in table.schema:
-        said = {key.lower(): value for key, value in metadata.items() if key.lower() in _FILLS}
         own = decoded(one.metadata)
+        said = {key.lower(): value for key, value in metadata.items() if key.lower() in _FILLS}
         said |= {key.lower(): value for key, value in own.items()}
-        named = joints or next((_names(own[key]) for key in LABELS if key in own), [])
-        named = named or next((_names(metadata[key]) for key in LABELS if key in metadata), [])
-        if not (named and is_list(one.type) and one.name.lower().replace(".", "_") in _QUANTITIES):
-            if one.name != label:
-                values = first.column(one.name) if first and one.name in nested else None
-                take(one.name, Cell(one.name, one.type), values, said)
+        if one.name == label:
             continue
-        for place, joint in enumerate(named[: LIMITS.joints]):
-            steps = () if label else (place,)
-            cell = Cell(one.name, one.type.value_type, steps, label, joint)
-            take(f"/{label or 'joint_names'}/{joint}/{one.name}", cell, None, said)
+        if joints and is_list(one.type) and _is_quantity(one.name):
+            for joint in joints[: LIMITS.joints]:
+                cell = Cell(one.name, one.type.value_type, label=label, joint=joint)
+                cells[f"/{label}/{joint}/{one.name}"] = _marked(table.path, cell, said)
+            continue
+        named = [text[key] for text in (own, metadata) for key in LABELS if key in text]
+        names = next(filter(None, map(_names, named)), [])
+        values = first.column(one.name) if first and one.name in nested else None
+        for name, steps, kind in _within(one.name, one.type, values):
+            place = _PLACE.fullmatch(name)
+            if place and _is_quantity(place[1]) and int(place[2]) < len(names):
+                name = f"/joint_names/{names[int(place[2])]}/{place[1]}"
+            cells[name] = _marked(table.path, Cell(one.name, kind, steps), said)
+            if len(cells) > LIMITS.columns:
+                raise LogError(
+                    f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
+                )
     flags = [name for name in cells if name.lower() in GOOD | BAD and _is_flag(cells[name].type)]
     return TableCells(table, cells, tuple(flags))
 
 
-_QUANTITIES = frozenset(stem for stems in STEMS.values() for stem in stems)
+def _within(
+    name: str, kind: pa.DataType, values: pa.Array | None, steps: tuple[int, ...] = ()
+) -> Iterator[tuple[str, tuple[int, ...], pa.DataType]]:
+    """Names, steps and types of the cells of a column, of which some `values` are given."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    if pa.types.is_struct(kind):
+        for place, one in enumerate(kind):
+            inner = values and pc.struct_field(values, [place])
+            yield from _within(f"{name}.{one.name}", one.type, inner, (*steps, place))
+    elif is_list(kind):
+        size = values and pc.max(pc.list_value_length(values)).as_py()
+        for place in range(min(size or 0, LIMITS.list_cells)):
+            inner = values and values.flatten()
+            yield from _within(f"{name}[{place}]", kind.value_type, inner, (*steps, place))
+    else:
+        yield name, steps, kind
+
+
+_PLACE = re.compile(r"(.+)\[(\d+)\]")
+
+
+def _is_quantity(name: str) -> bool:
+    """Whether a name is one of a joint's quantity."""
+    plain = name.lower().replace(".", "_")
+    return any(plain in stems for stems in STEMS.values())
 
 
 def _spoken(table: TableFile) -> tuple[str, list[str]]:
@@ -363,12 +364,6 @@ def is_list(kind: pa.DataType) -> bool:
     return types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind)
 
 
-def _holds_more(kind: pa.DataType) -> bool:
-    import pyarrow as pa
-
-    return is_list(kind) or pa.types.is_struct(kind)
-
-
 def _is_plain(kind: pa.DataType) -> bool:
     """Whether NumPy has the type."""
     import pyarrow as pa
@@ -385,7 +380,7 @@ def _is_flag(kind: pa.DataType) -> bool:
 def _flag(values: pa.Array) -> Any:
     """Whether flags (N,) are set: numbers but zero, texts but a no; NaN where one is missing."""
     if is_text(values.type):
-        return np.array([str(text).lower() not in _NO for text in values.to_pylist()])
+        return np.array([str(text).strip().lower() not in _NO for text in values.to_pylist()])
     return numbers_of(values) != 0
 
 

@@ -4,15 +4,19 @@ motors and units.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from algid.base.errors import LogError
+from algid.log import Companion
 from algid.notices import Notice
-from algid.profile import Profile, with_settings
+from algid.profile import Profile
+from algid.readers.arrays import of_arrays
 from algid.readers.column_names import Name, on_motor_side, other_joints, take_apart
-from algid.readers.columns import choose_columns
+from algid.readers.flat import open_table
 from tests.readers.headers import TableReader, opened
 
 PLAIN = "t q1 q2 tau1 tau2"
@@ -86,10 +90,12 @@ def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> N
 
 
 def test_columns_that_were_written_must_be_there() -> None:
+    table = of_arrays("log.csv", "arrays", {name: np.arange(3.0) for name in PLAIN.split()[:-1]})
+    sums = dict.fromkeys(("tau2", "tau1", "omega1"), 0)
     with pytest.raises(
         LogError, match="the columns tau2, omega1 that were written are not there: the file was"
     ):
-        choose_columns("log.csv", PLAIN.split()[:-1], Profile(), {}, ["tau2", "tau1", "omega1"])
+        open_table(replace(table, companion=Companion(None, sums)), Profile())
 
 
 @pytest.mark.parametrize("passive", [1, 2])
@@ -134,21 +140,17 @@ def test_who_said_which_joint_is_the_first() -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "settings", "unit", "stated"),
+    ("header", "settings", "unit"),
     [
-        (PLAIN, {}, None, False),
-        ("time_ms q1 q2 tau1 tau2", {}, "ms", True),
-        (PLAIN, {"time_unit": "us"}, "us", True),
-        ("time_ms q1 q2 tau1 tau2", {"time_unit": "us"}, "us", True),
-        ("t theta1 theta2 tau1 tau2", {}, "s", False),
+        (PLAIN, {}, None),
+        ("time_ms q1 q2 tau1 tau2", {}, "ms"),
+        (PLAIN, {"time_unit": "us"}, "us"),
+        ("time_ms q1 q2 tau1 tau2", {"time_unit": "us"}, "us"),
+        ("t theta1 theta2 tau1 tau2", {}, "s"),
     ],
 )
-def test_the_unit_of_time(
-    header: str, settings: dict[str, Any], unit: str | None, stated: bool
-) -> None:
-    """algid's own names mean seconds, and still are only taken to."""
-    found = choose_columns("log.csv", header.split(), with_settings(Profile(), settings), {})
-    assert (found.time_unit, found.time_stated) == (unit, stated)
+def test_the_unit_of_time(header: str, settings: dict[str, Any], unit: str | None) -> None:
+    assert assigned(header, settings).origin.reading.time_unit == unit
 
 
 def said(found: TableReader) -> list[tuple[str, str]]:
@@ -213,16 +215,15 @@ def test_the_file_and_the_user_differ_about_a_unit() -> None:
 def test_the_unit_in_the_name_of_a_column_that_a_user_names_is_used() -> None:
     found = assigned("t q1 q2 a_deg tau1 tau2", {"theta1": {"source": "a_deg"}})
     assert found.origin.reading.channels["theta1"].unit == "deg"
-    assert "is in 'v', which is no unit" in refusal(
+    assert "is in 'v'; expected one of N m," in refusal(
         "t q1 q2 x[V] tau1 tau2", {"tau1": {"source": "x[V]"}}
     )
 
 
 def test_a_unit_of_no_joint_is_refused_where_it_counts() -> None:
     assert refusal("t q1_inch q2 tau1 tau2") == (
-        "the column 'q1_inch' for theta1 is in 'inch', which is no unit of a joint; say its unit "
-        "if that is wrong: "
-        "--set theta1.unit=rad"
+        "the column 'q1_inch' for theta1 is in 'inch'; expected one of rad, mrad, deg, rev, rpm, "
+        "counts; say its unit if that is wrong: --set theta1.unit=rad"
     )
     assert '--set tau2.unit="N m"' in refusal(PLAIN, None, tau2="%")
     (foreign,) = said(assigned("t q1_inch q2 tau1 tau2", {"theta1": {"unit": "rev"}}))

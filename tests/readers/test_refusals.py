@@ -144,7 +144,7 @@ REFUSALS = {
                                                                    "--set theta2.counts=4096"
     ),
     "inches": Refusal(
-        table("t,q1 [inch],q2,tau1,tau2"), "'inch', which is no unit",
+        table("t,q1 [inch],q2,tau1,tau2"), "is in 'inch'; expected one of rad, mrad",
         '--set theta1.unit="rad"', "OTHER_UNIT",
     ),
     "a torque in degrees": Refusal(

@@ -127,25 +127,27 @@ def test_the_dialect_of_a_table() -> None:
         'made by hand\n\n"t" ; q1; "on, off" ;day\n1 ; 2,5;7;2024-01-02 '
         "03:04:05\n-2;.5;8;2024-01-02T03:04:06\n"
     )
-    assert dialect.columns == ("t", "q1", "on, off", "day")
+    kinds = ["int64", "double", "int64", "timestamp[ns]"]
+    assert dialect.schema.names == ["t", "q1", "on, off", "day"]
     assert (dialect.separator, dialect.decimal_comma, dialect.skip, dialect.padded) == (
         ";",
         True,
         3,
         True,
     )
-    assert (set(dialect.whole), set(dialect.dates)) == ({"t", "on, off"}, {"day"})
+    assert [str(kind) for kind in dialect.schema.types] == kinds
     plain = found("% rate 5\n% t q1\n1 2.5\n2 3\n")
-    assert (plain.columns, plain.separator, plain.comment, plain.skip) == (("t", "q1"), "", "%", 2)
-    assert (plain.decimal_comma, plain.padded) == (False, False)
+    assert (plain.schema.names, plain.separator, plain.comment) == (["t", "q1"], "", "%")
+    assert (plain.skip, plain.decimal_comma, plain.padded) == (2, False, True)
     assert found("t,q1\n1,2\n").decimal_comma is False
     # a cell more than nineteen digits long is no int64
-    assert found("t,q1\n12345678901234567890,1\n").whole == {"q1"}
+    types = found("t,q1\n12345678901234567890,1\n").schema.types
+    assert [str(kind) for kind in types] == ["double", "int64"]
 
 
 def test_titles_may_hold_separators_and_rows_may_break_off() -> None:
     dialect = found("run;7;b\nDate,2026-01-01\nt,q1,q2\n1,2,3\n2,3,4\n3,4")
-    assert (dialect.columns, dialect.skip) == (("t", "q1", "q2"), 3)
+    assert (dialect.schema.names, dialect.skip) == (["t", "q1", "q2"], 3)
     # of a table none of whose rows fits its header, the first separator that makes more than four
     # cells of it
     assert found("a|b|c|d|e\n1|2|3|4|5\n1|2\n1|2|3\n").separator == "|"
@@ -153,7 +155,8 @@ def test_titles_may_hold_separators_and_rows_may_break_off() -> None:
 
 def test_a_row_of_units_and_comments_above_and_below_it() -> None:
     dialect = found("# tau1 in mNm\nt,q1,tau1\n,rad,-\n# q1 in deg\n1,2,3\n")
-    assert (dict(dialect.units), dialect.skip) == ({"q1": "rad"}, 4)
+    assert (dialect.schema.field("q1").metadata, dialect.skip) == ({b"unit": b"rad"}, 4)
+    assert dialect.schema.field("tau1").metadata is None
     assert dialect.said == ("tau1 in mNm", " q1 in deg")
 
 

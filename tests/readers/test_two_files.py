@@ -78,10 +78,7 @@ def test_a_hole_in_the_torques_is_a_loss(tmp_path: Path) -> None:
 def test_files_that_do_not_overlap_are_refused(tmp_path: Path) -> None:
     torques(tmp_path / "t.csv", slice(None))
     late = angles(tmp_path / "a.csv", late_ns=10**10)
-    with pytest.raises(
-        LogError,
-        match=r"a\.csv: its angles run from .* and the torques of t\.csv from .*: expected ",
-    ):
+    with pytest.raises(LogError, match=r"a\.csv: 0 samples; .* lie before or behind what t\.csv"):
         read_log(late, Profile(torque_file="t.csv"))
 
 
