@@ -64,6 +64,11 @@ class IdentifiedArm:
         return list(map(self.model.names.index, within(FRICTION, self.model.names)))
 
     @property
+    def columns(self) -> FloatArray:
+        """U (1 + f, q): the columns of a kilogram and of friction out of all."""
+        return np.vstack([self.unit, np.eye(self.k.size)[self.friction]])
+
+    @property
     def tip_equivalent(self) -> float:
         """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
         return abs(float(self.k[self.model.names.index(K3)])) / self.l2**2

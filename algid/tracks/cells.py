@@ -1,25 +1,26 @@
 """Information of short cells of a log on the payload: sums of whitened rows that are linear in it.
 
-Rows are whitened as in `algid.estimators.whitening`. With the payload's column g = Y d, d what one
-kilogram at the tip adds to the constants (Table 2), a row reads e = g m_p + noise.
+Rows are whitened as in `algid.estimators.whitening`. With z the payload's column g, what one
+kilogram at the tip adds to the torque (Table 2), and those of friction, a row reads
+e = zᵀ x + noise, x the mass and the change of friction's coefficients.
 
-======  ==========================================  =========
+======  ==========================================  =============
 symbol  name                                        shape
-======  ==========================================  =========
-A       Σ g², information on m_p                    (C,)
-B       Σ g e, so that m_p = ΣB / ΣA                (C,)
-S       Σ g Y, how constants' errors enter          (C, q)
+======  ==========================================  =============
+U       z = U Y: a kilogram's constants, friction   (1 + f, q)
+P       Σ z Y, how constants' errors enter          (C, 1 + f, q)
+M       P Uᵀ, information on x                      (C, 1 + f, 1 + f)
+b       Σ z e, so that m_p = Σb / ΣM                (C, 1 + f)
 E       Σ e²                                        (C,)
 Q       Σ of the whitened torques squared           (C,)
-N       Σ c Y, c the columns of friction            (C, f, q)
-D       Σ c e                                       (C, f)
-======  ==========================================  =========
+======  ==========================================  =============
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -43,19 +44,30 @@ class Cells:
 
     start: FloatArray
     end: FloatArray
-    A: FloatArray
-    B: FloatArray
-    S: FloatArray
+    P: FloatArray
+    b: FloatArray
     E: FloatArray
     Q: FloatArray
     rows: FloatArray
-    N: FloatArray
-    D: FloatArray
-    friction: list[int] = field(default_factory=list)
-    """Which of the q columns are friction's."""
+    U: FloatArray
 
     def __len__(self) -> int:
         return int(self.start.size)
+
+    @cached_property
+    def M(self) -> FloatArray:
+        """Information (C, 1 + f, 1 + f) on the mass and friction's coefficients."""
+        return np.asarray(self.P @ self.U.T)
+
+    @property
+    def A(self) -> FloatArray:
+        """Information (C,) on the mass."""
+        return self.M[:, 0, 0]
+
+    @property
+    def B(self) -> FloatArray:
+        """Score (C,) of the mass."""
+        return self.b[:, 0]
 
     @property
     def middle(self) -> FloatArray:
@@ -72,19 +84,22 @@ class Cells:
         return float(self.B.sum() / max(self.A.sum(), 1e-300))
 
     def sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
-        """T (C, p): shift of the scores of payload `mass` (C,) kg by constants, lengths, body."""
-        return np.concatenate([self.S, mass[:, None] * (self.S @ arm.by_shape.T)], axis=1)
+        """T (C, 1 + f, p): shift of b by constants, lengths and body of a payload `mass` (C,)."""
+        by_shape = mass[:, None, None] * (self.P @ arm.by_shape.T)
+        return np.concatenate([self.P, by_shape], axis=2)
 
-    def friction_sensitivity(self, arm: IdentifiedArm, mass: FloatArray) -> FloatArray:
-        """V (C, f, p): shift of D by constants, lengths and body of a payload of `mass` (C,) kg."""
-        return np.concatenate([self.N, mass[:, None, None] * (self.N @ arm.by_shape.T)], axis=2)
+    def less(self, x: FloatArray) -> Cells:
+        """The cells without what a mass and friction x (C, 1 + f) explain."""
+        Mx = np.einsum("cij,cj->ci", self.M, x)
+        E = self.E - np.einsum("ci,ci->c", x, 2 * self.b - Mx)
+        return replace(self, b=self.b - Mx, E=E)
 
     def squares(self, mass: float | FloatArray) -> FloatArray:
         """Σ (e − g m_p)² (C,): what a payload of `mass` kg, one or (C,), leaves."""
         return np.asarray(self.E - 2 * mass * self.B + mass**2 * self.A)
 
 
-SUMS = outside(names_in(fields(Cells)), ("friction",))
+SUMS = outside(names_in(fields(Cells)), ("U",))
 
 
 def joined(parts: Sequence[Cells]) -> Cells:
@@ -103,36 +118,27 @@ def cells_of(
     `settle` is that of `IdentifiedArm.linearised`.
     """
     cells = []
-    for piece in pieces(segments, _PIECE_SAMPLES):
-        if len(piece) < 3 * POINTS:
-            continue
-        linear = arm.linearised(piece, c, settle=settle)
-        Y, e = linear.columns[:-1], linear.columns[-1]
-        g = arm.unit @ Y
-        e = e + (c - arm.k) @ Y
-        torque = e + arm.k @ Y
+    for piece in pieces(segments, _PIECE_SAMPLES, 3 * POINTS):
+        columns = arm.linearised(piece, c, settle=settle).columns
         step = max(1, round(CELL / piece.dt))
-        count = e.size // (2 * step)
-
-        def by_cell(rows: FloatArray, count: int = count, step: int = step) -> FloatArray:
-            whole = rows[..., : count * 2 * step]
-            return whole.reshape(rows.shape[:-1] + (count, 2 * step)).sum(axis=-1)
-
+        count = columns.shape[1] // (2 * step)
+        Y = columns[:, : count * 2 * step].reshape(-1, count, 2 * step).swapaxes(0, 1)
+        e = Y[:, -1] + (c - arm.k) @ Y[:, :-1]
+        Y = Y[:, :-1]
+        torque = e + arm.k @ Y
+        z = arm.columns @ Y
         given = Stencil(piece.dt, arm.shift).torques(len(piece))
-        first = piece.start + piece.dt * (given.start + step * np.arange(count))
+        start = piece.start + piece.dt * (given.start + step * np.arange(count))
         cells.append(
             Cells(
-                first,
-                first + step * piece.dt,
-                by_cell(g * g),
-                by_cell(g * e),
-                by_cell(g * Y).T,
-                by_cell(e * e),
-                by_cell(torque * torque),
+                start,
+                start + step * piece.dt,
+                z @ Y.swapaxes(1, 2),
+                np.einsum("czr,cr->cz", z, e),
+                np.sum(e * e, axis=1),
+                np.sum(torque * torque, axis=1),
                 np.full(count, 2.0 * step),
-                np.stack([by_cell(c * Y) for c in Y[arm.friction]]).transpose(2, 0, 1),
-                by_cell(Y[arm.friction] * e).T,
-                arm.friction,
+                arm.columns,
             )
         )
     return cells

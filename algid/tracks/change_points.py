@@ -19,7 +19,6 @@ there is one; `algid.tracks.change_times` has the rows around it say whether the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +34,6 @@ LIGHTEST = 1e-6  # information of a block that counts, of the largest
 FEWEST = 8  # pairs of blocks that give a variance
 _MEDIAN = 0.454936  # of a squared standard normal
 CHANCE = 1e-4  # that white rows have an excess over one span
-_ALIKE = 1.5  # neighbouring differences share a block: n of their squares scatter as n / 1.5 do
 
 # cells ahead of a cut and behind it that may hold both masses: whitened rows show a change late
 AHEAD, BEHIND = 8, 5
@@ -47,23 +45,16 @@ MOST_ROUNDS = 6
 _ROUNDING = 1e-12  # of sums of squares, in comparisons that drop a start
 
 
-@dataclass(frozen=True)
-class Segmentation:
-    """Cells at which stretches begin, and the last one's end.
-
-    How friction drifted, and the rows' variance that a change had to stand up to.
-    """
-
-    places: list[int]
-    drift: Drift
-    variance: float
-
-
-def first_segmentation(cells: Cells) -> Segmentation:
+def first_segmentation(cells: Cells) -> tuple[list[int], Drift, float]:
     """The changes of payload among `cells`.
 
     Before any change is known, errors are those of short blocks, of which few hold one. They are
     estimated again within the stretches, over longer blocks too, until the changes stay.
+
+    Returns
+    -------
+    Cells at which stretches begin and the last one's end, how friction drifted, and the rows'
+    variance that a change had to stand up to.
     """
     places = [0, len(cells)]
     spans: Sequence[int] = FIRST_SPANS
@@ -81,7 +72,7 @@ def first_segmentation(cells: Cells) -> Segmentation:
         if places == before and spans is SPANS:
             break
         spans = SPANS
-    return Segmentation(places, drift, spread)
+    return places, drift, spread
 
 
 def calm_parts(places: Sequence[int]) -> list[tuple[int, int]]:
@@ -148,7 +139,8 @@ def excess(
     for span in spans:
         starts = np.concatenate([np.arange(a, b - span + 1, span) for a, b in parts])
         part = np.repeat(np.arange(len(parts)), [max(0, (b - a) // span) for a, b in parts])
-        information, score = _blocks(A, starts, span), _blocks(B, starts, span)
+        ends = starts + span
+        information, score = sums(A, starts, ends), sums(B, starts, ends)
         heavy = information > LIGHTEST * information.max(initial=0.0)
         neighbours = heavy[1:] & heavy[:-1] & (np.diff(part) == 0)
         if neighbours.sum() < FEWEST:
@@ -157,46 +149,30 @@ def excess(
         white = 1 / information[1:] + 1 / information[:-1]
         if known is not None:
             T, covariance = known
-            J = np.diff(_blocks(T, starts, span) / information[:, None], axis=0)
+            J = np.diff(sums(T, starts, ends) / information[:, None], axis=0)
             white += np.einsum("cx,xy,cy->c", J, covariance, J)
         squares = np.diff(score / information)[neighbours] ** 2 / white[neighbours]
+        # neighbouring differences share a block: n of their squares scatter as n / 1.5 do
+        freedom = squares.size / 1.5
         if robust:
-            ratio, limit = _median(squares), _median_limit(squares.size)
+            # The median of ν squares of white rows is χ² of one degree of freedom at a share u
+            # which is Beta((ν + 1) / 2, (ν + 1) / 2), so that u = ½ + t / 2 √(ν + 1 + t²) with
+            # Student's t of ν + 1. Of few squares it is far from normal.
+            t = student_quantile(freedom + 1, 1 - CHANCE)
+            beyond = 0.5 - 0.5 * t / np.sqrt(freedom + 1 + t**2)
+            ratio = float(np.median(squares)) / _MEDIAN
+            limit = float(chi2_exceeded(1, beyond)) / _MEDIAN
         else:
-            ratio, limit = float(np.mean(squares)), _mean_limit(squares.size)
+            ratio, limit = float(np.mean(squares)), chi2_exceeded(freedom, CHANCE) / freedom
         if ratio > limit:
             factor = max(factor, ratio)
     return factor
 
 
-def _median(squares: FloatArray) -> float:
-    """Variance of normal numbers from their squares, of which a few may be those of others."""
-    return float(np.median(squares)) / _MEDIAN
-
-
-def _median_limit(count: int) -> float:
-    """What the `_median` of `count` squares of white rows passes by `CHANCE`.
-
-    That of ν squares is χ² of one degree of freedom at a share u which is Beta((ν + 1) / 2,
-    (ν + 1) / 2), so that u = ½ + t / 2 √(ν + 1 + t²) with Student's t of ν + 1. Of few squares it
-    is far from normal.
-    """
-    freedom = count / _ALIKE + 1
-    t = student_quantile(freedom, 1 - CHANCE)
-    beyond = 0.5 - 0.5 * t / np.sqrt(freedom + t**2)
-    return float(chi2_exceeded(1, beyond)) / _MEDIAN
-
-
-def _mean_limit(count: int) -> float:
-    """What the mean of `count` squares of white rows passes by `CHANCE`."""
-    freedom = count / _ALIKE
-    return float(chi2_exceeded(freedom, CHANCE)) / freedom
-
-
-def _blocks(x: FloatArray, starts: NDArray[np.int64], span: int) -> FloatArray:
-    """Sums (N, ...) over `span` cells from each of `starts` (N,)."""
+def sums(x: FloatArray, first: NDArray[np.int64], last: NDArray[np.int64]) -> FloatArray:
+    """Sums (N, ...) of x (C, ...) from each of the cells `first` (N,) to before `last` (N,)."""
     total = np.concatenate([np.zeros_like(x[:1]), np.cumsum(x, axis=0)])
-    return np.asarray(total[starts + span] - total[starts])
+    return np.asarray(total[last] - total[first])
 
 
 def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[int]:

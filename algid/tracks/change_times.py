@@ -39,6 +39,7 @@ SAFE = 25.0  # ξ beyond which a time is out of the question
 CLUSTERED = 3.0  # times as much counts what is explained over the variance of clusters
 CLUSTER = 0.2  # s: of rows that may err alike
 _AT_ONCE = 32  # candidates whose columns are whitened together
+_FAR = 2**40  # samples: more than any log has
 
 
 @dataclass(frozen=True)
@@ -128,8 +129,8 @@ def place(rows: Rows, low: float, high: float, variance: float) -> ChangeTime:
     gains = np.empty(moments.size)
     for first in range(0, moments.size, _AT_ONCE):
         x = rows.steps(moments[first : first + _AT_ONCE])
-        alone = np.sum(x * x, axis=1) - (x @ a) ** 2 / information
-        gains[first : first + _AT_ONCE] = (x @ left) ** 2 / np.maximum(alone, 1e-9 * information)
+        own = np.sum(x * x, axis=1) - (x @ a) ** 2 / information
+        gains[first : first + _AT_ONCE] = (x @ left) ** 2 / np.maximum(own, 1e-9 * information)
     best = int(np.argmax(gains))
     gain = float(gains[best])
     variance = max(variance, (float(left @ left) - gain) / max(left.size - 3, 1))
@@ -139,26 +140,17 @@ def place(rows: Rows, low: float, high: float, variance: float) -> ChangeTime:
         likely = moments[ratio <= limit]
         return float(likely[0]) - STEP, float(likely[-1]) + STEP
 
-    worth = _worth(rows, left, a / np.sqrt(information), float(moments[best]))
-    return ChangeTime(float(moments[best]), within(LIKELY), within(SAFE), worth)
-
-
-def _worth(rows: Rows, left: FloatArray, a: FloatArray, moment: float) -> float:
-    """What two masses explain of `left` (2 n,), the rows less one mass.
-
-    Rows of a cluster may err alike, as where a joint turns back and friction is not of its model's
-    shape. Over the variance of the clusters' scores (Liang & Zeger 1986) it has to be a third as
-    much, since these few scores hold what a change leaves of its neighbours too.
-    `a` (2 n,) is the column of one mass, of length one.
-    """
-    x = rows.steps(np.array([moment]))[0]
-    x -= (a @ x) * a
-    information, score = max(float(x @ x), 1e-300), float(x @ left)
-    two = left - score / information * x
+    # Rows of a cluster may err alike, as where a joint turns back and friction is not of its
+    # model's shape. Over the variance of the clusters' scores (Liang & Zeger 1986) a change has to
+    # explain a third as much, since these few scores hold what it leaves of its neighbours too.
+    x = rows.steps(moments[best : best + 1])[0]
+    x -= (a @ x / information) * a
+    alone, score = max(float(x @ x), 1e-300), float(x @ left)
     every = 2 * max(1, round(CLUSTER / rows.dt))
-    scores = np.add.reduceat(x * two, np.arange(0, left.size, every))
-    alike = max(information, float(scores @ scores))
-    return score**2 * min(1 / information, CLUSTERED / alike)
+    scores = np.add.reduceat(x * (left - score / alone * x), np.arange(0, left.size, every))
+    alike = max(alone, float(scores @ scores))
+    worth = score**2 * min(1 / alone, CLUSTERED / alike)
+    return ChangeTime(float(moments[best]), within(LIKELY), within(SAFE), worth)
 
 
 def explained(rows: Rows, moments: FloatArray) -> float:
@@ -166,39 +158,6 @@ def explained(rows: Rows, moments: FloatArray) -> float:
     X = np.concatenate([rows.whitened(rows.g[None]), rows.steps(moments)])
     fitted = np.linalg.lstsq(X.T, rows.e, rcond=None)[0]
     return float(np.sum((fitted @ X) ** 2))
-
-
-def cut_to(segment: Segment, start: float, end: float, shift: float) -> Segment | None:
-    """The samples that give the torques from `start` to `end` s, their stencils' included.
-
-    None where it has none.
-
-    `shift` is the time in s after which a logged torque acts.
-    """
-    given = Stencil(segment.dt, shift).torques(len(segment))  # the others serve the stencil
-    first = round((start - segment.start) / segment.dt) - given.start
-    last = round((end - segment.start) / segment.dt) + len(segment) - given.stop
-    first, last = max(0, first), min(len(segment), last)
-    if last - first <= 1:
-        return None
-    return segment.part(first, last)
-
-
-@dataclass(frozen=True)
-class Changes:
-    """Changes of a log, and what it weighs between them: `masses` (kg) are one more."""
-
-    places: tuple[ChangeTime, ...]
-    masses: tuple[float, ...]
-
-    def merged(self, first: int, last: int, *places: ChangeTime) -> Changes:
-        """With these changes, one or none, for those from `first` to `last`.
-
-        Of the masses between them only that before the first and that behind the last stay, and
-        without a change the one before.
-        """
-        masses = self.masses[: first + 1] + self.masses[last + 1 :][1 - len(places) :]
-        return Changes(self.places[:first] + places + self.places[last + 1 :], masses)
 
 
 @dataclass(frozen=True)
@@ -223,92 +182,95 @@ class Confirmation:
     penalty: float
     variance: float
 
-    def of(self, changes: Changes) -> list[ChangeTime]:
-        """Those of the changes, as cells have them, that the rows bear out, each where they do."""
+    def of(self, changes: Sequence[ChangeTime], weighed: Sequence[float]) -> list[ChangeTime]:
+        """Those of the changes, as cells have them, that the rows bear out, each where they do.
+
+        `weighed` are the masses in kg between them, one more.
+        """
+        places, masses = list(changes), list(weighed)
         count = None
-        while changes.places and len(changes.places) != count:
-            count = len(changes.places)
-            changes = self._placed(self._merged(self._placed(changes)))
+        while places and len(places) != count:
+            count = len(places)
+            places = self._placed(places, masses)
+            # Close changes whose rows need only one become one: a jolt is no change of payload.
+            times = np.array([one.time for one in places])
+            close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
+            single: dict[int, ChangeTime] = {}
+            for (first, last), rows in self._rows(places, masses, close):
+                one = self._place(rows, times[first] - MARGIN, times[last] + MARGIN)
+                if one is not None:
+                    both = explained(rows, times[[first, last]])
+                    if both - explained(rows, np.array([one.time])) < self.penalty:
+                        single[first] = one
+            following = len(places)
+            for first, one in sorted(single.items(), reverse=True):
+                if first + 1 < following:  # of pairs that share a change, the later one
+                    places[first : first + 2], following = [one], first
+                    del masses[first + 1]
+            places = self._placed(places, masses)
             # Drop those that explain too little, of neighbours the least first.
-            gains = [np.inf] + [one.gain for one in changes.places] + [np.inf]
-            for at in reversed(range(len(changes.places))):
+            gains = [np.inf] + [one.gain for one in places] + [np.inf]
+            for at in reversed(range(len(places))):
                 before, own, after = gains[at : at + 3]
                 if own < self.penalty and own <= min(before, after):
-                    changes = changes.merged(at, at)
-        return list(changes.places)
+                    del places[at], masses[at + 1]
+        return places
 
     def _rows(
-        self, changes: Changes, groups: Sequence[tuple[int, int]]
+        self,
+        places: Sequence[ChangeTime],
+        masses: Sequence[float],
+        groups: Sequence[tuple[int, int]],
     ) -> Iterator[tuple[tuple[int, int], Rows]]:
         """The rows about each group of changes, from its first to its last, in one pass.
 
         They hold the masses about the group, and no other.
         """
-        safe = [(-np.inf, self.ends[0]), *(one.safe for one in changes.places), (self.ends[1], 0)]
-        times = [one.time for one in changes.places]
+        safe = [(-np.inf, self.ends[0]), *(one.safe for one in places), (self.ends[1], 0)]
+        times = [one.time for one in places]
         spans = []
         for first, last in groups:
             start, end = safe[first][1], safe[last + 2][0]
             spans.append((max(start, times[first] - WIDEST), min(end, times[last] + WIDEST)))
-        for place, piece in windows(self.source(), spans, self.arm.shift):
-            first, last = groups[place]
-            moments, masses = times[first : last + 1], changes.masses[first : last + 2]
-            yield groups[place], rows_of(piece, self.arm, self.drift, moments, masses)
+        for at, piece in windows(self.source(), spans, self.arm.shift):
+            first, last = groups[at]
+            own = masses[first : last + 2]
+            if len(piece) > 2 * POINTS:
+                yield groups[at], rows_of(piece, self.arm, self.drift, times[first : last + 1], own)
 
-    def _placed(self, changes: Changes) -> Changes:
+    def _place(self, rows: Rows, low: float, high: float) -> ChangeTime | None:
+        """The change between `low` and `high` s; None where the rows are too few."""
+        low, high = max(low, float(rows.t[0]) + MARGIN), min(high, float(rows.t[-1]) - MARGIN)
+        return place(rows, low, high, self.variance) if low < high else None
+
+    def _placed(self, changes: Sequence[ChangeTime], masses: Sequence[float]) -> list[ChangeTime]:
         """Each change where the rows about it have it; where they are too few, as it was."""
-        places = list(changes.places)
-        for (at, _), rows in self._rows(changes, [(one, one) for one in range(len(places))]):
+        places = list(changes)
+        alone = [(at, at) for at in range(len(places))]
+        for (at, _), rows in self._rows(changes, masses, alone):
             time = places[at].time
-            low = max(time - REACH, float(rows.t[0]) + MARGIN)
-            high = min(time + REACH, float(rows.t[-1]) - MARGIN)
-            if low < high:
-                places[at] = place(rows, low, high, self.variance)
-        return replace(changes, places=tuple(places))
-
-    def _merged(self, changes: Changes) -> Changes:
-        """Merge close changes where their rows need only one: a jolt is no change of payload."""
-        times = np.array([one.time for one in changes.places])
-        close = [(at, at + 1) for at in np.flatnonzero(np.diff(times) < CLOSE).tolist()]
-        places: dict[tuple[int, int], ChangeTime] = {}
-        for (first, last), rows in self._rows(changes, close):
-            low = max(times[first] - MARGIN, float(rows.t[0]) + MARGIN)
-            high = min(times[last] + MARGIN, float(rows.t[-1]) - MARGIN)
-            if low < high:
-                one = place(rows, low, high, self.variance)
-                both = explained(rows, times[[first, last]])
-                if both - explained(rows, np.array([one.time])) < self.penalty:
-                    places[first, last] = one
-        following = len(changes.places)
-        for (first, last), one in sorted(places.items(), reverse=True):
-            if last < following:  # of pairs that share a change, the later one
-                changes, following = changes.merged(first, last, one), first
-        return changes
+            places[at] = self._place(rows, time - REACH, time + REACH) or places[at]
+        return places
 
 
 def windows(
     log: Iterable[Segment], spans: Sequence[tuple[float, float]], shift: float
 ) -> Iterator[tuple[int, Segment]]:
-    """Numbered pieces of a log within `spans` (s), in one pass.
+    """Numbered pieces of a log that give the torques within `spans` (s), in one pass.
 
-    What a gap cuts comes in parts.
+    They hold their stencils' samples. What a gap cuts comes in parts. `shift` is the time in s
+    after which a logged torque acts.
     """
     held: dict[int, Segment] = {}
-
-    def cut(at: int) -> Iterator[tuple[int, Segment]]:
-        piece = cut_to(held.pop(at), *spans[at], shift)
-        if piece is not None and len(piece) > 2 * POINTS:
-            yield at, piece
-
     for segment in log:
-        spare = POINTS * segment.dt + abs(shift)  # for the stencils
-        for at, (start, end) in enumerate(spans):
-            ends = np.array([start - spare, end + spare]) - segment.start
-            first, last = np.clip(np.rint(ends / segment.dt), 0, len(segment)).astype(int).tolist()
+        given = Stencil(segment.dt, shift).torques(_FAR)  # the others serve the stencil
+        for at, span in enumerate(spans):
+            start, end = ((time - segment.start) / segment.dt for time in span)
+            first = min(max(round(start) - given.start, 0), len(segment))
+            last = min(max(round(end) + _FAR - given.stop, 0), len(segment))
             if at in held and not (segment.continues and first < last):
-                yield from cut(at)
+                yield at, held.pop(at)
             if first < last:
                 part = segment.part(first, last)
                 held[at] = append(held[at], part) if at in held else part
-    for at in list(held):
-        yield from cut(at)
+    yield from held.items()

@@ -22,8 +22,7 @@ Where the rows do without, φ is nothing: its price is a part of each mass's pre
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,35 +41,27 @@ _RIDGE = 1e-9  # of the diagonal: what a standing joint leaves open stays nothin
 class Drift:
     """Change of friction φ (H, f) at `knots` (H,) in s; covariance (H f, H f) at unit variance.
 
-    Both are zero where friction is as the arm's constants have it.
+    Both are zero where friction is as the arm's constants have it. `by_mass` (K, H f) is G / A of
+    the groups of cells whose masses were free beside it.
     """
 
     knots: FloatArray
     phi: FloatArray
     covariance: FloatArray
+    by_mass: FloatArray
 
     def freed(self, cells: Cells) -> Cells:
         """The cells of a log whose friction is as its arm's constants have it."""
-        phi = self.at(cells.middle)
-        by_friction = cells.N[:, :, cells.friction]
-        return replace(
-            cells,
-            B=cells.B - np.einsum("cf,cf->c", cells.S[:, cells.friction], phi),
-            E=cells.E
-            - 2 * np.einsum("cf,cf->c", cells.D, phi)
-            + np.einsum("cf,cfg,cg->c", phi, by_friction, phi),
-            D=cells.D - np.einsum("cfg,cg->cf", by_friction, phi),
-        )
+        return cells.less(np.insert(self.at(cells.middle), 0, 0.0, axis=1))
 
     def at(self, t: FloatArray) -> FloatArray:
         """Φ (C, f) at the times `t` (C,)."""
         return between(self.knots, self.phi, t)
 
-    def variances(self, cells: Cells, starts: NDArray[np.int64]) -> FloatArray:
-        """Part of φ in the variances (K,) of the masses of cell groups, for unit variance."""
-        normal = _normal(cells, starts, self.knots)
-        by_mass = normal.G / normal.A[:, None]
-        return np.einsum("kx,xy,ky->k", by_mass, self.covariance, by_mass)
+    @property
+    def variances(self) -> FloatArray:
+        """Part of φ in the variances (K,) of the groups' masses, for unit variance."""
+        return np.einsum("kx,xy,ky->k", self.by_mass, self.covariance, self.by_mass)
 
     def variance_at(self, t: FloatArray, slope: FloatArray) -> FloatArray:
         """Variances (C,) at the times `t` (C,) of what changes by `slope` (C, f) with φ."""
@@ -78,45 +69,15 @@ class Drift:
         blocks = self.covariance.reshape(self.knots.size, f, self.knots.size, f)
         return np.einsum("cf,cfg,cg->c", slope, blocks[near, :, near], slope)
 
-    def sensitivity(
-        self, cells: Cells, starts: NDArray[np.int64], T: FloatArray, V: FloatArray
-    ) -> FloatArray:
-        """T (C, p): shift of the scores by the arm's constants, while φ follows that of friction.
+    def followed(self, cells: Cells, starts: NDArray[np.int64], T: FloatArray) -> FloatArray:
+        """Shift (C, p) of the masses' scores by the arm's constants, while φ follows that of D.
 
-        `V` (C, f, p) is how `Cells.D` shifts with them.
+        `T` (C, 1 + f, p) is how `Cells.b` shifts with them.
         """
-        normal = _normal(cells, starts, self.knots)
-        sums = np.add.reduceat(T, starts, axis=0) / normal.A[:, None]
-        shift = np.zeros((*self.phi.shape, T.shape[1]))
-        for interval, own, hats in _intervals(self.knots, cells.middle):
-            shift[interval] += np.einsum("hc,cfp->hfp", hats, V[own])
-        by_knot = self.covariance @ (shift.reshape(-1, T.shape[1]) - normal.G.T @ sums)
-        phi = between(self.knots, by_knot.reshape(shift.shape), cells.middle)
-        return np.asarray(T - np.einsum("cf,cfp->cp", cells.S[:, cells.friction], phi))
-
-
-@dataclass(frozen=True, eq=False)
-class _Normal:
-    """The normal equations of the module's table, and the knots of φ."""
-
-    knots: FloatArray
-    A: FloatArray
-    B: FloatArray
-    G: FloatArray
-    N: FloatArray
-    D: FloatArray
-
-    @property
-    def reduced(self) -> tuple[FloatArray, FloatArray]:
-        """Information (H f, H f) on φ, masses free, and its scores (H f,)."""
-        by_mass = self.G / self.A[:, None]
-        return self.N - by_mass.T @ self.G, self.D - by_mass.T @ self.B
-
-
-def no_drift(cells: Cells) -> Drift:
-    """Friction as the arm's constants have it."""
-    knots, f = knots_of(cells), len(cells.friction)
-    return Drift(knots, np.zeros((knots.size, f)), np.zeros((knots.size * f,) * 2))
+        shift = _onto(self.knots, cells.middle, T[:, 1:])
+        score = shift.reshape(-1, T.shape[2]) - self.by_mass.T @ np.add.reduceat(T[:, 0], starts)
+        phi = between(self.knots, (self.covariance @ score).reshape(shift.shape), cells.middle)
+        return np.asarray(T[:, 0] - np.einsum("cf,cfp->cp", cells.M[:, 0, 1:], phi))
 
 
 def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
@@ -133,16 +94,31 @@ def drift_of(cells: Cells, starts: NDArray[np.int64], variance: float) -> Drift:
     Drift
         Nothing where friction explains no more than chance does.
     """
-    normal = _normal(cells, starts)
-    information, score = normal.reduced
-    scale = np.sqrt(np.maximum(np.diag(normal.N), 1e-300))
-    scaled = information / np.outer(scale, scale) + _RIDGE * np.eye(scale.size)
+    knots, M, t = knots_of(cells), cells.M, cells.middle
+    count, f = knots.size, M.shape[1] - 1
+    A = np.maximum(np.add.reduceat(cells.A, starts), 1e-300)
+    G, N = np.zeros((starts.size, count, f)), np.zeros((count, count, f, f))
+    interval, hats = _hats(knots, t)
+    runs = np.union1d(starts, np.flatnonzero(np.diff(interval)) + 1)
+    group, knot = np.searchsorted(starts, runs, side="right") - 1, interval[runs]
+    for side, hat in enumerate(hats):
+        by_hat = hat[:, None, None] * M[:, :, 1:]
+        np.add.at(G, (group, knot + side), np.add.reduceat(by_hat[:, 0], runs))
+        for other, beside in enumerate(hats):
+            both = np.add.reduceat(beside[:, None, None] * by_hat[:, 1:], runs)
+            np.add.at(N, (knot + side, knot + other), both)
+    size = count * f
+    G, N = G.reshape(starts.size, size), N.swapaxes(1, 2).reshape(size, size)
+    by_mass = G / A[:, None]
+    score = _onto(knots, t, cells.b[:, 1:]).ravel() - by_mass.T @ np.add.reduceat(cells.B, starts)
+    scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
+    scaled = (N - by_mass.T @ G) / np.outer(scale, scale) + _RIDGE * np.eye(scale.size)
     inverse = np.linalg.inv(scaled) / np.outer(scale, scale)
     phi = inverse @ score
     chance = scale.size + SURE * np.sqrt(2 * scale.size)
     if not score @ phi > variance * chance:
-        return no_drift(cells)
-    return Drift(normal.knots, phi.reshape(normal.knots.size, -1), inverse)
+        phi, inverse = 0 * phi, 0 * inverse
+    return Drift(knots, phi.reshape(count, f), inverse, by_mass)
 
 
 def knots_of(cells: Cells) -> FloatArray:
@@ -153,37 +129,23 @@ def knots_of(cells: Cells) -> FloatArray:
 
 def between(knots: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
     """Values (C, ...) at times `t` (C,) by linear interpolation of (H, ...) at the knots (H,)."""
+    interval, hats = _hats(knots, t)
+    early, late = hats.reshape(2, -1, *[1] * (values.ndim - 1))
+    return np.asarray(early * values[interval] + late * values[interval + 1])
+
+
+def _onto(knots: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
+    """Sums (H, ...) of values (C, ...) at increasing times `t` (C,), each times its knot's hat."""
+    sums = np.zeros((knots.size, *values.shape[1:]))
+    interval, hats = _hats(knots, t)
+    found, runs = np.unique(interval, return_index=True)
+    for side, hat in enumerate(hats.reshape(2, -1, *[1] * (values.ndim - 1))):
+        sums[found + side] += np.add.reduceat(hat * values, runs)
+    return sums
+
+
+def _hats(knots: FloatArray, t: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    """The knot (C,) before each time `t` (C,), and the hats (2, C) of that one and the next."""
     interval = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, knots.size - 2)
-    share = (t - knots[interval]) / np.diff(knots)[interval]
-    share = share.reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray((1 - share) * values[interval] + share * values[interval + 1])
-
-
-def _intervals(knots: FloatArray, t: FloatArray) -> Iterator[tuple[slice, slice, FloatArray]]:
-    """For each interval its two knots, its times among the increasing `t`, their hats (2, c)."""
-    ends = np.searchsorted(t, knots[1:-1])
-    for place, own in enumerate(np.split(t, ends)):
-        first = 0 if place == 0 else int(ends[place - 1])
-        late = (own - knots[place]) / (knots[place + 1] - knots[place])
-        yield slice(place, place + 2), slice(first, first + own.size), np.stack([1 - late, late])
-
-
-def _normal(cells: Cells, starts: NDArray[np.int64], knots: FloatArray | None = None) -> _Normal:
-    knots = knots_of(cells) if knots is None else knots
-    f, count = len(cells.friction), knots.size
-    group = np.searchsorted(starts, np.arange(len(cells)), side="right") - 1
-    S, N = cells.S[:, cells.friction], cells.N[:, :, cells.friction]
-    G, NN = np.zeros((starts.size, count, f)), np.zeros((count, f, count, f))
-    D = np.zeros((count, f))
-    for interval, own, hats in _intervals(knots, cells.middle):
-        D[interval] += hats @ cells.D[own]
-        np.add.at(G[:, interval], group[own], np.einsum("hc,cf->chf", hats, S[own]))
-        NN[interval, :, interval] += np.einsum("hc,kc,cfg->hfkg", hats, hats, N[own], optimize=True)
-    return _Normal(
-        knots,
-        np.maximum(np.add.reduceat(cells.A, starts), 1e-300),
-        np.add.reduceat(cells.B, starts),
-        G.reshape(starts.size, -1),
-        NN.reshape(count * f, count * f),
-        D.ravel(),
-    )
+    late = (t - knots[interval]) / np.diff(knots)[interval]
+    return interval, np.stack([1 - late, late])

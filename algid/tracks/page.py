@@ -14,7 +14,7 @@ import numpy as np
 from algid.base.criteria import HOLE
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL
-from algid.base.text import ABSENT, file_name, joined, significant
+from algid.base.text import file_name, formatted, joined, resolved, significant
 from algid.base.verdict import Verdict, graded
 from algid.base.words import counted
 from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
@@ -44,9 +44,8 @@ def track_document(result: TrackResult) -> Document:
     name = file_name(result.log.path)
     seconds, rate = significant(result.log.duration, 4), significant(result.log.rate, 4)
     sentences = tuple(one.sentence for one in result.notices)
-    made = {"algid": result.version, "arm's result": result.arm}
-    made["sha256 of the arm's result"] = result.arm_sha256
-    provenance = provenance_table(list(made.items()), [result.log])
+    made = [("algid", result.version), ("arm's result", result.arm)]
+    made.append(("sha256 of the arm's result", result.arm_sha256))
     return Document(
         title=f"Payload in time of {name}",
         verdict=verdict(result),
@@ -57,7 +56,7 @@ def track_document(result: TrackResult) -> Document:
             Section(
                 "settings",
                 "Settings and provenance",
-                (settings_table(result.settings), provenance),
+                (settings_table(result.settings), provenance_table(made, [result.log])),
                 folded=True,
             ),
         ),
@@ -106,15 +105,15 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
 def stretch_table(result: TrackResult) -> Table:
     """The stretches, their masses and intervals."""
     rows = []
-    truths = result.truth or (None,) * len(result.track.stretches)
-    for place, (stretch, status, truth) in enumerate(
-        zip(result.track.stretches, result.statuses, truths, strict=True), start=1
+    stretches = result.track.stretches
+    truths = result.truth or (None,) * len(stretches)
+    for place, (one, status, truth) in enumerate(
+        zip(stretches, result.statuses, truths, strict=True), start=1
     ):
-        true = error = ABSENT
-        if truth is not None:
-            true, error = fixed(truth, stretch.std), fixed(stretch.m_p - truth, stretch.std)
-        span = (f"{stretch.start:.3f}", f"{stretch.end:.3f}")
-        rows.append((str(place), *span, *mass_and_half(stretch), "kg", status.value, true, error))
+        error = None if truth is None else one.m_p - truth
+        true = [resolved(truth, one.std), resolved(error, one.std)]
+        span = (f"{one.start:.3f}", f"{one.end:.3f}")
+        rows.append((str(place), *span, *mass_and_half(one), "kg", status.value, *true))
     return Table(
         "Payload by stretch",
         {
@@ -133,12 +132,10 @@ def change_table(result: TrackResult) -> Table:
     for place, (moment, low, high) in enumerate(result.track.changes.tolist()):
         before, after = result.track.stretches[place : place + 2]
         step = after.m_p - before.m_p
-        by = ("" if step < 0 else "+") + fixed(step, max(before.std, after.std))
-        true = ABSENT
-        if times:
-            true = f"{min(times, key=lambda time: abs(time - moment)):.3f}"
+        by = ("" if step < 0 else "+") + resolved(step, max(before.std, after.std))
+        near = min(times, key=lambda time: abs(time - moment), default=None)
         between = f"[{low:.3f}, {high:.3f}]"
-        rows.append((str(place + 1), f"{moment:.3f}", by, "kg", between, true))
+        rows.append((str(place + 1), f"{moment:.3f}", by, "kg", between, formatted(near, ".3f")))
     return Table(
         "Changes",
         {
@@ -166,22 +163,9 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
 
 
 def mass_and_half(stretch: Stretch) -> tuple[str, str]:
-    """A stretch's mass and half its 95 % interval in kg, to the second digit of the deviation.
-
-    A mass that may be nothing is 0, with one digit of the interval.
-    """
-    half = NORMAL * stretch.std
-    if stretch.empty:
-        return "0", fixed(half, 10 * float(f"{half:.0e}"))
-    return fixed(stretch.m_p, stretch.std), fixed(half, stretch.std)
-
-
-def fixed(value: float, std: float) -> str:
-    """`value` with the decimals that its standard deviation resolves, so that columns line up."""
-    decimals = 3
-    if math.isfinite(std) and std > 0:
-        decimals = min(max(1 - math.floor(math.log10(std)), 0), 9)
-    return f"{value:z.{decimals}f}"
+    """A stretch's mass and half its 95 % interval in kg; a mass that may be nothing is 0."""
+    mass = "0" if stretch.empty else resolved(stretch.m_p, stretch.std)
+    return mass, significant(NORMAL * stretch.std, 2)
 
 
 def verdict(result: TrackResult) -> Verdict:
@@ -213,12 +197,12 @@ def _headline(result: TrackResult) -> str:
     half = mass_and_half(max(stretches, key=lambda stretch: stretch.std))[1]
     if not changes:
         return f"the payload does not change: {masses[0]} ± {half} kg throughout"
-    what = f", in {counted(len(stretches), 'stretch', 'stretches')}"
+    what = f", in {len(stretches)} stretches"
     if len(changes) <= MOST_NAMED:
         times = joined([f"{time:.2f}" for time in changes])
         what = f" at {times} s, weighing {joined(masses)} kg"
-    how_often = {1: "once", 2: "twice"}.get(len(changes), counted(len(changes), "time"))
-    return f"the payload changes {how_often}{what}, the least certain to ± {half} kg (95 %)"
+    times = counted(len(changes), "time")
+    return f"the payload changes {times}{what}, the least certain to ± {half} kg (95 %)"
 
 
 def _failure(result: TrackResult) -> str | None:

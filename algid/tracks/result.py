@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from algid.base.criteria import UNDETERMINED
 from algid.base.errors import ResultError
-from algid.base.files import first_misfit, read_text, whole_file
+from algid.base.files import first_misfit, read_whole, whole_file
 from algid.base.significance import NORMAL, SURE
 from algid.notices import Notice
 from algid.report.export import START_KEY
@@ -151,23 +151,17 @@ def read_track(folder: Path) -> TrackResult:
     path = folder / FILE
     again = "run algid track again with this version"
     try:
-        file = _File.model_validate(json.loads(read_text(path)))
+        file = _File.model_validate_json(read_whole(path))
     except OSError as error:
         raise ResultError(f"{path}: cannot read it ({error.strerror})") from error
     except ValidationError as error:
         raise ResultError(f"{path}: {first_misfit(error)}; {again}") from error
-    except (ValueError, RecursionError) as error:
-        reason = str(error).partition("\n")[0]
-        raise ResultError(
-            f"{path}: not JSON ({reason}); expected a track of algid track"
-        ) from error
     parts = list(blocks(folder / CURVE, COLUMNS))
     if not parts:
         raise ResultError(f"{folder / CURVE}: it holds no rows; {again}")
     t, m_p, high, stretch, left = (
         np.concatenate([part[name] for part in parts]) for name in COLUMNS
     )
-    changes = [list(one.values()) for one in file.changes]
     return TrackResult(
         track=Track(
             stretches=file.stretches,
@@ -176,7 +170,7 @@ def read_track(folder: Path) -> TrackResult:
             std=(high - m_p) / NORMAL,
             stretch=stretch,
             left=left,
-            changes=np.array(changes).reshape(-1, 3),
+            changes=np.array([list(one.values()) for one in file.changes]).reshape(-1, 3),
             colour=file.excess,
             explained=file.explained,
             holes=np.array(file.holes).reshape(-1, 2),

@@ -33,23 +33,6 @@ ARM = IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, NOI
 NOTHING = np.zeros((9, 9))
 
 
-def numbered(count: int) -> Cells:
-    n = np.arange(1.0, count + 1)
-    return Cells(
-        n,
-        n + 0.5,
-        2 * n,
-        6 * n,
-        np.outer(n, np.arange(7.0)),
-        20 * n,
-        30 * n,
-        np.full(count, 4.0),
-        n[:, None, None] * np.arange(14.0).reshape(2, 7),
-        n[:, None] * np.ones(2),
-        [5, 6],
-    )
-
-
 def carrying(mass: float) -> FloatArray:
     """The arm's constants (7,) with `mass` kg at its tip."""
     return ARM.k + mass * ARM.unit
@@ -221,9 +204,10 @@ def test_scores_shift_with_a_bodys_shape_by_its_derivatives(name: str) -> None:
     slope = (moved(step).unit - moved(-step).unit) / (2 * step)
     row = ("l1", "l2", "y_p", "J_p").index(name)
     np.testing.assert_allclose(arm.by_shape[row], slope, atol=1e-8)
-    count = numbered(3)
-    cells = replace(count, S=np.outer(np.arange(1.0, 4.0), np.arange(10.0)))
+    P = np.arange(1.0, 4.0)[:, None, None] * np.arange(30.0).reshape(3, 10)
+    nothing = np.zeros(3)
+    cells = Cells(nothing, nothing, P, P[..., 0], nothing, nothing, nothing, np.eye(3, 10))
     mass = np.array([0.2, 0.5, 1.1])
     T = cells.sensitivity(arm, mass)
-    assert T.shape == (3, 14)
-    np.testing.assert_allclose(T[:, 10 + row], mass * (cells.S @ slope), atol=1e-6)
+    assert T.shape == (3, 3, 14)
+    np.testing.assert_allclose(T[..., 10 + row], mass[:, None] * (P @ slope), atol=1e-6)

@@ -12,7 +12,6 @@ from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import segments
 from algid.tracks.arm import IdentifiedArm
 from algid.tracks.change_times import (
-    Changes,
     ChangeTime,
     Confirmation,
     Rows,
@@ -31,7 +30,7 @@ ARM = IdentifiedArm(
     CASE.arm.l2,
     NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2)),
 )
-STEADY = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), np.zeros((4, 4)))
+STEADY = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), np.zeros((4, 4)), np.zeros((1, 4)))
 
 
 def rough(*moments: float) -> tuple[ChangeTime, ...]:
@@ -40,9 +39,8 @@ def rough(*moments: float) -> tuple[ChangeTime, ...]:
 
 
 def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[ChangeTime]:
-    changes = Changes(rough(*moments), masses)
     evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 4.5), 60.0, 1.0)
-    return evidence.of(changes)
+    return evidence.of(rough(*moments), masses)
 
 
 def test_a_step_of_acceleration_is_seen_as_differences_see_it() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,20 +28,16 @@ def rows(change: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, Floa
 
 
 def summed(Y: FloatArray, e: FloatArray) -> Cells:
-    """Cells whose columns of constants are the two frictions'."""
-    g, c = Y[..., 0], Y[..., 1:]
+    """Cells whose columns are the payload's and the two frictions'."""
     return Cells(
         MIDDLE - CELL / 2,
         MIDDLE + CELL / 2,
-        np.sum(g * g, axis=1),
-        np.sum(g * e, axis=1),
-        np.einsum("cr,crq->cq", g, c),
+        np.einsum("crz,crq->czq", Y, Y),
+        np.einsum("crz,cr->cz", Y, e),
         np.sum(e * e, axis=1),
         np.sum(e * e, axis=1),
         np.full(COUNT, float(ROWS)),
-        np.einsum("crf,crq->cfq", c, c),
-        np.einsum("crf,cr->cf", c, e),
-        [0, 1],
+        np.eye(3),
     )
 
 
@@ -65,11 +63,11 @@ def test_masses_and_friction_are_those_of_least_squares_over_all_rows() -> None:
     np.testing.assert_allclose(found.covariance, covariance[3:, 3:], rtol=1e-5, atol=1e-12)
     information = np.add.reduceat(cells.A, STARTS)
     np.testing.assert_allclose(
-        1 / information + found.variances(cells, STARTS), np.diag(covariance)[:3], rtol=1e-6
+        1 / information + found.variances, np.diag(covariance)[:3], rtol=1e-6
     )
     left = e - np.einsum("crf,cf->cr", Y[..., 1:], found.at(MIDDLE))
     np.testing.assert_allclose(freed.E, np.sum(left**2, axis=1), rtol=1e-9)
-    np.testing.assert_allclose(freed.D, np.einsum("crf,cr->cf", Y[..., 1:], left), atol=1e-9)
+    np.testing.assert_allclose(freed.b, np.einsum("crz,cr->cz", Y, left), atol=1e-9)
 
 
 def test_friction_as_it_was_is_left_alone() -> None:
@@ -83,10 +81,8 @@ def test_friction_as_it_was_is_left_alone() -> None:
 @pytest.mark.parametrize("duration", [1.0, 12.0, 3600.0])
 def test_knots_span_the_log_and_lines_run_between_them(duration: float) -> None:
     cells = summed(*rows(rising(), np.random.default_rng(3)))
-    stretched = Cells(
-        *(getattr(cells, name) * duration / 12 for name in ("start", "end")),
-        *(getattr(cells, name) for name in ("A", "B", "S", "E", "Q", "rows", "N", "D")),
-    )
+    start, end = cells.start * duration / 12, cells.end * duration / 12
+    stretched = replace(cells, start=start, end=end)
     knots = knots_of(stretched)
     assert knots[[0, -1]] == pytest.approx([0, duration])
     assert 2 <= knots.size <= 61

@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from algid.results import LogSummary
 from algid.tracks.page import (
     POINTS,
     change_table,
-    fixed,
     payload_figure,
 )
 from algid.tracks.payload import Stretch, Track
@@ -63,16 +60,6 @@ def track(masses: list[float], std: float = 0.001, **changes: object) -> TrackRe
         version="1",
     )
     return replace(made, **changes)  # type: ignore[arg-type]
-
-
-@given(st.floats(-50, 50), st.floats(1e-8, 10))
-def test_a_mass_is_written_to_the_second_digit_of_its_error(value: float, std: float) -> None:
-    text = fixed(value, std)
-    decimals = len(text.partition(".")[2])
-    assert float(text) == pytest.approx(value, abs=0.5000001 * 10.0**-decimals)
-    assert decimals == 0 or std >= 0.999 * 10.0**-decimals  # no more digits than the error leaves
-    assert decimals == 9 or std * 10**decimals > 9.99  # and no fewer than two of its own
-    assert text not in ("-0", "-0.0", "-0.00")
 
 
 def test_changes_have_their_sign_and_the_nearest_true_moment() -> None:
