@@ -134,8 +134,8 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
     try:
         rest = resting(kept, experiment.shared.model, loads)
         problem = PositionProblem(experiment, belief, kept, campaign.asked, campaign.duration, rest)
-        optimum = optimise(problem, rate, campaign.seed, progress)
-        motion = problem.family.motion(optimum.x, problem.family.basis(t))
+        x, interrupted = optimise(problem, rate, campaign.seed, progress)
+        motion = problem.family.motion(x, problem.family.basis(t))
         slopes = Sensitivities(experiment.shared.model, motion, rate)
         # the error bars of its log
         whole = Information(experiment, belief.mean, slopes)
@@ -166,5 +166,5 @@ def plan(campaign: Campaign, progress: Progress | None = None) -> Design:
         worst=np.sqrt(worst),
         shares=np.einsum("pi,bij,jp->pb", C, parts, C) / np.diag(C)[:, None],
         usage=usage(campaign.limits, slopes, loads, derivatives=False),
-        interrupted=optimum.interrupted,
+        interrupted=interrupted,
     )

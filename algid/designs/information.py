@@ -158,10 +158,7 @@ class Information:
     @cached_property
     def S(self) -> FloatArray:
         """Information (Q, Q) of all runs."""
-        total = []
-        for log in self._logs:
-            total.append(log.count * log.T.T @ (log.Z @ log.Z.T) @ log.T)
-        return np.sum(total, axis=0)
+        return self.parts(self._slopes.Y.shape[2])[0]
 
     def parts(self, samples: int) -> FloatArray:
         """Information (B, Q, Q) of each `samples` samples of the motion.

@@ -100,6 +100,22 @@ class Row:
     upper: bool = True
     loaded: bool | None = None
 
+    @property
+    def kind(self) -> str:
+        """What the limit is of, in words."""
+        load = {None: "", True: ", loaded", False: ", unloaded"}[self.loaded]
+        return f"{self.limit.replace('-', ' ')}{load}"
+
+    @property
+    def place(self) -> str:
+        """Where it is: a joint, and which way."""
+        if self.joint is None:
+            return ""
+        return f"joint {self.joint + 1}, {'up' if self.upper else 'down'}"
+
+    def __str__(self) -> str:
+        return f"{self.kind} of {self.place}" if self.place else self.kind
+
 
 @dataclass(frozen=True, eq=False)
 class Usage:
@@ -203,23 +219,8 @@ def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:
     most = np.where(other[:, None], used.u, -np.inf).max(axis=0)
     best = int(np.argmin(most))
     row = used.rows[int(np.argmax(np.where(other, used.u[:, best], -np.inf)))]
-    raise SettingError(_missed(row, limits, float(most[best])))
-
-
-def _missed(row: Row, limits: Limits, most: float) -> str:
-    if row.limit == "tip-height":
-        reach = float(limits.lengths.sum())
-        lowest = reach - most * (reach - limits.height)
-        return (
-            f"{flag('tip_height')}: within the range the tip rises no higher than {lowest:.3g} m, "
-            f"the limit asks for {limits.height:.3g} m (margin included); lower it, or widen "
-            f"{flag('range')}"
-        )
-    assert row.joint is not None
-    limit = limits.torque[row.joint]
-    asks = f"the {'loaded ' if row.loaded else ''}arm asks for"
-    return (
-        f"{flag('torque')}: {asks} {most * limit:.3g} N m at joint "
-        f"{row.joint + 1} even at rest, the limit is {limit:.3g} N m (margin included); raise it, "
-        f"or move {flag('range')} to where gravity pulls less"
+    raise SettingError(
+        f"{flag(row.limit.replace('-', '_'))}: even at rest, wherever within {flag('range')}, "
+        f"{row}, takes {100 * float(most[best]):.4g} % of its limit (margin included); allow more, "
+        f"or move or widen {flag('range')}"
     )

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.progress import Progress
+
+if TYPE_CHECKING:
+    from algid.designs.position import PositionProblem
 
 _DONE = 1e-5  # change of the figure at which a stage ends
 _HALVINGS = 24
@@ -49,41 +52,14 @@ class Evaluation:
     room_gradient: FloatArray
 
 
-class Programme(Protocol):
-    """A family of motions within limits."""
-
-    @property
-    def rest(self) -> FloatArray:
-        """A motion (n,) that keeps all limits: none at all."""
-
-    def random(self, rng: np.random.Generator) -> FloatArray:
-        """A random motion (n,), not yet within the limits."""
-
-    def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:
-        """Figure and limits of a motion."""
-
-    def excess(self, x: FloatArray, rate: float) -> float:
-        """The largest usage of any limit."""
-
-    def score(self, x: FloatArray) -> float:
-        """What the finalists are judged by, the smaller the better."""
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """The best motion, its score, and whether the search was broken off."""
-
-    x: FloatArray
-    score: float
-    interrupted: bool
-
-
-def optimise(problem: Programme, rate: float, seed: int, progress: Progress | None = None) -> Found:
-    """The best motion that the search finds; the best so far where it is interrupted.
+def optimise(
+    problem: PositionProblem, rate: float, seed: int, progress: Progress | None = None
+) -> tuple[FloatArray, bool]:
+    """The best motion that the search finds, and whether it was broken off before its end.
 
     Parameters
     ----------
-    problem : Programme
+    problem : PositionProblem
     rate : float, Hz
         Samples a second at which the limits are kept in the end.
     seed : int
@@ -95,33 +71,82 @@ def optimise(problem: Programme, rate: float, seed: int, progress: Progress | No
     KeyboardInterrupt
         If it is interrupted before there is a motion to keep.
     """
-    search = _Search(problem, rate, progress)
+    from scipy.optimize import minimize
+
+    total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
+    done = 0
+    current: FloatArray | None = None
+    judged: dict[float, FloatArray] = {}
+
+    def score(x: FloatArray) -> float:
+        """The score of a motion drawn within the limits, which is remembered."""
+        x = kept(problem, x, rate)
+        found = problem.score(x)
+        judged.setdefault(found, x)
+        return found
+
+    def step(x: FloatArray) -> None:
+        nonlocal done, current
+        current = x.copy()
+        done += 1
+        if progress is not None:
+            progress("searching", done, total)
+
+    def run(x: FloatArray, stage: Stage) -> FloatArray:
+        """The motion that a stage ends with."""
+        nonlocal done
+
+        # SLSQP asks for the figure, the limits and their gradients at one x after another
+        @lru_cache(maxsize=1)
+        def evaluated(key: bytes) -> Evaluation:
+            return _evaluated(problem, np.frombuffer(key), stage, rows)
+
+        def at(x: FloatArray) -> Evaluation:
+            return evaluated(x.tobytes())
+
+        rows = 1
+        rows = at(x).room.size
+        start = done
+        ended = minimize(
+            lambda x: at(x).figure,
+            x,
+            jac=lambda x: at(x).gradient,
+            constraints={
+                "type": "ineq",
+                "fun": lambda x: at(x).room,
+                "jac": lambda x: at(x).room_gradient,
+            },
+            method="SLSQP",
+            callback=step,
+            options={"maxiter": stage.iterations, "ftol": _DONE},
+        )
+        done = start + stage.iterations
+        return ended.x if np.all(np.isfinite(ended.x)) else x
+
+    interrupted = False
     try:
         rng = np.random.default_rng(seed)
         room = 0.5 * (1 + max(_EASY, problem.excess(problem.rest, FIRST.rate)))
-        starts = []
+        ends = []
         for _ in range(STARTS):
-            start = kept(problem, problem.random(rng), FIRST.rate, room)
-            starts.append(search.run(start, FIRST))
-        for x in sorted(starts, key=search.judged)[:KEPT]:
-            better = x
+            ends.append(run(kept(problem, problem.random(rng), FIRST.rate, room), FIRST))
+        for end in sorted(ends, key=score)[:KEPT]:
+            better = end
             for stage in LATER:
-                better = search.run(better, stage)
-                search.judged(better)
+                better = run(better, stage)
+                score(better)
     except KeyboardInterrupt:
-        if search.current is None:
+        if current is None:
             raise
-        search.judged(search.current)
-        assert search.best is not None
-        return Found(*search.best, interrupted=True)
-    assert search.best is not None
-    return Found(*search.best, interrupted=False)
+        score(current)
+        interrupted = True
+    return judged[min(judged)], interrupted
 
 
-def kept(problem: Programme, x: FloatArray, rate: float, most: float = 1.0) -> FloatArray:
+def kept(problem: PositionProblem, x: FloatArray, rate: float, most: float = 1.0) -> FloatArray:
     """The motion `x`, drawn back to rest until it uses `most` of the limits.
 
-    a small one is enlarged to that.
+    A small one is enlarged to that.
     """
     rest = problem.rest
     low, high = 0.0, 1.0
@@ -138,78 +163,19 @@ def kept(problem: Programme, x: FloatArray, rate: float, most: float = 1.0) -> F
     return rest + low * (x - rest)
 
 
-class _Search:
-    """Run stages, keep the best motion that obeys the limits, and report the progress."""
+def _evaluated(problem: PositionProblem, x: FloatArray, stage: Stage, rows: int) -> Evaluation:
+    """The evaluation of `x`, of `rows` limits.
 
-    def __init__(self, problem: Programme, rate: float, progress: Progress | None) -> None:
-        self._problem, self._rate, self._progress = problem, rate, progress
-        self.best: tuple[FloatArray, float] | None = None
-        self.current: FloatArray | None = None
-        self._rows = 1
-        self._done = 0
-        self._total = STARTS * FIRST.iterations + KEPT * sum(stage.iterations for stage in LATER)
-
-    def judged(self, x: FloatArray) -> float:
-        """The score of a motion within the limits, remembered if it is the best so far."""
-        x = kept(self._problem, x, self._rate)
-        score = self._problem.score(x)
-        if self.best is None or score < self.best[1]:
-            self.best = (x, score)
-        return score
-
-    def run(self, x: FloatArray, stage: Stage) -> FloatArray:
-        """The motion that a stage ends with."""
-        from scipy.optimize import minimize
-
-        # SLSQP asks for the figure, the limits and their gradients at one x after another
-        @lru_cache(maxsize=1)
-        def evaluated(key: bytes) -> Evaluation:
-            return self._evaluated(np.frombuffer(key), stage)
-
-        def at(x: FloatArray) -> Evaluation:
-            return evaluated(x.tobytes())
-
-        start = self._done
-
-        def step(x: FloatArray) -> None:
-            self.current = x.copy()
-            self._done += 1
-            if self._progress is not None:
-                self._progress("searching", self._done, self._total)
-
-        limits = {"type": "ineq", "fun": lambda x: at(x).room, "jac": lambda x: at(x).room_gradient}
-        ended = minimize(
-            lambda x: at(x).figure,
-            x,
-            jac=lambda x: at(x).gradient,
-            constraints=limits,
-            method="SLSQP",
-            callback=step,
-            options={"maxiter": stage.iterations, "ftol": _DONE},
-        )
-        self._done = start + stage.iterations
-        if not np.all(np.isfinite(ended.x)):
-            return x
-        return ended.x
-
-    def _evaluated(self, x: FloatArray, stage: Stage) -> Evaluation:
-        """The evaluation of `x`.
-
-        a step so long that nothing can be said of the motion is one to be shortened.
-        """
-        try:
-            evaluation = self._problem.evaluate(x, stage)
-        except np.linalg.LinAlgError:
-            evaluation = None
-        if (
-            evaluation is not None
-            and np.isfinite(evaluation.figure)
-            and np.all(np.isfinite(evaluation.room))
-        ):
-            self._rows = evaluation.room.size
-            return evaluation
-        room = np.full(self._rows, -_HOPELESS)
-        return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((self._rows, x.size)))
+    A step so long that nothing can be said of the motion is one to be shortened.
+    """
+    try:
+        found = problem.evaluate(x, stage)
+        if np.isfinite(found.figure) and np.all(np.isfinite(found.room)):
+            return found
+    except np.linalg.LinAlgError:
+        pass
+    room = np.full(rows, -_HOPELESS)
+    return Evaluation(_HOPELESS, np.zeros(x.size), room, np.zeros((rows, x.size)))
 
 
 def soft_maximum(u: FloatArray, hardness: float) -> tuple[FloatArray, FloatArray]:

@@ -106,13 +106,13 @@ def limit_table(design: Design) -> Table:
     most = 1 - design.campaign.margin
     tightest: dict[str, tuple[Row, float]] = {}
     for row, used in design.binding:
-        tightest.setdefault(kind_name(row), (row, used))
+        tightest.setdefault(row.kind, (row, used))
     rows = []
     for kind, (row, used) in tightest.items():
         limit, value = amounts(design, row, used)
         numbers = (significant(value, 4), significant(limit, 4), percent(used, 1.0, 3))
         binds = _YES[used >= BINDS * most]
-        rows.append((kind, *numbers, binds, SIGNS[row.limit], place_name(row) or ABSENT))
+        rows.append((kind, *numbers, binds, SIGNS[row.limit], row.place or ABSENT))
     note = (
         f"A margin of {percent(design.campaign.margin, 1.0)} % is left for what a controller "
         "overshoots. Torque is the largest that any arm of those believed possible asks for."
@@ -126,19 +126,6 @@ def limit_table(design: Design) -> Table:
         tuple(rows),
         note,
     )  # fmt: skip
-
-
-def kind_name(row: Row) -> str:
-    """What a limit is of, in words."""
-    load = {None: "", True: ", loaded", False: ", unloaded"}[row.loaded]
-    return f"{row.limit.replace('-', ' ')}{load}"
-
-
-def place_name(row: Row) -> str:
-    """Where a limit is: a joint, and which way."""
-    if row.joint is None:
-        return ""
-    return f"joint {row.joint + 1}, {'up' if row.upper else 'down'}"
 
 
 def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
@@ -172,10 +159,9 @@ def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
         reasons.append(Notice("NOT_REACHED", numbers={"case": "stopped"}))
     relative = np.where(design.campaign.asked.wanted, design.relative, -np.inf)
     row, used = design.binding[0]
-    limit = kind_name(row) if row.joint is None else f"{kind_name(row)} of {place_name(row)}"
     return graded(
         f"every parameter asked for to within {percent(design.largest, 1.0)} % (one σ; "
-        f"{design.names[int(np.argmax(relative))]} is the least certain); active limit: {limit} "
+        f"{design.names[int(np.argmax(relative))]} is the least certain); active limit: {row} "
         f"({percent(used, 1.0, 3)} %)",
         reasons,
     )

@@ -19,13 +19,14 @@ x       centre (2,), then a_1l, b_1l, a_2l, b_2l for each l     (2 + 4 L,)
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.designs.belief import Belief, Objective
+from algid.designs.belief import Belief, Load, Objective
 from algid.designs.information import Experiment, Information, Sensitivities
 from algid.designs.limits import Limits, usage
 from algid.designs.optimise import Evaluation, Stage, soft_maximum
@@ -100,6 +101,7 @@ class Fourier:
         return np.concatenate([centre, rng.standard_normal(self.size - 2)])
 
 
+@dataclass(frozen=True, eq=False)
 class PositionProblem:
     """Fourier motions within limits, for all arms of a belief.
 
@@ -110,56 +112,56 @@ class PositionProblem:
     limits : Limits
     asked : Objective
     duration : float, s
-    rest : (2,), rad
-        A posture within the limits, for all arms of the belief.
+    posture : (2,), rad
+        One within the limits, for all arms of the belief.
     """
 
-    def __init__(
-        self,
-        experiment: Experiment,
-        belief: Belief,
-        limits: Limits,
-        asked: Objective,
-        duration: float,
-        rest: FloatArray,
-    ) -> None:
-        self._experiment, self._belief, self._limits, self._asked = (
-            experiment,
-            belief,
-            limits,
-            asked,
-        )
-        self._loads = list(map(belief.load, experiment.kinds))
-        self.family = Fourier(duration)
-        self.rest = np.concatenate([rest, np.zeros(self.family.size - 2)])
-        self._basis = cache(lambda rate: self.family.basis(middles(duration, rate)))
+    experiment: Experiment
+    belief: Belief
+    limits: Limits
+    asked: Objective
+    duration: float
+    posture: FloatArray
+
+    @cached_property
+    def family(self) -> Fourier:
+        """The motions."""
+        return Fourier(self.duration)
+
+    @property
+    def rest(self) -> FloatArray:
+        """A motion (n,) that keeps all limits: none at all."""
+        return np.append(self.posture, np.zeros(self.family.size - 2))
+
+    @cached_property
+    def _loads(self) -> list[Load]:
+        return list(map(self.belief.load, self.experiment.kinds))
+
+    @cached_property
+    def _basis(self) -> Callable[[float], FloatArray]:
+        return cache(lambda rate: self.family.basis(middles(self.duration, rate)))
 
     def slopes(self, x: FloatArray, rate: float) -> Sensitivities:
         """The motion of `x` at `rate` Hz."""
         return Sensitivities(
-            self._experiment.shared.model, self.family.motion(x, self._basis(rate)), rate
+            self.experiment.shared.model, self.family.motion(x, self._basis(rate)), rate
         )
 
     def random(self, rng: np.random.Generator) -> FloatArray:
         """A random motion about the resting posture."""
-        return self.family.random(rng, self.rest[:2])
-
-    def criterion(self, slopes: Sensitivities, stage: Stage) -> tuple[float, FloatArray]:
-        """Figure to make small, and its derivatives (6, N) by the motion."""
-        information = Information(self._experiment, self._belief.mean, slopes)
-        figure, A = self._asked.figure(information.S, stage.sharpness)
-        return figure, information.gradient(A)
+        return self.family.random(rng, self.posture)
 
     def evaluate(self, x: FloatArray, stage: Stage) -> Evaluation:
         """Figure and limits of a motion."""
         slopes, basis = self.slopes(x, stage.rate), self._basis(stage.rate)
-        figure, by_motion = self.criterion(slopes, stage)
-        used = usage(self._limits, slopes, self._loads)
+        information = Information(self.experiment, self.belief.mean, slopes)
+        figure, A = self.asked.figure(information.S, stage.sharpness)
+        used = usage(self.limits, slopes, self._loads)
         most, share = soft_maximum(used.u, stage.hardness)
         assert used.by_motion is not None
         return Evaluation(
             figure,
-            self.family.gradient(by_motion, basis),
+            self.family.gradient(information.gradient(A), basis),
             1 - most,
             -self.family.gradient(used.by_motion * share[:, None], basis),
         )
@@ -167,16 +169,16 @@ class PositionProblem:
     def excess(self, x: FloatArray, rate: float) -> float:
         """The largest usage of any limit by any arm of the belief."""
         return float(
-            usage(self._limits, self.slopes(x, rate), self._loads, derivatives=False).u.max()
+            usage(self.limits, self.slopes(x, rate), self._loads, derivatives=False).u.max()
         )
 
     def score(self, x: FloatArray) -> float:
         """The largest relative bound of the worst arm of the belief."""
         slopes = self.slopes(x, JUDGED_RATE)
-        arms = [self._belief.mean, *self._belief.draws(JUDGED_ARMS, seed=0)]
+        arms = [self.belief.mean, *self.belief.draws(JUDGED_ARMS, seed=0)]
         bounds = []
         for arm in arms:
-            bounds.append(self._asked.largest(Information(self._experiment, arm, slopes).S))
+            bounds.append(self.asked.largest(Information(self.experiment, arm, slopes).S))
         return max(bounds)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -119,28 +118,33 @@ def of_case(case: Case, source: str, loaded: bool | None, knowns: PriorKnowledge
     SettingError
         If there are to be loaded runs without a payload.
     """
-    case = replace(case, arm=replace(case.arm, **knowns.lengths))
-    arm = case.arm
+    arm = replace(case.arm, **knowns.lengths)
     mass = case.payload if knowns.payload is None else knowns.payload
-    error = WRONG if knowns.error is None else knowns.error
-    shape = {"y_p": case.place[1], "J_p": case.inertia}
-    body = tuple(name for name, value in shape.items() if value)
-    terms = (PHASES,) if arm.sines().any() or "y_p" in body else ()
+    x, y = case.place
+    body = tuple(name for name, size in (("y_p", y), ("J_p", case.inertia)) if size)
+    terms = (PHASES,) if arm.sines().any() or y else ()
     model = Model(terms, gravity=arm.g)
     shared = _shared(model, mass or None, loaded, source, knowns, body)
-    more = 1 + error
+
+    def parameters(arm: Arm, mass: float) -> FloatArray:
+        """Of the arm and a payload that is shaped like the case's."""
+        inertia = case.inertia * (mass / case.payload if case.payload else 1.0)
+        value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
+        value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
+        l2 = arm.l2 if x is None else x
+        value |= {"m_p": mass, "l1": arm.l1, "l2": l2, "y_p": y, "J_p": inertia}
+        return vector(shared.names, value)
+
+    more = 1 + (WRONG if knowns.error is None else knowns.error)
+    mean = parameters(arm, mass)
     wrong = [  # the parameters are linear in each mass and friction
-        (replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
-        (replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
-        (replace(arm, b1=more * arm.b1), mass),
-        (replace(arm, b2=more * arm.b2), mass),
-        (arm, more * mass),
+        parameters(replace(arm, m1=more * arm.m1, I1=more * arm.I1), mass),
+        parameters(replace(arm, m2=more * arm.m2, I2=more * arm.I2), mass),
+        parameters(replace(arm, b1=more * arm.b1), mass),
+        parameters(replace(arm, b2=more * arm.b2), mass),
+        parameters(arm, more * mass),
     ]
-    mean = _parameters(shared, case, arm, mass)
-    spread = np.empty((len(mean), len(wrong)))
-    for place, (other, its_mass) in enumerate(wrong):
-        spread[:, place] = _parameters(shared, case, other, its_mass) - mean
-    belief = Belief(shared, mean, spread, box=True)
+    belief = Belief(shared, mean, (np.array(wrong) - mean).T, box=True)
     return PriorArm(source, belief, np.array([arm.l1, arm.l2]), None)
 
 
@@ -162,87 +166,55 @@ def _shared(
     return Shared(model, payload=loaded, lengths=knowns.lengths, body=body if loaded else ())
 
 
-def _parameters(shared: Shared, case: Case, arm: Arm, mass: float) -> FloatArray:
-    """Parameters (Q,) of an arm and its payload, an object of the shape that the case's has."""
-    x, y = case.place
-    inertia = case.inertia * (mass / case.payload if case.payload else 1.0)
-    value = dict(zip(CONSTANT_NAMES, arm.constants().tolist(), strict=True))
-    value |= dict(zip(SINES, arm.sines().tolist(), strict=True))
-    value |= {"m_p": mass, "l1": arm.l1, "l2": arm.l2 if x is None else x, "y_p": y, "J_p": inertia}
-    return vector(shared.names, value)
-
-
 def _of_result(
     result: Result, source: str, loaded: bool | None, knowns: PriorKnowledge
 ) -> PriorArm:
-    model, left_out = _planned(model_of(result))
-    lengths = given_lengths(result) | knowns.lengths
-    value = _estimates(result, knowns.payload) | lengths
-    body = with_error_bar(result, BODY_PARAMETERS)
-    shared = _shared(model, value.get("m_p"), loaded, source, replace(knowns, **lengths), body)
-    # what is estimated with the constants takes of their precision
-    shared = replace(shared, delay=with_error_bar(result, DELAYS) == DELAYS)
-    for name in shared.names:
-        if name not in value:
-            remedy = "identify it from logs that determine it"
-            if name in ("l1", "l2"):
-                remedy = f"give {flag(name)}"
-            raise ResultError(f"{source}: the result has no {name}; {remedy}")
-    mean = vector(shared.names, value)
-    exact = set() if knowns.payload is None else {"m_p"}
-    spread = _spread(result, source, shared.names, mean, exact, knowns.error)
-    reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
-    doubts = left_out + contradictions(result, knowns.lengths)
-    belief = Belief(shared, mean, spread, box=False)
-    return PriorArm(source, belief, reach, noise_of(result), doubts)
+    """The prior of an identified arm: its estimates, and their covariance.
 
-
-def _estimates(result: Result, payload: float | None) -> dict[str, float]:
-    """The estimates by name, as far as there are any, with a payload of that mass in kg if given.
-
-    An object of another mass is shaped like the one that was identified.
-    """
-    every = result.estimates.items()
-    value = {name: one.estimate for name, one in every if one.estimate is not None}
-    if payload is None:
-        return value
-    if "J_p" in value:
-        value["J_p"] *= payload / (value.get("m_p") or payload)
-    return value | {"m_p": payload}
-
-
-def _planned(model: Model) -> tuple[Model, tuple[Notice, ...]]:
-    """The model less the terms that no regressor holds, and a notice of them."""
-    planned = outside(model.terms, _UNPLANNED)
-    if planned == model.terms:
-        return model, ()
-    titles = [TERMS[term].title for term in outside(model.terms, planned)]
-    left = Notice("NOT_REACHED", numbers={"case": "terms", "terms": titles})
-    return replace(model, terms=planned), (left,)
-
-
-def _spread(
-    result: Result,
-    source: str,
-    names: Sequence[str],
-    mean: FloatArray,
-    given: set[str],
-    error: float | None,
-) -> FloatArray:
-    """F (Q, Q): a root of the result's covariance.
-
-    What has no error bar is wrong by `error` at `SURE` deviations.
+    An object of another mass is shaped like the one that was identified. What has no error bar is
+    wrong by the error that the user states, at `SURE` deviations.
 
     Raises
     ------
     ResultError
-        Where a constant has no error bar and no `error` is given.
+        If a parameter has no estimate, or a constant no error bar where no error is stated.
     """
-    known = with_error_bar(result, outside(names, given))
+    model, doubts = model_of(result), contradictions(result, knowns.lengths)
+    planned = outside(model.terms, _UNPLANNED)
+    if planned != model.terms:
+        titles = [TERMS[term].title for term in outside(model.terms, planned)]
+        numbers = {"case": "terms", "terms": titles}
+        doubts = (Notice("NOT_REACHED", numbers=numbers), *doubts)
+        model = replace(model, terms=planned)
+    value = {}
+    for name, one in result.estimates.items():
+        if one.estimate is not None:
+            value[name] = one.estimate
+    exact = set[str]()
+    if knowns.payload is not None:
+        exact.add("m_p")
+        if "J_p" in value:
+            value["J_p"] *= knowns.payload / (value.get("m_p") or knowns.payload)
+        value["m_p"] = knowns.payload
+    lengths = given_lengths(result) | knowns.lengths
+    value |= lengths
+    body = with_error_bar(result, BODY_PARAMETERS)
+    shared = _shared(model, value.get("m_p"), loaded, source, replace(knowns, **lengths), body)
+    # what is estimated with the constants takes of their precision
+    shared = replace(shared, delay=with_error_bar(result, DELAYS) == DELAYS)
+    names = shared.names
+    for name in outside(names, value):
+        remedy = "identify it from logs that determine it"
+        if name in ("l1", "l2"):
+            remedy = f"give {flag(name)}"
+        raise ResultError(f"{source}: the result has no {name}; {remedy}")
+    mean = vector(names, value)
+    # a root of the covariance
+    known = with_error_bar(result, outside(names, exact))
     covariance = covariance_of(result, names, known)
     bare = outside(names, known)
-    without = outside(bare, given)
-    if without and error is None:
+    without = outside(bare, exact)
+    if without and knowns.error is None:
         why = f"the result leaves {', '.join(without)} without error bars"
         if result.fit is None:
             why = f"the result of {flag('estimator')} {result.estimator} has no error bars"
@@ -250,8 +222,12 @@ def _spread(
             f"{source}: {why}; identify from logs that determine them, or say how wrong it may be: "
             f"{flag('prior_error')}"
         )
+    error = WRONG if knowns.error is None else knowns.error
     for row in map(names.index, bare):
-        covariance[row, row] = ((WRONG if error is None else error) * mean[row] / SURE) ** 2
+        covariance[row, row] = (error * mean[row] / SURE) ** 2
     size = np.maximum(np.abs(mean), 1e-12)
     eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(size, size))
-    return size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+    spread = size[:, None] * vectors * np.sqrt(np.maximum(eigenvalues, 0.0))
+    belief = Belief(shared, mean, spread, box=False)
+    reach = np.array([value.get("l1", np.nan), value.get("l2", np.nan)])
+    return PriorArm(source, belief, reach, noise_of(result), doubts)

@@ -23,7 +23,8 @@ FURTHEST = 2 * np.pi  # rad to either side: few joints turn further
 SMALLEST, LARGEST = 1e-6, 1e6
 """What a limit in rad, rad/s, rad/s² or N m may be, but for 0 and inf."""
 EXAMPLES = {
-    "range": "rad like 1.2 (to both sides of hanging), 1.2,1.0, or -2.7:-0.4,-1.2:1.2",
+    "range": "rad like 1.2 (to both sides of hanging), 1.2,1.0, or LOW:HIGH of each joint like "
+    "-2.7:-0.4,-1.2:1.2",
     "speed": "rad/s like 3 or 3,4",
     "acceleration": "rad/s² like 30 or 30,60",
     "torque": "N m like 5 or 5,2",
@@ -42,46 +43,35 @@ def _pair(value: Any, info: ValidationInfo) -> FloatArray:
         If it can be no such limit.
     """
     name = str(info.field_name)
-    wrong = PydanticCustomError("limit", "expected {like}", {"like": EXAMPLES[name]})
     if isinstance(value, str):
         value = [part.split(":") for part in value.split(",")]
     try:
         table = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):  # no numbers, or not as many in each part
-        raise wrong from None
+        table = np.full(1, np.nan)
     if table.shape[-1:] == (1,):
         table = table[..., 0]
     spans = name == "range" and table.shape == (2, 2)
-    if not spans and (table.shape not in ((), (1,), (2,)) or not np.all(table >= 0)):
-        raise wrong
-    if np.any(np.isnan(table)):
-        raise wrong
+    low, high = table.T if spans else (-table, table)
+    like = EXAMPLES[name]
     if name == "runs":
-        whole = np.all(table == np.rint(table)) and table.max() <= MOST_RUNS
-        if table.shape != (2,) or not whole or not np.any(table):
-            raise wrong
-        return table
-    sizes = np.abs(table[np.isfinite(table)])
-    if not spans and not np.all(table > 0):
-        raise wrong
-    if np.any((sizes > 0) & ((sizes < SMALLEST) | (sizes > LARGEST))):
-        bounds = {"low": f"{SMALLEST:g}", "high": f"{LARGEST:g}"}
-        raise PydanticCustomError("limit", "expected from {low} to {high}, or inf", bounds)
+        whole = (table == np.rint(table)) & (table >= 0) & (table <= MOST_RUNS)
+        right = bool(table.shape == (2,) and table.any() and np.all(whole))
+    else:
+        sizes = np.abs(table[np.isfinite(table) & (table != 0)])
+        most = FURTHEST if name == "range" else LARGEST
+        right = bool(np.all(low < high) and np.all((sizes >= SMALLEST) & (sizes <= most)))
+        right = right and np.array_equal(np.isfinite(low), np.isfinite(high))
+        right = right and low.shape in ((), (1,), (2,))
+        like = f"{like}; from {SMALLEST:g} to {most:.4g}, or inf"
+    if not right:
+        raise PydanticCustomError("limit", "expected {like}", {"like": like})
     if name != "range":
         return np.broadcast_to(table, 2)
-    far = sizes.max(initial=0.0)
-    if far > FURTHEST:
-        turn = {"far": f"{far:g}", "rad": f"{np.radians(far):.4g}"}
-        said = "expected rad, at most a turn (for {far}° give {rad}), or inf"
-        raise PydanticCustomError("limit", said, turn)
-    if not spans:
-        half = np.broadcast_to(table, 2)
-        return np.stack([np.array(HANGING) - half, np.array(HANGING) + half], axis=1)
-    low, high = table.T
-    if not np.all(low < high) or np.any(np.isfinite(low) != np.isfinite(high)):
-        said = "expected LOW:HIGH with LOW below HIGH, both finite or neither"
-        raise PydanticCustomError("limit", said)
-    return table
+    if spans:
+        return table
+    half, middle = np.broadcast_to(table, 2), np.array(HANGING)
+    return np.stack([middle - half, middle + half], axis=1)
 
 
 Pair = Annotated[FloatArray, PlainValidator(_pair)]

@@ -186,17 +186,16 @@ REFUSED = [
     (["case1", *SENSORS, "--speed", "3", "--torque", "2"], "--range: it must be given"),
     (["case1", *LIMITS], "--position-noise: case1 does not tell"),
     (["case1", *SENSORS, *LIMITS, "--range", "x"], "--range: expected rad like 1.2"),
-    (["case1", *SENSORS, *LIMITS, "--range=-60:60,-60:60"], "for 60° give 1.047"),
-    (["case1", *SENSORS, *LIMITS, "--range", "7,inf"], "at most a turn (for 7° give 0.1222)"),
-    (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "LOW below HIGH"),
+    (["case1", *SENSORS, *LIMITS, "--range=-60:60,-60:60"], "from 1e-06 to 6.283, or inf"),
+    (["case1", *SENSORS, *LIMITS, "--range", "1:-1,0:1"], "or LOW:HIGH of each joint like"),
     (["case1", *SENSORS, *LIMITS, "--speed=-3"], "--speed: expected rad/s"),
     (
         ["case1", *SENSORS, *LIMITS, "--range=-0.2:0.2,-0.1:0.1", "--torque", "0.2,0.2"],
-        "--torque: the loaded arm asks for",
+        "--torque: even at rest, wherever within --range, torque, loaded of joint 1",
     ),
     (
         ["case1", *SENSORS, *LIMITS, "--set", "tip_height=0.1"],
-        "--set tip_height: within the range the tip rises no higher",
+        "--set tip_height: even at rest, wherever within --range, tip height, takes",
     ),
     (
         ["case1", *SENSORS, *LIMITS, "--set", "tip_height=5"],
