@@ -1,20 +1,21 @@
-.PHONY: accuracy accuracy-quick run-to-run contradictions saturation
+# Experiments of coverage: a table each, into build/; `EXPERIMENT="--arms 2 --draws 3"` makes one short.
+EXPERIMENTS := contradictions saturation planar efforts passive misfit prior false-alarms elastic disturbed
+.PHONY: accuracy run-to-run conventions $(EXPERIMENTS)
 
-ACCURACY_DRAWS ?= 100
-ACCURACY_MODEL_DRAWS ?= 4
+EXPERIMENT ?=
+MEASURE = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines
 
-accuracy: setup ## errors against the Cramér-Rao bound, peers, errors of real joints; into build/accuracy
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --draws $(ACCURACY_DRAWS) -o build/accuracy
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy_models --draws $(ACCURACY_MODEL_DRAWS) -o build/accuracy
+accuracy: setup ## errors against the Cramér-Rao bound, peers, held torques, errors of real joints
+	$(MEASURE).accuracy $(EXPERIMENT)
+	$(MEASURE).accuracy_hold $(EXPERIMENT)
+	$(MEASURE).accuracy_models $(EXPERIMENT)
 
-accuracy-quick: setup
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.accuracy --quick -o build/accuracy
+conventions: setup ## every wrong convention of a log, on five arms, with and without friction; what is advised
+	$(MEASURE).conventions $(EXPERIMENT)
+	$(MEASURE).advice $(EXPERIMENT)
+
+$(EXPERIMENTS): setup
+	$(MEASURE).$(subst -,_,$@) $(EXPERIMENT)
 
 run-to-run: setup ## all splits of two real arms' runs into halves: whether intervals hold, and repeatability
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.run_to_run ../shared/data
-
-contradictions: setup ## real runs whose second torque is scaled: whether that is named, and from which factor on
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.contradictions ../shared/data
-
-saturation: setup ## torques cut off by a sensor or a drive: whether they are found and left out, and coverage
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pipelines.saturation
+	$(MEASURE).run_to_run

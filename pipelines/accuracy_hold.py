@@ -1,20 +1,16 @@
 """Whether logs tell a held torque from one that moves evenly, and what it does to intervals.
 
-    python -m pipelines.accuracy_hold [--draws 8] [--arms 4] [--rows slow,joint2]
-
 Each row is simulated with a torque that is held from sample to sample and with one that is not,
 and identified without a flag. Asked: intervals of k1 … k7 that hold the truth in 92 % or more,
 errors within 1.5 times the bound of a known hold, and at most 1 % of the even torques taken for
 held ones.
 
-"slow" and "joint2" move under a PD controller (`pipelines.controlled`), the others in open loop. Of
-what a controller holds for a millisecond and a log has every tenth time, nothing is held.
+Slow motions and joint 2 alone are under a PD controller, the others in open loop. Of what a
+controller holds for a millisecond and a log has every tenth time, nothing is held.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -26,8 +22,9 @@ from algid.log import Log
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
-from pipelines.controlled import Controller, Plan, controlled
 from pipelines.cramer_rao import Truth, information
+from pipelines.experiment import Seen, count, experiment, grid, judged, number, rms, share
+from pipelines.simulator import Controller, Plan, controlled
 
 FIRST_ARM = 300  # seeds of arms that nothing was tuned on
 SIGMA_THETA, SIGMA_TAU = 1e-3, 1e-2
@@ -133,88 +130,40 @@ def _pd(row: Row, arm: Arm, t: FloatArray, held: bool, seed: int) -> Truth:
         omega[joint] += (size[:, None] * w * np.cos(w * fine + phase[:, None])).sum(axis=0)
     k = arm.constants()
     inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])
-    gains = np.diag(inertia * STIFFNESS**2), np.diag(2 * 0.7 * inertia * STIFFNESS)
+    law = Controller(inertia * STIFFNESS**2, 2 * 0.7 * inertia * STIFFNESS, digital=held)
     plan = Plan(theta, omega, np.zeros_like(theta))
-    payload, friction = np.zeros((t.size, 1)), np.zeros((1, 2, 1))
-    found = controlled(
-        arm, plan, Controller(*gains, digital=held), payload, friction, row.rate, rng
-    )
-    angles, torques = found.theta[:, :, 0], found.tau[:, :, 0]
+    angles, torques, _ = controlled(k, plan, law, np.zeros(2), row.rate, rng)
     return Truth(t, angles, np.gradient(angles, t, axis=1), torques)
 
 
-@dataclass(frozen=True, eq=False)
-class Draw:
-    """Intervals that hold the truth, errors over the bound, the hold, its source, terms, grade."""
-
-    inside: list[bool]
-    over_bound: list[float]
-    used: str
-    told: bool
-    terms: tuple[str, ...]
-    grade: str
-
-
-def draw(key: str, held: bool, seed: int, number: int) -> Draw:
+def draw(key: str, held: bool, seed: int, number: int) -> Seen:
     """Identify one log without a flag."""
     here = scene(key, held, seed)
-    log = here.log(np.random.default_rng([seed, number, held]))
-    result = identify(log, report=False)
-    inside, over = [], []
-    for name, true, least in zip(CONSTANT_NAMES, here.arm.constants(), here.bound, strict=True):
-        found = result.parameters[name]
-        if found.estimate is None or found.ci95 is None or None in found.ci95:
-            continue
-        low, high = found.ci95
-        inside.append(bool(low <= true <= high))
+    result = identify(here.log(np.random.default_rng([seed, number, held])), report=False)
+    seen = judged(result, dict(zip(CONSTANT_NAMES, here.arm.constants(), strict=True)))
+    for name, least, true in zip(CONSTANT_NAMES, here.bound, here.arm.constants(), strict=True):
         if np.isfinite(least):
-            over.append((found.estimate - true) / least)
+            seen["over bound"] += [error * true / least for error in seen[f"error {name}"]]
     hold = result.fit.torque_hold if result.fit is not None else None
     assert hold is not None
-    terms = tuple(term for term in result.parameters if term not in CONSTANT_NAMES)
-    return Draw(inside, over, hold.used, bool(hold.told), terms, result.verdict.grade)
-
-
-def line(key: str, held: bool, arms: int, draws: int, verbose: bool) -> str:
-    """A row of the table."""
-    found = []
-    for seed in range(FIRST_ARM, FIRST_ARM + arms):
-        for number in range(draws):
-            found.append(draw(key, held, seed, number))
-            if verbose:
-                one = found[-1]
-                print("  ", seed, one.used, one.told, one.terms, one.grade, one.inside, flush=True)
-    inside = 100 * np.mean([each for one in found for each in one.inside])
-    over = np.sqrt(np.mean(np.square([each for one in found for each in one.over_bound])))
-    taken = sum(one.used == "zoh" for one in found)
-    untold = sum(not one.told for one in found)
-    false = sum(bool(set(one.terms) - {"delay"}) for one in found)
-    what = "held" if held else "even"
-    return (
-        f"| {ROWS[key].name} | {what} | {taken} | {untold} | {len(found)} | {inside:.1f} "
-        f"| {over:.2f} | {false} |"
-    )
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print a Markdown table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--draws", type=int, default=8)
-    parser.add_argument("--arms", type=int, default=4)
-    parser.add_argument("--rows", default=",".join(ROWS))
-    parser.add_argument("--verbose", action="store_true")
-    wanted = parser.parse_args(arguments)
-    print(
-        "| motion | torque | taken as held | not told or refuted | of | coverage, % | over bound "
-        "| false terms |"
-    )
-    print("|---|---|---|---|---|---|---|---|")
-    for key in wanted.rows.split(","):
-        for held in (True, False):
-            print(line(key, held, wanted.arms, wanted.draws, wanted.verbose), flush=True)
+    seen |= {"taken": [hold.used == "zoh"], "untold": [not hold.told]}
+    seen["false"] = [bool(result.parameters.keys() - {*CONSTANT_NAMES, "delay"})]
+    return seen
 
 
 if __name__ == "__main__":
-    main()
+    rows = {
+        f"{row.name}, {'held' if held else 'even'}": (key, held)
+        for key, row in ROWS.items()
+        for held in (True, False)
+    }
+    columns = {
+        "taken as held": count("taken"),
+        "not told or refuted": count("untold"),
+        "of": count("draw"),
+        "held": share("held"),
+        "over bound": number("over bound", rms),
+        "false terms": count("false"),
+    }
+    arms = range(FIRST_ARM, FIRST_ARM + 4)
+    experiment("hold", __doc__, grid(rows, arms), draw, columns, draws=8)

@@ -1,22 +1,16 @@
-"""Errors that real arms have, and what `--model auto` makes of them: the model errors of `make
-accuracy`.
-
-    python -m pipelines.accuracy_models --arms 4 --draws 4
+"""Errors that real arms have, and what `--model auto` makes of them: a part of `make accuracy`.
 
 Each row of `real_arms.ROWS` is simulated on hidden arms, ten seconds unloaded and ten loaded, and
-identified once with no flag and once with all the old flags. Coverage counts the 95 % intervals of
+identified once with no flag and once with all the old flags. Asked: 88 % of the 95 % intervals of
 k1 … k7 and m_p that hold the truth.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-from collections import Counter
-from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from argparse import Namespace
+from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,28 +20,17 @@ from algid.estimators import refined, robust
 from algid.estimators.problem import Problem, WeakSettings
 from algid.estimators.terms import Selection, select
 from algid.model import Model
-from pipelines import real_arms
+from pipelines.experiment import Seen, experiment, number, share, words
+from pipelines.real_arms import ROWS, Scene, scenes
 
 MODES = ("no flag", "all old flags")
-ASKED = 88.0  # % of the intervals
-FIRST_ARM = 11
-Row = dict[str, Any]
-
-_scenes: dict[tuple[str, int, bool], real_arms.Scene] = {}
+FIRST_ARM, ARMS = 11, 4
 
 
-def install(made: dict[tuple[str, int, bool], real_arms.Scene]) -> None:
-    """Hand the motions to a process, so that each is integrated once."""
-    _scenes.update(made)
-
-
-def draw(job: tuple[str, int, int, str]) -> Row:
-    """One pair of logs of a row, identified in one mode: errors in σ and in percent, and which
-    intervals hold.
-    """
-    row, arm, seed, mode = job
+def draw(row: str, mode: str, arm: int, seed: int, made: tuple[Scene, Scene]) -> Seen:
+    """One pair of logs of a row, identified in one mode."""
     rng = np.random.default_rng([seed, arm, sum(row.encode())])
-    unloaded, loaded = (_scenes[row, arm, kind].log(rng) for kind in (False, True))
+    unloaded, loaded = (one.log(rng) for one in made)
     logs = [lambda: [unloaded]], [lambda: [loaded]]
     weak = WeakSettings(bandwidth=60.0)
     flags = Selection(Model(("coulomb", "offset", "rotor")), delay=True)
@@ -58,99 +41,42 @@ def draw(job: tuple[str, int, int, str]) -> Row:
         fit = robust.fit(
             Problem(*logs, replace(weak, model=chosen.shapes or chosen.model, estimate_delay=False))
         )
-    truth = _scenes[row, arm, False].truth
     names = [*CONSTANT_NAMES, "m_p"]
     places = [fit.names.index(name) for name in names]
-    wanted = np.array([truth[name] for name in names])
-    z = (fit.values[places] - wanted) / fit.std[places]
+    wanted = np.array([made[0].truth[name] for name in names])
+    z = np.abs(fit.values[places] - wanted) / fit.std[places]
+    error = np.abs(fit.values[places] / wanted - 1)
     return {
-        "row": row,
-        "mode": mode,
-        "estimator": fit.estimator,
+        "by": [fit.estimator],
         "terms": [*chosen.model.terms, *(["delay"] if chosen.delay else [])],
-        "inside": (np.abs(z) <= fit.quantile).tolist(),
-        "z": np.abs(z).tolist(),
-        "percent": (100 * np.abs(fit.values[places] / wanted - 1)).tolist(),
+        "held": (z <= fit.quantile).tolist(),
+        "z": z.tolist(),
+        "k": error[:-1].tolist(),
+        "m_p": error[-1:].tolist(),
     }
 
 
-def summarised(found: Iterable[Row]) -> list[Row]:
-    """A line a row and mode: estimators, coverage, errors, and how often each term was chosen."""
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for one in found:
-        groups.setdefault((one["row"], one["mode"]), []).append(one)
-    lines = []
-    for (row, mode), drawn in groups.items():
-        percent = np.array([one["percent"] for one in drawn])
-        lines.append(
-            {
-                "row": row,
-                "mode": mode,
-                "estimators": dict(Counter(one["estimator"] for one in drawn)),
-                "coverage": 100 * float(np.mean([one["inside"] for one in drawn])),
-                "z95": float(np.percentile([one["z"] for one in drawn], 95)),
-                "k_percent": float(np.median(percent[:, :-1])),
-                "m_p_percent": float(np.median(percent[:, -1])),
-                "terms": dict(Counter(term for one in drawn for term in one["terms"])),
-            }
+def rows(given: Namespace) -> Iterable[tuple[str, Iterable[tuple[Any, ...]]]]:
+    """Rows of errors in both modes; the arms of a row are simulated side by side."""
+    seeds = tuple(range(FIRST_ARM, FIRST_ARM + (given.arms or ARMS)))
+    for row, mode in product(ROWS, MODES):
+        yield (
+            f"{row}, {mode}",
+            (
+                (row, mode, arm, seed, made)
+                for arm, made in zip(seeds, scenes(ROWS[row], seeds), strict=True)
+                for seed in range(given.draws)
+            ),
         )
-    return lines
-
-
-def markdown(lines: Sequence[Row]) -> str:
-    """The table, no flag beside all flags."""
-    text = [
-        f"## Model errors: coverage asked {ASKED:g} %, errors at most those of all old flags",
-        "",
-        (
-            "| error of arm or sensors | mode | estimators | coverage % | 95th pct of abs z | k: "
-            "median % | m_p | terms |"
-        ),
-        "|" + "---|" * 8,
-    ]
-    for line in lines:
-        estimators, terms = (
-            ", ".join(f"{name} {count}" for name, count in line[key].items())
-            for key in ("estimators", "terms")
-        )
-        text.append(
-            f"| {line['row']} | {line['mode']} | {estimators} | {line['coverage']:.0f} | "
-            f"{line['z95']:.1f} "
-            f"| {line['k_percent']:.3g} | {line['m_p_percent']:.3g} | {terms} |"
-        )
-    return "\n".join(text) + "\n"
-
-
-def evaluate(rows: Sequence[str], arms: int, draws: int) -> list[Row]:
-    """The lines of `rows`."""
-    seeds = list(range(FIRST_ARM, FIRST_ARM + arms))
-    made = real_arms.scenes(list(rows), seeds)
-    jobs = [
-        (row, arm, seed, mode)
-        for row in rows
-        for mode in MODES
-        for arm in seeds
-        for seed in range(draws)
-    ]
-    with ProcessPoolExecutor(2, initializer=install, initargs=(made,)) as pool:
-        return summarised(pool.map(draw, jobs, chunksize=2))
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/accuracy"))
-    parser.add_argument("--arms", type=int, default=4)
-    parser.add_argument("--draws", type=int, default=4)
-    parser.add_argument(
-        "--row", action="append", choices=list(real_arms.ROWS), help="only this row, or these"
-    )
-    given = parser.parse_args()
-    given.output.mkdir(parents=True, exist_ok=True)
-    lines = evaluate(given.row or list(real_arms.ROWS), given.arms, given.draws)
-    (given.output / "models.json").write_text(json.dumps(lines, indent=1))
-    (given.output / "models.md").write_text(text := markdown(lines))
-    print(text)
 
 
 if __name__ == "__main__":
-    main()
+    columns = {
+        "estimators": words("by"),
+        "held": share("held"),
+        "95th percentile, σ": number("z", lambda z: np.percentile(z, 95)),
+        "k: median, %": number("k", np.median, 100),
+        "m_p": number("m_p", np.median, 100),
+        "terms": words("terms"),
+    }
+    experiment("models", __doc__, rows, draw, columns, draws=4)

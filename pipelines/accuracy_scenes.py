@@ -1,16 +1,14 @@
-"""Arms, motions and noise of the accuracy benchmark, and the peers that run on the same logs."""
+"""Arms, motions and noise of experiments, and least squares behind filters on the same logs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from algid.arm import CONSTANT_NAMES, Arm, FloatArray, regressor, with_payload
-from algid.estimators.fit import Fit
-from algid.estimators.paper import stage1, stage2
-from algid.signals.observers import LuenbergerObserver
+from algid.arm import Arm, FloatArray, regressor, with_payload
+from algid.log import Log, Origin, Reading
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
 from algid.synth.excitation import Torque, wide_multi_sine
@@ -38,19 +36,6 @@ class Scene:
         """k1 … k7, m_p, l1, l2: (10,)."""
         return np.concatenate([self.arm.constants(), [self.payload, self.arm.l1, self.arm.l2]])
 
-    def held_by(self, fit: Fit) -> NDArray[np.bool_]:
-        """Which of the fit's intervals hold the truth (10,); it may have more of the payload."""
-        places = [fit.names.index(name) for name in (*CONSTANT_NAMES, "m_p", "l1", "l2")]
-        inside: NDArray[np.bool_] = (
-            np.abs(fit.values[places] - self.truth) <= fit.quantile * fit.std[places]
-        )
-        return inside
-
-    @property
-    def turns(self) -> FloatArray:
-        """Turns that each joint ranges over without payload (2,)."""
-        return np.ptp(self.bare.theta, axis=1) / (2 * np.pi)
-
 
 def random_arm(seed: int) -> tuple[Arm, float]:
     """An arm of plausible make and a payload of a quarter to one of its second link's mass."""
@@ -74,6 +59,26 @@ def case_of(name: str) -> Case:
         return load_case(name)
     arm, payload = random_arm(int(name.removeprefix("arm")))
     return Case(name, arm, payload, None, {})
+
+
+def logged(
+    t: FloatArray,
+    theta: FloatArray,
+    tau: FloatArray,
+    rng: np.random.Generator,
+    sigmas: tuple[float, float | FloatArray],
+    **reading: Any,
+) -> Log:
+    """One draw of the log of angles in rad and torques in N m by sensors with white noise.
+
+    A joint may turn as often as it will.
+    """
+    theta = theta + sigmas[0] * rng.standard_normal(theta.shape)
+    tau = tau + sigmas[1] * rng.standard_normal(tau.shape)
+    read = Reading(**{"accepted": ("DEGREES",), **reading})
+    return Log(
+        np.round(t * 1e9).astype(np.int64), theta, tau, Origin("arm.csv", "csv", {}, reading=read)
+    )
 
 
 def scene(name: str) -> Scene:
@@ -153,27 +158,6 @@ def _inverse_dynamics(log: Segment, cutoff: float) -> FloatArray:
     b = np.concatenate([tau[joint][inner] for joint in range(2)])
     k: FloatArray = np.linalg.lstsq(A, b, rcond=None)[0]
     return k
-
-
-def paper(bare: Segment, burdened: Segment, gravity: float) -> FloatArray:
-    """The paper's method with its observer on windows of one second, median over windows: k1 … k7,
-    m_p (8,).
-    """
-    theta, omega, tau = _windows(bare)
-    k = np.nanmedian(stage1(theta, omega, tau, bare.dt).k[..., -200:], axis=(1, 2))
-    theta, omega, tau = _windows(burdened)
-    second = stage2(theta, omega, tau, bare.dt, k, gravity)
-    return np.append(k, np.nanmedian(second.m_p[..., -200:]))
-
-
-def _windows(log: Segment) -> tuple[FloatArray, FloatArray, FloatArray]:
-    length = round(1 / log.dt) + 1
-    omega = LuenbergerObserver(log.dt).velocities(log.theta)
-    starts = range(0, len(log) - length + 1, length - 1)
-    return tuple(  # type: ignore[return-value]
-        np.stack([signal[:, start : start + length] for start in starts], axis=1)
-        for signal in (log.theta, omega, log.tau)
-    )
 
 
 def _payload_mass(k: FloatArray, loaded: FloatArray, gravity: float) -> float:

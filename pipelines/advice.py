@@ -9,27 +9,25 @@ is, where that reads it. A row without an advice passes if the result is right, 
 another code. At least `ENOUGH` of the advices have to be right, and no row may end wrong without
 one. Friction of real joints is no model's: there a mend has to bring back what
 the log says unspoiled, where that is further off. Arms have motors at both joints, one motor
-(acrobot, pendubot), a joint held still in each of two logs, or friction of real joints. Writes
-`advice.md` into the output folder.
+(acrobot, pendubot), a joint held still in each of two logs, or friction of real joints.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import re
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+import polars as pl
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.errors import AlgidError
@@ -39,7 +37,9 @@ from algid.results import Result, read_result
 from algid.results.verdict import CAUSES, again
 from algid.synth.excitation import Torque, wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, steered
+from pipelines import conventions
 from pipelines.accuracy_scenes import case_of
+from pipelines.experiment import Seen, count, experiment, grid, words
 
 ARMS = ("case1", "arm21", "arm22")
 RATE, DURATION = 250.0, 8.0
@@ -52,28 +52,15 @@ WIDTH, STRIBECK_SPEED = 0.05, 0.3  # rad/s
 HELD = np.array([400.0, 40.0])  # N m/rad and N m s/rad that hold a joint, by its inertia
 ADVISED = re.compile(r"--set passive=\d|--set \w+\.unit=\"?deg\"?|--angle-unit deg")
 
-Pair = tuple[FloatArray, FloatArray]
-Spoil = Callable[[FloatArray, FloatArray], Pair]
-
-
-def _turned(off1: float = 0.0, off2: float = 0.0) -> Spoil:
-    return lambda th, ta: (th - np.array([[off1], [off2]]), ta)
-
-
-def _signed(angles: tuple[int, int], torques: tuple[int, int]) -> Spoil:
-    return lambda th, ta: (th * np.array(angles)[:, None], ta * np.array(torques)[:, None])
-
-
-SPOILS: dict[str, Spoil] = {
-    "nothing": _turned(),
-    "seen from behind": _signed((-1, -1), (-1, -1)),
-    "torques turned": _signed((1, 1), (-1, -1)),
-    "joint 2 turned": _signed((1, -1), (1, -1)),
-    "zero hanging": _turned(-np.pi / 2),
-    "zero upright": _turned(np.pi / 2),
-    "zero upright, from behind": lambda th, ta: (-(th - np.array([[np.pi / 2], [0.0]])), -ta),
-    "zero of θ1 off by 70°": _turned(np.radians(70)),
-    "θ2 absolute": lambda th, ta: (np.stack([th[0], th[0] + th[1]]), ta),
+SPOILS = {
+    title: conventions.SPOILS[title]
+    for title in (
+        *("nothing", "all signs", "both torques", "joint 2", "zero hanging", "zero upright"),
+        "θ2 absolute",
+    )
+} | {
+    "zero upright, from behind": lambda a, b, s, t: (np.pi / 2 - a, -b, -s, -t),
+    "zero of θ1 off by 70°": lambda a, b, s, t: (a - np.radians(70), b, s, t),
 }
 KINDS = ("both motors", "acrobot", "pendubot", "a joint each", "real friction")
 
@@ -85,19 +72,6 @@ class Outcome:
     code: int
     text: str
     result: Result | None
-
-
-@dataclass(frozen=True)
-class Line:
-    """A row of the table."""
-
-    cells: tuple[str, ...]
-    passed: bool
-    right: int
-    advised: int
-
-    def __str__(self) -> str:
-        return f"| {' | '.join(self.cells)} | {'yes' if self.passed else 'NO'} |"
 
 
 def friction(torque: FloatArray, omega: FloatArray, size: FloatArray) -> FloatArray:
@@ -142,23 +116,16 @@ def driven(kind: str, arm: str, log: int) -> tuple[FloatArray, FloatArray, Float
     return t, motion.theta, torques(t)(motion.theta, motion.omega)
 
 
-def written(folder: Path, kind: str, arm: str, title: str, spoil: Spoil) -> None:
+def written(folder: Path, kind: str, arm: str, title: str, spoil: str, logs: int) -> None:
     """The logs, with the noise of row `title` and spoiled by `spoil`, as files."""
-    for log in range(_count(kind)):
+    for log in range(logs):
         rng = np.random.default_rng([log, sum(arm.encode()), sum(title.encode())])
         t, theta, tau = driven(kind, arm, log)
         tau = np.where(tau != 0, tau + SIGMA_TAU * rng.standard_normal(tau.shape), 0.0)
         theta = theta + SIGMA_THETA * rng.standard_normal(theta.shape)
-        columns = np.column_stack([t, *(row for pair in spoil(theta, tau) for row in pair)])
-        header = "t,theta1,theta2,tau1,tau2"
-        np.savetxt(
-            folder / f"log{log}.csv", columns, delimiter=",", header=header, comments="", fmt="%.9g"
-        )
-
-
-def _count(kind: str) -> int:
-    """Logs of an arm."""
-    return 2 if kind == "a joint each" else 1
+        names = ("t", "theta1", "theta2", "tau1", "tau2")
+        columns = dict(zip(names, (t, *SPOILS[spoil](*theta, *tau)), strict=True))
+        pl.DataFrame(columns).write_csv(folder / f"log{log}.csv")
 
 
 def run(words: list[str], folder: Path) -> Outcome:
@@ -213,72 +180,48 @@ def furthest(result: Result | None, k: FloatArray, names: tuple[str, ...]) -> fl
     return max(errors, default=np.inf)
 
 
-def row(job: tuple[str, str, str]) -> Line:
+def draw(kind: str, title: str, arm: str, _: int) -> Seen:
     """One spoiled arm: its advices and what they lead to."""
-    kind, arm, title = job
     k = case_of(arm).arm.constants()
     # what real joints rub is no viscous friction, and no constant of the arm
     names = CONSTANT_NAMES[:5] if kind == "real friction" else CONSTANT_NAMES
-    limit = WITHIN
+    limit, logs = WITHIN, 2 if kind == "a joint each" else 1
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
-        words = ["algid", "identify", *(str(folder / f"log{n}.csv") for n in range(_count(kind)))]
-        words += ["--no-report", "-o", str(folder), "--accept", "DEGREES"]
+        call = ["algid", "identify", *(str(folder / f"log{n}.csv") for n in range(logs))]
+        call += ["--no-report", "-o", str(folder), "--accept", "DEGREES"]
         if kind in ("acrobot", "pendubot"):
-            words += ["--set", f"passive={1 if kind == 'acrobot' else 2}"]
+            call += ["--set", f"passive={1 if kind == 'acrobot' else 2}"]
         if kind == "real friction":
-            written(folder, kind, arm, title, SPOILS["nothing"])
-            limit = max(WITHIN, ALIKE * furthest(run(words, folder).result, k, names))
-            words.append("--force")
-        written(folder, kind, arm, title, SPOILS[title])
-        first = run(words, folder)
-        told, right = [], 0
-        for advice, command in advices(words, first).items():
+            written(folder, kind, arm, title, "nothing", logs)
+            limit = max(WITHIN, ALIKE * furthest(run(call, folder).result, k, names))
+            call.append("--force")
+        written(folder, kind, arm, title, title, logs)
+        first = run(call, folder)
+        right, told = [], []
+        for advice, command in advices(call, first).items():
             then = run(command, folder)
             if command[1] == "inspect":
-                right += then.code != Exit.USAGE
+                right.append(then.code != Exit.USAGE)
                 told.append(f"inspect → exit {then.code}")
                 continue
             far = furthest(then.result, k, names)
             again = command in advices(command, then).values()
-            right += then.code in (Exit.OK, Exit.DATA_LOST) and far <= limit and not again
+            right.append(then.code in (Exit.OK, Exit.DATA_LOST) and far <= limit and not again)
             told.append(f"{advice} → exit {then.code}, {far:.2g} σ{', again' if again else ''}")
     far = furthest(first.result, k, names)
-    verdict = "refused" if first.result is None else first.result.verdict.word
-    passed = right == len(told) and (bool(told) or far <= limit or first.code != 0)
-    read = f"exit {first.code}, {verdict}, {far:.2g} σ"
-    return Line((kind, title, arm, read, "; ".join(told) or "–"), passed, right, len(told))
-
-
-def lines(arms: tuple[str, ...], kinds: tuple[str, ...], processes: int) -> Iterator[Line]:
-    """The table's rows."""
-    jobs = [(kind, arm, title) for kind, title, arm in product(kinds, SPOILS, arms)]
-    with ProcessPoolExecutor(processes) as pool:
-        yield from pool.map(row, jobs)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--arms", nargs="+", default=ARMS)
-    parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/conventions"))
-    given = parser.parse_args()
-    text = ["| logs | spoiled | arm | as read | advices | passes |", f"|{'---|' * 6}"]
-    right, advised, silent = 0, 0, 0
-    for line in lines(tuple(given.arms), tuple(given.kinds), given.processes):
-        text.append(str(line))
-        right += line.right
-        advised += line.advised
-        silent += not (line.passed or line.advised)
-        print(line, flush=True)
-    summary = f"{right} of {advised} advices are right"
-    text += ["", f"{summary}; {silent} of {len(text) - 2} rows end wrong without one."]
-    print(text[-1])
-    given.output.mkdir(parents=True, exist_ok=True)
-    (given.output / "advice.md").write_text("\n".join([*text, ""]), encoding="utf-8")
-    raise SystemExit(right < ENOUGH * advised or silent > 0)
+    silent = not right and far > limit and first.code == 0
+    wrong = [f"({arm}: exit {first.code}, {far:.2g} σ; {'; '.join(told)})"]
+    return {"right": right, "silent": [silent], "not": [] if all(right) and not silent else wrong}
 
 
 if __name__ == "__main__":
-    main()
+    rows = {f"{kind}, {title}": (kind, title) for kind, title in product(KINDS, SPOILS)}
+    columns = {
+        "advices": lambda seen: str(len(seen["right"])),
+        "right": count("right"),
+        "wrong without one": count("silent"),
+        "which": words("not"),
+    }
+    every = experiment("advice", __doc__, grid(rows, ARMS), draw, columns, draws=1)
+    raise SystemExit(np.mean(every["right"]) < ENOUGH or any(every["silent"]))

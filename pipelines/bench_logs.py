@@ -1,20 +1,23 @@
-"""The logs that `bench_processor` times: a periodic motion and the torque it takes, tiled.
-
-The motion of 10 s is a sum of harmonics, so that its derivatives and, by eq. (1), its torque are
-closed forms; each repetition gets torque noise of its own, and the encoder's steps.
-"""
+"""The logs that are timed: made once, kept in a folder, the same on every machine."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import struct
+from collections.abc import Iterable, Iterator
+from heapq import merge
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 
 from algid.arm import FloatArray, inverse_dynamics
+from algid.base.files import whole_file
+from algid.base.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin
 from algid.synth.cases import load_case
 from algid.writers import write_log
+from algid.writers.mcap import messages
 
 RATE = 1000
 PERIOD = 10.0  # s
@@ -23,38 +26,54 @@ ENCODER_STEP = 2 * np.pi / 2**20  # rad
 TORQUE_STEP = 1e-3  # N m
 TORQUE_NOISE = 0.01  # N m
 _BLOCK = 25  # periods a block
+_IMU = "sensor_msgs/msg/Imu"
+_IMU_DEFINITION = f"""\
+std_msgs/Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance
+geometry_msgs/Vector3 angular_velocity
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration
+float64[9] linear_acceleration_covariance
+{HEADER}================================================================================
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
 
 
 def motion(seed: int = 0) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Angles, velocities and accelerations (2, N) of one period: ten harmonics from 0.1 to 2 Hz a
-    joint.
+    joint, so that by eq. (1) the torque is a closed form.
     """
     draw = np.random.default_rng(seed)
-    t = np.arange(round(PERIOD * RATE)) / RATE
     order = np.arange(1, 21, 2)
     rate = 2 * np.pi * order / PERIOD
-    amplitude = draw.uniform(0.3, 0.9, (2, order.size)) / np.sqrt(order)
-    angle = rate * t[:, None]
+    amplitude = (draw.uniform(0.3, 0.9, (2, order.size)) / np.sqrt(order))[:, None]
     phase = draw.uniform(0, 2 * np.pi, (2, 1, order.size))
-    theta, omega, alpha = (
-        np.stack([wave @ row for wave, row in zip(waves, factor, strict=True)])
-        for waves, factor in (
-            (np.sin(angle + phase), amplitude),
-            (np.cos(angle + phase), amplitude * rate),
-            (-np.sin(angle + phase), amplitude * rate**2),
-        )
+    angle = rate * (np.arange(round(PERIOD * RATE)) / RATE)[:, None] + phase
+    return (
+        (amplitude * np.sin(angle)).sum(axis=2),
+        (amplitude * rate * np.cos(angle)).sum(axis=2),
+        (-amplitude * rate**2 * np.sin(angle)).sum(axis=2),
     )
-    return theta, omega, alpha
 
 
-def blocks(rows: int, case: str = "case1") -> Iterator[Log]:
-    """A log of `rows` samples in blocks; the same for the same length."""
-    draw = np.random.default_rng(1)
-    theta, omega, alpha = motion()
-    clean = np.tile(
-        inverse_dynamics(load_case(case).arm.constants(), theta, omega, alpha), (1, _BLOCK)
-    )
-    theta = np.tile(np.rint(theta / ENCODER_STEP) * ENCODER_STEP, (1, _BLOCK))
+def blocks(rows: int, seed: int = 0) -> Iterator[Log]:
+    """A log of `rows` samples in blocks: the motion tiled, with the encoder's steps, each
+    repetition with torque noise of its own.
+    """
+    draw = np.random.default_rng(seed + 1)
+    exact = motion(seed)
+    clean = np.tile(inverse_dynamics(load_case("case1").arm.constants(), *exact), (1, _BLOCK))
+    theta = np.tile(np.rint(exact[0] / ENCODER_STEP) * ENCODER_STEP, (1, _BLOCK))
     for first in range(0, rows, theta.shape[1]):
         count = min(theta.shape[1], rows - first)
         noisy = clean[:, :count] + TORQUE_NOISE * draw.standard_normal((2, count))
@@ -63,8 +82,105 @@ def blocks(rows: int, case: str = "case1") -> Iterator[Log]:
         yield Log(stamps, theta[:, :count], tau, Origin("", "", {}))
 
 
-def log(path: Path, rows: int) -> Path:
+def log(path: Path, rows: int, seed: int = 0) -> Path:
     """The log as Parquet or MCAP, once."""
     if not path.exists():
-        write_log(path, blocks(rows))
+        write_log(path, blocks(rows, seed))
     return path
+
+
+def arm_log(rows: int) -> Log:
+    """A log of encoder counts and torque steps: values repeat as those of a real arm do."""
+    draw = np.random.default_rng(1)
+    t = np.arange(rows) * 1e-3
+    wave = np.stack([np.sin(0.7 * t) + 0.3 * np.sin(3.1 * t), np.cos(1.1 * t)])
+    theta = np.rint(wave * 16384) / 16384
+    tau = np.rint((8 * wave + draw.normal(0, 0.01, wave.shape)) / 3e-3) * 3e-3
+    omega = np.rint(np.gradient(wave, 1e-3, axis=1) * 100) / 100
+    return Log(START_NS + np.arange(rows) * 1_000_000, theta, tau, Origin("", "", {}), omega)
+
+
+Topic = tuple[str, str, str, str, bytes, Iterable[tuple[int, bytes]]]
+"""A topic's name, the encoding of its messages, its type, how that is defined, the definition, and
+stamps in ns and contents of its messages."""
+
+
+def write_topics(path: Path, topics: Iterable[Topic]) -> None:
+    """An MCAP file of zstd chunks of 768 KiB, its messages in the order of their stamps."""
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        writer = Writer(stream, chunk_size=768 * 1024, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2", library="algid bench")
+        waiting = []
+        for topic, encoding, name, kind, definition, contents in topics:
+            schema = writer.register_schema(name, kind, definition)
+            channel = writer.register_channel(topic, encoding, schema)
+            waiting.append(zip(repeat(channel), contents))
+        for channel, (stamp, content) in merge(*waiting, key=lambda one: one[1][0]):
+            writer.add_message(channel, stamp, content, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def joint_and_imu(path: Path, rows: int) -> None:
+    """Joint states with an Imu message between every five."""
+    log = arm_log(rows)
+    stamps = log.stamp_ns.tolist()
+    states = zip(stamps, (one.tobytes() for one in messages(log)), strict=True)
+    imu = zip((stamp + 1000 for stamp in stamps[::5]), imu_payloads(len(stamps[::5])), strict=True)
+    definition = JOINT_STATE_DEFINITION.encode()
+    write_topics(
+        path,
+        [
+            ("/joint_states", "cdr", JOINT_STATE, "ros2msg", definition, states),
+            ("/imu/data", "cdr", _IMU, "ros2msg", _IMU_DEFINITION.encode(), imu),
+        ],
+    )
+
+
+def imu_payloads(rows: int) -> Iterator[bytes]:
+    """Imu messages in CDR."""
+    frame = b"imu_link\0"
+    head = struct.pack("<BBBBiII", 0, 1, 0, 0, 1_700_000_000, 5, len(frame)) + frame
+    head += bytes(-(len(head) - 4) % 8)
+    for row in np.rint(np.random.default_rng(2).normal(size=(rows, 37)) * 1000) / 1000:
+        yield head + row.tobytes()
+
+
+def protobuf_states(path: Path, rows: int) -> None:
+    """Joint states as protobuf messages with a Timestamp."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    message = file.message_type.add(name="State")
+    message.field.add(
+        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
+    )
+    for number, (name, kind) in enumerate(
+        (("name", 9), ("position", 1), ("velocity", 1), ("effort", 1)), 2
+    ):
+        message.field.add(name=name, number=number, type=kind, label=3)
+    stamp = descriptor_pb2.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(stamp)
+    pool.Add(file)
+    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
+    data = descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString()
+    log = arm_log(rows)
+    omega = log.omega
+    assert omega is not None
+
+    def content(row: int, stamp_ns: int) -> bytes:
+        seconds, nanos = divmod(stamp_ns, 10**9)
+        one = state(
+            timestamp={"seconds": seconds, "nanos": nanos},
+            name=["j1", "j2"],
+            position=log.theta[:, row],
+            velocity=omega[:, row],
+            effort=log.tau[:, row],
+        )
+        return bytes(one.SerializeToString())
+
+    stamps = log.stamp_ns.tolist()
+    contents = ((stamp_ns, content(row, stamp_ns)) for row, stamp_ns in enumerate(stamps))
+    write_topics(path, [("/arm", "protobuf", "arm.State", "protobuf", data, contents)])

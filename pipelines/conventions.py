@@ -4,32 +4,29 @@ Each arm is simulated with and without friction, its log spoiled by one mistake 
 no flag. A row passes where a right log is called right, and where a wrong one has failed (exit 3)
 and the convention that is named brings the constants back. A zero that is off by less than 45°,
 sensors that fail, and logs in each other's place must be named by their code, never be Good, and
-have failed where an error is beyond `FAR` of its own σ. Rows that no log can tell stand at the end.
-Writes `conventions.md` into the output folder.
+have failed where an error is beyond `FAR` of its own σ. Of scales of the torque no log can tell.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.base.errors import LogError
-from algid.base.verdict import GRADE_WORDS
 from algid.estimators.convention_search import judge
 from algid.estimators.conventions import AS_READ
 from algid.identification.identify import identify
-from algid.inspection.conventions import judged, mend
+from algid.inspection.conventions import judged as conventions_of
+from algid.inspection.conventions import mend
 from algid.log import Log, Origin, Reading
 from algid.results import Result
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.accuracy_scenes import case_of
+from pipelines.experiment import Seen, count, experiment, grid, words
 
 ARMS = ("case1", "case2", "arm21", "arm22", "arm23")
 RATE, DURATION = 1000.0, 5.0
@@ -37,67 +34,52 @@ SIGMA_THETA, SIGMA_TAU = 3e-4, 1e-2  # rad, N m
 COULOMB = 0.05  # of the largest torque, where there is friction
 ALIKE = 0.02  # of the constant: a mend brings it back
 
-Pair = tuple[FloatArray, FloatArray]
-Spoil = Callable[[FloatArray, FloatArray], Pair]
+Spoil = Callable[..., tuple[FloatArray, ...]]
+"""What is made of θ1, θ2, τ1, τ2."""
 
 
-def _pair(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.stack([a, b])
-
-
-ROWS: dict[str, Spoil] = {
-    "nothing": lambda th, ta: (th, ta),
-    "all signs": lambda th, ta: (-th, -ta),
-    "θ2 off by 180°": lambda th, ta: (_pair(th[0], th[1] + np.pi), ta),
-    "both torques": lambda th, ta: (th, -ta),
-    "both angles": lambda th, ta: (-th, ta),
-    "τ1": lambda th, ta: (th, _pair(-ta[0], ta[1])),
-    "τ2": lambda th, ta: (th, _pair(ta[0], -ta[1])),
-    "θ1": lambda th, ta: (_pair(-th[0], th[1]), ta),
-    "θ2": lambda th, ta: (_pair(th[0], -th[1]), ta),
-    "joint 1": lambda th, ta: (_pair(-th[0], th[1]), _pair(-ta[0], ta[1])),
-    "joint 2": lambda th, ta: (_pair(th[0], -th[1]), _pair(ta[0], -ta[1])),
-    "joints swapped": lambda th, ta: (th[::-1], ta[::-1]),
-    "torques swapped": lambda th, ta: (th, ta[::-1]),
-    "θ2 absolute": lambda th, ta: (_pair(th[0], th[0] + th[1]), ta),
-    "angles × 3": lambda th, ta: (3 * th, ta),
-    "θ1 × 9.6": lambda th, ta: (_pair(9.6 * th[0], th[1]), ta),
-    "motor 2 at the base": lambda th, ta: (th, _pair(ta[0] - ta[1], ta[1])),
-    "zero hanging": lambda th, ta: (_pair(th[0] + np.pi / 2, th[1]), ta),
-    "zero upright": lambda th, ta: (_pair(th[0] - np.pi / 2, th[1]), ta),
-    "zero of θ2 off by 90°": lambda th, ta: (_pair(th[0], th[1] + np.pi / 2), ta),
+SPOILS: dict[str, Spoil] = {
+    "nothing": lambda a, b, s, t: (a, b, s, t),
+    "all signs": lambda a, b, s, t: (-a, -b, -s, -t),
+    "θ2 off by 180°": lambda a, b, s, t: (a, b + np.pi, s, t),
+    "both torques": lambda a, b, s, t: (a, b, -s, -t),
+    "both angles": lambda a, b, s, t: (-a, -b, s, t),
+    "τ1": lambda a, b, s, t: (a, b, -s, t),
+    "τ2": lambda a, b, s, t: (a, b, s, -t),
+    "θ1": lambda a, b, s, t: (-a, b, s, t),
+    "θ2": lambda a, b, s, t: (a, -b, s, t),
+    "joint 1": lambda a, b, s, t: (-a, b, -s, t),
+    "joint 2": lambda a, b, s, t: (a, -b, s, -t),
+    "joints swapped": lambda a, b, s, t: (b, a, t, s),
+    "torques swapped": lambda a, b, s, t: (a, b, t, s),
+    "θ2 absolute": lambda a, b, s, t: (a, a + b, s, t),
+    "angles × 3": lambda a, b, s, t: (3 * a, 3 * b, s, t),
+    "θ1 × 9.6": lambda a, b, s, t: (9.6 * a, b, s, t),
+    "motor 2 at the base": lambda a, b, s, t: (a, b, s - t, t),
+    "zero hanging": lambda a, b, s, t: (a + np.pi / 2, b, s, t),
+    "zero upright": lambda a, b, s, t: (a - np.pi / 2, b, s, t),
+    "zero of θ2 off by 90°": lambda a, b, s, t: (a, b + np.pi / 2, s, t),
+    # what installation, sensors and recorders do to a log
+    "zero of θ1 off by 40°": lambda a, b, s, t: (a + np.radians(40), b, s, t),
+    "5 % of the samples lost, time renumbered": lambda *channels: _pierced(channels),
+    "τ2 dead for 1 s": lambda a, b, s, t: (a, b, s, np.r_[t[:1000], 0 * t[1000:2000], t[2000:]]),
+    "torques × 6": lambda a, b, s, t: (a, b, 6 * s, 6 * t),
+    "torques ÷ 6": lambda a, b, s, t: (a, b, s / 6, t / 6),
 }
-
-
-def _without_five_percent(theta: FloatArray, tau: FloatArray) -> Pair:
-    """Samples lost, and the time of the others made from their numbers."""
-    kept = np.random.default_rng(5).random(theta.shape[1]) > 0.05
-    return theta[:, kept], tau[:, kept]
-
-
-def _dead_for_a_second(theta: FloatArray, tau: FloatArray) -> Pair:
-    dead = tau.copy()
-    dead[1, 1000:2000] = 0.0
-    return theta, dead
-
-
-def _turned(theta: FloatArray, tau: FloatArray) -> Pair:
-    """The zero of θ1 off by less than what another convention is taken for."""
-    return _pair(theta[0] + np.radians(40), theta[1]), tau
-
-
-SPOILED: dict[str, tuple[Spoil, str]] = {
-    "zero of θ1 off by 40°": (_turned, "PHASES"),
-    "5 % of the samples lost, time renumbered": (_without_five_percent, "LOST_SAMPLES"),
-    "τ2 dead for 1 s": (_dead_for_a_second, "SENSOR_FAULT"),
+NOTICED = {
+    "zero of θ1 off by 40°": "PHASES",
+    "5 % of the samples lost, time renumbered": "LOST_SAMPLES",
+    "τ2 dead for 1 s": "SENSOR_FAULT",
 }
-"""What installation, sensors and recorders do to a log, and the code that tells it."""
+"""The code that tells a mistake which no convention undoes."""
 EXCHANGED = "loaded and unloaded exchanged"
+INVISIBLE = ("torques × 6", "torques ÷ 6")
 FAR = 10.0  # σ
-INVISIBLE: dict[str, Spoil] = {
-    "torques × 6": lambda th, ta: (th, 6 * ta),
-    "torques ÷ 6": lambda th, ta: (th, ta / 6),
-}
+
+
+def _pierced(channels: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+    kept = np.random.default_rng(5).random(channels[0].size) > 0.05
+    return tuple(channel[kept] for channel in channels)
 
 
 def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, SimulatedMotion]:
@@ -111,7 +93,7 @@ def motion_of(name: str, *, loaded: bool = False) -> tuple[FloatArray, Simulated
     return k, simulate(moved, wide_multi_sine(arm, sum(name.encode()) + loaded), t)
 
 
-def log_of(motion: SimulatedMotion, spoil: Spoil, *, friction: bool, seed: int = 0) -> Log:
+def log_of(motion: SimulatedMotion, spoil: Spoil, friction: int, seed: int = 0) -> Log:
     """The log of a motion by noisy sensors, spoiled.
 
     The motors overcome Coulomb friction where there is some.
@@ -121,12 +103,10 @@ def log_of(motion: SimulatedMotion, spoil: Spoil, *, friction: bool, seed: int =
     if friction:
         tau = tau + COULOMB * np.abs(tau).max(axis=1, keepdims=True) * np.tanh(motion.omega / 0.02)
     theta = motion.theta + SIGMA_THETA * rng.standard_normal(tau.shape)
-    read = spoil(theta, tau + SIGMA_TAU * rng.standard_normal(tau.shape))
-    return Log(
-        np.round(motion.t[: read[0].shape[1]] * 1e9).astype(np.int64),
-        *read,
-        Origin("arm.csv", "csv", {}),
-    )
+    tau = tau + SIGMA_TAU * rng.standard_normal(tau.shape)
+    a, b, s, t = spoil(*theta, *tau)
+    stamps = np.round(motion.t[: a.size] * 1e9).astype(np.int64)
+    return Log(stamps, np.stack([a, b]), np.stack([s, t]), Origin("arm.csv", "csv", {}))
 
 
 def mended(log: Log, k: FloatArray) -> bool:
@@ -156,28 +136,31 @@ def furthest(result: Result, k: FloatArray) -> float:
     return max(far)
 
 
-def row(
-    name: str, spoil: Spoil, arm: str, k: FloatArray, motion: SimulatedMotion, *, friction: bool
-) -> tuple[str, bool]:
-    """A line of the table, and whether it passes."""
-    log = log_of(motion, spoil, friction=friction)
-    named = mend(log, judged(log))
-    words = "" if named is None else f"{named.words}: `{' '.join(named.remedy.flags)}`"
+def draw(title: str, arm: str, number: int) -> Seen:
+    """What is said of a spoiled log, every second with friction, and whether it passes."""
+    if title == EXCHANGED:
+        return exchanged(arm, number)
+    k, motion = motion_of(arm)
+    log = log_of(motion, SPOILS[title], number)
+    named = mend(log, conventions_of(log))
+    right = title == "nothing" or title in INVISIBLE
     try:
         result = identify(log, report=False)
     except LogError as refusal:  # exit 2: a scale that no joint has
-        right = name == "nothing" or name in INVISIBLE
-        return _line(name, arm, friction, "", "Refused", str(refusal).partition(": ")[2], not right)
-    found = result.verdict
-    if name == "nothing" or name in INVISIBLE:
-        passed = named is None and found.grade != "failed"
-    elif name in SPOILED:
-        passed, words = _noticed(result, SPOILED[name][1], k), SPOILED[name][1]
+        return _seen(arm, number, f"Refused, {str(refusal).partition(': ')[2]}", not right)
+    grade = result.verdict.grade
+    if right:
+        passed = named is None and grade != "failed"
+    elif title in NOTICED:
+        passed = _noticed(result, NOTICED[title], k)
     else:
-        passed = found.grade == "failed" and named is not None and mended(log, k)
-    return _line(
-        name, arm, friction, f"{furthest(result, k):.3g}", GRADE_WORDS[found.grade], words, passed
-    )
+        passed = grade == "failed" and named is not None and mended(log, k)
+    flags = "" if named is None else f", {' '.join(named.remedy.flags)}"
+    return _seen(arm, number, f"{grade}, {furthest(result, k):.3g} σ{flags}", passed)
+
+
+def _seen(arm: str, number: int, told: str, passed: bool) -> Seen:
+    return {"passes": [passed], "not": [] if passed else [f"({arm}, {number}: {told})"]}
 
 
 def _noticed(result: Result, code: str, k: FloatArray) -> bool:
@@ -189,69 +172,24 @@ def _noticed(result: Result, code: str, k: FloatArray) -> bool:
     return named and level != "good" and (level == "failed" or furthest(result, k) <= FAR)
 
 
-def _line(
-    name: str, arm: str, friction: bool, far: str, level: str, words: str, passed: bool
-) -> tuple[str, bool]:
-    cells = (name, arm, "yes" if friction else "no", far, level, words)
-    return f"| {' | '.join(cells)} | {'yes' if passed else 'NO'} |", passed
-
-
-def exchanged(arm: str, k: FloatArray, *, friction: bool) -> tuple[str, bool]:
-    """The row of a loaded and an unloaded log in each other's place.
-
-    a joint may turn as often as it will.
-    """
+def exchanged(arm: str, number: int) -> Seen:
+    """A loaded and an unloaded log in each other's place; a joint may turn as often as it will."""
     turning = Origin("arm.csv", "csv", {}, reading=Reading(accepted=("DEGREES",)))
     loaded, unloaded = (
         replace(
-            log_of(motion_of(arm, loaded=kind)[1], ROWS["nothing"], friction=friction, seed=kind),
+            log_of(motion_of(arm, loaded=kind)[1], SPOILS["nothing"], number, seed=kind),
             origin=turning,
         )
         for kind in (True, False)
     )
-    result = identify(loaded, unloaded, report=False)
-    passed = _noticed(result, "LOGS_APART", k)
-    far, level = f"{furthest(result, k):.3g}", GRADE_WORDS[result.verdict.grade]
-    return _line(EXCHANGED, arm, friction, far, level, "LOGS_APART", passed)
-
-
-def lines_of(arm: str) -> list[tuple[str, bool]]:
-    """The lines of one arm, and whether each passes."""
-    k, motion = motion_of(arm)
-    rows = {**ROWS, **{name: spoil for name, (spoil, _) in SPOILED.items()}, **INVISIBLE}
-    found = []
-    for friction in (False, True):
-        found += [
-            row(name, spoil, arm, k, motion, friction=friction) for name, spoil in rows.items()
-        ]
-        found.append(exchanged(arm, k, friction=friction))
-    return found
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--arms", nargs="+", default=ARMS)
-    parser.add_argument("-o", "--output", type=Path, default=Path("build/conventions"))
-    arguments = parser.parse_args()
-    lines = [
-        "| spoiled | arm | friction | error, σ | verdict | named | passes |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    failed = 0
-    with ProcessPoolExecutor(2) as pool:
-        for found in pool.map(lines_of, arguments.arms):
-            for line, passed in found:
-                lines.append(line)
-                failed += not passed
-                print(line, flush=True)
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    summary = f"{len(lines) - 2 - failed} of {len(lines) - 2} rows pass."
-    (arguments.output / "conventions.md").write_text(
-        "\n".join([*lines, "", summary, ""]), encoding="utf-8"
-    )
-    print(summary)
-    raise SystemExit(failed > 0)
+    result, k = identify(loaded, unloaded, report=False), motion_of(arm)[0]
+    told = f"{result.verdict.grade}, {furthest(result, k):.3g} σ"
+    return _seen(arm, number, told, _noticed(result, "LOGS_APART", k))
 
 
 if __name__ == "__main__":
-    main()
+    rows = {title: (title,) for title in (*SPOILS, EXCHANGED)}
+    columns = {"of": lambda seen: str(len(seen["passes"])), "pass": count("passes")}
+    columns["does not"] = words("not")
+    every = experiment("conventions", __doc__, grid(rows, ARMS), draw, columns, draws=2)
+    raise SystemExit(not all(every["passes"]))

@@ -1,215 +1,113 @@
 """Whether intervals hold where joints are elastic: `python -m pipelines.elastic`.
 
-Arms whose motors turn the links by springs (Spong 1987), simulated by a road of their own:
-
-    B θ̈ + friction(θ̇) + p = τ,   p = K (θ − q) + D (θ̇ − q̇),   M(q) q̈ + n(q, q̇) = p
-
-Angles are logged at the motors. Each arm is identified with no flag from one log and from four, of
-a torque in open loop and of a digital PD controller. "held" are the 95 % intervals of k1 … k5 that
-hold the truth, of results with exit code 0 or 3 and of those with 0 alone; "far" is the largest
-distance of one of the latter in standard deviations, "found" how often elastic joints were chosen,
-and "k_e held" the intervals of their stiffness. `--rigid` arms have stiff joints; none is to be
-chosen. In full: `--arms 10 --rigid 200`.
-
-======  =======================================================  ==============
-symbol  name                                                     shape
-======  =======================================================  ==============
-S       motions that are integrated side by side                 scalar
-x       angles and velocities of motors, then of links           (8, S)
-B       rotors' inertia, a share in `ROTOR` of the links'        (2, S) kg m^2
-K       stiffness, by the link's frequency against its motor     (2, S) N m/rad
-======  =======================================================  ==============
+Arms whose motors turn the links by springs without damping (`pipelines.simulator`); angles are
+logged at the motors. Each arm is identified with no flag from one log and from four, of a torque in
+open loop and of a digital PD controller. "held" are the 95 % intervals of k1 … k5 that hold the
+truth, of all results and of those with exit code 0; "far" is the largest distance of one of the
+latter in standard deviations, "found" how often elastic joints were chosen, and "k_e held" the
+intervals of their stiffness. Of stiff joints none is to be chosen.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections import Counter
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from argparse import Namespace
+from collections.abc import Iterable
+from functools import cache
+from itertools import product
+from typing import Any
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.identification.identify import identify
-from algid.log import Log, Origin, Reading
-from pipelines.accuracy_scenes import random_arm
-from pipelines.race_scenes import DURATION, RATE, SIGMA_TAU, SIGMA_THETA, sines, swung
+from algid.log import Log
+from algid.model import RIGID
+from pipelines.accuracy_scenes import logged, random_arm
+from pipelines.experiment import Seen, count, experiment, judged, number, share
+from pipelines.race_scenes import DURATION, RATE, SIGMA_TAU, SIGMA_THETA, followed, sines
+from pipelines.simulator import Arms
 
 SUBSTEPS = 6
-SPEEDS = (30.0, 55.0, 80.0)  # rad/s, of a link against its motor
+SPEEDS = (30.0, 55.0, 80.0)  # rad/s, of a link against its locked motor
 DRIVES = ("open loop", "digital PD")
-ROTOR = (0.05, 0.2)
-DAMPING = 0.0  # of the critical one, by a link's inertia
-COULOMB, WIDTH = 0.05, 0.05  # of the drive's RMS; rad/s
+ROTOR = (0.05, 0.2)  # of the links' inertia
+COULOMB = 0.05  # of the drive's RMS
 TRACKED = 12.0  # rad/s, of the controller
+ARMS, STIFF = 10, 100  # of each stiffness and drive
 
 
-@dataclass(frozen=True)
-class Scene:
-    """An arm and a drive: rad/s of its joints, infinite if they are stiff, and the arm's seed."""
+@cache
+def scenes(
+    speed: float, drive: str, seeds: range, runs: int
+) -> list[tuple[FloatArray, FloatArray, list[Log]]]:
+    """Of each seed k1 … k5 (5,) as logs show them, the stiffness (2,), and so many logs.
 
-    speed: float
-    drive: str
-    seed: int
-
-
-@dataclass(frozen=True, eq=False)
-class Draw:
-    """Logs of a scene with the truth: k1 … k5 (5,) as the logs show them, K and B (2,)."""
-
-    scene: Scene
-    truth: FloatArray
-    stiffness: FloatArray
-    rotor: FloatArray
-    logs: tuple[Log, ...]
-
-
-def draws(scenes: Sequence[Scene], runs: int) -> list[Draw]:
-    """So many logs of each scene, all simulated side by side."""
-    arms = [random_arm(100 + scene.seed)[0] for scene in scenes]
-    k = np.stack([arm.constants() for arm in arms], axis=-1)
-    shares = np.stack(
-        [np.random.default_rng([7, scene.seed]).uniform(*ROTOR, 2) for scene in scenes], axis=-1
-    )
-    links = np.stack([k[4] + k[2], k[2]])
-    speed = np.array([scene.speed for scene in scenes])
-    K = np.where(np.isfinite(speed), np.where(np.isfinite(speed), speed, 0.0) ** 2 * links, np.inf)
-    B = shares * links
-    motions = [_moved(scenes, k, B, K, run) for run in range(runs)]
-    found = []
-    for place, scene in enumerate(scenes):
-        truth = k[:5, place].copy()
-        truth[4] += B[0, place]
-        logs = [_logged(*motion, place, run, scene) for run, motion in enumerate(motions)]
-        found.append(Draw(scene, truth, K[:, place], B[:, place], tuple(logs)))
-    return found
+    `speed` is that of the joints in rad/s, 0 if they are stiff. All are simulated side by side.
+    """
+    keys = list(product(seeds, range(runs)))
+    k = np.stack([random_arm(100 + seed)[0].constants() for seed, _ in keys], axis=-1)
+    links, inertia = np.stack([k[4] + k[2], k[2]]), np.stack([k[4] + k[2] + 2 * k[0], k[2]])
+    shares = [np.random.default_rng([7, seed]).uniform(*ROTOR, 2) for seed, _ in keys]
+    rotor = np.transpose(shares) * links
+    fine = np.arange(2 * SUBSTEPS * round(DURATION * RATE) + 1) / (2 * SUBSTEPS * RATE)
+    waves = [sines(k[:, s], 1000 * seed + run, fine) for s, (seed, run) in enumerate(keys)]
+    # runs of an arm rub alike: by its first drive
+    size = [np.sqrt(np.mean(wave**2, axis=1)) for wave in waves[::runs]]
+    coulomb = COULOMB * np.transpose(size).repeat(runs, axis=1)
+    arms = Arms(k, coulomb=coulomb, rotor=rotor, stiffness=speed**2 * links)
+    drawn = [np.random.default_rng(1000 * seed + run + 50) for seed, run in keys]
+    held = np.full(len(keys), drive == "digital PD")
+    gains = inertia * TRACKED**2, 1.4 * inertia * TRACKED
+    states, torques = followed(arms, np.stack(waves, axis=-1), held, gains, drawn, SUBSTEPS)
+    t, logs = np.arange(len(states)) / RATE, []
+    for place, (seed, run) in enumerate(keys):
+        rng = np.random.default_rng([seed, run, DRIVES.index(drive), int(speed or 1000)])
+        signals = states[:, :2, place].T, torques[..., place].T
+        logs.append(logged(t, *signals, rng, (SIGMA_THETA, SIGMA_TAU), accepted=()))
+    truth = k[:5] + np.outer([0, 0, 0, 0, 1], rotor[0])
+    return [
+        (truth[:, first], speed**2 * links[:, first], logs[first : first + runs])
+        for first in range(0, len(keys), runs)
+    ]
 
 
-def _moved(
-    scenes: Sequence[Scene], k: FloatArray, B: FloatArray, K: FloatArray, run: int
-) -> tuple[FloatArray, FloatArray]:
-    """Motors' angles and torques (N, 2, S) of one run."""
-    n = round(DURATION * RATE)
-    fine = np.arange(2 * SUBSTEPS * n + 1) / (2 * SUBSTEPS * RATE)
-    seeds = [1000 * scene.seed + run for scene in scenes]
-    tau = np.stack([sines(k[:, s], seed, fine) for s, seed in enumerate(seeds)], axis=-1)
-    first = np.stack([sines(k[:, s], 1000 * one.seed, fine) for s, one in enumerate(scenes)], -1)
-    coulomb = COULOMB * np.sqrt(np.mean(first**2, axis=1))  # runs of an arm rub alike
-    held = np.array([scene.drive == "digital PD" for scene in scenes])
-    drawn = [np.random.default_rng(seed + 50) for seed in seeds]
-    push = np.stack([k[4] + k[2] + 2 * k[0], k[2]]) * TRACKED**2
-    stiff = ~np.isfinite(K[0])
-    spring = np.where(stiff, 0.0, K)
-    damper = 2 * DAMPING * np.sqrt(spring * np.stack([k[4] + k[2], k[2]]))
-
-    def rate(x: FloatArray, torque: FloatArray) -> FloatArray:
-        m, m_dot, q, q_dot = x[:2], x[2:4], x[4:6], x[6:]
-        k1, k2, k3, k4, k5 = k[:5]
-        w1, w2 = q_dot
-        c2, s2, c12 = np.cos(q[1]), np.sin(q[1]), np.cos(q[0] + q[1])
-        m11, m12, m22 = k5 + k3 + 2 * k1 * c2, k3 + k1 * c2, k3
-        net = torque - k[5:7] * m_dot - coulomb * np.tanh(m_dot / WIDTH)
-        passed = np.where(stiff, net, spring * (m - q) + damper * (m_dot - q_dot))
-        own = np.where(stiff, B, 0.0)
-        b1 = passed[0] + k1 * s2 * (2 * w1 + w2) * w2 - k4 * np.cos(q[0]) - k2 * c12
-        b2 = passed[1] - k1 * s2 * w1**2 - k2 * c12
-        m11, m22 = m11 + own[0], m22 + own[1]
-        det = m11 * m22 - m12**2
-        link = np.stack([m22 * b1 - m12 * b2, m11 * b2 - m12 * b1]) / det
-        motor = np.where(stiff, link, (net - passed) / B)
-        return np.concatenate([m_dot, motor, q_dot, link])
-
-    x = np.zeros((8, len(scenes)))
-    x[0] = x[4] = -np.pi / 2
-    gains = push, 1.4 / TRACKED * push
-    states, torques = swung(rate, x, tau, held, gains, drawn, SUBSTEPS)
-    return states[:, :2], torques
+def draw(truth: FloatArray, stiffness: FloatArray, logs: list[Log]) -> Seen:
+    """What became of an arm's logs."""
+    result = identify(logs, report=False)
+    seen = judged(result, dict(zip(RIGID, truth, strict=True)))
+    if result.complete and not result.verdict.failed:
+        seen |= {"exit 0 or 4": [1], "held, exit 0": seen["held"], "z, exit 0": seen["z"]}
+    chosen = result.fit.stiffness if result.fit else {}
+    seen["found"] = [bool(chosen)]
+    for one, true in zip(chosen.values(), stiffness, strict=False):
+        if one.half is not None and one.estimate is not None:
+            seen["held k_e"].append(abs(one.estimate - true) <= one.half)
+    return seen
 
 
-def _logged(angles: FloatArray, torques: FloatArray, place: int, run: int, scene: Scene) -> Log:
-    kind = DRIVES.index(scene.drive)
-    rng = np.random.default_rng([scene.seed, run, kind, int(min(scene.speed, 1000.0))])
-    theta, tau = angles[:, :, place].T, torques[:, :, place].T
-    theta = theta + SIGMA_THETA * rng.standard_normal(theta.shape)
-    tau = tau + SIGMA_TAU * rng.standard_normal(tau.shape)
-    stamps = np.round(np.arange(tau.shape[1]) / RATE * 1e9).astype(np.int64)
-    origin = Origin(f"{scene.drive}-{scene.seed}-{run}.csv", "csv", {}, reading=Reading())
-    return Log(stamps, theta, tau, origin)
-
-
-def judged(job: tuple[Draw, int]) -> Counter[str]:
-    """What became of a draw's first logs; of `far`, the distance in tenths of a deviation."""
-    draw, count = job
-    result = identify(list(draw.logs[:count]), report=False)
-    names = [f"k{number + 1}" for number in range(5)]
-    seen = [(result.parameters[name], true) for name, true in zip(names, draw.truth, strict=True)]
-    usable = result.complete and result.verdict.grade != "failed"
-    total = Counter(draws=1, usable=usable)
-    for one, true in seen:
-        if one.usable and one.estimate is not None and one.std and one.half is not None:
-            held = abs(one.estimate - true) <= one.half
-            total.update(told=1, held=held)
-            if usable:
-                total.update({"told usable": 1, "held usable": held})
-                far = round(10 * abs(one.estimate - true) / one.std)
-                total["far"] = max(total["far"], far)
-    stiffness = result.fit.stiffness if result.fit else {}
-    total["found"] = bool(stiffness)
-    for one, true in zip(stiffness.values(), draw.stiffness, strict=False):
-        low, high = one.ci95 or (None, None)
-        if low is not None and high is not None:
-            total.update({"told k_e": 1, "held k_e": low <= true <= high})
-    return total
-
-
-def _row(words: Sequence[object], jobs: Sequence[Counter[str]]) -> str:
-    far, total = 0, Counter[str]()
-    for one in jobs:
-        far = max(far, one.pop("far", 0))
-        total.update(one)
-
-    def share(kind: str) -> str:
-        held, told = total[f"held{kind}"], total[f"told{kind}"]
-        return f"{held}/{told}" + (f" = {100 * held / told:.0f} %" if told else "")
-
-    cells = [*words, total["draws"], total["found"], share(""), total["usable"]]
-    cells += [share(" usable"), f"{far / 10:.1f}", share(" k_e")]
-    return "| " + " | ".join(map(str, cells)) + " |"
-
-
-def main() -> None:
-    """Print the table, row by row."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--arms", type=int, default=2, help="of each stiffness and drive")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first arm")
-    parser.add_argument("--rigid", type=int, default=4, help="draws of stiff arms")
-    parser.add_argument("--speed", type=float, action="append", help="rad/s, in place of all")
-    parser.add_argument("--processes", type=int, default=1, choices=(1, 2))
-    given = parser.parse_args()
-    print(
-        "| joints, rad/s | drive | logs | draws | found | held | exit 0 | held | far | k_e held |"
-    )
-    print("|" + 10 * "---|", flush=True)
-    every = given.speed or SPEEDS
-    with ProcessPoolExecutor(given.processes) as pool:
-        seeds = range(given.first, given.first + given.arms)
-        for drive in DRIVES:
-            for speed in every:
-                made = draws([Scene(speed, drive, seed) for seed in seeds], 4)
-                for count in (1, 4):
-                    jobs = [(draw, count) for draw in made]
-                    print(_row((speed, drive, count), list(pool.map(judged, jobs))), flush=True)
-            seeds_of_stiff = range(1000, 1000 + given.rigid // 2)
-            stiff = [Scene(np.inf, drive, seed) for seed in seeds_of_stiff]
-            if stiff:
-                made = draws(stiff, 1)
-                jobs = [(draw, 1) for draw in made]
-                print(_row(("stiff", drive, 1), list(pool.map(judged, jobs))), flush=True)
+def rows(given: Namespace) -> Iterable[tuple[str, Iterable[tuple[Any, ...]]]]:
+    """By stiffness, drive and number of logs; the draws of a row are simulated side by side."""
+    for drive, speed in product(DRIVES, (*SPEEDS, 0.0)):
+        arms = range(given.arms or ARMS) if speed else range(1000, 1000 + (given.arms or STIFF))
+        for logs in (1, 4) if speed else (1,):
+            title = f"{speed:g} rad/s, {drive}, {logs}" if speed else f"stiff, {drive}, 1"
+            yield (
+                title,
+                (
+                    (truth, stiffness, made)
+                    for truth, stiffness, made in scenes(speed, drive, arms, logs)
+                ),
+            )
 
 
 if __name__ == "__main__":
-    main()
+    columns = {
+        "draws": count("draw"),
+        "found": count("found"),
+        "held": share("held"),
+        "exit 0": count("exit 0 or 4"),
+        "held of exit 0": share("held, exit 0"),
+        "far, σ": number("z, exit 0", np.max),
+        "k_e held": share("held k_e"),
+    }
+    experiment("elastic", __doc__, rows, draw, columns)

@@ -4,9 +4,9 @@ Each log is of another simulated arm and of one of `KINDS`, in turn; half of eac
 friction. Noise of angles is drawn from 1e-4 to 1e-2 rad, even in its logarithm, that of torques is
 1 % of their RMS. Nothing is wrong with a log: the reasons of its verdict may say what is `TRUE` of
 it, and any other accuses it falsely. A log is withheld where it is refused, its result failed or
-an estimate has no interval that may be used. Prints each log that is withheld or accused with its
-reasons, all reasons by code, the share of such logs with its 95 % interval (Clopper-Pearson), and
-how many intervals of k1 … k7 hold the truth. `--first` goes on where an earlier run ended.
+an estimate has no interval that may be used. A row gives how many are withheld or accused, all
+reasons by code, and how many intervals of k1 … k7 hold the truth. `--first` goes on where an
+earlier run ended.
 
 ========  ==============================================================================
 kind      log
@@ -23,13 +23,9 @@ light     plain, a second link of 1 to 5 % of the first one's mass
 
 from __future__ import annotations
 
-import argparse
-from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.stats import beta
 
 from algid.arm import CONSTANT_NAMES, Arm, FloatArray, inverse_dynamics
 from algid.base.errors import LogError
@@ -39,6 +35,7 @@ from algid.synth.excitation import wide_multi_sine
 from algid.synth.sensors import Sensors, sample_times
 from algid.synth.simulator import SimulatedMotion, simulate
 from pipelines.accuracy_scenes import random_arm
+from pipelines.experiment import Seen, count, experiment, grid, judged, share, words
 
 FIRST_ARM = 1000  # seeds of arms that nothing was tuned on
 KINDS = ("plain", "jitter", "gaps", "slow", "balanced", "light")
@@ -59,23 +56,6 @@ TRUE = (
 
 That the likelihood does not converge is one: the robust estimate stands, and nothing is accused.
 """
-
-
-@dataclass(frozen=True)
-class Judged:
-    """What algid made of a sound log: a verdict, false reasons, and which intervals hold."""
-
-    number: int
-    grade: str
-    alarms: tuple[str, ...]
-    told: tuple[str, ...]
-    inside: int = 0
-    intervals: int = 0
-
-    @property
-    def withheld(self) -> bool:
-        """True if the log has not been used, or its reasons accuse it."""
-        return self.grade in ("refused", "failed") or bool(self.alarms)
 
 
 def arm_of(kind: str, rng: np.random.Generator) -> Arm:
@@ -130,8 +110,8 @@ def log_of(number: int) -> tuple[Log, FloatArray]:
     rms = np.sqrt(np.mean(tau**2, axis=1, keepdims=True))
     theta = motion.theta + noise * rng.standard_normal(tau.shape)
     tau = tau + TORQUE_NOISE * rms * rng.standard_normal(tau.shape)
-    words = f"{kind}, noise {noise:.1e} rad{', Coulomb' * (number // len(KINDS) % 2)}"
-    origin = Origin(words, "csv", {})
+    title = f"{number}: {kind}, noise {noise:.1e} rad{', Coulomb' * (number // len(KINDS) % 2)}"
+    origin = Origin(title, "csv", {})
     t = motion.t
     if by_stamps:
         t = sample_times(500.0, 5.0, Sensors(jitter=rng.uniform(0.08, 0.15) / 500.0, seed=number))
@@ -139,73 +119,33 @@ def log_of(number: int) -> tuple[Log, FloatArray]:
     return Log(stamps, theta, tau, origin), arm.constants()
 
 
-def judged(number: int) -> Judged:
-    """What algid makes of sound log `number`; one with a false alarm is printed with it."""
-    log, k = log_of(number)
+def draw(kind: str, _arm: int, number: int) -> Seen:
+    """What algid made of a sound log; "withheld" is one that is not used or falsely accused."""
+    log, k = log_of(len(KINDS) * number + KINDS.index(kind))
     try:
         result = identify(log, report=False)
     except LogError as refusal:
-        found = Judged(number, "refused", ("REFUSED",), (str(refusal),))
-    else:
-        reasons = result.verdict.reasons
-        told = tuple(dict.fromkeys(one.code for one in reasons))
-        inside = []
-        for name, true in zip(CONSTANT_NAMES, k, strict=True):
-            low, high = result.parameters[name].ci95 or (None, None)
-            if low is not None and high is not None:
-                inside.append(low <= true <= high)
-        found = Judged(
-            number,
-            result.verdict.grade,
-            tuple(code for code in told if code not in TRUE),
-            told,
-            sum(inside),
-            len(inside),
-        )
-    if found.withheld:
-        print(
-            f"log {number} ({log.origin.path}): {found.grade}, {found.inside} of "
-            f"{found.intervals} intervals hold: {', '.join(found.told)}",
-            flush=True,
-        )
-    return found
-
-
-def interval(count: int, of: int) -> tuple[float, float]:
-    """The 95 % interval of a share that `count` of so many have."""
-    low = beta.ppf(0.025, count, of - count + 1) if count else 0.0
-    high = beta.ppf(0.975, count + 1, of - count) if count < of else 1.0
-    return float(low), float(high)
-
-
-def table(seen: Iterable[Judged]) -> list[str]:
-    """Lines of the reasons by kind of log, and of the share of logs with a false alarm."""
-    logs = list(seen)
-    lines = ["| kind | logs | Good | withheld or accused | intervals that hold |", f"|{'---|' * 5}"]
-    for place, kind in enumerate(KINDS):
-        own = [log for log in logs if log.number % len(KINDS) == place]
-        good, alarmed = sum(log.grade == "good" for log in own), sum(log.withheld for log in own)
-        held = f"{sum(log.inside for log in own)} of {sum(log.intervals for log in own)}"
-        lines.append(f"| {kind} | {len(own)} | {good} | {alarmed} | {held} |")
-    lines += ["", "| code | logs |", "|---|---|"]
-    counts = Counter(code for log in logs for code in (log.told if log.intervals else log.alarms))
-    for code, count in counts.most_common():
-        lines.append(f"| {code}{' (true)' if code in TRUE else ''} | {count} |")
-    withheld = sum(log.withheld for log in logs)
-    low, high = interval(withheld, len(logs))
-    share = f"{withheld} of {len(logs)}: {withheld / len(logs):.1%} (95 %: {low:.1%} to {high:.1%})"
-    return [*lines, "", f"Sound logs that are withheld or accused: {share}"]
-
-
-def main() -> None:
-    """Identify the logs and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--logs", type=int, default=300)
-    parser.add_argument("--first", type=int, default=0)
-    given = parser.parse_args()
-    numbers = range(given.first, given.first + given.logs)
-    print("\n".join(table([judged(number) for number in numbers])))
+        return {"draw": [1], "refused": [1], "withheld": [f"{log.origin.path}: {refusal}"]}
+    seen = judged(result, dict(zip(CONSTANT_NAMES, k, strict=True)))
+    told = {one.code for one in result.verdict.reasons}
+    false = sorted(told.difference(TRUE))
+    seen |= {"codes": sorted(told), "false": false}
+    if false or result.verdict.failed:
+        seen["withheld"] = [f"{log.origin.path}: {', '.join(sorted(told))}"]
+    return seen
 
 
 if __name__ == "__main__":
-    main()
+    columns = {
+        "logs": count("draw"),
+        "Good": count("good"),
+        "withheld or accused": lambda seen: str(len(seen["withheld"])),
+        "refused": count("refused"),
+        "failed": count("failed"),
+        "intervals hold": share("held"),
+        "false codes": words("false"),
+        "all codes": words("codes"),
+        "which": words("withheld"),
+    }
+    kinds = {kind: (kind,) for kind in KINDS}
+    experiment("false-alarms", __doc__, grid(kinds, range(1)), draw, columns, draws=50)

@@ -1,8 +1,4 @@
-"""Give batches hostile records, manifests and folders.
-
-Fail on a traceback, a hang, a lost job, or a touch elsewhere.
-
-Usage: python -m pipelines.fuzz_batches [CASES] [SEED]
+"""Batches over hostile records, manifests and folders: a source of `pipelines.fuzz`.
 
 Jobs end at once here, as failed or with an empty result: it is what a batch makes of its folders
 that is tried. It ends with a row a job and a record a row, and the next run has nothing left to
@@ -13,20 +9,14 @@ from __future__ import annotations
 
 import os
 import random
-import shutil
-import signal
 import subprocess
-import sys
 import tempfile
-import time
-import traceback
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
 import polars as pl
 
@@ -38,10 +28,6 @@ from algid.batches.records import JobStatus, stat_of
 from algid.batches.run import Batch, BatchConfig, sweep
 from algid.settings import Settings
 from pipelines.hostile.batches import furnish_output, grow, manifest, record
-
-CASES = 5_000
-SECONDS = 20
-FAILURES = ("traceback", "hang", "lost", "elsewhere", "left", "again", "lines")
 
 
 class AtOnce(Executor):
@@ -70,39 +56,11 @@ class AtOnce(Executor):
         return future
 
 
-def main() -> int:
-    """Run all cases."""
-    cases = int(sys.argv[1]) if len(sys.argv) > 1 else CASES
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    signal.signal(signal.SIGALRM, _hang)
-    total: Counter[str] = Counter()
-    start, slowest = time.monotonic(), 0.0
-    for number in range(seed, seed + cases):
-        began = time.monotonic()
-        place = Path(tempfile.mkdtemp(prefix="algid-fuzz-"))
-        signal.alarm(SECONDS)
-        try:
-            kind, text = outcome(place, random.Random(number))
-        except TimeoutError:
-            kind, text = "hang", ""
-        except BaseException:  # whatever a batch raises that is no message
-            kind, text = "traceback", traceback.format_exc()[-1500:]
-        finally:
-            signal.alarm(0)
-            shutil.rmtree(place)
-        slowest = max(slowest, time.monotonic() - began)
-        total[kind] += 1
-        if kind in FAILURES:
-            print(f"{kind}: seed {number}: {text}", flush=True)
-    print(
-        f"{cases} batches: {dict(total)}; the slowest {slowest:.1f} s; "
-        f"{time.monotonic() - start:.0f} s in all"
-    )
-    return int(any(total[kind] for kind in FAILURES))
-
-
-def _hang(_number: int, _frame: FrameType | None) -> NoReturn:
-    raise TimeoutError
+def batches(folder: Path, seeds: range) -> Iterator[Callable[[], tuple[str, str]]]:
+    """Batches over hostile folders, records and manifests."""
+    for seed in seeds:
+        with tempfile.TemporaryDirectory(dir=folder) as place:
+            yield partial(outcome, Path(place), random.Random(seed))
 
 
 def outcome(place: Path, draw: random.Random) -> tuple[str, str]:
@@ -161,23 +119,15 @@ def _run(jobs: list[Any], out: Path, executor: AtOnce) -> tuple[set[str], str | 
 
 def _logs_below(folder: Path) -> set[str]:
     """Logs below a folder, as another program finds them."""
-    endings = ("*.csv", "*.mcap", "*.parquet", "*.csv.gz", "*.CSV")
-    tests = [word for name in endings for word in ("-o", "-name", name)][1:]
-    hidden = ["(", "-name", ".*", "-o", "-type", "d", "-name", "*.algid", ")", "-prune", "-o"]
-    command = [
-        "find",
-        f"{folder}/",
-        "-mindepth",
-        "1",
-        *hidden,
-        "-type",
-        "f",
-        "(",
-        *tests,
-        ")",
-        "-print0",
-    ]
-    found = subprocess.run(command, capture_output=True, check=True).stdout.split(b"\0")
+    endings = " -o ".join(
+        f"-name {name}" for name in ["*.csv", "*.mcap", "*.parquet", "*.csv.gz", "*.CSV"]
+    )
+    found = subprocess.run(
+        ["find", f"{folder}/", "-mindepth", "1"]
+        + f"( -name .* -o -type d -name *.algid ) -prune -o -type f ( {endings} ) -print0".split(),
+        capture_output=True,
+        check=True,
+    ).stdout.split(b"\0")
     paths = (os.fsdecode(path).replace("//", "/", 1) for path in found if path)
     return {path for path in paths if not _in_bag(Path(path), folder)}
 
@@ -188,7 +138,3 @@ def _in_bag(path: Path, folder: Path) -> bool:
         for one in path.parents
         if one != folder and one.is_relative_to(folder)
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -10,19 +10,19 @@ alarm. Errors that the score test has no shape for are among them.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 
 from algid.arm import FloatArray
 from algid.identification.identify import identify
-from algid.log import Log, Origin, Reading
+from algid.log import Log
+from algid.model import RIGID
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, SimulatedMotion, steered
-from pipelines.accuracy_scenes import case_of
-from pipelines.experiment import experiment
+from pipelines.accuracy_scenes import case_of, logged
+from pipelines.experiment import Seen, count, experiment, grid, judged, number, share
 
 ARMS = ("case1", "arm22")
 RATE, DURATION = 250.0, 8.0
@@ -30,45 +30,19 @@ SIGMA_THETA, SIGMA_TAU = 5e-4, 5e-3  # rad, and share of the torque's RMS
 COULOMB, WIDTH = 0.05, 0.05  # of the torque's RMS, rad/s
 Error = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 """Torque (2, M) in shares of the RMS `size` (2, 1), of angles, velocities and motors' torques."""
-
-
-def _gears(_q: FloatArray, w: FloatArray, u: FloatArray, size: FloatArray) -> FloatArray:
-    return -np.abs(u) * np.tanh(w / WIDTH) / size
-
-
-def _drag(_q: FloatArray, w: FloatArray, _u: FloatArray, _size: FloatArray) -> FloatArray:
-    return -w * np.abs(w) / 50.0
-
-
-def _cogging(q: FloatArray, _w: FloatArray, _u: FloatArray, _size: FloatArray) -> FloatArray:
-    return np.sqrt(2) * np.sin(6 * q)
-
-
-def _cable(q: FloatArray, _w: FloatArray, _u: FloatArray, _size: FloatArray) -> FloatArray:
-    return np.sqrt(2) * np.sin(2 * q - 0.7)
-
-
-def _bearing(q: FloatArray, w: FloatArray, _u: FloatArray, _size: FloatArray) -> FloatArray:
-    return np.sqrt(2) * np.sin(q - 0.7) * np.tanh(w / WIDTH)
-
-
-def _belt(_q: FloatArray, w: FloatArray, _u: FloatArray, _size: FloatArray) -> FloatArray:
-    return -np.tanh((w - w[::-1]) / (2 * WIDTH))
-
-
 ERRORS: dict[str, Error] = {
-    "gears that rub by the motor's torque": _gears,
-    "drag by the square of speed": _drag,
-    "cogging, six a turn": _cogging,
-    "a cable's pull, twice a turn": _cable,
-    "friction that changes along a turn": _bearing,
-    "a belt that rubs on the other joint": _belt,
+    "gears that rub by the motor's torque": lambda _, w, u, size: (
+        -np.abs(u) * np.tanh(w / WIDTH) / size
+    ),
+    "drag by the square of speed": lambda _, w, *__: -w * np.abs(w) / 50.0,
+    "cogging, six a turn": lambda q, *_: np.sqrt(2) * np.sin(6 * q),
+    "a cable's pull, twice a turn": lambda q, *_: np.sqrt(2) * np.sin(2 * q - 0.7),
+    "friction that changes along a turn": lambda q, w, *_: (
+        np.sqrt(2) * np.sin(q - 0.7) * np.tanh(w / WIDTH)
+    ),
+    "a belt that rubs on the other joint": lambda _, w, *__: -np.tanh((w - w[::-1]) / (2 * WIDTH)),
 }
 SHARES = (0.003, 0.01, 0.03)
-ROWS: tuple[tuple[str, float], ...] = (
-    ("nothing", 0.0),
-    *((name, share) for name in ERRORS for share in SHARES),
-)
 
 
 def moved(name: str, error: str, share: float, seed: int) -> tuple[SimulatedMotion, FloatArray]:
@@ -98,57 +72,28 @@ def log_of(name: str, error: str, share: float, seed: int) -> Log:
     motion, motors = moved(name, error, share, seed)
     rng = np.random.default_rng([seed, sum(name.encode()), sum(error.encode())])
     size = np.sqrt(np.mean(motors**2, axis=1, keepdims=True))
-    theta = motion.theta + SIGMA_THETA * rng.standard_normal(motors.shape)
-    tau = motors + SIGMA_TAU * size * rng.standard_normal(motors.shape)
-    origin = Origin(f"{name}.csv", "csv", {}, reading=Reading(accepted=("DEGREES",)))
-    return Log(np.round(motion.t * 1e9).astype(np.int64), theta, tau, origin)
+    return logged(motion.t, motion.theta, motors, rng, (SIGMA_THETA, SIGMA_TAU * size))
 
 
-def judged(job: tuple[str, str, float, int]) -> Counter[str]:
-    """What became of the draws of an arm."""
-    name, error, share, draws = job
-    true = case_of(name).arm.constants()
-    total: Counter[str] = Counter()
-    for seed in range(draws):
-        result = identify(log_of(name, error, share, seed), report=False)
-        codes = {notice.code for notice in result.notices}
-        good = result.verdict.grade == "good"
-        total.update(draws=1, said=bool(codes & {"REFUTED"}), good=good)
-        for number in range(5):
-            one = result.parameters[f"k{number + 1}"]
-            if not one.usable or one.estimate is None or not one.std or one.ci95 is None:
-                continue
-            held = one.ci95[0] <= true[number] <= one.ci95[1]
-            total.update(told=1, held=held)
-            if good:
-                total.update({"told good": 1, "held good": held})
-                far = abs(one.estimate - true[number]) / one.std
-                total["far"] = max(total["far"], round(10 * far))
-    return total
-
-
-def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """The table, row by row."""
-    yield "| error | share | draws | said | Good | held | held of Good | farthest of Good, σ |"
-    yield f"|{'---|' * 8}"
-    for error, share in ROWS:
-        jobs = [(name, error, share, draws) for name in ARMS]
-        total: Counter[str] = Counter()
-        farthest = 0
-        for of_arm in pool.map(judged, jobs):
-            farthest = max(farthest, of_arm.pop("far", 0))
-            total.update(of_arm)
-        cells = [
-            f"{100 * share:g} %",
-            str(total["draws"]),
-            str(total["said"]),
-            str(total["good"]),
-            f"{total['held']}/{total['told']}",
-            f"{total['held good']}/{total['told good']}",
-            f"{farthest / 10:.1f}",
-        ]
-        yield f"| {error} | {' | '.join(cells)} |"
+def draw(error: str, share: float, name: str, seed: int) -> Seen:
+    """What became of one draw, and of it again where it is Good."""
+    result = identify(log_of(name, error, share, seed), report=False)
+    seen = judged(result, dict(zip(RIGID, case_of(name).arm.constants(), strict=False)))
+    if result.verdict.grade == "good":
+        seen |= {f"{key}, Good": seen[key] for key in ("held", "z")}
+    return seen
 
 
 if __name__ == "__main__":
-    experiment("misfit", __doc__, lines, 10, "arm and row")
+    rows = {"nothing": ("nothing", 0.0)}
+    rows |= {f"{one}, {100 * size:g} %": (one, size) for one, size in product(ERRORS, SHARES)}
+    columns = {
+        "draws": count("draw"),
+        "said": count("REFUTED"),
+        "Good": count("good"),
+        "held": share("held"),
+        "held of Good": share("held, Good"),
+        "farthest of Good, σ": number("z, Good", np.max),
+        "error, %": number("error", lambda errors: np.median(np.abs(errors)), 100),
+    }
+    experiment("misfit", __doc__, grid(rows, ARMS), draw, columns)

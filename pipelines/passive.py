@@ -5,26 +5,21 @@ An acrobot's first joint, or a pendubot's second, bears Coulomb friction of its 
 pull at both joints by 2 % of the driven joint's torque, slowly and unlogged. Every draw is
 identified with no flag but `--set passive`. A row gives how many converged, how many failed, how
 many have k1, k2 and k3 all as nothing, and how many intervals hold the truth of those that are
-told, by constant. Writes
-`passive.md` into the output folder.
+told, by constant.
 """
 
 from __future__ import annotations
-
-from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.identification.identify import identify
-from algid.log import Log, Origin, Reading
+from algid.log import Log
 from algid.signals.filters import correlate
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, steered
-from pipelines.accuracy_scenes import case_of
-from pipelines.experiment import experiment
+from pipelines.accuracy_scenes import case_of, logged
+from pipelines.experiment import Seen, count, experiment, grid, judged, share
 
 ARMS = ("case1", "arm21", "arm22", "arm23")
 RATE, DURATION = 250.0, 10.0
@@ -60,12 +55,8 @@ def log_of(name: str, passive: int, seed: int) -> Log:
 
     motion = steered(arm.constants(), controller, t, HANGING, corners=t)
     driven = wide(t) * motors
-    reading = Reading(passive=passive, accepted=("DEGREES",))
-    logged = driven + SIGMA_TAU * rng.standard_normal(driven.shape)
-    logged[passive - 1] = 0.0
-    theta = motion.theta + SIGMA_THETA * rng.standard_normal(driven.shape)
-    origin = Origin(f"{name}.csv", "csv", {}, reading=reading)
-    return Log(np.round(t * 1e9).astype(np.int64), theta, logged, origin)
+    driven += SIGMA_TAU * rng.standard_normal(driven.shape) * motors
+    return logged(t, motion.theta, driven, rng, (SIGMA_THETA, 0.0), passive=passive)
 
 
 def _slow(rng: np.random.Generator, count: int) -> FloatArray:
@@ -76,46 +67,21 @@ def _slow(rng: np.random.Generator, count: int) -> FloatArray:
     return np.asarray(slow / np.sqrt(np.mean(slow**2, axis=1, keepdims=True)))
 
 
-def judged(job: tuple[str, int, int]) -> Counter[str]:
-    """What became of the draws of an arm."""
-    name, passive, draws = job
-    true = dict(zip(CONSTANT_NAMES, case_of(name).arm.constants().tolist(), strict=True))
-    found: Counter[str] = Counter()
-    for seed in range(draws):
-        result = identify(log_of(name, passive, seed), report=False)
-        assert result.fit is not None
-        found.update(draws=1, converged=result.fit.converged, failed=result.verdict.failed)
-        sizes = [abs(result.parameters[k].estimate or 0.0) / true[k] for k in ("k1", "k2", "k3")]
-        found["nothing"] += max(sizes) < 0.1
-        for k, value in true.items():
-            one = result.parameters[k]
-            if not one.usable:  # too weakly excited, and said so
-                continue
-            low, high = one.ci95 or (None, None)
-            found[k] += low is None or high is None or low <= value <= high
-            found[f"told {k}"] += 1
-    return found
-
-
-def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """The table, row by row."""
-    names = " | ".join(CONSTANT_NAMES)
-    yield f"| joint without motor | draws | converged | failed | nothing | {names} |"
-    yield f"|{'---|' * (5 + len(CONSTANT_NAMES))}"
-    for passive, title in ((1, "1 (acrobot)"), (2, "2 (pendubot)")):
-        total: Counter[str] = Counter()
-        jobs = [(name, passive, draws) for name in ARMS]
-        for (name, *_), found in zip(jobs, pool.map(judged, jobs), strict=True):
-            total.update(found)
-            yield _line(f"{title}, {name}", found)
-        yield _line(f"{title}, all", total)
-
-
-def _line(title: str, total: Counter[str]) -> str:
-    cells = [total[cell] for cell in ("draws", "converged", "failed", "nothing")]
-    held = [f"{total[k]}/{total[f'told {k}']}" for k in CONSTANT_NAMES]
-    return f"| {title} | {' | '.join(map(str, [*cells, *held]))} |"
+def draw(passive: int, name: str, seed: int) -> Seen:
+    """What became of one draw."""
+    true = dict(zip(CONSTANT_NAMES, case_of(name).arm.constants(), strict=True))
+    result = identify(log_of(name, passive, seed), report=False)
+    seen = judged(result, true)
+    assert result.fit is not None
+    seen["converged"] = [result.fit.converged]
+    sizes = [abs(result.parameters[k].estimate or 0.0) / true[k] for k in ("k1", "k2", "k3")]
+    seen["nothing"] = [max(sizes) < 0.1]
+    return seen
 
 
 if __name__ == "__main__":
-    experiment("passive", __doc__, lines, 50, "of four arms and kind")
+    rows = {"1 (acrobot)": (1,), "2 (pendubot)": (2,)}
+    columns = {"draws": count("draw"), "converged": count("converged")}
+    columns |= {"failed": count("failed"), "nothing": count("nothing")}
+    columns |= {k: share(f"held {k}") for k in CONSTANT_NAMES}
+    experiment("passive", __doc__, grid(rows, ARMS), draw, columns, draws=50)

@@ -4,34 +4,30 @@ Arms drawn at random are identified from logs that excite them well, whose torqu
 that hold joint 2 still and that rest; with an unlogged torque, so that the likelihood is refuted,
 too. Their CAD is exact, errs by 20 % as it says (normal, each mass, centre and inertia by itself),
 has every number 20 % off to a random side, or is wrong (masses a third or thrice) and says 20 % all
-the same. A row gives the share of 95 % intervals of k1 … k5 that hold the truth, of those that are
-measured and that are from the prior; how many of all are either; how wide measured ones are beside
-those without a prior (median); how many priors are contradicted; how many results claim to be
-complete.
-Writes `prior.md` into the output folder.
+the same. A row gives how many 95 % intervals of k1 … k5 hold the truth, of those that are measured
+and that are from the prior; how wide measured ones are beside those without a prior (median); how
+many priors are contradicted.
 """
 
 from __future__ import annotations
 
-import os
 import tempfile
-from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from algid.arm import CONSTANT_NAMES, Arm, FloatArray, inverse_dynamics
+from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.identification.identify import identify
-from algid.log import Log, Origin, Reading
+from algid.log import Log
+from algid.model import RIGID
 from algid.results import Result
 from algid.settings import Settings
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, simulate, steered
-from pipelines.accuracy_scenes import random_arm
-from pipelines.experiment import experiment
+from pipelines.accuracy_scenes import logged, random_arm
+from pipelines.experiment import Seen, count, experiment, grid, judged, number, share
 
 RATE, DURATION = 200.0, 4.0
 SIGMA_THETA = 3e-4  # rad
@@ -40,7 +36,6 @@ ERROR = 20.0  # per cent, as every CAD says of itself
 MOTIONS = ("rich", "faint", "joint 2 still", "rest", "rich, refuted")
 CADS = ("none", "exact", "errs by 20 %", "20 % off", "wrong")
 DRAWN = ("m1", "m2", "lc1", "lc2", "I1", "I2")
-RIGID = CONSTANT_NAMES[:5]
 PULL = 0.05  # of the torque's RMS: an unlogged torque that refutes the likelihood
 
 
@@ -65,10 +60,7 @@ def log_of(arm: Arm, motion: str, seed: int) -> Log:
         theta, tau = moved.theta, moved.tau
     size = np.sqrt(np.mean(tau**2, axis=1, keepdims=True))
     noise = FAINT if motion == "faint" else NOISE
-    theta = theta + SIGMA_THETA * rng.standard_normal(theta.shape)
-    tau = tau + noise * size * rng.standard_normal(tau.shape)
-    origin = Origin(f"arm{seed}.csv", "csv", {}, reading=Reading(accepted=("DEGREES",)))
-    return Log(np.round(t * 1e9).astype(np.int64), theta, tau, origin)
+    return logged(t, theta, tau, rng, (SIGMA_THETA, noise * size))
 
 
 def _locked(arm: Arm, t: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -144,73 +136,43 @@ def urdf(arm: Arm) -> str:
     )
 
 
-def judged(job: tuple[str, int, str]) -> dict[str, tuple[Counter[str], list[float]]]:
-    """What became of one arm with each CAD, and the widths beside those without one."""
-    motion, seed, estimator = job
-    arm, _ = random_arm(seed)
-    true = dict(zip(RIGID, arm.constants().tolist(), strict=False))
-    log, found = log_of(arm, motion, seed), {}
-    alone: Result | None = None
+def identified(log: Log, arm: Arm, estimator: str, cad: str, seed: int) -> Result:
+    """The result with the prior of a CAD, or without one."""
+    settings = Settings(estimator=estimator)
+    if cad == "none":
+        return identify(log, settings=settings, report=False)
     with tempfile.TemporaryDirectory() as folder:
-        for cad in CADS:
-            settings = Settings(estimator=estimator)
-            if cad != "none":
-                file = Path(folder) / f"{cad[:2]}.urdf"
-                file.write_text(urdf(drawing(arm, cad, seed)), encoding="utf-8")
-                settings = settings.but(prior=str(file), prior_error=ERROR)
-            result = identify(log, settings=settings, report=False)
-            counts, widths = Counter(draws=1, complete=result.complete), list[float]()
-            counts["refuted"] = any(one.code == "REFUTED" for one in result.notices)
-            counts["contradicted"] = any(one.code == "OTHER_ARM" for one in result.notices)
-            for name, value in true.items():
-                one = result.parameters[name]
-                low, high = one.ci95 or (None, None)
-                if low is None or high is None or not one.usable:
-                    continue
-                whose = "measured" if one.measured else "prior"
-                counts[whose] += 1
-                counts[f"held {whose}"] += low <= value <= high
-                other = None if alone is None else alone.parameters[name]
-                if one.measured and other is not None and other.half and one.half:
-                    widths.append(one.half / other.half)
-            if cad == "none":
-                alone = result
-            found[cad] = counts, widths
-    return found
+        file = Path(folder) / "arm.urdf"
+        file.write_text(urdf(drawing(arm, cad, seed)), encoding="utf-8")
+        settings = settings.but(prior=str(file), prior_error=ERROR)
+        return identify(log, settings=settings, report=False)
 
 
-def lines(draws: int, pool: ProcessPoolExecutor) -> Iterator[str]:
-    """The table, row by row."""
-    yield (
-        "| motion, estimator | CAD | draws | refuted | measured: hold | of all | prior: hold | "
-        "of all | width | contradicted | complete |"
-    )
-    yield f"|{'---|' * 11}"
-    for motion in MOTIONS:
-        for estimator in ("refined", "weak"):
-            if motion.endswith("refuted") and estimator == "weak":
-                continue
-            jobs = [(motion, seed, estimator) for seed in range(draws)]
-            total = {cad: Counter[str]() for cad in CADS}
-            widths = {cad: list[float]() for cad in CADS}
-            for found in pool.map(judged, jobs):
-                for cad, (counts, of_cad) in found.items():
-                    total[cad].update(counts)
-                    widths[cad] += of_cad
-            for cad in CADS:
-                cells = total[cad]
-                width = f"{np.median(widths[cad]):.2f}" if widths[cad] else ""
-                held = []
-                for whose in ("measured", "prior"):
-                    share = 100 * cells[f"held {whose}"] / max(1, cells[whose])
-                    held += [f"{share:.1f} %" if cells[whose] else "", str(cells[whose])]
-                yield (
-                    f"| {motion}, {estimator} | {cad} | {cells['draws']} | {cells['refuted']} | "
-                    f"{' | '.join(held)} | {width} | {cells['contradicted']} | "
-                    f"{cells['complete']} |"
-                )
+def draw(motion: str, estimator: str, cad: str, seed: int, _draw: int) -> Seen:
+    """What became of one arm, and how wide its intervals are beside those without a prior."""
+    arm, _ = random_arm(seed)
+    log = log_of(arm, motion, seed)
+    result = identified(log, arm, estimator, cad, seed)
+    seen = judged(result, dict(zip(RIGID, arm.constants(), strict=False)))
+    alone = result if cad == "none" else identified(log, arm, estimator, "none", seed)
+    for name in RIGID:
+        one, other = result.parameters[name], alone.parameters[name]
+        seen[f"held {'measured' if one.measured else 'prior'}"] += seen[f"held {name}"]
+        if one.measured and other.usable and other.half and one.half:
+            seen["width"].append(one.half / other.half)
+    return seen
 
 
 if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    experiment("prior", __doc__, lines, 10, "of each motion and estimator")
+    ways = [*product(MOTIONS[:4], ("refined", "weak")), ("rich, refuted", "refined")]
+    rows = {f"{way[0]}, {way[1]}, {cad}": (*way, cad) for way, cad in product(ways, CADS)}
+    columns = {
+        "draws": count("draw"),
+        "refuted": count("REFUTED"),
+        "measured: hold": share("held measured"),
+        "prior: hold": share("held prior"),
+        "width": number("width", np.median),
+        "contradicted": count("OTHER_ARM"),
+        "exit 0": count("exit 0"),
+    }
+    experiment("prior", __doc__, grid(rows, range(24)), draw, columns, draws=1)

@@ -37,7 +37,7 @@ import numpy as np
 from pipelines.race_examples import example_table, reproduced
 from pipelines.race_peers import PEERS, SIMULATED_ALONE
 from pipelines.race_scenes import BOUNDED, KINDS, Scene, scenes
-from pipelines.run_to_run import BUILDS, FIGURES, figures, fitted, held_out, runs, splits
+from pipelines.run_to_run import BUILDS, DATA, FIGURES, figures, fitted, held_out, runs, splits
 
 PACKAGES = ("algid", "mujoco", "pin", "pysindy", "numpy", "scipy")
 _RESAMPLED = 400
@@ -170,7 +170,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("-o", "--output", type=Path, default=Path("build/race"))
     parser.add_argument("--seeds", type=int, default=30, help="arms of each kind")
     parser.add_argument("--splits", type=int, default=15, help="of each build's real runs")

@@ -1,7 +1,5 @@
 """Whether intervals hold from run to run: all splits of a real arm's runs into halves.
 
-    python -m pipelines.run_to_run ../shared/data
-
 The ten runs of C.1 and the nine of A.0 can be split into halves in 126 ways each. Both halves of a
 split are estimated by themselves, with no flag: each chooses its own terms. z is the difference
 of two estimates of k1 … k7 over its standard deviation; "inside" are differences within what both
@@ -33,6 +31,7 @@ from algid.log import Log
 from pipelines.race_peers import PEERS, Answer, even
 from pipelines.race_regressions import NAMES, columns, smoothed
 
+DATA = Path("../shared/data")
 BUILDS = {"C.1": "C1_sysid", "A.0": "A0_sysid"}
 L1 = 0.2  # m, of both builds
 FIGURES = (
@@ -142,7 +141,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--build", action="append", choices=tuple(BUILDS), help="only these")
     parser.add_argument(
         "--of", action="append", choices=tuple(PEERS), help="contenders; algid if none is named"
@@ -152,14 +151,14 @@ def main() -> None:
     print("|" + (3 + len(FIGURES)) * "---|", flush=True)
     with ProcessPoolExecutor(2) as pool:
         for build in given.build or BUILDS:
-            count = len(runs(given.folder, build))
+            count = len(runs(given.data, build))
             every = list(range(count))
             wanted = set(splits(every))
             for left in every:
                 wanted |= set(splits([run for run in every if run != left]))
             halves = sorted({half for split in wanted for half in split})
             for peer in given.of or ("algid",):
-                jobs = [(given.folder, build, peer, half) for half in halves]
+                jobs = [(given.data, build, peer, half) for half in halves]
                 found = dict(zip(halves, pool.map(fitted, jobs, chunksize=4), strict=True))
                 values = figures(list(splits(every)), found)
                 errors = jackknifed(count, found)

@@ -14,6 +14,9 @@ from pathlib import Path
 
 from algid.log import Log
 
+FINE = {"same", "told", "read", "refused", "done", "library", "stopped"}
+"""Ends of a case that are good; any other is a finding."""
+
 
 @dataclass(frozen=True)
 class Hostile:

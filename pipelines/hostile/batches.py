@@ -12,45 +12,26 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pipelines.hostile.values import TEXTS, anything, changed
+from pipelines.hostile.values import TEXTS, anything, as_toml, changed
 from pipelines.mutations import damage
 
-RECORD: dict[str, Any] = {
-    "job": {
-        "name": "r1/a",
-        "logs": ["a.csv"],
-        "loaded": ["b.csv"],
-        "profile": None,
-        "robot": "r1",
-        "time": "2026-01-31T12:00:00+01:00",
-        "labels": {"payload": 0.5, "site": "Ulm", "runs": 3, "good": True},
-        "trouble": None,
-    },
-    "status": "ok",
-    "reason": "",
-    "basis": "b",
-    "inputs": [
-        {"path": "a.csv", "size": 1, "mtime_ns": 2, "ctime_ns": 3, "sha256": "c"},
-        {"path": "b.csv", "size": 1, "mtime_ns": 2, "ctime_ns": 3, "sha256": None},
-    ],
-    "settings": {"estimator": "weak", "poles": [1.0, 2.0]},
-    "version": "0.1",
-    "seconds": 1.5,
-    "start_ns": 1_700_000_000_000_000_000,
-    "log_seconds": 10.0,
-    "estimator": "weak",
-    "estimates": {"k1": [1.0, 0.1, "OK"], "k5+k3+z1": [None, None, "WEAK_EXCITATION"]},
-}
-ROW: dict[str, Any] = {
-    "name": "r1/a",
-    "logs": "logs/a.csv",
-    "loaded": "b.csv;c.csv",
-    "robot": "r1",
-    "time": "2026-01-31T12:00:00Z",
-    "payload": 0.5,
-}
+RECORD: dict[str, Any] = json.loads("""
+{"job": {"name": "r1/a", "logs": ["a.csv"], "loaded": ["b.csv"], "profile": null, "robot": "r1",
+  "time": "2026-01-31T12:00:00+01:00", "trouble": null,
+  "labels": {"payload": 0.5, "site": "Ulm", "runs": 3, "good": true}},
+ "status": "ok", "reason": "", "basis": "b", "settings": {"estimator": "weak", "poles": [1.0, 2.0]},
+ "inputs": [{"path": "a.csv", "size": 1, "mtime_ns": 2, "ctime_ns": 3, "sha256": "c"},
+  {"path": "b.csv", "size": 1, "mtime_ns": 2, "ctime_ns": 3, "sha256": null}],
+ "version": "0.1", "seconds": 1.5, "start_ns": 1700000000000000000, "log_seconds": 10.0,
+ "estimator": "weak",
+ "estimates": {"k1": [1.0, 0.1, "OK"], "k5+k3+z1": [null, null, "WEAK_EXCITATION"]}}
+""")
+ROW: dict[str, Any] = json.loads("""
+{"name": "r1/a", "logs": "logs/a.csv", "loaded": "b.csv;c.csv", "robot": "r1",
+ "time": "2026-01-31T12:00:00Z", "payload": 0.5}
+""")
 NAMES = (
-    *(
+    *[
         "a",
         "b",
         "a-loaded",
@@ -61,38 +42,30 @@ NAMES = (
         "d.algid",
         ".h",
         "result",
-        "a b",
         "é",
-        "ä" * 90,
-    ),
-    *(
-        "bad\nname",
         "a\\b",
+        "%",
+        "~",
+        "-",
+        "loaded",
+    ],
+    *(
+        "a b",
+        "ä" * 90,
+        "-loaded",
+        "bad\nname",
         "\x1b[31m",
         "caf\udce9",
         "\u202eltr",
         "x" * 200,
         "y" * 240,
-        "%",
-        "~",
-        "-",
-        "loaded",
-        "-loaded",
     ),
 )
 """Names of files and folders; those of `TEXTS` that the system takes come along."""
 ENDS = (
     "",
     ".csv",
-    ".csv",
-    ".mcap",
-    ".parquet",
-    ".csv.gz",
-    ".CSV",
-    ".toml",
-    ".npz",
-    ".algid",
-    ".json",
+    *[".csv", ".mcap", ".parquet", ".csv.gz", ".CSV", ".toml", ".npz", ".algid", ".json"],
 )
 
 
@@ -111,35 +84,11 @@ def manifest(draw: random.Random, folder: Path) -> Path:
     ]
     rows = [row if isinstance(row, dict) else {"name": row} for row in rows]
     is_toml = draw.random() < 0.5
-    text = _toml(rows) if is_toml else _csv(rows, draw)
+    text = as_toml({"job": rows}) if is_toml else _csv(rows, draw)
     content = text.encode(errors="surrogatepass")
     path = folder / f"m{'.toml' if is_toml else '.csv'}"
     path.write_bytes(damage(content, draw) if draw.random() < 0.2 else content)
     return path
-
-
-def _toml(rows: list[dict[Any, Any]]) -> str:
-    return "\n".join(
-        "[[job]]\n"
-        + "\n".join(f"{json.dumps(str(key))} = {_toml_value(value)}" for key, value in row.items())
-        for row in rows
-    )
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, dict):
-        return (
-            "{"
-            + ", ".join(
-                f"{json.dumps(str(key))} = {_toml_value(one)}" for key, one in value.items()
-            )
-            + "}"
-        )
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml_value, value)) + "]"
-    if isinstance(value, float):
-        return repr(value)
-    return json.dumps("" if value is None else value, ensure_ascii=False)
 
 
 def _csv(rows: list[dict[Any, Any]], draw: random.Random) -> str:
@@ -163,25 +112,21 @@ def grow(draw: random.Random, folder: Path) -> None:
         where = draw.choice(places)
         name = draw.choice((draw.choice(NAMES), draw.choice(TEXTS))) + draw.choice(ENDS)
         path = Path(f"{where}/{name}")
-        makers: tuple[Callable[[Path], object], ...] = (
-            *(
-                Path.mkdir,
-                Path.mkdir,
-                os.mkfifo,
-                lambda p: (p.mkdir(), (p / "metadata.yaml").touch()),
-            ),
-            lambda p: p.symlink_to(draw.choice(places)),
-            lambda p: p.symlink_to(
-                draw.choice(("/dev/zero", "/", "/etc", ".", "..", p.name, "absent"))
-            ),
-            *([lambda p: p.write_text("t,theta1\n0,1\n")] * 6),
-        )
+        lead = draw.choice((*places, "/dev/zero", "/", "/etc", ".", "..", name, "absent"))
+        makers: list[Callable[[Path], object]] = [Path.mkdir, Path.mkdir, os.mkfifo, _bag]
+        makers += [lambda p, lead=lead: p.symlink_to(lead)] * 2  # type: ignore[misc]
+        makers += [lambda p: p.write_text("t,theta1\n0,1\n")] * 6
         with suppress(OSError, ValueError):  # the system does not take every name
             if os.path.lexists(path):  # a pipe would be waited for
                 continue
             draw.choice(makers)(path)
             if path.is_dir() and not path.is_symlink() and path.is_relative_to(folder):
                 places.append(path)
+
+
+def _bag(path: Path) -> None:
+    path.mkdir()
+    (path / "metadata.yaml").touch()
 
 
 def furnish_output(draw: random.Random, out: Path) -> None:

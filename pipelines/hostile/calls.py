@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import random
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -22,52 +22,31 @@ from pipelines.mutations import damage
 
 UNLOADED, LOADED = "case1-unloaded.csv", "case1-loaded.csv"
 RESULTS = ("full.algid", "weak.algid", "paper.algid")
-NOISE = ("--position-noise", "1e-3", "--torque-noise", "1e-2")
-DESIGN = (
-    "--range",
-    "1.2",
-    "--speed",
-    "3",
-    "--torque",
-    "1.5",
-    "--duration",
-    "1",
-    "--rate",
-    "50",
-    *NOISE,
-)
-QUICK = ("--estimator", "weak", "--model", "plain", "--no-report")
-CALLS: dict[str, tuple[str, ...]] = {
-    "inspect": (UNLOADED,),
-    "design": ("case1", "-o", "out", *DESIGN),
-    "identify": (UNLOADED, "-o", "out", *QUICK),
-    "validate": ("full.algid", UNLOADED),
-    "export": ("full.algid", "--to", "urdf", "-o", "out/arm.urdf"),
-    "track": (
-        LOADED,
-        "--parameters",
-        "full.algid",
-        "--l1",
-        "0.1626",
-        "--l2",
-        "0.1232",
-        "-o",
-        "out",
-    ),
-    "report": ("weak.algid",),
-    "compare": ("full.algid", "weak.algid", "-o", "out"),
-    "synth": ("case1", "-o", "out", "--duration", "0.2", "--rate", "50"),
-    "convert": (UNLOADED, "-o", "out/copy.mcap"),
-    "guide": (),
+NOISE = "--position-noise 1e-3 --torque-noise 1e-2"
+DESIGN = f"--range 1.2 --speed 3 --torque 1.5 --duration 1 --rate 50 {NOISE}"
+QUICK = "--estimator weak --model plain --no-report"
+LENGTHS = "--l1 0.1626 --l2 0.1232"
+CALLS = {
+    "inspect": UNLOADED,
+    "design": f"case1 -o out {DESIGN}",
+    "identify": f"{UNLOADED} -o out {QUICK}",
+    "validate": f"full.algid {UNLOADED}",
+    "export": "full.algid --to urdf -o out/arm.urdf",
+    "track": f"{LOADED} --parameters full.algid {LENGTHS} -o out",
+    "report": "weak.algid",
+    "compare": "full.algid weak.algid -o out",
+    "synth": "case1 -o out --duration 0.2 --rate 50",
+    "convert": f"{UNLOADED} -o out/copy.mcap",
+    "guide": "",
 }
-NEVER = {
+NEVER = [
     "--help",
     "--watch",
     "--scheduler",
     "--version",
     "--install-completion",
     "--show-completion",
-}
+]
 """Options that wait for ever by intent, talk to a cluster, or print nothing else."""
 SLOW = {("identify", "--estimator"), ("identify", "--model"), ("identify", "--cross-validate")}
 """Flags that choose honest work of more than a second."""
@@ -85,19 +64,7 @@ class Call:
 def draw_call(seed: int, place: Path) -> Call:
     """The call of that seed; the files that it needs are put into `place`."""
     draw = random.Random(seed)
-    makers: tuple[Callable[[random.Random, Path], Call], ...] = (
-        flags,
-        flags,
-        flags,
-        toml,
-        result,
-        result,
-        series,
-    )
-    return draw.choice(makers)(draw, place)
-
-
-# flags
+    return draw.choice((flags, flags, flags, toml, result, result, series))(draw, place)
 
 
 @cache
@@ -112,18 +79,13 @@ def options(name: str) -> tuple[Any, ...]:
 def flags(draw: random.Random, _place: Path) -> Call:
     """A sound call with one to three flags of any value."""
     name = draw.choice([one for one in COMMANDS if one in CALLS])
-    given = [*CALLS[name]]  # no argument of a process holds a NUL, nor half a character
-    chosen = (
-        [draw.choice(options(name)) for _ in range(draw.choice((1, 1, 2, 3)))]
-        if options(name)
-        else []
-    )
-    for option in chosen:
-        if (name, option.opts[-1]) in SLOW and draw.random() < 0.8:
-            continue
-        given += _given(option, draw)
-    if draw.random() < 0.1 and CALLS[name]:
-        given[draw.randrange(len(CALLS[name]))] = values.text(draw)
+    given = sound = CALLS[name].split()
+    for option in draw.choices(options(name), k=draw.choice((1, 1, 2, 3))) if options(name) else ():
+        if (name, option.opts[-1]) not in SLOW or draw.random() < 0.2:
+            given = given + _given(option, draw)
+    if draw.random() < 0.1 and sound:
+        given[draw.randrange(len(sound))] = values.text(draw)
+    # no argument of a process holds a NUL, nor half a character
     words = [word.replace("\0", "").replace("\ud800", "\udcff") for word in given]
     return Call("flags", (name, *words))
 
@@ -161,7 +123,7 @@ def _words(draw: random.Random) -> list[str]:
     """What an option of text may hold: numbers in every arrangement that some option has."""
     one, two, three, four = (repr(values.number(draw)) for _ in range(4))
     key = draw.choice(
-        (
+        [
             "tau1.sign",
             "theta1.unit",
             "theta1.offset",
@@ -170,78 +132,33 @@ def _words(draw: random.Random) -> list[str]:
             "accept",
             "a.b.c",
             "signs",
-        )
+        ]
     )
-    arranged = (
-        f"{one}",
-        f"{one},{two}",
-        f"{one}:{two},{three}:{four}",
-        f"{one},{two},{three},{four}",
-    )
-    return [
-        *arranged,
-        f"{one}={two},{three}={four}",
-        f"{key}={values.text(draw)}",
-        f"{key}={one}",
-        values.text(draw),
-    ]
-
-
-# TOML
+    arranged = f"{one} {one},{two} {one}:{two},{three}:{four} {one},{two},{three},{four}"
+    assigned = f"{one}={two},{three}={four} {key}={one}"
+    return [*arranged.split(), *assigned.split(), f"{key}={values.text(draw)}", values.text(draw)]
 
 
 def toml(draw: random.Random, place: Path) -> Call:
     """A file of settings, some of it changed."""
     file = "hostile.toml"
-    known: tuple[tuple[Any, tuple[str, ...]], ...] = (
-        (places.PROFILE, ("identify", UNLOADED, "-o", "out", *QUICK, "--profile", file)),
-        (places.PROFILE, ("inspect", UNLOADED, "--profile", file)),
-        (places.PROFILE, ("convert", UNLOADED, "-o", "out/copy.csv", "--profile", file)),
-        (places.ARM, ("synth", file, "-o", "out", "--duration", "0.2", "--rate", "50")),
-        (places.ARM, ("design", file, "-o", "out", *DESIGN)),
-        (places.LIMITS, ("design", "case1", "-o", "out", "--limits", file, *NOISE)),
-        (places.TOLERANCES, ("validate", "full.algid", "--max-error", file)),
-        (places.MANIFEST, ("batch", file, "-o", "out", "--workers", "1", *QUICK, "-q")),
+    known = (
+        ("profile", f"identify {UNLOADED} -o out {QUICK} --profile {file}"),
+        ("profile", f"inspect {UNLOADED} --profile {file}"),
+        ("profile", f"convert {UNLOADED} -o out/copy.csv --profile {file}"),
+        ("arm", f"synth {file} -o out --duration 0.2 --rate 50"),
+        ("arm", f"design {file} -o out {DESIGN}"),
+        ("limits", f"design case1 -o out --limits {file} {NOISE}"),
+        ("tolerances", f"validate full.algid --max-error {file}"),
+        ("manifest", f"batch {file} -o out --workers 1 {QUICK} -q"),
     )
-    content, arguments = draw.choice(known[:-1] if draw.random() < 0.95 else known)
-    written = as_toml(values.changed(content, draw)).encode("utf-8", "surrogatepass")
+    kind, arguments = draw.choice(known[:-1] if draw.random() < 0.95 else known)
+    content = places.SOUND[kind]
+    written = values.as_toml(values.changed(content, draw)).encode("utf-8", "surrogatepass")
     if draw.random() < 0.2:
         written = damage(written or b" ", draw)
     (place / file).write_bytes(written)
-    return Call("toml", arguments, written.decode(errors="replace")[:600])
-
-
-def as_toml(content: dict[str, Any]) -> str:
-    """A document in TOML; what TOML cannot say is said as it would be in JSON."""
-    lines = [
-        f"{_key(key)} = {_inline(value)}"
-        for key, value in content.items()
-        if not isinstance(value, dict)
-    ]
-    for key, value in content.items():
-        if isinstance(value, dict):
-            lines += [
-                f"[{_key(key)}]",
-                *(f"{_key(inner)} = {_inline(one)}" for inner, one in value.items()),
-            ]
-    return "\n".join(lines) + "\n"
-
-
-def _key(key: str) -> str:
-    return json.dumps(key, ensure_ascii=False)
-
-
-def _inline(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(key)} = {_inline(one)}" for key, one in value.items()) + "}"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(_inline, value)) + "]"
-    if isinstance(value, float):
-        return repr(value)  # nan and inf are TOML's own words
-    return "" if value is None else json.dumps(value, ensure_ascii=False)
-
-
-# results
+    return Call("toml", tuple(arguments.split()), written.decode(errors="replace")[:600])
 
 
 def result(draw: random.Random, place: Path) -> Call:
@@ -283,38 +200,33 @@ def _differing(content: Any, written: bytes) -> str:
 
 def _reading(folder: str, draw: random.Random) -> tuple[str, ...]:
     """A command that reads that result or track."""
+    form = f"--format {draw.choice(('table', 'json'))}"
     if folder.endswith(".track"):
-        shown = draw.choice(("table", "json"))
-        return ("report", folder, "--format", shown, *draw.choice(((), ("--export", "mcap"))))
-    form = ("--format", draw.choice(("table", "json")))
-    track = ("track", LOADED, "--parameters", folder, "-o", "out")
-    known: tuple[tuple[str, ...], ...] = (
-        ("report", folder, *form),
-        ("report", folder, "--export", "mcap"),
-        ("compare", folder, "weak.algid", "-o", "out", *form),
-        ("compare", "full.algid", folder, *form),
-        ("validate", folder, "--max-error", "50"),
-        ("validate", folder, "--max-error", "paper"),
-        ("validate", folder, UNLOADED, *form),
-        ("validate", folder, UNLOADED, "--loaded", LOADED, "--simulate"),
+        return tuple(f"report {folder} {form}{draw.choice(('', ' --export mcap'))}".split())
+    known = (
+        f"report {folder} {form}",
+        f"report {folder} --export mcap",
+        f"compare {folder} weak.algid -o out {form}",
+        f"compare full.algid {folder} {form}",
+        f"validate {folder} --max-error 50",
+        f"validate {folder} --max-error paper",
+        f"validate {folder} {UNLOADED} {form}",
+        f"validate {folder} {UNLOADED} --loaded {LOADED} --simulate",
         *(
-            ("export", folder, "--to", to, "-o", "out/arm.x")
-            for to in ("urdf", "mjcf", "sdf", "python", "c", "yaml")
+            f"export {folder} --to {to} -o out/arm.x"
+            for to in ["urdf", "mjcf", "sdf", "python", "c", "yaml"]
         ),
-        ("identify", LOADED, "--parameters", folder, "-o", "out", *QUICK),
-        (*track, "--l1", "0.1626", "--l2", "0.1232"),
-        track,
-        ("design", folder, "-o", "out", *DESIGN),
+        f"identify {LOADED} --parameters {folder} -o out {QUICK}",
+        f"track {LOADED} --parameters {folder} -o out {LENGTHS}",
+        f"track {LOADED} --parameters {folder} -o out",
+        f"design {folder} -o out {DESIGN}",
     )
-    return draw.choice(known)
+    return tuple(draw.choice(known).split())
 
 
 def _copied(source: Path, target: Path) -> None:
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(source, target)
-
-
-# tables
 
 
 def series(draw: random.Random, place: Path) -> Call:
@@ -323,37 +235,19 @@ def series(draw: random.Random, place: Path) -> Call:
     if kind == "jobs":
         _copied(place / "results", place / "hostile")
         file = place / "hostile" / "jobs.parquet"
-        arguments: tuple[str, ...] = (
-            "report",
-            "hostile",
-            "-o",
-            "out",
-            "--format",
-            draw.choice(("table", "json")),
-        )
+        arguments = f"report hostile -o out --format {draw.choice(('table', 'json'))}"
     elif kind == "design":
         _copied(place / "case1.design", place / "hostile.design")
         file = place / "hostile.design" / draw.choice(("trajectory.csv", "design.json"))
-        arguments = (
-            "synth",
-            "case1",
-            "--motion",
-            "hostile.design",
-            "-o",
-            "out",
-            "--duration",
-            "0.5",
-            "--rate",
-            "50",
-        )
+        arguments = "synth case1 --motion hostile.design -o out --duration 0.5 --rate 50"
     else:
         base = "full.algid" if kind == "result" else "case1-loaded.track"
         folder = f"hostile{Path(base).suffix}"
         _copied(place / base, place / folder)
         file = draw.choice(sorted((place / folder).glob("*.parquet")))
-        arguments = ("report", folder, *draw.choice(((), ("--export", "mcap"))))
+        arguments = f"report {folder}{draw.choice(('', ' --export mcap'))}"
     note = _spoil(file, draw)
-    return Call(f"series {kind}", arguments, f"{file.name}: {note}")
+    return Call(f"series {kind}", tuple(arguments.split()), f"{file.name}: {note}")
 
 
 TYPES: tuple[Any, ...] = (

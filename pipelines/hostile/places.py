@@ -6,90 +6,56 @@ from __future__ import annotations
 
 import io
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+import tomllib
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 from algid.cli import run
 
-ARM = {
-    "arm": {
-        "m1": 1.2,
-        "m2": 0.8,
-        "lc1": 0.15,
-        "lc2": 0.12,
-        "l1": 0.3,
-        "l2": 0.25,
-        "I1": 0.01,
-        "I2": 0.006,
-        "b1": 0.5,
-        "b2": 0.4,
-        "g": 9.81,
-    },
-    "payload": {"m_p": 0.5},
-    "paper_error_percent": {"k1": 0.2},
-    "torque": {
-        "joint1": {"amplitude": [0.5, 0.2], "frequency": [0.5, 0.3], "phase": [1.0, 2.0]},
-        "joint2": {"amplitude": [0.5, 0.2], "frequency": [0.5, 0.3], "phase": [1.0, 2.0]},
-    },
+CASE = Path(__file__).parents[2] / "data" / "cases" / "case1.toml"
+_TEXTS = {
+    "arm": CASE.read_text(encoding="utf-8"),
+    "profile": """
+joints = ["theta1", "theta2"]
+time = "t"
+time_unit = "s"
+zero = "horizontal"
+drive = "joint"
+second_angle = "relative"
+gravity = 9.81
+velocity = true
+signs = [1, 1]
+offsets = [0.0, 0.0]
+start = 0.0
+end = 10.0
+accept = ["DEGREES"]
+theta1 = {source = "theta1", unit = "rad", sign = 1, offset = 0.0, gear_ratio = 1.0, unwrap = false}
+tau2 = {source = "tau2", unit = "N m", sign = 1, torque_constant = 1.0, gear_ratio = 1.0}
+""",
+    "limits": """
+range = 1.2
+speed = 3.0
+acceleration = 30.0
+torque = [1.5, 1.0]
+tip_height = -1.0
+duration = 2.0
+rate = 100.0
+runs = [1, 1]
+""",
+    "tolerances": "max_error_percent = {k1 = 50.0, k4 = 50.0}",
+    "manifest": """
+[defaults]
+robot = "r1"
+[[jobs]]
+name = "a"
+logs = ["case1-unloaded.csv"]
+loaded = ["case1-loaded.csv"]
+payload = 0.3515
+""",
 }
-PROFILE = {
-    "joints": ["theta1", "theta2"],
-    "time": "t",
-    "time_unit": "s",
-    "zero": "horizontal",
-    "drive": "joint",
-    "second_angle": "relative",
-    "gravity": 9.81,
-    "velocity": True,
-    "signs": [1, 1],
-    "offsets": [0.0, 0.0],
-    "start": 0.0,
-    "end": 10.0,
-    "accept": ["DEGREES"],
-    "theta1": {
-        "source": "theta1",
-        "unit": "rad",
-        "sign": 1,
-        "offset": 0.0,
-        "gear_ratio": 1.0,
-        "unwrap": False,
-    },
-    "tau2": {"source": "tau2", "unit": "N m", "sign": 1, "torque_constant": 1.0, "gear_ratio": 1.0},
-}
-LIMITS = {
-    "range": 1.2,
-    "speed": 3.0,
-    "acceleration": 30.0,
-    "torque": [1.5, 1.0],
-    "tip_height": -1.0,
-    "duration": 2.0,
-    "rate": 100.0,
-    "runs": [1, 1],
-}
-TOLERANCES = {"max_error_percent": {"k1": 50.0, "k4": 50.0}}
-MANIFEST = {
-    "defaults": {"robot": "r1"},
-    "jobs": [
-        {
-            "name": "a",
-            "logs": ["case1-unloaded.csv"],
-            "loaded": ["case1-loaded.csv"],
-            "payload": 0.3515,
-        }
-    ],
-}
-_SHORT = (
-    "--duration",
-    "3",
-    "--rate",
-    "100",
-    "--torque",
-    "wide",
-    "--position-noise",
-    "1e-4",
-    "--torque-noise",
-    "1e-2",
-)
+SOUND: dict[str, dict[str, Any]] = {kind: tomllib.loads(text) for kind, text in _TEXTS.items()}
+"""A document of each kind."""
 
 
 def called(*arguments: str) -> tuple[int, str, str]:
@@ -106,61 +72,24 @@ def called(*arguments: str) -> tuple[int, str, str]:
 
 def furnish(place: Path) -> None:
     """Make everything in the folder `place`."""
-    at = str(place)
-    log, loaded = (str(place / f"case1-{role}.csv") for role in ("unloaded", "loaded"))
-    weak = ("--estimator", "weak", "--model", "plain", "-q")
-    calls: tuple[tuple[str, ...], ...] = (
-        ("synth", "case1", "-o", at, "--format", "csv", *_SHORT),
-        ("synth", "case1", "-o", at, "--format", "mcap", *_SHORT),
-        ("identify", log, "--loaded", loaded, "-o", at, "--name", "full", "-q"),
-        ("identify", log, "-o", at, "--name", "weak", "--no-report", *weak),
-        (
-            "identify",
-            log,
-            "--loaded",
-            loaded,
-            "-o",
-            at,
-            "--name",
-            "paper",
-            "--estimator",
-            "paper",
-            "-q",
-            "--no-report",
-        ),
-        (
-            "track",
-            loaded,
-            "--parameters",
-            str(place / "full.algid"),
-            "-o",
-            at,
-            "--l1",
-            "0.1626",
-            "--l2",
-            "0.1232",
-            "-q",
-        ),
-        (
-            *(
-                "design",
-                "case1",
-                "-o",
-                at,
-                "--range",
-                "1.2",
-                "--speed",
-                "3",
-                "--torque",
-                "1.5",
-                "--duration",
-                "2",
-            ),
-            *("--rate", "50", "--position-noise", "1e-3", "--torque-noise", "1e-2", "-q"),
-        ),
-        ("batch", log, "-o", str(place / "results"), "--workers", "1", "--no-report", *weak),
+    log, loaded, weak = (
+        "case1-unloaded.csv",
+        "case1-loaded.csv",
+        "--estimator weak --model plain -q",
     )
-    for arguments in calls:
-        code, _, said = called(*arguments)
+    noise = "--position-noise 1e-4 --torque-noise 1e-2"
+    motion = f"--duration 3 --rate 100 --torque wide {noise}"
+    for call in (
+        f"synth case1 -o . --format csv {motion}",
+        f"synth case1 -o . --format mcap {motion}",
+        f"identify {log} --loaded {loaded} -o . --name full -q",
+        f"identify {log} -o . --name weak --no-report {weak}",
+        f"identify {log} --loaded {loaded} -o . --name paper --estimator paper -q --no-report",
+        f"track {loaded} --parameters full.algid -o . --l1 0.1626 --l2 0.1232 -q",
+        f"design case1 -o . --range 1.2 --speed 3 --torque 1.5 --duration 2 --rate 50 {noise} -q",
+        f"batch {log} -o results --workers 1 --no-report {weak}",
+    ):
+        with chdir(place):
+            code, _, said = called(*call.split())
         if code not in (0, 3, 4):
-            raise RuntimeError(f"{arguments}: {code}: {said}")
+            raise RuntimeError(f"{call}: {code}: {said}")

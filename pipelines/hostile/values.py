@@ -5,6 +5,7 @@ them there.
 from __future__ import annotations
 
 import copy
+import json
 import random
 from typing import Any
 
@@ -194,3 +195,33 @@ def _scaled(old: int | float, by: float) -> int | float:
         return old * by
     except OverflowError:
         return old * 10**30
+
+
+def as_toml(content: dict[str, Any]) -> str:
+    """A document in TOML; what TOML cannot say is said as it would be in JSON."""
+    lines = [
+        f"{_key(key)} = {_inline(value)}"
+        for key, value in content.items()
+        if not isinstance(value, dict)
+    ]
+    for key, value in content.items():
+        if isinstance(value, dict):
+            lines += [
+                f"[{_key(key)}]",
+                *(f"{_key(inner)} = {_inline(one)}" for inner, one in value.items()),
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def _key(key: str) -> str:
+    return json.dumps(key, ensure_ascii=False)
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {_inline(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    if isinstance(value, float):
+        return repr(value)  # nan and inf are TOML's own words
+    return "" if value is None else json.dumps(value, ensure_ascii=False)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.fuzz_calls import FAILURES, judged
+from pipelines.fuzz_calls import judged
 from pipelines.hostile import places
-from pipelines.hostile.calls import Call, as_toml, flags
-from pipelines.hostile.values import anything, changed
+from pipelines.hostile.calls import Call, flags
+from pipelines.hostile.values import anything, as_toml, changed
 
 
 @pytest.mark.parametrize(
@@ -37,7 +37,6 @@ from pipelines.hostile.values import anything, changed
 )
 def test_the_judge_sees_every_bad_end(code: int, out: str, err: str, kind: str) -> None:
     assert judged(Call("flags", ("report", "x")), code, out, err)[0] == kind
-    assert (kind in FAILURES) == (kind not in ("done", "refused", "library"))
 
 
 @pytest.mark.parametrize("text", ["{", '{"a": NaN}'])
@@ -52,7 +51,7 @@ def test_calls_and_documents_are_the_same_for_the_same_seed() -> None:
         flags(random.Random(seed), Path()) for seed in range(30)
     ]
     assert len({flags(random.Random(seed), Path()).arguments[0] for seed in range(200)}) > 10
-    for content in (places.ARM, places.PROFILE, places.LIMITS, places.TOLERANCES, places.MANIFEST):
+    for content in places.SOUND.values():
         before = as_toml(content)
         assert tomllib.loads(before)
         others = {as_toml(changed(content, random.Random(seed))) for seed in range(20)}

@@ -17,7 +17,7 @@ from algid.estimators.problem import Problem, WeakSettings
 from algid.signals.segments import Segment
 from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
-from pipelines.controlled import Controller, Plan, controlled
+from pipelines.simulator import Controller, Plan, controlled
 
 RATE, SECONDS, NOISE = 1000.0, 8.0, 2e-3
 
@@ -25,11 +25,10 @@ RATE, SECONDS, NOISE = 1000.0, 8.0, 2e-3
 @cache
 def follower() -> Segment:
     """Case 1's arm behind a digital PD controller whose encoders are noisy."""
-    arm = load_case("case1").arm
-    k = arm.constants()
+    k = load_case("case1").arm.constants()
     stiffness = 2 * np.pi * 4.0
     inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])
-    gains = np.diag(inertia * stiffness**2), np.diag(1.4 * inertia * stiffness)
+    gains = inertia * stiffness**2, 1.4 * inertia * stiffness
     count = round(SECONDS * RATE)
     t = np.arange(2 * count - 1) / (2 * RATE)
     turn = 2 * np.pi * np.array([[0.4, 1.1, 1.9], [0.6, 1.3, 2.3]])[:, :, None]
@@ -37,11 +36,11 @@ def follower() -> Segment:
     omega = 0.4 * (turn * np.cos(turn * t)).sum(axis=1)
     weight = np.stack([k[3] * np.cos(theta[0]), 0 * t]) + k[1] * np.cos(theta.sum(axis=0))
     rng = np.random.default_rng(3)
-    controller = Controller(*gains, digital=True, seen=np.full(2, NOISE))
-    nothing = np.zeros((count, 1))
-    moved = controlled(arm, Plan(theta, omega, weight), controller, nothing, nothing[0], RATE, rng)
-    tau = moved.tau[:, :, 0] + 1e-2 * rng.standard_normal((2, count))
-    return Segment(0.0, 1 / RATE, moved.seen[:, :, 0], tau)
+    controller = Controller(*gains, digital=True, seen=NOISE)
+    plan = Plan(theta, omega, weight)
+    _, torques, seen = controlled(k, plan, controller, np.zeros(2), RATE, rng)
+    tau = torques + 1e-2 * rng.standard_normal((2, count))
+    return Segment(0.0, 1 / RATE, seen, tau)
 
 
 def fitted(log: Segment) -> Fit:

@@ -14,15 +14,14 @@ from algid.estimators.widths import likeliest_width
 from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.accuracy_scenes import random_arm
-from pipelines.controlled import WIDTH, Controller, Plan, controlled
+from pipelines.simulator import WIDTH, Controller, Plan, controlled
 
 SEED = 415  # an arm that nothing was tuned on
 
 
 def rubbing() -> tuple[Segment, FloatArray]:
     """Three seconds behind a PD controller, friction of a tenth of the weight; k1 … k7, f1, f2."""
-    arm = random_arm(SEED)[0]
-    k, count, rng = arm.constants(), 3001, np.random.default_rng(SEED)
+    k, count, rng = random_arm(SEED)[0].constants(), 3001, np.random.default_rng(SEED)
     fine = np.arange(2 * count - 1) / 2000.0
     theta, omega = np.zeros((2, fine.size)), np.zeros((2, fine.size))
     theta[0] = -np.pi / 2
@@ -34,10 +33,9 @@ def rubbing() -> tuple[Segment, FloatArray]:
         np.array([k[4] + k[2] + 2 * k[0], k[2]]),
         0.1 * np.array([k[3] + k[1], k[1]]),
     )
-    law = Controller(np.diag(600 * inertia), np.diag(35 * inertia))
     plan = Plan(theta, omega, np.zeros_like(theta))
-    moved = controlled(arm, plan, law, np.zeros((count, 1)), friction[None, :, None], 1000.0, rng)
-    angles, torques = moved.theta[:, :, 0], moved.tau[:, :, 0]
+    law = Controller(600 * inertia, 35 * inertia)
+    angles, torques, _ = controlled(k, plan, law, friction, 1000.0, rng)
     noise = rng.standard_normal((2, 2, count))
     log = Segment(0.0, 1e-3, angles + 1e-3 * noise[0], torques + 1e-2 * noise[1])
     return log, np.append(k, friction)

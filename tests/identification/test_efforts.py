@@ -21,7 +21,6 @@ from algid.settings import Settings
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
-from pipelines.efforts import judged
 from tests.cli.commands import app
 from tests.readers.headers import opened
 
@@ -196,8 +195,3 @@ def test_a_current_is_in_amperes() -> None:
     with pytest.raises(LogError, match="torque_constant"):
         opened(["t", "q1", "q2", "tau1", "tau2"], {"effort": "current"})
     assert Settings().but(effort="command").effort == "command"
-
-
-def test_the_table_of_efforts_names_one_and_applies_its_flag() -> None:
-    found = judged(("external", "case1", 1))
-    assert found == {"draws": 1, "named": 1, "exit 3": 1, "then 0": 1, "held": 1}
