@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Iterator
-from heapq import merge
-from itertools import repeat
 from pathlib import Path
 
 import numpy as np
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
 from algid.arm import FloatArray, inverse_dynamics
 from algid.base.files import whole_file
-from algid.base.ros2 import HEADER, JOINT_STATE, JOINT_STATE_DEFINITION
+from algid.base.ros2 import HEADER
 from algid.log import Log, Origin
 from algid.synth.cases import load_case
 from algid.writers import write_log
-from algid.writers.mcap import messages
+from pipelines.mutations import Topic, joint_states, write_topics
 
 RATE = 1000
 PERIOD = 10.0  # s
@@ -100,40 +98,19 @@ def arm_log(rows: int) -> Log:
     return Log(START_NS + np.arange(rows) * 1_000_000, theta, tau, Origin("", "", {}), omega)
 
 
-Topic = tuple[str, str, str, str, bytes, Iterable[tuple[int, bytes]]]
-"""A topic's name, the encoding of its messages, its type, how that is defined, the definition, and
-stamps in ns and contents of its messages."""
-
-
-def write_topics(path: Path, topics: Iterable[Topic]) -> None:
-    """An MCAP file of zstd chunks of 768 KiB, its messages in the order of their stamps."""
+def zipped(path: Path, topics: Iterable[Topic]) -> None:
+    """An MCAP file of zstd chunks of 768 KiB."""
     with whole_file(path) as temporary, temporary.open("wb") as stream:
-        writer = Writer(stream, chunk_size=768 * 1024, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library="algid bench")
-        waiting = []
-        for topic, encoding, name, kind, definition, contents in topics:
-            schema = writer.register_schema(name, kind, definition)
-            channel = writer.register_channel(topic, encoding, schema)
-            waiting.append(zip(repeat(channel), contents))
-        for channel, (stamp, content) in merge(*waiting, key=lambda one: one[1][0]):
-            writer.add_message(channel, stamp, content, stamp)
-        writer.finish()  # type: ignore[no-untyped-call]
+        write_topics(stream, topics, chunk_size=768 * 1024, compression=CompressionType.ZSTD)
 
 
 def joint_and_imu(path: Path, rows: int) -> None:
     """Joint states with an Imu message between every five."""
     log = arm_log(rows)
     stamps = log.stamp_ns.tolist()
-    states = zip(stamps, (one.tobytes() for one in messages(log)), strict=True)
     imu = zip((stamp + 1000 for stamp in stamps[::5]), imu_payloads(len(stamps[::5])), strict=True)
-    definition = JOINT_STATE_DEFINITION.encode()
-    write_topics(
-        path,
-        [
-            ("/joint_states", "cdr", JOINT_STATE, "ros2msg", definition, states),
-            ("/imu/data", "cdr", _IMU, "ros2msg", _IMU_DEFINITION.encode(), imu),
-        ],
-    )
+    definition = _IMU_DEFINITION.encode()
+    zipped(path, [joint_states(log), ("/imu/data", "cdr", _IMU, "ros2msg", definition, imu)])
 
 
 def imu_payloads(rows: int) -> Iterator[bytes]:
@@ -183,4 +160,4 @@ def protobuf_states(path: Path, rows: int) -> None:
 
     stamps = log.stamp_ns.tolist()
     contents = ((stamp_ns, content(row, stamp_ns)) for row, stamp_ns in enumerate(stamps))
-    write_topics(path, [("/arm", "protobuf", "arm.State", "protobuf", data, contents)])
+    zipped(path, [("/arm", "protobuf", "arm.State", "protobuf", data, contents)])

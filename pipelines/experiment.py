@@ -79,6 +79,20 @@ def number(key: str, of: Callable[[Any], Any], factor: float = 1.0) -> Column:
     return lambda seen: f"{factor * of(np.array(seen[key])):.3g}" if seen[key] else "–"
 
 
+def with_error(key: str, of: Callable[[Any], Any], factor: float = 1.0) -> Column:
+    """A statistic of the numbers of all draws, ± its standard error over draws by the bootstrap."""
+
+    def cell(seen: Seen) -> str:
+        kept = [np.asarray(one)[np.isfinite(one)] for one in seen[key]]
+        if not sum(map(len, kept)):
+            return "–"
+        drawn = np.random.default_rng(0).integers(len(kept), size=(400, len(kept)))
+        again = [of(np.concatenate([kept[place] for place in row])) for row in drawn]
+        return f"{factor * of(np.concatenate(kept)):.3g} ± {factor * np.nanstd(again):.2g}"
+
+    return cell
+
+
 def rms(values: Any) -> Any:
     """The root of the mean square."""
     return np.sqrt(np.mean(np.square(values)))

@@ -3,108 +3,53 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterable
+from heapq import merge
+from itertools import repeat
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
+from mcap.writer import Writer
 
 from algid.arm import Arm
+from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log, Origin, Truth
 from algid.writers import FORMATS, mcap, write_log
 
-_NUMBERS = (
-    0,
-    1,
-    0x7F,
-    0xFF,
-    0x7FFF,
-    0xFFFF,
-    0x7FFFFFFF,
-    0xFFFFFFFF,
-    1 << 40,
-    (1 << 63) - 1,
-    (1 << 64) - 1,
-)
+_NUMBERS = (0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 40, (1 << 63) - 1)
 _WORDS = (
-    b"nan",
-    b"inf",
-    b"1e999",
-    b"-",
-    b",",
-    b"\n",
-    b'"',
-    b"#",
-    b";",
-    b"\0",
-    b"\xff\xfe",
-    b"<script>",
-    b"\x1b[31m",
+    *(b"nan", b"inf", b"1e999", b"-", b",", b"\n", b'"', b"#", b";", b"\0", b"\xff\xfe"),
+    *(b"<script>", b"\x1b[31m"),
 )
 
 
 def damage(content: bytes, draw: random.Random) -> bytes:
     """The content with one to three pieces of damage."""
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
-        content = draw.choice(_KINDS)(content, draw)
+        # the end holds footers and summaries, the start magic and headers: both deserve more than
+        # their share
+        end = len(content)
+        near = draw.choice((16, 64, 400, 2000))
+        first, last = draw.choice(((0, end), (0, end), (0, end), (0, near), (end - near, end)))
+        place = draw.randrange(max(0, first), max(1, min(last, end)))
+        width = draw.choice((2, 4, 8))
+        number = draw.choice((*_NUMBERS, (1 << 64) - 1)) & ((1 << 8 * width) - 1)
+        some = content[place : place + draw.choice((1, 9, 64, 512, 5000))]
+        old, new = draw.choice(
+            (
+                (content[place : place + 1], bytes([draw.randrange(256)])),  # another byte
+                (content[place : place + 1], bytes([content[place] ^ 1 << draw.randrange(8)])),
+                (content[place : place + width], number.to_bytes(width, "little")),
+                (content[place:], b""),  # cut off
+                (some, b""),
+                (some, some + some),
+                (some, bytes(len(some))),
+                (b"", draw.choice(_WORDS)),
+            )
+        )
+        content = (content[:place] + new + content[place + len(old) :]) or b"\0"
     return content
-
-
-def _flip_bit(content: bytes, draw: random.Random) -> bytes:
-    place = draw.randrange(len(content))
-    return content[:place] + bytes([content[place] ^ 1 << draw.randrange(8)]) + content[place + 1 :]
-
-
-def _set_byte(content: bytes, draw: random.Random) -> bytes:
-    place = draw.randrange(len(content))
-    return content[:place] + bytes([draw.randrange(256)]) + content[place + 1 :]
-
-
-def _set_number(content: bytes, draw: random.Random) -> bytes:
-    width = draw.choice((2, 4, 8))
-    place = draw.randrange(max(1, len(content) - width))
-    number = draw.choice(_NUMBERS) & ((1 << 8 * width) - 1)
-    return content[:place] + number.to_bytes(width, "little") + content[place + width :]
-
-
-def _cut(content: bytes, draw: random.Random) -> bytes:
-    return content[: draw.randrange(1, len(content))] if len(content) > 1 else content
-
-
-def _remove(content: bytes, draw: random.Random) -> bytes:
-    place, length = draw.randrange(len(content)), draw.choice((1, 2, 8, 100, 5000))
-    return (content[:place] + content[place + length :]) or b"\0"
-
-
-def _repeat(content: bytes, draw: random.Random) -> bytes:
-    place, length = draw.randrange(len(content)), draw.choice((1, 9, 100, 5000))
-    return content[: place + length] + content[place:]
-
-
-def _insert(content: bytes, draw: random.Random) -> bytes:
-    place = draw.randrange(len(content))
-    return content[:place] + draw.choice(_WORDS) + content[place:]
-
-
-def _zeros(content: bytes, draw: random.Random) -> bytes:
-    place, length = draw.randrange(len(content)), draw.choice((4, 64, 512, 4096))
-    return content[:place] + bytes(min(length, len(content) - place)) + content[place + length :]
-
-
-# the end holds footers and summaries, the start magic and headers: both deserve more than their
-# share
-def _near_the_end(content: bytes, draw: random.Random) -> bytes:
-    cut = max(0, len(content) - draw.choice((64, 400, 2000)))
-    return content[:cut] + draw.choice((_flip_bit, _set_byte, _set_number))(content[cut:], draw)
-
-
-def _near_the_start(content: bytes, draw: random.Random) -> bytes:
-    cut = min(len(content), draw.choice((16, 64, 400)))
-    return draw.choice((_flip_bit, _set_byte, _set_number))(content[:cut], draw) + content[cut:]
-
-
-_KINDS = (
-    *(_flip_bit, _flip_bit, _set_byte, _set_number, _cut, _remove, _repeat, _insert, _zeros),
-    *(_near_the_end, _near_the_start),
-)
 
 
 def clean_log(rows: int = 400) -> Log:
@@ -131,3 +76,31 @@ def clean_files(folder: Path) -> list[Path]:
     # small chunks, so that damage to one leaves others
     mcap.write(folder / "clean.mcap", clean_log(), truth=truth, chunk_size=8192)
     return paths
+
+
+Topic = tuple[str, str, str, str, bytes, Iterable[tuple[int, bytes]]]
+"""A topic's name, the encoding of its messages, its type, how that is defined, the definition, and
+stamps in ns and contents of its messages."""
+
+
+def joint_states(log: Log) -> Topic:
+    """The log's messages in CDR."""
+    contents = (payload.tobytes() for payload in mcap.messages(log))
+    stamped = zip(log.stamp_ns.tolist(), contents, strict=True)
+    definition = JOINT_STATE_DEFINITION.encode()
+    return "/joint_states", "cdr", JOINT_STATE, "ros2msg", definition, stamped
+
+
+def write_topics(stream: IO[bytes], topics: Iterable[Topic], **options: Any) -> None:
+    """An MCAP file, its messages in the order of their stamps."""
+    writer = Writer(stream, **options)
+    writer.start(profile="ros2", library="algid pipelines")
+    waiting = []
+    for topic, encoding, name, kind, definition, contents in topics:
+        channel = writer.register_channel(
+            topic, encoding, writer.register_schema(name, kind, definition)
+        )
+        waiting.append(zip(repeat(channel), contents))
+    for row, (channel, (stamp, content)) in enumerate(merge(*waiting, key=lambda one: one[1][0])):
+        writer.add_message(channel, stamp, content, stamp, row)
+    writer.finish()  # type: ignore[no-untyped-call]

@@ -112,28 +112,23 @@ def drawing(arm: Arm, cad: str, seed: int) -> Arm:
 
 def urdf(arm: Arm) -> str:
     """The arm as a URDF file has it."""
-
-    def link(number: int) -> str:
-        m, lc, inertia = (float(getattr(arm, f"{what}{number}")) for what in ("m", "lc", "I"))
-        return (
-            f'<link name="link{number}"><inertial><origin xyz="{lc!r} 0 0"/><mass value="{m!r}"/>'
-            f'<inertia ixx="{inertia!r}" iyy="{inertia!r}" izz="{inertia!r}" ixy="0" ixz="0" '
-            'iyz="0"/></inertial></link>'
+    links = ((1, arm.m1, arm.lc1, arm.I1), (2, arm.m2, arm.lc2, arm.I2))
+    parts = [
+        f'<link name="link{number:g}"><inertial><origin xyz="{lc!r} 0 0"/><mass value="{m!r}"/>'
+        f'<inertia ixx="{inertia!r}" iyy="{inertia!r}" izz="{inertia!r}" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial></link>"
+        for number, m, lc, inertia in np.array(links).tolist()
+    ]
+    parts += [
+        f'<joint name="to_{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin {place}/><axis xyz="0 0 1"/></joint>'
+        for kind, parent, child, place in (
+            ("continuous", "base", "link1", 'rpy="1.5707963267948966 0 0"'),
+            ("continuous", "link1", "link2", f'xyz="{float(arm.l1)!r} 0 0"'),
+            ("fixed", "link2", "tip", f'xyz="{float(arm.l2)!r} 0 0"'),
         )
-
-    def joint(kind: str, parent: str, child: str, place: str) -> str:
-        return (
-            f'<joint name="to_{child}" type="{kind}"><parent link="{parent}"/>'
-            f'<child link="{child}"/><origin {place}/><axis xyz="0 0 1"/></joint>'
-        )
-
-    return (
-        f'<robot name="arm"><link name="base"/>{link(1)}{link(2)}<link name="tip"/>'
-        + joint("continuous", "base", "link1", 'rpy="1.5707963267948966 0 0"')
-        + joint("continuous", "link1", "link2", f'xyz="{float(arm.l1)!r} 0 0"')
-        + joint("fixed", "link2", "tip", f'xyz="{float(arm.l2)!r} 0 0"')
-        + "</robot>"
-    )
+    ]
+    return f'<robot name="arm"><link name="base"/>{"".join(parts)}<link name="tip"/></robot>'
 
 
 def identified(log: Log, arm: Arm, estimator: str, cad: str, seed: int) -> Result:

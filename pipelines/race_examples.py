@@ -4,14 +4,14 @@ known.
 Regressions, output error and algid recover the constants of the paper's first case from a log
 without noise; PySINDy's weak form finds Lorenz' equations, as in its own examples; MuJoCo's sysid
 finds an arm that MuJoCo has simulated; pinocchio's regressor times an arm's parameters is
-pinocchio's own inverse dynamics; the paper's method gives the paper's Table 4, which `make
-reproduce` does at length.
+pinocchio's own inverse dynamics; the paper's method gives the paper's Table 4. `tests/test_race.py`
+runs them.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -123,28 +123,3 @@ EXAMPLES = {
     "MuJoCo sysid": Example("an arm that MuJoCo simulates", 0.02, _own_arm),
     "the paper's method": Example("Table 4 of case 1", 0.0, _table4),
 }
-
-
-def reproduced(peers: Sequence[str]) -> dict[str, float]:
-    """How far each of the contenders is off on its example; infinity where it falls."""
-    found = {}
-    for peer in peers:
-        try:
-            found[peer] = EXAMPLES[peer].run()
-        except Exception:  # a contender that falls is a result
-            found[peer] = float("inf")
-    return found
-
-
-def example_table(found: dict[str, float]) -> str:
-    """Markdown: a line a contender."""
-    lines = [
-        "| contender | example | off by at most | off by | reproduced |",
-        "|---|---|---|---|---|",
-    ]
-    for peer, example in EXAMPLES.items():
-        if peer in found:
-            done = "yes" if found[peer] <= example.limit else "no"
-            what = f"{peer} | {example.what} | {example.limit:g} | {found[peer]:.2g}"
-            lines.append(f"| {what} | {done} |")
-    return "\n".join(lines)

@@ -9,7 +9,8 @@ residual below 5 Hz.
 
 Splits share runs, so that their figures are not independent. What stands behind ± is the
 jackknife's standard error: every figure is taken anew without one run, over all splits of the
-others.
+others. With `--splits` all contenders of `pipelines.race_peers` take part with so many random
+splits, and ± is the scatter from one split to another.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from algid.arm import FloatArray
 from algid.log import Log
-from pipelines.race_peers import PEERS, Answer, even
+from pipelines.race_peers import PEERS, SIMULATED_ALONE, Answer, even
 from pipelines.race_regressions import NAMES, columns, smoothed
 
 DATA = Path("../shared/data")
@@ -126,48 +127,42 @@ def figures(taken: Sequence[Split], found: Mapping[Half, Fit]) -> FloatArray:
     return np.array([inside, z, scatter, *np.sqrt(np.mean(missed, axis=0))])
 
 
-def jackknifed(count: int, found: Mapping[Half, Fit]) -> FloatArray:
-    """Standard errors (5,) of `FIGURES` over all splits of so many runs."""
-    every = range(count)
-    without = np.stack(
-        [figures(list(splits([run for run in every if run != left])), found) for left in every]
-    )
-    spread = (without - without.mean(axis=0)) ** 2
-    return np.asarray(np.sqrt((count - 1) / count * spread.sum(axis=0)))
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, default=DATA)
-    parser.add_argument("--build", action="append", choices=tuple(BUILDS), help="only these")
-    parser.add_argument(
-        "--of", action="append", choices=tuple(PEERS), help="contenders; algid if none is named"
-    )
+    parser.add_argument("--splits", type=int, help="so many at random, of every contender")
     given = parser.parse_args()
-    print("| build | contender | splits | " + " | ".join(FIGURES) + " |")
-    print("|" + (3 + len(FIGURES)) * "---|", flush=True)
+    print("| build | contender | splits | " + " | ".join(FIGURES) + " | processor s | fell |")
+    print("|" + (5 + len(FIGURES)) * "---|", flush=True)
+    peers = [peer for peer in PEERS if peer not in SIMULATED_ALONE] if given.splits else ["algid"]
     with ProcessPoolExecutor(2) as pool:
-        for build in given.build or BUILDS:
-            count = len(runs(given.data, build))
-            every = list(range(count))
-            wanted = set(splits(every))
-            for left in every:
-                wanted |= set(splits([run for run in every if run != left]))
-            halves = sorted({half for split in wanted for half in split})
-            for peer in given.of or ("algid",):
-                jobs = [(given.data, build, peer, half) for half in halves]
-                found = dict(zip(halves, pool.map(fitted, jobs, chunksize=4), strict=True))
-                values = figures(list(splits(every)), found)
-                errors = jackknifed(count, found)
-                cells = [
-                    f"{value:.3g} ± {error:.2g}" if np.isfinite(value) else "–"
-                    for value, error in zip(values, errors, strict=True)
-                ]
-                taken = len(list(splits(every)))
-                print(f"| {build} | {peer} | {taken} | " + " | ".join(cells) + " |", flush=True)
+        for build, peer in product(BUILDS, peers):
+            every = range(len(runs(given.data, build)))
+            whole = list(splits(every))
+            if given.splits:
+                order = np.random.default_rng(0).permutation(len(whole))
+                whole = [whole[place] for place in order[: given.splits]]
+                parts = [[split] for split in whole]
+            else:
+                parts = [list(splits([run for run in every if run != left])) for left in every]
+            halves = sorted({half for part in (whole, *parts) for split in part for half in split})
+            jobs = [(given.data, build, peer, half) for half in halves]
+            found = dict(zip(halves, pool.map(fitted, jobs, chunksize=4), strict=True))
+            again = np.stack([figures(part, found) for part in parts])
+            # of splits that share no run their scatter, else the jackknife's standard error
+            spread = np.std(again, axis=0, ddof=min(1, len(parts) - 1))
+            if not given.splits:
+                spread = (len(parts) - 1) / np.sqrt(len(parts)) * spread
+            cells = [
+                f"{value:.3g} ± {error:.2g}" if np.isfinite(value) else "–"
+                for value, error in zip(figures(whole, found), spread, strict=True)
+            ]
+            seconds = np.mean([one.seconds for one in found.values()])
+            cells += [f"{seconds:.2g}", str(sum(one.answer is None for one in found.values()))]
+            print(f"| {build} | {peer} | {len(whole)} | {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -6,22 +6,20 @@ import random
 import struct
 import zlib
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from io import BytesIO
 
 import zstandard
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, IndexType
 
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.log import Log
-from algid.writers.mcap import messages
 from pipelines.hostile import Hostile
-from pipelines.mutations import clean_log
+from pipelines.mutations import clean_log, joint_states, write_topics
 
 MAGIC = b"\x89MCAP0\r\n"
 SCHEMA, CHANNEL, MESSAGE, CHUNK, INDEX, DATA_END = 3, 4, 5, 6, 7, 15
-TOPIC = "/joint_states"
+TOPIC = b"/joint_states"
 NUMBERS = (
     0,
     1,
@@ -69,32 +67,21 @@ def split(content: bytes) -> list[Record]:
 
 def written(draw: random.Random) -> bytes:
     """A sound file, written in one of the ways that there are."""
-    stream = BytesIO()
-    writer = Writer(
+    log, stream = log_of_records(), BytesIO()
+    indexes = (IndexType.ALL, IndexType.NONE, IndexType.CHUNK, IndexType.MESSAGE)
+    options = ("use_chunking", "use_statistics", "enable_crcs", "repeat_channels", "repeat_schemas")
+    others = [(stamp, b"\0\1\0\0\7") for stamp in log.stamp_ns.tolist()[::7]]
+    write_topics(
         stream,
+        [
+            joint_states(log),
+            ("/other", "cdr", "std_msgs/msg/Int8", "ros2msg", b"int8 data", others),
+        ],
         chunk_size=draw.choice((1, 2000, 8000, 1 << 20)),
         compression=draw.choice(list(CompressionType)),
-        use_chunking=draw.random() < 0.8,
-        index_types=draw.choice(
-            (IndexType.ALL, IndexType.NONE, IndexType.CHUNK, IndexType.MESSAGE)
-        ),
-        use_statistics=draw.random() < 0.8,
-        enable_crcs=draw.random() < 0.8,
-        repeat_channels=draw.random() < 0.8,
-        repeat_schemas=draw.random() < 0.8,
+        index_types=draw.choice(indexes),
+        **{option: draw.random() < 0.8 for option in options},
     )
-    writer.start()
-    schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
-    channel = writer.register_channel(TOPIC, "cdr", schema)
-    other = writer.register_channel(
-        "/other", "cdr", writer.register_schema("std_msgs/msg/Int8", "ros2msg", b"int8 data")
-    )
-    log = log_of_records()
-    for row, (stamp, payload) in enumerate(zip(log.stamp_ns.tolist(), messages(log), strict=True)):
-        writer.add_message(channel, stamp, payload.tobytes(), stamp, row)
-        if row % 7 == 0:
-            writer.add_message(other, stamp, b"\0\1\0\0\7", stamp, row)
-    writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue()
 
 
@@ -163,26 +150,18 @@ def _lengths(records: list[Record], draw: random.Random) -> bool:
 
 
 def _redefined(records: list[Record], draw: random.Random) -> bool:
-    text = draw.choice((b"/other", TOPIC.encode(), b""))
-    body = (
-        struct.pack("<HHI", draw.choice((1, 2, 3, 0)), draw.choice((1, 2, 9, 0)), len(text)) + text
-    )
-    body += struct.pack("<I", 3) + draw.choice((b"cdr", b"jso")) + struct.pack("<I", 0)
+    def text(content: bytes) -> bytes:
+        return struct.pack("<I", len(content)) + content
+
     if draw.random() < _CHANCE:
-        name, data = (
-            JOINT_STATE.encode(),
-            draw.choice((b"float64[] effort", b"", JOINT_STATE_DEFINITION.encode())),
-        )
-        body = (
-            struct.pack("<HI", draw.choice((1, 2, 7)), len(name))
-            + name
-            + struct.pack("<I", 7)
-            + b"ros2msg"
-        )
-        body += struct.pack("<I", len(data)) + data
-        records.insert(draw.randrange(len(records)), Record(SCHEMA, body))
+        data = draw.choice((b"float64[] effort", b"", JOINT_STATE_DEFINITION.encode()))
+        head = struct.pack("<H", draw.choice((1, 2, 7))) + text(JOINT_STATE.encode())
+        made = Record(SCHEMA, head + text(b"ros2msg") + text(data))
     else:
-        records.insert(draw.randrange(len(records)), Record(CHANNEL, body))
+        head = struct.pack("<HH", draw.choice((1, 2, 3, 0)), draw.choice((1, 2, 9, 0)))
+        topic, encoding = draw.choice((b"/other", TOPIC, b"")), draw.choice((b"cdr", b"jso"))
+        made = Record(CHANNEL, head + text(topic) + text(encoding) + struct.pack("<I", 0))
+    records.insert(draw.randrange(len(records)), made)
     return True
 
 
@@ -227,15 +206,9 @@ def _numbers(records: list[Record], draw: random.Random) -> bool:
 
 
 def _many(records: list[Record], draw: random.Random) -> bool:
-    small = draw.choice(
-        (
-            Record(77, b""),
-            Record(200, b""),
-            Record(MESSAGE, bytes(22)),
-            Record(CHUNK, bytes(40)),
-            Record(INDEX, bytes(6)),
-        )
-    )
+    sizes = ((77, 0), (200, 0), (MESSAGE, 22), (CHUNK, 40), (INDEX, 6))
+    code, size = draw.choice(sizes)
+    small = Record(code, bytes(size))
     place = draw.randrange(len(records))
     records[place:place] = [small] * draw.choice((100, 3000, 30_000))
     return False
@@ -253,31 +226,3 @@ _EDITS = (
     _numbers,
     _many,
 )
-
-
-def with_schemas(
-    topics: list[tuple[str, str, str, str, bytes, list[bytes]]], *, joints: bool
-) -> bytes:
-    """A file with topics (name, message encoding, type, schema encoding, schema, messages), and
-    the joints beside.
-    """
-    stream = BytesIO()
-    writer = Writer(stream, chunk_size=1 << 16)
-    writer.start()
-    log = log_of_records()
-    if joints:
-        channel = writer.register_channel(
-            TOPIC,
-            "cdr",
-            writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode()),
-        )
-        for stamp, payload in zip(log.stamp_ns.tolist(), messages(replace(log)), strict=True):
-            writer.add_message(channel, stamp, payload.tobytes(), stamp)
-    for topic, encoding, name, kind, data, contents in topics:
-        channel = writer.register_channel(topic, encoding, writer.register_schema(name, kind, data))
-        for row, message in enumerate(contents):
-            writer.add_message(
-                channel, int(log.stamp_ns[0]) + row * 10**6, message, int(log.stamp_ns[0])
-            )
-    writer.finish()  # type: ignore[no-untyped-call]
-    return stream.getvalue()

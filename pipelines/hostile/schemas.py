@@ -5,50 +5,46 @@ from __future__ import annotations
 import json
 import random
 import struct
-from collections.abc import Callable
+from io import BytesIO
 
 from google.protobuf import descriptor_pb2
 
 from pipelines.hostile import Hostile
-from pipelines.hostile.records import NUMBERS, log_of_records, with_schemas
+from pipelines.hostile.records import NUMBERS, log_of_records
+from pipelines.mutations import Topic, joint_states, write_topics
 
-Topic = tuple[str, str, str, str, bytes, list[bytes]]
 _LENGTHS = ("", "0", "1", "2", "<=3", "4294967295", "99999999999", "9" * 5000, "-1", "x")
 _TYPES = (
-    "float64",
-    "float32",
-    "int8",
-    "uint64",
-    "string",
-    "wstring",
-    "bool",
-    "a/T",
-    "a/Zero",
-    "Header",
-    "time",
-    "gone/T",
+    *("float64", "float32", "int8", "uint64", "string", "wstring", "bool"),
+    *("a/T", "a/Zero", "Header", "time", "gone/T"),
 )
+_IDL = """module a { } ; struct T typedef double sequence < > , [ ] 3 @ ( ) effort ::a::msg::T
+string unsigned long const " /* */ // # \\ union \u202e"""
 
 
 def beside(draw: random.Random) -> Hostile:
     """The joints' topic, and hostile ones beside it."""
+    log = log_of_records()
     topics = [_topic(draw, number) for number in range(draw.choice((1, 2, 30)))]
-    return Hostile(".mcap", with_schemas(topics, joints=True), "beside", log_of_records())
+    return Hostile(".mcap", _file([joint_states(log), *topics]), "beside", log)
 
 
 def alone(draw: random.Random) -> Hostile:
     """A hostile topic, and no other."""
-    return Hostile(".mcap", with_schemas([_topic(draw, 0)], joints=False), "alone", None)
+    return Hostile(".mcap", _file([_topic(draw, 0)]), "alone", None)
+
+
+def _file(topics: list[Topic]) -> bytes:
+    stream = BytesIO()
+    write_topics(stream, topics, chunk_size=1 << 16)
+    return stream.getvalue()
 
 
 def _topic(draw: random.Random, number: int) -> Topic:
-    makers: tuple[Callable[[random.Random], tuple[str, str, str, bytes, list[bytes]]], ...] = (
-        _msg,
-        _idl,
-        _protobuf,
-        _json,
-    )
-    return (f"/hostile{number}", *draw.choice(makers)(draw))
+    encoding, name, kind, definition, contents = draw.choice((_msg, _idl, _protobuf, _json))(draw)
+    start = int(log_of_records().stamp_ns[0])
+    stamped = [(start + row * 10**6, content) for row, content in enumerate(contents)]
+    return f"/hostile{number}", encoding, name, kind, definition, stamped
 
 
 def _payloads(draw: random.Random) -> list[bytes]:
@@ -107,45 +103,7 @@ def _msg(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
 
 
 def _idl(draw: random.Random) -> tuple[str, str, str, bytes, list[bytes]]:
-    words = (
-        *(
-            "module",
-            "a",
-            "{",
-            "}",
-            ";",
-            "struct",
-            "T",
-            "typedef",
-            "double",
-            "sequence",
-            "<",
-            ">",
-            ",",
-            "[",
-            "]",
-            "3",
-            "@",
-        ),
-        *(
-            "(",
-            ")",
-            "effort",
-            "::a::msg::T",
-            "string",
-            "unsigned",
-            "long",
-            "const",
-            '"',
-            "/*",
-            "*/",
-            "//",
-            "#",
-            "\\",
-            "union",
-        ),
-        *("9" * 5000, "\n", "\u202e"),
-    )
+    words = (*_IDL.split(), "9" * 5000, "\n")
     member = " ".join(draw.choice(words) for _ in range(draw.choice((3, 30, 3000))))
     sound = draw.choice(
         (
