@@ -346,51 +346,39 @@ def precision_of(prior: Prior | None, shared: Shared) -> FloatArray:
 def left_out(
     shared: Shared, logs: Sequence[LogInformation], beta: FloatArray, prior: Prior | None = None
 ) -> FloatArray:
-    """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass."""
+    """Shared parameters (n, Q) without each of n logs in turn, from `beta` and no further pass.
+
+    What is left of a kind is one sum, without differences of sums: one log may inform 1e16 times as
+    much as the others.
+    """
     estimates = np.empty((len(logs), len(shared.names)))
     loaded = np.array([log.loaded for log in logs])
     for kind in (False, True):
-        others, _ = by_kind(of_kind(logs, not kind))
-        own = of_kind(logs, kind)
-        for place, rest in zip(np.flatnonzero(loaded == kind), _without_each(own), strict=True):
-            estimates[place] = combine(shared, list(others) + rest, beta, prior)[0]
-    return estimates
-
-
-def _without_each(own: Sequence[LogInformation]) -> list[list[LogInformation]]:
-    """The likelihood of all logs of a kind but one, in one sum; none without the only one.
-
-    Without differences of sums: one log may inform 1e16 times as much as the others.
-    """
-    if len(own) < 2:
-        return [[]] * len(own)
-    c0, loaded = own[0].c0, own[0].loaded
-    S, g = np.zeros((len(own), c0.size, c0.size)), np.zeros((len(own), c0.size))
-    for place, log in enumerate(own):
-        S[place], score = log.total
-        g[place] = score - S[place] @ (c0 - log.c0)
-
-    def rest(parts: FloatArray) -> FloatArray:
+        (others, _), own = by_kind(of_kind(logs, not kind)), of_kind(logs, kind)
+        q = len(shared.log_names)
+        parts = np.zeros((len(own), q, q + 1))  # S and the score at one point
+        for part, log in zip(parts, own, strict=True):
+            S, g = log.total
+            part[:, :-1], part[:, -1] = S, g - S @ (own[0].c0 - log.c0)
         nothing = np.zeros_like(parts[:1])
         before = np.cumsum(np.concatenate([nothing, parts[:-1]]), axis=0)
         after = np.cumsum(np.concatenate([nothing, parts[:0:-1]]), axis=0)[::-1]
-        return before + after
-
-    others = []
-    for each, score in zip(rest(S), rest(g), strict=True):
-        others.append([LogInformation(loaded, c0, each[None], score[None])])
-    return others
+        for place, rest in zip(np.flatnonzero(loaded == kind), before + after, strict=True):
+            left = LogInformation(kind, own[0].c0, rest[None, :, :-1], rest[None, :, -1])
+            estimates[place] = combine(shared, [*others, left], beta, prior)[0]
+    return estimates
 
 
 FEWEST_LOGS = 4
+"""Logs from which on leaving them out shows how far an estimate moves."""
 
 
-def jackknife(logs: Sequence[LogInformation], without: FloatArray) -> FloatArray | None:
+def jackknife(logs: Sequence[LogInformation], without: FloatArray) -> FloatArray:
     """Covariance (Q, Q) of an estimate from how it moves as logs are left out.
 
     Parameters
     ----------
-    logs : n of them; None is returned for fewer than `FEWEST_LOGS`
+    logs : n of them
     without : (n, Q), estimates without each log: see `left_out`
 
     Notes
@@ -399,8 +387,6 @@ def jackknife(logs: Sequence[LogInformation], without: FloatArray) -> FloatArray
     (β_(hi) − β̄_h)². What differs from run to run is in it. A kind of which there is one log alone
     adds nothing.
     """
-    if len(logs) < FEWEST_LOGS:
-        return None
     covariance = np.zeros((without.shape[1], without.shape[1]))
     loaded = np.array([log.loaded for log in logs])
     for kind in (without[~loaded], without[loaded]):

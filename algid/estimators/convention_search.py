@@ -15,10 +15,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from math import copysign, inf, pi, remainder
+from math import copysign, pi, remainder
+from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.names import evenly_spread, outside, vector
@@ -34,13 +34,10 @@ from algid.estimators.convention_sums import (
     solved,
     summed,
     thinned,
-    together,
 )
 from algid.estimators.conventions import AS_READ, Convention
 from algid.model import F1, F2, J2, K1, K2, K3, K4, K5, K6, K7, LARGEST_PHASE, MOMENTS, PARAMETERS
 
-# of a torque's power: what the arm's true convention leaves on a log that is nearly all model
-_CLEAN = 1e-3
 # Hz and s: what is looked at, and what scales are sought in
 _FINE, _COARSE = (
     (250.0, 40.0),
@@ -48,7 +45,7 @@ _FINE, _COARSE = (
 )
 _EACH = 10.0  # s of each of several logs, at least
 _SHORTEST = 6 * WINDOW  # of motion
-_QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)  # the last two half a turn behind the first
+_TURNS = tuple(product((0.0, 0.5 * pi, pi, -0.5 * pi), (0.0, pi)))  # of both zeros
 _SHIFTED = 3  # conventions, of the best, whose zeros are set free
 _REACH, _SETTLED = 0.2, 1e-5  # rad, of the grid on which free zeros are sought
 _MOST_GRIDS = 100
@@ -214,21 +211,23 @@ def judge(
 def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgement | None:
     """Try every convention on logs of one arm that were read alike, on the stretches that move.
 
-    None where they do not move for six windows, or the torque of a motor is zero throughout.
+    None where they do not move for six windows, or the torque of a motor is zero throughout. None
+    other than as it was read stands where a bent arm explains as much: zeros turn three moments by
+    two angles, centres of mass off the links' lines, or a payload, turn each by its own.
     """
-    log = _trials(logs, gravity)
-    if log is None:
+    trials = _trials(logs, gravity)
+    if trials is None:
         return None
-    candidates = list(log.discrete())
-    judged = _judged(candidates, log.apart)
-    if judged.alone and judged.best.left.max() < _CLEAN:
-        return _of_a_bent_arm(judged, log)
-    candidates += log.shifted(candidates)
-    judged = _judged(candidates, log.apart)
+    candidates = trials.unscaled()
+    judged = _judged(candidates, trials.apart)
     if not judged.alone:
-        candidates += log.scaled()
-        judged = _judged(candidates, log.apart)
-    return _of_a_bent_arm(judged, log)
+        judged = _judged(candidates + list(trials.scaled()), trials.apart)
+    best = judged.best
+    if judged.alone and (best.family != AS_READ or max(map(abs, best.zero)) > LARGEST_PHASE):
+        bent = trials.bent()
+        if bent is not None and bent <= best.score + trials.apart:
+            return replace(judged, alone=False)
+    return judged
 
 
 def tried_together(
@@ -238,7 +237,7 @@ def tried_together(
     log = _trials(logs, gravity)
     if log is None:
         return None
-    return log.under(convention)
+    return log.under(replace(convention, zero=AS_READ.zero), convention.zero)[0]
 
 
 def zeroed_together(
@@ -273,22 +272,6 @@ def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
     return trials
 
 
-def _of_a_bent_arm(judged: Judgement, log: _Trials) -> Judgement:
-    """The judgement; of another convention none where a bent arm, as it was read, explains as much.
-
-    Zeros turn three moments by two angles; centres of mass off the links' lines, or a payload, turn
-    each by its own.
-    """
-    best = judged.best
-    small = max(abs(angle) for angle in best.zero) <= LARGEST_PHASE
-    if not judged.alone or (best.family == AS_READ and small):
-        return judged
-    bent = log.bent()
-    if bent is None or bent > best.score + log.apart:
-        return judged
-    return replace(judged, alone=False)
-
-
 def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
     as_read = next(one for one in candidates if one.convention == AS_READ)
     best = None
@@ -298,7 +281,7 @@ def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
         if best is None:
             best = candidate
             continue
-        if best.balanced and candidate.convention == best.other_side:
+        if candidate.convention in (best.convention, best.other_side if best.balanced else None):
             continue
         alone = best.convincing and candidate.score - best.score > apart
         return Judgement(as_read, best, alone)
@@ -310,39 +293,6 @@ def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
 def seconds_of_each(count: int, longest: float = _FINE[1]) -> float:
     """How much of each of `count` logs is looked at, in s, where of one alone it is `longest`."""
     return max(longest / count, _EACH)
-
-
-@dataclass(frozen=True, eq=False)
-class _Windowed:
-    """Logs thinned to one rate, and which of their windows move."""
-
-    logs: tuple[ThinnedLog, ...]
-    moving: tuple[NDArray[np.bool_], ...]
-
-    @classmethod
-    def of(cls, logs: Sequence[Recorded], rate: float, longest: float) -> _Windowed:
-        longest = seconds_of_each(len(logs), longest)
-        thin = []
-        for log in logs:
-            thin.append(thinned(log.theta, log.tau, log.dt, rate, longest))
-        return cls(tuple(thin), tuple(moving(thin)))
-
-    @property
-    def seconds(self) -> float:
-        """How long the logs move, in s."""
-        seconds = 0.0
-        for log, kept in zip(self.logs, self.moving, strict=True):
-            seconds += log.theta.shape[1] * log.dt * float(kept.mean())
-        return seconds
-
-    def summed(self, angles: Convention) -> tuple[ConventionSums, ConventionSums]:
-        """Sums with the second motor in its joint, and with it at the base."""
-        at_joint, at_base = [], []
-        for log, kept in zip(self.logs, self.moving, strict=True):
-            joint, base = summed(angles, log, kept)
-            at_joint.append(joint)
-            at_base.append(base)
-        return together(at_joint), together(at_base)
 
 
 def _least(scores: Callable[[FloatArray], FloatArray], start: FloatArray) -> FloatArray:
@@ -367,136 +317,91 @@ class _Trials:
     """Logs, mapped and fitted under any convention."""
 
     def __init__(self, logs: Sequence[Recorded], gravity: bool) -> None:
-        self._fine = _Windowed.of(logs, *_FINE)
-        self._coarse = _Windowed.of(logs, *_COARSE)
-        self.seconds = self._fine.seconds
+        self._fine, self._coarse = (
+            moving([thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs])
+            for rate, longest in (
+                (rate, seconds_of_each(len(logs), longest)) for rate, longest in (_FINE, _COARSE)
+            )
+        )
         self._passive = logs[0].passive
         self._names = ZEROED
-        self._free = np.eye(len(COLUMNS))
-        turns: Sequence[float] = _QUARTERS
+        self._free = np.eye(len(COLUMNS))[None]
+        self._turns = _TURNS
         if not gravity:
             weighs = np.array([PARAMETERS[name].weighs for name in COLUMNS])
             self._names = outside(ZEROED, np.array(COLUMNS)[weighs].tolist())
-            self._free = np.delete(self._free, weighs, axis=1)
-            turns = (0.0,)
-        self._turns = turns
+            self._free = np.delete(self._free, weighs, axis=2)
+            self._turns = _TURNS[:2]
+        self.seconds = sum(log.seconds for log in self._fine)
         self.apart = max(APART, 2 * EVIDENCE * WINDOW / max(self.seconds, _SHORTEST))
         """By how much the scores of two distinct conventions differ."""
-        self._passes: dict[Convention, tuple[ConventionSums, ConventionSums]] = {}
+        self._passes: dict[tuple[Convention, bool], tuple[ConventionSums, ConventionSums]] = {}
 
-    def under(self, convention: Convention) -> Candidate:
-        """The candidate of one convention."""
-        family, zero = replace(convention, zero=AS_READ.zero), convention.zero
+    def under(self, family: Convention, *zeros: tuple[float, float]) -> list[Candidate]:
+        """The candidates of a family with each of some zeros."""
         sums = self._sums(family, self._fine)
-        c, left, covariance = self._solved(sums, [family], self._place(zero)[None])
-        return Candidate(
-            family,
-            zero,
-            self._names,
-            c[0],
-            covariance[0],
-            left[0],
-            float(_merits(left)[0]),
-            sums.speed,
-        )
+        T = np.stack([self._place(zero) for zero in zeros])
+        c, left, covariance = solved(sums, [family], T, self._passive)
+        every = zip(zeros, c, covariance, left, _merits(left).tolist(), strict=True)
+        return [
+            Candidate(family, zero, self._names, k, V, share, score, sums.speed)
+            for zero, k, V, share, score in every
+        ]
 
     def zeroed(self, family: Convention) -> Candidate:
         """The candidate of a family with the zeros that fit best."""
-        return self.under(replace(family, zero=self._best_zero(family)))
+        return self.under(family, self._best_zero(family))[0]
 
-    def discrete(self) -> Iterator[Candidate]:
-        """Every convention without a scale, its zeros by quarter and half turns."""
+    def unscaled(self) -> list[Candidate]:
+        """The log as read, and every convention without a scale that may come near the best.
+
+        No zeros leave less than a free phase for each moment does: the families of conventions are
+        gone over from the least of that on, until no lawful convention of the rest can come near.
+        """
+        bounds: list[tuple[float, Convention]] = []
         for families in _families(self._passive):
-            yield from self._turned(families)
-
-    def shifted(self, discrete: Sequence[Candidate]) -> Iterator[Candidate]:
-        """Conventions of least residual when both zeros are free, with the zeros that fit best."""
-        families: list[Convention] = []
-        scores: list[float] = []
-        for each in _families(self._passive):
-            families += each
-            scores += self._scores(each, self._fine)
-        for place in np.argsort(scores, kind="stable")[:_SHIFTED]:
-            yield from self._with_free_zero(families[place], discrete)
+            left = self._with_phases(families, self._fine)[1]
+            bounds += zip(_merits(left).tolist(), families, strict=True)
+        found = self.under(AS_READ, AS_READ.zero)
+        for place, (bound, family) in enumerate(sorted(bounds, key=itemgetter(0))):
+            lawful = [one.score for one in found if not one.broken]
+            if lawful and bound > min(lawful) + self.apart:
+                break
+            found += self._of_family(family, free=place < _SHIFTED)
+        return found
 
     def scaled(self) -> Iterator[Candidate]:
         """Scales of both angles, or of one, of least residual at the log's own signs and order."""
         for joints in ((1, 1), (1, 0), (0, 1)):
             family = self._scaled(joints)
-            if family is None:
-                continue
-            candidates = list(self._turned([family]))
-            yield from candidates
-            yield from self._with_free_zero(family, candidates)
+            if family is not None:
+                yield from self._of_family(family)
 
-    def _turned(self, families: Sequence[Convention]) -> Iterator[Candidate]:
-        """Each family of the same angles and drive, its zeros by quarter and half turns.
+    def _of_family(self, family: Convention, *, free: bool = True) -> list[Candidate]:
+        """A family with zeros by quarter and half turns, and those that fit best if by far."""
+        turned = self.under(family, *self._turns)
+        least = min(one.score for one in turned)
+        if free and (best := self.zeroed(family)).score < least - self.apart:
+            turned.append(best)
+        return turned
 
-        The sign of both torques, and half a turn of a zero, turn signs of coefficients and nothing
-        else: conventions that differ so share a fit.
+    def _with_phases(
+        self, families: Sequence[Convention], logs: Sequence[ThinnedLog]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Coefficients (F, 15) of families of the same angles, a free phase for each moment.
+
+        With them the shares (F, 2) that are left.
         """
-        sums = self._sums(families[0], self._fine)
-        plain = self._turns[:2]
-        T = np.stack([self._place((turn, 0.0)) for turn in plain])
-        uprights = list(map(_upright, families))
-        upright = list(dict.fromkeys(uprights))
-        c, left, covariance = self._solved(sums, upright, T)
-        scores = _merits(left).tolist()
-        signs = self._signs()
-        k = c[:, None] * signs
-        covariances = signs[:, :, None] * signs[:, None] * covariance[:, None]
-        for family, own in zip(families, uprights, strict=True):
-            first = len(plain) * upright.index(own)
-            for half, (number, turn) in product((0, 1), enumerate(self._turns)):
-                fit, turned = first + number % 2, 2 * (number // 2) + half
-                yield Candidate(
-                    family,
-                    (turn, half * pi),
-                    self._names,
-                    family.torque_signs[0] * k[fit, turned],
-                    covariances[fit, turned],
-                    left[fit],
-                    scores[fit],
-                    sums.speed,
-                )
-
-    def _signs(self) -> FloatArray:
-        """Signs (4, q) of coefficients where neither, the second, the first or both zeros turn.
-
-        By half a turn.
-        """
-        signs = np.ones((4, len(self._names)))
-        for row, (one, two) in zip(signs, product((1, -1), repeat=2), strict=True):
-            for name, sign in ((K4, one), (K1, two), (K2, one * two)):
-                if name in self._names:
-                    row[self._names.index(name)] = sign
-        return signs
-
-    def _with_free_zero(
-        self, family: Convention, discrete: Sequence[Candidate]
-    ) -> Iterator[Candidate]:
-        """The zeros that fit best, where they leave far less than the discrete ones."""
-        free = self.zeroed(family)
-        least = inf
-        for one in discrete:
-            if one.family == family:
-                least = min(least, one.score)
-        if free.score < least - self.apart:
-            yield free
-
-    def _scores(self, families: Sequence[Convention], log: _Windowed) -> list[float]:
-        """Log residuals with free zeros, summed, of families of the same angles and drive."""
-        sums = self._sums(families[0], log)
-        return _sizes(self._solved(sums, families, self._free[None])[1]).tolist()
+        sums = self._sums(families[0], logs)
+        c, left, _ = solved(sums, families, self._free, self._passive)
+        return c @ self._free[0].T, left
 
     def bent(self) -> float | None:
         """What is left as the log was read with a phase for each moment.
 
         None where one is no phase.
         """
-        sums = self._sums(AS_READ, self._fine)
-        free, left, _ = self._solved(sums, [AS_READ], self._free[None])
-        c = self._free @ free[0]
+        (c,), left = self._with_phases([AS_READ], self._fine)
         places = np.array(list(map(COLUMNS.index, MOMENTS)))
         cosine, sine = c[places], c[places + 1]  # both 0 of a moment without a column
         if np.any(np.arctan2(np.abs(sine), cosine) > LARGEST_PHASE):
@@ -505,14 +410,13 @@ class _Trials:
 
     def _best_zero(self, family: Convention) -> tuple[float, float]:
         """Zeros δ1 and δ2 in rad of least residual; k1, k2 and k4 are positive if determined."""
-        sums = self._sums(family, self._fine)
-        c = self._free @ self._solved(sums, [family], self._free[None])[0][0]
+        sums, ((c,), _) = self._sums(family, self._fine), self._with_phases([family], self._fine)
         places = np.array([COLUMNS.index(K4), COLUMNS.index(K1)])  # each with its sine part next
         start = np.arctan2(c[places + 1], c[places])
 
         def scores(zeros: FloatArray) -> FloatArray:
             T = np.stack([self._place((one, two)) for one, two in zeros.tolist()])
-            return _sizes(self._solved(sums, [family], T)[1])
+            return _sizes(solved(sums, [family], T, self._passive)[1])
 
         best = _least(scores, start)
         return remainder(float(best[0]), 2 * pi), remainder(float(best[1]), 2 * pi)
@@ -523,10 +427,10 @@ class _Trials:
         None where no scale leaves far less than none.
         """
 
-        def score(scale: float, log: _Windowed) -> float:
-            return self._scores([_scaled_by(scale, joints)], log)[0]
+        def score(scale: float, logs: Sequence[ThinnedLog]) -> float:
+            return float(_sizes(self._with_phases([_scaled_by(scale, joints)], logs)[1])[0])
 
-        travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse.logs], axis=0)
+        travel = np.max([np.ptp(log.theta, axis=1) for log in self._coarse], axis=0)
         grid = _grid(travel[np.array(joints) == 1])
         scale = min(grid, key=lambda scale: score(scale, self._coarse))
         if score(scale, self._coarse) > score(1.0, self._coarse) - self.apart:
@@ -542,11 +446,6 @@ class _Trials:
             scale = nearest
         return _scaled_by(scale, joints)
 
-    def _solved(
-        self, sums: ConventionSums, families: Sequence[Convention], T: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return solved(sums, families, T, self._passive)
-
     def _place(self, zero: tuple[float, float]) -> FloatArray:
         """T (15, q) of the zeros δ1 and δ2."""
         T = np.zeros((len(COLUMNS), len(self._names)))
@@ -558,20 +457,15 @@ class _Trials:
                 T[row : row + 2, column] = np.cos(turned[name]), np.sin(turned[name])
         return T
 
-    def _sums(self, family: Convention, log: _Windowed) -> ConventionSums:
-        """Sums for a family's angles and drive.
-
-        Those of the last pass over the logs serve the next one too.
-        """
+    def _sums(self, family: Convention, logs: Sequence[ThinnedLog]) -> ConventionSums:
+        """Sums for a family's angles and drive, one pass for all that share them."""
         angles = Convention(
             swapped=family.swapped, scale=family.scale, signs=family.signs, absolute=family.absolute
         )
-        if angles not in self._passes or log is not self._fine:
-            passed = log.summed(angles)
-            if log is not self._fine:
-                return passed[family.base]
-            self._passes[angles] = passed
-        return self._passes[angles][family.base]
+        key = angles, logs is self._fine
+        if key not in self._passes:
+            self._passes[key] = summed(angles, logs)
+        return self._passes[key][family.base]
 
 
 def _families(passive: int | None = None) -> Iterator[list[Convention]]:
@@ -591,12 +485,6 @@ def _families(passive: int | None = None) -> Iterator[list[Convention]]:
                 every.append(replace(angles, torques_swapped=swap, torque_signs=signs))
         if passive is None or not base:
             yield every
-
-
-def _upright(family: Convention) -> Convention:
-    """The family whose fit differs by the sign of all coefficients at most."""
-    one, two = family.torque_signs
-    return replace(family, torque_signs=(1, one * two))
 
 
 def _scaled_by(scale: float, joints: tuple[int, int]) -> Convention:

@@ -16,7 +16,7 @@ T       c's place among the columns, for the zeros δ1 and δ2                (1
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,21 +67,23 @@ class ConventionSums:
 
 @dataclass(frozen=True, eq=False)
 class ThinnedLog:
-    """Angles and torques (2, N) as read, `dt` s apart, with velocities and windows' kernels.
+    """Angles, velocities (2, N) and torques' moments (2, R) of a log as it was read.
 
-    Velocities are (2, N - 2 `reach`).
-
-    `squares` (2, R) are the joints' squared velocities, averaged over each window.
+    `squares` (2, R) are the joints' squared velocities, averaged over each window; the windows
+    `kept` (R,) count, which move for `seconds`.
     """
 
     theta: FloatArray
     omega: FloatArray
-    tau: FloatArray
-    dt: float
-    reach: int
-    windows: Windows
-    kernels: FloatArray
+    torques: FloatArray
     squares: FloatArray
+    windows: Windows
+    kept: NDArray[np.bool_]
+
+    @property
+    def seconds(self) -> float:
+        """How long the log moves, in s."""
+        return self.theta.shape[1] * self.windows.dt * float(self.kept.mean())
 
 
 def _windows(dt: float, rate: float) -> tuple[int, Windows]:
@@ -106,58 +108,53 @@ def thinned(
     width, windows = _windows(dt, rate)
     assert windows.bandwidth is not None
     count = min(theta.shape[1], round(longest / dt)) // width
-    theta = theta[:, : count * width].reshape(2, count, width).mean(axis=2)
-    tau = tau[:, : count * width].reshape(2, count, width).mean(axis=2)
-    dt, bandwidth = windows.dt, windows.bandwidth
-    omega, kernels = correlate(theta, differentiator(dt, bandwidth)), windows.kernels()
-    squares = windows.moments(omega**2, kernels[0])
-    return ThinnedLog(theta, omega, tau, dt, half_length(dt, bandwidth), windows, kernels, squares)
+    theta, tau = (
+        signal[:, : count * width].reshape(2, count, width).mean(axis=2) for signal in (theta, tau)
+    )
+    inner = slice(reach := half_length(windows.dt, windows.bandwidth), count - reach)
+    omega = correlate(theta, differentiator(windows.dt, windows.bandwidth))
+    plain = windows.kernels()[0]
+    squares, torques = windows.moments(omega**2, plain), windows.moments(tau[:, inner], plain)
+    every = np.ones(squares.shape[1], dtype=bool)
+    return ThinnedLog(theta[:, inner], omega, torques, squares, windows, every)
 
 
-def moving(logs: Sequence[ThinnedLog]) -> list[NDArray[np.bool_]]:
-    """Windows (R,) of each log in which a joint exceeds `AT_REST` of its RMS speed in all logs.
+def moving(logs: Sequence[ThinnedLog]) -> list[ThinnedLog]:
+    """The logs with windows in which a joint exceeds `AT_REST` of its RMS speed in all of them.
 
     Where both joints stand, dry friction may hold them, and no equation of motion holds.
     """
     every = np.concatenate([log.squares for log in logs], axis=1)
     least = AT_REST**2 * np.mean(every, axis=1, keepdims=True)
-    return [np.any(log.squares >= least, axis=0) for log in logs]
+    return [replace(log, kept=np.any(log.squares >= least, axis=0)) for log in logs]
 
 
-def together(sums: Sequence[ConventionSums]) -> ConventionSums:
-    """The sums of several logs of one arm."""
-    weight = np.array([one.independent for one in sums])
-    squares = np.array([one.speed**2 for one in sums])
-    gram, cross, power = sums[0].gram, sums[0].cross, sums[0].power
-    for one in sums[1:]:
-        gram = gram + one.gram
-        cross = cross + one.cross
-        power = power + one.power
-    speed = np.sqrt(weight @ squares / max(float(weight.sum()), 1e-300))
-    return ConventionSums(gram, cross, power, speed, float(weight.sum()))
-
-
-def summed(
-    angles: Convention, log: ThinnedLog, kept: NDArray[np.bool_]
-) -> tuple[ConventionSums, ConventionSums]:
-    """Sums over the windows `kept` (R,) for angles so mapped.
+def summed(angles: Convention, logs: Sequence[ThinnedLog]) -> tuple[ConventionSums, ConventionSums]:
+    """Sums over the windows of logs of one arm for angles so mapped.
 
     With the second motor in its joint, and with it at the base.
     """
-    theta = angles.angles(log.theta[:, log.reach : -log.reach])
-    omega = angles.angles(log.omega)  # linear without zeros
-    motion = Motion(theta, omega, omega)
-    X = log.windows.columns(MODEL, motion)[:, _PLACES][:, :, kept]
-    tau = log.tau[:, log.reach : -log.reach]
-    torques = log.windows.moments(tau, log.kernels[0])[:, kept]
-    speed = np.sqrt(np.mean(omega**2, axis=1))
-    independent = X.shape[2] / OVERLAP
-    power = np.sum(torques**2, axis=1)
-
-    def of_columns(Y: FloatArray) -> ConventionSums:
-        return ConventionSums(Y @ Y.swapaxes(1, 2), Y @ torques.T, power, speed, independent)
-
-    return of_columns(X), of_columns(np.stack([X[0] - X[1], X[1]]))
+    size = len(COLUMNS)
+    grams, crosses = np.zeros((2, 2, size, size)), np.zeros((2, 2, size, 2))
+    power, squares, independent = np.zeros(2), np.zeros(2), 0.0
+    for log in logs:
+        omega = angles.angles(log.omega)  # linear without zeros
+        motion = Motion(angles.angles(log.theta), omega, omega)
+        X = log.windows.columns(MODEL, motion)[:, _PLACES][:, :, log.kept]
+        torques, weight = log.torques[:, log.kept], X.shape[2] / OVERLAP
+        both = X, np.stack([X[0] - X[1], X[1]])
+        for gram, cross, Y in zip(grams, crosses, both, strict=True):
+            gram += Y @ Y.swapaxes(1, 2)
+            cross += Y @ torques.T
+        power += np.sum(torques**2, axis=1)
+        squares += weight * np.mean(omega**2, axis=1)
+        independent += weight
+    speed = np.sqrt(squares / max(independent, 1e-300))
+    joint, base = (
+        ConventionSums(gram, cross, power, speed, independent)
+        for gram, cross in zip(grams, crosses, strict=True)
+    )
+    return joint, base
 
 
 def solved(

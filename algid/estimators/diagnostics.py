@@ -28,12 +28,10 @@ from algid.estimators.combine import (
     combine,
     likelihood,
     of_kind,
-    sandwich,
     scaled_pinv,
     scaled_pinvs,
-    scatters,
 )
-from algid.estimators.fit import Fit, Status
+from algid.estimators.fit import Fit, Status, alone
 from algid.estimators.identifiability import sizes
 from algid.estimators.parametrisation import Shared
 from algid.estimators.weak import Normal
@@ -299,8 +297,8 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
         for normal in normals:
             gram = normal.gram[:, joint]
             logs.append(LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]))
-        c, covariance, _ = by_themselves(shared, logs)
-        return c[both], covariance[np.ix_(both, both)]
+        own = alone(shared, logs)
+        return own.values[both], own.covariance[np.ix_(both, both)]
 
     f, F = of_joint(0)
     s, S = of_joint(1)
@@ -375,16 +373,15 @@ def payload_distance(fit: Fit) -> float | None:
     unloaded, loaded = of_kind(fit.logs, False), of_kind(fit.logs, True)
     if not (fit.shared.payload and unloaded and loaded):
         return None
-    c, covariance, determined = by_themselves(fit.shared, unloaded)
-    c_loaded, covariance_loaded, determined_loaded = by_themselves(fit.shared, loaded)
-    if not (determined and determined_loaded):
-        return None
-    if _singular(covariance) or _singular(covariance_loaded):
-        return None
+    bare, burdened = alone(fit.shared, unloaded), alone(fit.shared, loaded)
+    for own in (bare, burdened):
+        if own.unidentifiable or _singular(own.covariance):
+            return None
     freedom = len(fit.shared.log_names) - (len(fit.shared.names) - len(fit.shared.log_names))
-    arm = Prior.of(fit.shared.log_names, c, covariance)
-    S = scaled_pinv(covariance_loaded)
-    information = LogInformation(True, c_loaded, S[None], np.zeros_like(c_loaded)[None])
+    arm = Prior.of(bare.names, bare.values, bare.covariance)
+    S = scaled_pinv(burdened.covariance)
+    nothing = np.zeros_like(burdened.values)
+    information = LogInformation(True, burdened.values, S[None], nothing[None])
     _, _, value = combine(fit.shared, [information], fit.values, arm)
     return max(0.0, normal_exceeded(float(chi2_tail(freedom, max(0.0, -2 * value)))))
 
@@ -439,15 +436,3 @@ def repeatability(fit: Fit) -> MassScatter | None:
     low = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.025)))
     high = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.975)))
     return MassScatter(np.array(masses), std, (low, high))
-
-
-def by_themselves(
-    shared: Shared, logs: Sequence[LogInformation]
-) -> tuple[FloatArray, FloatArray, bool]:
-    """Coefficients (q,) of logs of one kind, their sandwich (q, q), whether all are determined."""
-    own = Shared(shared.model, shared.delay)
-    plain = [replace(log, loaded=False) for log in logs]
-    c, S, _ = combine(own, plain, np.zeros(len(own.names)))
-    inverse = scaled_pinv(S)
-    meat, _ = sandwich(scatters(own, plain, c))
-    return c, inverse @ meat @ inverse, bool(np.linalg.matrix_rank(inverse @ S) == len(c))

@@ -14,6 +14,7 @@ from algid.base.compiled import student_quantile
 from algid.base.names import outside, places_outside
 from algid.base.significance import NORMAL, level
 from algid.estimators.combine import (
+    FEWEST_LOGS,
     LogInformation,
     Prior,
     Scatter,
@@ -99,8 +100,6 @@ class Fit:
     residual : sums over the innovations, log by log; empty where they were not gathered
     freedom : independent stretches of log behind a sandwich, else samples of torque
     iterations, converged : of the refined estimator
-    without : (n, Q) or None
-        The estimates without each of the logs, where error bars needed them.
     endogeneity : distance of instruments from least squares, in standard deviations, or None
     notes : remarks on the fit, such as why the refined estimator returned the weak estimate
     moved : (2,), rad, how far each joint travelled
@@ -126,7 +125,6 @@ class Fit:
     iterations: int = 0
     converged: bool = True
     prior: Prior | None = None
-    without: FloatArray | None = None
     endogeneity: float | None = None
     notes: tuple[Notice, ...] = ()
     moved: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
@@ -216,36 +214,6 @@ class Fit:
         return float(np.sqrt(max(float(determined @ self.covariance @ determined), 0.0)))
 
 
-@dataclass(frozen=True, eq=False)
-class OwnEstimate:
-    """One log's own coefficients and standard deviations (q,), infinite where not determined."""
-
-    loaded: bool
-    values: FloatArray
-    std: FloatArray
-
-    def __post_init__(self) -> None:
-        keep_arrays(self)
-
-
-def own_estimates(fit: Fit) -> tuple[OwnEstimate, ...]:
-    """Each log's own estimate of `Shared.log_names` from its blocks alone, unloaded logs first."""
-    estimates = []
-    shared = Shared(fit.shared.model, fit.shared.delay)
-    for log in fit.logs:
-        alone = [replace(log, loaded=False)]
-        values, S, _ = combine(shared, alone, log.c0, fit.shrinkage)
-        known = examine(fit.shared.log_names, values, S, fit.moved)
-        covariance = known.covariance
-        if fit.intervals != "likelihood":
-            meat, _ = sandwich(scatters(shared, alone, values))
-            meat = meat + precision_of(fit.shrinkage, shared)
-            covariance = covariance @ meat @ covariance
-        std = np.where(known.determined, np.sqrt(np.maximum(np.diag(covariance), 0.0)), np.inf)
-        estimates.append(OwnEstimate(log.loaded, values, std))
-    return tuple(estimates)
-
-
 _STATUS: dict[bool, Status] = {True: "OK", False: "NOT_IDENTIFIABLE"}
 
 
@@ -261,7 +229,6 @@ def finish(
     samples: int = 1,
     repeats: Groups = (),
     shrinkage: Prior | None = None,
-    without: FloatArray | None = None,
 ) -> Fit:
     """Solve for the shared parameters, and attach error bars and statuses.
 
@@ -285,8 +252,6 @@ def finish(
         Logs that repeat each other, where that was looked at: one log for sandwich and jackknife.
     shrinkage : Prior, optional
         The prior's part on terms that are shrunk, which physics bounds and no log leaves open.
-    without : (n, Q), optional
-        The estimates without each of the logs, where the estimator has made them itself.
 
     Notes
     -----
@@ -311,12 +276,9 @@ def finish(
         each: Sequence[LogInformation] = logs
         if repeats:
             each = merged(logs, repeats)
-        if without is None:
-            without = left_out(shared, logs, beta, prior)
-        alone = without
-        if len(each) < len(logs):
-            alone = left_out(shared, each, beta, prior)
-        repeated = jackknife(each, alone)
+        repeated = None
+        if len(each) >= FEWEST_LOGS:
+            repeated = jackknife(each, left_out(shared, each, beta, prior))
         intervals = "sandwich" if repeated is None else "jackknife"
         kinds, known_before = scatters(shared, each, beta), precision_of(prior, shared)
         meat, freedom = sandwich(kinds)
@@ -349,11 +311,23 @@ def finish(
         unidentifiable=known.left_open,
         logs=tuple(logs),
         prior=prior,
-        without=without,
         moved=moved,
         repeats=repeats,
         shrinkage=shrinkage,
     )
+
+
+def alone(
+    shared: Shared,
+    logs: Sequence[LogInformation],
+    prior: Prior | None = None,
+    *,
+    coloured: bool = True,
+) -> Fit:
+    """The fit of a log's own coefficients, `Shared.log_names`, to logs of one kind alone."""
+    own, plain = Shared(shared.model, shared.delay), [replace(log, loaded=False) for log in logs]
+    nowhere = np.full(2, np.inf)
+    return finish("weak", own, plain, logs[0].c0, nowhere, prior, coloured=coloured)
 
 
 OF_FEW = 2.3

@@ -60,16 +60,23 @@ _FEWEST = 0.5  # share of the windows that must not go astray
 _TOGETHER = 8 * (weak.PIECE_SAMPLES + 4096)  # samples whose windows are simulated side by side
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Moments:
-    """Sums of one log: `gram` as in the module's table.
+    """Sums of one log: of `rows` windows, of which `astray` could not be simulated.
 
-    `rows` windows, of which `astray` could not be simulated.
+    `moves` says whether the coefficients move the arm.
     """
 
-    gram: FloatArray
-    rows: int
-    astray: int
+    grams: BlockSums = field(default_factory=BlockSums)
+    rows: int = 0
+    astray: int = 0
+    moves: bool = True
+
+    def add(self, both: FloatArray, good: NDArray[np.bool_]) -> None:
+        """Add instruments and columns (2, 2 q + 1, R) of windows; only `good` ones (R,) count."""
+        self.rows += good.size
+        self.astray += int(np.sum(np.logical_not(good)))
+        self.grams.add(weak.grams(np.where(good, both, 0.0), OVERLAP // _STRIDE))
 
 
 def fit(problem: Problem, start: Fit | None = None) -> Fit:
@@ -130,20 +137,24 @@ def evidence(
         if shared.delay:
             c[-1] -= settings.shift.delay  # the windows are shifted by it: the column is a change's
         for sums in moments(sources, settings, c, following):
-            if sums is None or sums.astray > _FEWEST * sums.rows:
+            if not sums.moves or sums.astray > _FEWEST * sums.rows:
                 return None
             if sums.rows:
-                logs.append(replace(_projected(sums, c, kind), c0=c0))
+                gram, good = sums.grams.values(), sums.rows - sums.astray
+                logs.append(replace(projected(gram, good, c, kind), c0=c0))
     return logs
 
 
-def _projected(sums: Moments, c: FloatArray, loaded: bool) -> LogInformation:
-    """A log's likelihood projected on the instruments, weighed by its residual at `c` (q,)."""
+def projected(gram: FloatArray, rows: int, c: FloatArray, loaded: bool) -> LogInformation:
+    """A log's likelihood projected on the instruments, weighed by its residual at `c` (q,).
+
+    `gram` is that of so many `rows`, as in the module's table.
+    """
     q = c.size
     v = np.concatenate([np.zeros(q), -c, [1.0]])
-    weights = row_weights(sums.gram.sum(axis=0), v, sums.rows - sums.astray)
+    weights = row_weights(gram.sum(axis=0), v, rows)
     # Overlapping rows repeat each other: a window's worth of rows counts as two.
-    gram = np.einsum("a,baxy->bxy", weights * (2.0 * _STRIDE / OVERLAP), sums.gram)
+    gram = np.einsum("a,baxy->bxy", weights * (2.0 * _STRIDE / OVERLAP), gram)
     A, V = gram[:, :q, q : 2 * q], gram[:, :q, :q].sum(axis=0)
     projection = A.sum(axis=0).T @ scaled_pinv(V)
     scores = gram[:, :q, -1] - A @ c
@@ -155,51 +166,25 @@ def moments(
     settings: WeakSettings,
     c: FloatArray,
     following: Following | None = None,
-) -> list[Moments | None]:
+) -> list[Moments]:
     """Sums over each log, the windows simulated with coefficients `c`.
 
-    None of those that these do not move. Where it is known how the arm is `following` a
-    reference, the motion that this explains stands in place of a simulated one.
+    Where it is known how the arm is `following` a reference, the motion that this explains stands
+    in place of a simulated one.
 
     The windows of many pieces are simulated side by side: a step costs the same for few as for
     many.
     """
-    gathered = [_Sums() for _ in sources]
+    gathered = [Moments() for _ in sources]
     for batch in _batches(sources, settings):
         if following is None:
             instruments = _side_by_side(batch, settings, c)
         else:
             instruments = _explained(following, batch, settings, c)
         for (number, _, _), (both, good, moves) in zip(batch, instruments, strict=True):
-            if moves:
-                gathered[number].add(both, good)
-            else:
-                gathered[number].moves = False
-    return [sums.total() for sums in gathered]
-
-
-@dataclass(eq=False)
-class _Sums:
-    """Sums of one log so far."""
-
-    grams: BlockSums = field(default_factory=BlockSums)
-    rows: int = 0
-    astray: int = 0
-    moves: bool = True
-
-    def add(self, both: FloatArray, good: NDArray[np.bool_]) -> None:
-        """Add instruments and columns (2, 2 q + 1, R) of windows; only `good` ones (R,) count."""
-        self.rows += good.size
-        self.astray += int(np.sum(np.logical_not(good)))
-        self.grams.add(weak.grams(np.where(good, both, 0.0), OVERLAP // _STRIDE))
-
-    def total(self) -> Moments | None:
-        """The sums; None where the coefficients do not move the arm."""
-        if not self.moves:
-            return None
-        if not self.rows:
-            return Moments(np.zeros((0, 2, 1, 1)), 0, 0)
-        return Moments(self.grams.values(), self.rows, self.astray)
+            gathered[number].moves &= moves
+            gathered[number].add(both, good)
+    return gathered
 
 
 _Piece = tuple[int, Segment, Windows]
@@ -240,38 +225,28 @@ def _side_by_side(
 
     Their shapes are (2, 2 q + 1, R) and (R,).
     """
-    model = settings.model
+    model, delay = settings.model, settings.estimate_delay
     linear = c[: len(model.names)]
-    theta, omega, tau, measured, dt = [], [], [], [], []
+    cuts, dt = [], []
     for _, piece, windows in batch:
-        cut = _cut(piece, windows)
-        theta.append(cut.theta)
-        omega.append(cut.omega)
-        tau.append(cut.tau)
-        measured.append(cut.measured)
-        dt.append(np.full(cut.theta.shape[1], windows.dt))
-    moved = _simulated(
-        model,
-        linear,
-        np.concatenate(dt),
-        _Cut(
-            np.concatenate(theta, axis=1),
-            np.concatenate(omega, axis=1),
-            np.concatenate(tau, axis=1),
-            np.concatenate(measured, axis=1),
-        ),
+        cuts.append(cut(piece, windows))
+        dt.append(np.full(cuts[-1][0].shape[1], windows.dt))
+    theta, omega, tau, measured = (
+        np.concatenate(parts, axis=1) for parts in zip(*cuts, strict=True)
     )
+    start = np.concatenate([theta, omega])
+    states, good, moves = simulated(model, linear, np.concatenate(dt), start, tau, measured)
     last = 0
     for (_, piece, windows), periods in zip(batch, dt, strict=True):
-        own = slice(last, last + periods.size)
-        last = own.stop
-        columns = windows.equations(model, piece, settings.estimate_delay, linear)
+        own = slice(last, last := last + periods.size)
+        ends = [rows[:, own].reshape(2, -1) for rows in (states[:2], tau[:, :, :-1], states[2:])]
+        motion = Segment(0.0, windows.dt, ends[0], ends[1], ends[2])
+        columns = windows.equations(model, piece, delay, linear)
         plain = Windows(windows.dt, windows.length, 0.0, None)
-        motion = moved.end_to_end(own, windows.dt)
-        Z = plain.equations(model, motion, settings.estimate_delay, linear)[:, :-1, ::OVERLAP]
+        Z = plain.equations(model, motion, delay, linear)[:, :-1, ::OVERLAP]
         both = np.concatenate([Z, columns[:, :, ::_STRIDE]], axis=1)
         both = np.where(_moving(windows, piece, settings)[:, None], both, 0.0)
-        yield both, moved.good[own], bool(np.all(moved.moves[own]))
+        yield both, good[own], bool(np.all(moves[own]))
 
 
 def _explained(
@@ -301,25 +276,13 @@ def _moving(windows: Windows, piece: Segment, settings: WeakSettings) -> NDArray
     return windows.square_speeds(piece)[:, ::_STRIDE] >= np.square(settings.rest)[:, None]
 
 
-@dataclass(frozen=True, eq=False)
-class _Cut:
-    """R windows of L samples, cut from logs.
+def cut(piece: Segment, windows: Windows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Every `_STRIDE`-th window of a piece: R windows of L samples.
 
-    Parameters
-    ----------
-    theta, omega : (2, R), angles and velocities at their starts
-    tau : (2, R, L + 1)
-    measured : (2, R, L), angles
+    Returns
+    -------
+    Angles and velocities (2, R) at their starts, torques (2, R, L + 1) and angles (2, R, L)
     """
-
-    theta: FloatArray
-    omega: FloatArray
-    tau: FloatArray
-    measured: FloatArray
-
-
-def _cut(piece: Segment, windows: Windows) -> _Cut:
-    """Every `_STRIDE`-th window of a piece."""
     length, margin = OVERLAP * windows.step, windows.margin
     starts = margin + np.arange(
         0, len(piece) - 2 * margin - length + 1, windows.step * _STRIDE, dtype=np.int64
@@ -328,65 +291,60 @@ def _cut(piece: Segment, windows: Windows) -> _Cut:
     at = np.clip(instants - windows.shift / windows.dt, 0, len(piece) - 1)
     before = np.minimum(at.astype(np.int64), len(piece) - 2)
     tau = piece.tau[:, before] + (at - before) * (piece.tau[:, before + 1] - piece.tau[:, before])
-    theta, omega = _started(piece, windows, starts)
-    return _Cut(theta, omega, tau, piece.theta[:, instants[:, :-1]])
+    measured = piece.theta[:, instants[:, :-1]]
+    if windows.bandwidth is None:
+        assert piece.omega is not None  # `Windows.equations` has asked for it
+        return piece.theta[:, starts], piece.omega[:, starts], tau, measured
+    reach = half_length(piece.dt, windows.bandwidth)
+    theta, omega = (
+        correlate(piece.theta, kernel(piece.dt, windows.bandwidth))[:, starts - reach]
+        for kernel in (smoother, differentiator)
+    )
+    return theta, omega, tau, measured
 
 
-@dataclass(frozen=True, eq=False)
-class _Simulated:
-    """The motion that R windows of L samples would have had.
-
-    Parameters
-    ----------
-    theta, omega, tau : (2, R, L)
-    good : (R,), windows that have not run away
-    moves : (R,), windows on which the mass matrix is positive definite
-    """
-
-    theta: FloatArray
-    omega: FloatArray
-    tau: FloatArray
-    good: NDArray[np.bool_]
-    moves: NDArray[np.bool_]
-
-    def end_to_end(self, own: slice, dt: float) -> Segment:
-        """Some of the windows, of samples `dt` s apart, one after another."""
-        theta = self.theta[:, own].reshape(2, -1)
-        tau = self.tau[:, own].reshape(2, -1)
-        omega = self.omega[:, own].reshape(2, -1)
-        return Segment(0.0, dt, theta, tau, omega)
-
-
-def _simulated(model: Model, c: FloatArray, dt: FloatArray, cut: _Cut) -> _Simulated:
+def simulated(
+    model: Model,
+    c: FloatArray,
+    dt: FloatArray,
+    start: FloatArray,
+    tau: FloatArray,
+    measured: FloatArray,
+) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
     """The motion that windows cut from logs would have had, of samples `dt` (R,) s apart.
 
     Runge-Kutta's fourth order in steps of some `_STEP` s, all windows side by side, from the
-    measured start. (To start earlier, so that what the unmodelled torque did before has faded,
-    made the instruments too weak.)
+    measured `start` (4, R). (To start earlier, so that what the unmodelled torque did before has
+    faded, made the instruments too weak.)
+
+    Returns
+    -------
+    Angles and velocities (4, R, L), the windows (R,) that have not run away, and those (R,) on
+    which the mass matrix is positive definite
     """
     stride = _stride(float(dt[0]))
     h = stride * dt
     inside = np.arange(stride) / stride
     # the torque where the method asks for it
-    acts = np.ascontiguousarray(np.moveaxis(cut.tau[:, :, :: stride // 2], 2, 0))
-    x = np.concatenate([cut.theta, cut.omega])
+    acts = np.ascontiguousarray(np.moveaxis(tau[:, :, :: stride // 2], 2, 0))
+    x = start
     parts = []  # a step each: states at both ends, and their rates
     with np.errstate(
         divide="ignore", invalid="ignore", over="ignore"
-    ):  # `_inert` judges afterwards
-        for step in range(0, 2 * (cut.measured.shape[2] // stride), 2):
+    ):  # what moves no arm is judged afterwards
+        for step in range(0, 2 * (measured.shape[2] // stride), 2):
             ahead, first, last = advanced(model, c, x, acts[step : step + 3], h)
             # of the angles, the velocity at the end is nearer than the method's last rate
             last = np.concatenate([ahead[2:], last[2:]])
             parts.append((x, ahead, h * first, h * last))
             x = np.clip(ahead, -1e6, 1e6)
     states = _cubic(np.moveaxis(np.array(parts), 0, -1), inside)
-    thetas, omegas = states[:2], states[2:]
-    good = np.abs(thetas - cut.measured).max(axis=(0, 2)) < _ASTRAY
-    moves = _inert(model, c, thetas[:, :, ::stride])
+    good = np.abs(states[:2] - measured).max(axis=(0, 2)) < _ASTRAY
+    (m11, m12), (_, m22) = inertia(model, c, states[:2, :, ::stride])
+    moves = np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)
     # A window that ran away is left out; products of its velocities would overflow.
-    thetas[:, ~good], omegas[:, ~good] = 0.0, 0.0
-    return _Simulated(thetas, omegas, cut.tau[:, :, :-1], good, moves)
+    states[:, ~good] = 0.0
+    return states, good, moves
 
 
 def _cubic(parts: FloatArray, s: FloatArray) -> FloatArray:
@@ -397,22 +355,3 @@ def _cubic(parts: FloatArray, s: FloatArray) -> FloatArray:
     rise_of_end = s**2 * (3 - 2 * s)
     weights = np.stack([1 - rise_of_end, rise_of_end, s * (1 - s) ** 2, s**2 * (s - 1)])
     return np.einsum("wark,ws->arks", parts, weights).reshape(*parts.shape[1:3], -1)
-
-
-def _started(
-    piece: Segment, windows: Windows, starts: NDArray[np.int64]
-) -> tuple[FloatArray, FloatArray]:
-    """Angles and velocities (2, R) at the starts of windows."""
-    if windows.bandwidth is None:
-        assert piece.omega is not None  # `Windows.equations` has asked for it
-        return piece.theta[:, starts], piece.omega[:, starts]
-    reach = half_length(piece.dt, windows.bandwidth)
-    theta = correlate(piece.theta, smoother(piece.dt, windows.bandwidth))
-    omega = correlate(piece.theta, differentiator(piece.dt, windows.bandwidth))
-    return theta[:, starts - reach], omega[:, starts - reach]
-
-
-def _inert(model: Model, c: FloatArray, theta: FloatArray) -> NDArray[np.bool_]:
-    """Whether the mass matrix is positive definite at the angles (2, R, S) of each window (R,)."""
-    (m11, m12), (_, m22) = inertia(model, c, theta)
-    return np.all((m11 > 0) & (m11 * m22 > m12**2), axis=-1)

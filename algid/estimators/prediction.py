@@ -315,9 +315,7 @@ def cross_validate(
         return None
     total = PredictionScore()
     columns = len(fit.shared.model.names)
-    without = fit.without
-    if without is None:
-        without = left_out(fit.shared, fit.logs, fit.values, fit.prior)
+    without = left_out(fit.shared, fit.logs, fit.values, fit.prior)
     for place, (source, log) in enumerate(zip(sources, fit.logs, strict=True)):
         c = fit.shared.coefficients(without[place], log.loaded)
         delay = float(c[columns:].sum())

@@ -35,7 +35,7 @@ from algid.estimators.modulating_functions import OVERLAP
 from algid.estimators.problem import WeakSettings
 from algid.estimators.weak import Normal, grams, overlapping, solve
 from algid.model import FIRST_TERMS, Model
-from algid.signals.segments import Segment, append
+from algid.signals.segments import Segment, settled
 
 BoolArray = NDArray[np.bool_]
 
@@ -199,23 +199,8 @@ def sound(segments: Iterable[Segment], limits: Sequence[Limit]) -> Iterator[Segm
     if not limits:
         yield from segments
         return
-    held: Segment | None = None
-    decided = 0  # samples of what is held that were given out, or left out
-    for piece in segments:
-        if held is not None and not piece.continues:
-            yield from _cut(held, limits, decided, len(held))
-            held = None
-        if held is None:
-            held, decided = piece, 0
-        else:
-            held = append(held, piece)
-        guard = _guard(piece.dt)
-        ready = max(decided, len(held) - guard)  # of the rest, what follows is not known yet
-        yield from _cut(held, limits, decided, ready)
-        first = max(0, ready - guard - 1)
-        held, decided = held.part(first, len(held)), ready - first
-    if held is not None:
-        yield from _cut(held, limits, decided, len(held))
+    for held, first, last in settled(segments, lambda dt: _guard(dt) + 1):
+        yield from _cut(held, limits, first, last)
 
 
 def _guard(dt: float) -> int:

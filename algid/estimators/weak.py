@@ -26,26 +26,23 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.estimators.body import with_body
 from algid.estimators.combine import (
-    FEWEST_LOGS,
     BlockSums,
     LogInformation,
     Prior,
     by_kind,
     combine,
     scaled_pinv,
-    scaled_pinvs,
 )
 from algid.estimators.fit import Fit, finish
 from algid.estimators.innovations import LAGS, ResidualSums, pooled, residual_sums
 from algid.estimators.modulating_functions import OVERLAP, Known, Windows, row_weights
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError, WeakSettings
-from algid.model import K2, K4, attributes
+from algid.model import DELAYS, K2, K4, attributes
 from algid.signals.differences import held_torque
-from algid.signals.segments import Segment, pieces
+from algid.signals.segments import Segment, append, pieces
 
 Gathered = TypeVar("Gathered")
-_TOGETHER = 256  # logs that are left out at once
 State = TypeVar("State")
 Weighed = TypeVar("Weighed")
 Solved = tuple[FloatArray, list[LogInformation]]
@@ -88,7 +85,9 @@ def fit(problem: Problem) -> Fit:
         base, change = settings.shift.delay, 0.0
         if shared.delay:
             change = float(beta[len(model.names)])
-            beta, logs = _from(shared, beta, logs, base)
+            since = base * np.isin(shared.names, DELAYS)
+            beta = beta + since
+            logs = [replace(log, c0=log.c0 + since[: log.c0.size]) for log in logs]
             settings = settings.delayed(base + change)
         settled = True
         if not model.linear:
@@ -100,12 +99,7 @@ def fit(problem: Problem) -> Fit:
         if settled and abs(change) < _DELAY_SETTLED * max(normal.dt for normal in every):
             break
     moved = np.max([normal.moved for normal in every], axis=0)
-    without = None
-    if len(every) >= FEWEST_LOGS:
-        without = _left_out(shared, normals, solved, prior, base, beta)
-    return with_body(
-        finish("weak", shared, logs, beta, moved, prior, coloured=True, without=without)
-    )
+    return with_body(finish("weak", shared, logs, beta, moved, prior, coloured=True))
 
 
 def normals_of(
@@ -147,22 +141,6 @@ def first_estimate(
     _, under_load = solved[True]
     ((whole,), _) = by_kind(under_load)
     return first_payload(shared, arm, whole), logs + under_load
-
-
-def _from(
-    shared: Shared, beta: FloatArray, logs: list[LogInformation], base: float
-) -> tuple[FloatArray, list[LogInformation]]:
-    """Estimate and likelihoods in the whole delay, where they were in the change from `base`."""
-    if not shared.delay:
-        return beta, logs
-    place = len(shared.model.names)
-
-    def whole(values: FloatArray) -> FloatArray:
-        values = values.copy()
-        values[place] += base
-        return values
-
-    return whole(beta), [replace(log, c0=whole(log.c0)) for log in logs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,34 +285,13 @@ def overlapping(
             windows = Windows(piece.dt, window, settings.shift.at(piece.dt), bandwidth)
         fresh = len(piece)
         if piece.continues and before is not None:
-            piece = _prefixed(before, piece, windows.overlap + left_over)
+            first = max(len(before) - windows.overlap - left_over, 0)
+            piece = replace(append(before.part(first, len(before)), piece), continues=True)
         left_over = (len(piece) - 2 * windows.margin) % windows.step
         before = piece
         if settings.shift.held:
             piece = replace(piece, tau=held_torque(piece.tau))
         yield piece, windows, fresh
-
-
-def _prefixed(before: Segment, piece: Segment, overlap: int) -> Segment:
-    """The piece with the last `overlap` samples of the one before."""
-    first = max(len(before) - overlap, 0)
-
-    def joined(old: FloatArray, new: FloatArray) -> FloatArray:
-        return np.concatenate([old[:, first:], new], axis=1)
-
-    omega = reference = None
-    if before.omega is not None and piece.omega is not None:
-        omega = joined(before.omega, piece.omega)
-    if before.reference is not None and piece.reference is not None:
-        reference = joined(before.reference, piece.reference)
-    return replace(
-        piece,
-        start=piece.start - (len(before) - first) * piece.dt,
-        theta=joined(before.theta, piece.theta),
-        tau=joined(before.tau, piece.tau),
-        omega=omega,
-        reference=reference,
-    )
 
 
 def grams(X: FloatArray, rows: int) -> FloatArray:
@@ -378,80 +335,27 @@ def evidence(normal: Normal, weights: FloatArray, c: FloatArray, loaded: bool) -
     return LogInformation(loaded, c, S, gram[:, :-1, -1] - S @ c)
 
 
-def solve(
-    normals: Sequence[Normal], loaded: bool = False
-) -> tuple[FloatArray, list[LogInformation]]:
-    """Coefficients (q,) of logs that share them, and each log's likelihood there.
+def solve(normals: Sequence[Normal], loaded: bool = False) -> Solved:
+    """Coefficients of logs that share them, and each log's likelihood there.
 
     The rows of a joint weigh by its own residual, log by log.
     """
-    c, weights = _of_subsets(normals, np.ones((1, len(normals))))
-    logs = []
-    for normal, own in zip(normals, weights[0], strict=True):
-        logs.append(evidence(normal, own, c[0], loaded))
-    return c[0], logs
-
-
-def _of_subsets(normals: Sequence[Normal], kept: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (k, q) of k subsets of n logs, and the weights (k, n, 2) of their rows there.
-
-    `kept` (k, n) is 1 of a log that counts, else 0.
-    """
     grams = np.stack([normal.gram.sum(axis=0) for normal in normals])
     rows = np.stack([normal.rows for normal in normals])
-    size, flat = grams.shape[-1], grams.reshape(2 * len(normals), -1)
 
     def weigh(c: FloatArray) -> FloatArray:
-        each: FloatArray = np.ones((len(kept), len(normals), 2))
-        if c.size:  # after the first time
-            each = row_weights(grams, np.insert(-c, c.shape[1], 1.0, axis=1), rows)
-        return each * kept[:, :, None]
+        if not c.size:  # the first time
+            return np.ones((len(normals), 2))
+        return row_weights(grams, np.append(-c, 1.0), rows)
 
     def solved(weights: FloatArray, _: FloatArray) -> FloatArray:
-        total = (weights.reshape(len(kept), -1) @ flat).reshape(-1, size, size)
-        return np.einsum("kij,kj->ki", scaled_pinvs(total[:, :-1, :-1]), total[:, :-1, -1])
+        total = np.tensordot(weights, grams, 2)
+        return scaled_pinv(total[:-1, :-1]) @ total[:-1, -1]
 
-    start: FloatArray = np.empty((len(kept), 0))
+    start: FloatArray = np.empty(0)
     c, _ = reweighted(weigh, solved, start)
-    return c, weigh(c)
-
-
-def _left_out(
-    shared: Shared,
-    normals: Mapping[bool, list[Normal]],
-    solved: Mapping[bool, Solved],
-    prior: Prior | None,
-    base: float,
-    beta: FloatArray,
-) -> FloatArray:
-    """Estimates (n, Q) without each log, every other one weighed anew.
-
-    A log that is alike to most has weight in proportion: with the weights of all logs no estimate
-    would move. `base` is the delay, in s, from which the passes estimate a change; without the only
-    log of its kind stands `beta`.
-    """
-    every = {kind: (c, list(by_kind(logs)[0])) for kind, (c, logs) in solved.items()}
-    estimates = []
-    for kind, own in normals.items():
-        if len(own) == 1:
-            estimates.append(beta)
-            continue
-        for first in range(0, len(own), _TOGETHER):
-            kept = 1 - np.eye(len(own))[first : first + _TOGETHER]
-            for rest in _summed(own, kept, kind):
-                start, logs = first_estimate(shared, every | {kind: rest}, prior)
-                start, logs = _from(shared, start, logs, base)
-                estimates.append(combine(shared, logs, start, prior)[0])
-    return np.array(estimates)
-
-
-def _summed(normals: Sequence[Normal], kept: FloatArray, loaded: bool) -> Iterator[Solved]:
-    """Coefficients (q,) of each subset of logs, and their likelihood in one sum."""
-    whole = np.stack([normal.gram.sum(axis=0) for normal in normals])
-    for c, weights in zip(*_of_subsets(normals, kept), strict=True):
-        gram = np.tensordot(weights, whole, 2)[None, None]  # as of one joint whose weight is 1
-        total = replace(normals[0], gram=gram)
-        yield c, [evidence(total, np.ones(1), c, loaded)]
+    both = zip(normals, weigh(c), strict=True)
+    return c, [evidence(normal, own, c, loaded) for normal, own in both]
 
 
 def first_payload(shared: Shared, arm: FloatArray, loaded: LogInformation) -> FloatArray:

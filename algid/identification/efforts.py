@@ -11,16 +11,12 @@ horizontal plane.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from algid.arm import FloatArray
 from algid.base.names import within
 from algid.base.significance import SURE
 from algid.estimators.combine import of_kind
-from algid.estimators.diagnostics import by_themselves
-from algid.estimators.fit import Fit
+from algid.estimators.fit import Fit, alone
 from algid.model import EVERY_TERM, K3, K4, K5, K6, K7, MOMENTS, SINE_OF, names_of, terms_named
 from algid.notices import Notice, Remedy
 from algid.physics.effort import FRICTION
@@ -137,13 +133,9 @@ def _size(known: Known, name: str) -> tuple[float, float]:
 
 def _of_fit(fit: Fit) -> Known:
     """The fit's value of each parameter, with its standard deviation even where it is open."""
-    return _known(fit.names, fit.values, fit.covariance)
-
-
-def _known(names: Sequence[str], values: FloatArray, covariance: FloatArray) -> Known:
-    spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    pairs = zip(values.tolist(), spreads.tolist(), strict=True)
-    return dict(zip(names, pairs, strict=True))
+    spreads = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    pairs = zip(fit.values.tolist(), spreads.tolist(), strict=True)
+    return dict(zip(fit.names, pairs, strict=True))
 
 
 def _own(fit: Fit, loaded: bool) -> Known:
@@ -154,5 +146,4 @@ def _own(fit: Fit, loaded: bool) -> Known:
     logs = of_kind(fit.logs, loaded)
     if not logs:
         return {}
-    values, covariance, _ = by_themselves(fit.shared, logs)
-    return _known(fit.shared.log_names, values, covariance)
+    return _of_fit(alone(fit.shared, logs))

@@ -14,7 +14,7 @@ from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.names import outside, places_outside, within
 from algid.base.significance import chance, level
 from algid.estimators.diagnostics import FAR_BEYOND, broken_bounds, repeatability, term_worths
-from algid.estimators.fit import Fit, own_estimates
+from algid.estimators.fit import Fit, alone
 from algid.estimators.parametrisation import PAYLOAD_PARAMETERS
 from algid.estimators.prediction import PredictionScore, cross_validate, score
 from algid.estimators.terms import Selection
@@ -276,8 +276,10 @@ def fit_summary(found: Fitted) -> results.FitSummary:
 
 def _by_log(fit: Fit) -> Iterator[dict[str, Estimate]]:
     """Each log's own estimates."""
-    for own in own_estimates(fit):
-        yield _estimates(fit.shared.log_names, own.values, own.std, fit.quantile)
+    coloured = fit.intervals != "likelihood"
+    for log in fit.logs:
+        own = alone(fit.shared, [log], fit.shrinkage, coloured=coloured)
+        yield _estimates(own.names, own.values, own.std, fit.quantile)
 
 
 def _noise(fit: Fit) -> dict[str, float]:

@@ -31,6 +31,13 @@ def _contradicts(notice: Notice) -> bool:
     return notice.code in CONTRADICTED
 
 
+def _is_doubtful(outcome: Identified) -> bool:
+    """True unless a likelihood stands, within the bounds of physics and upright."""
+    if outcome.fit is None or outcome.estimator != "refined":
+        return True
+    return bool(outcome.fit.broken_bounds) or has_code(outcome.notices, "WRONG_ZERO")
+
+
 def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
     """Checks, as code and case, of single logs that the fit of all of them makes more precisely."""
     codes = []
@@ -78,8 +85,9 @@ def result_of(outcome: Identified, settings: Settings, survey: Recordings) -> Re
     of_logs: list[Notice] = []
     lost = contradicted = False
     accepted = {code for log in survey.logs for code in log.origin.reading.accepted}
+    doubtful = _is_doubtful(outcome)
     for log, is_down in zip(survey.logs, down, strict=True):
-        for notice in survey.notices(log):
+        for notice in survey.notices(log, doubtful=doubtful):
             if notice.key in replaced or (is_down and notice.code in _OF_GRAVITY):
                 continue
             of_logs.append(notice.of(PurePath(log.name).name))  # the paths stand among the logs

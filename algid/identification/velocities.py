@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from algid.options import flag
 from algid.settings import Settings
 from algid.signals.filters import correlate, differentiator, half_length, reflected
 from algid.signals.observers import PAPER_POLES, LuenbergerObserver
-from algid.signals.segments import Segment, append
+from algid.signals.segments import Segment, settled
 
 
 def with_velocities(
@@ -28,7 +27,11 @@ def with_velocities(
         If measured velocities are asked for and the log has none.
     """
     if settings.velocity != "measured" and not luenberger:
-        yield from _differentiated(survey.segments(log), settings.bandwidth)
+        bandwidth = settings.bandwidth
+        for held, first, last in settled(
+            survey.segments(log), lambda dt: half_length(dt, bandwidth)
+        ):
+            yield _derived(held, bandwidth).part(first, last)
         return
     observer: LuenbergerObserver | None = None
     for segment in survey.segments(log):
@@ -46,30 +49,10 @@ def with_velocities(
         yield replace(segment, omega=observer.velocities(segment.theta))
 
 
-def _differentiated(segments: Iterable[Segment], bandwidth: float) -> Iterator[Segment]:
-    """The segments with velocities by the zero-phase differentiator, in parts of other lengths.
-
-    What comes out does not depend on how the segments were cut: samples wait until the kernel
-    reaches no further than what follows them.
-    """
-    held: Segment | None = None
-    done = 0  # samples of what is held that were given out
-    for segment in chain(segments, [None]):
-        if held is not None and (segment is None or not segment.continues):
-            yield _derived(held, bandwidth).part(done, len(held))
-            held = None
-        if segment is None:
-            return
-        held, done = (segment, 0) if held is None else (append(held, segment), done)
-        reach = half_length(held.dt, bandwidth)
-        if len(held) - reach > max(done, reach):
-            yield _derived(held, bandwidth).part(done, len(held) - reach)
-            first = max(0, len(held) - 2 * reach)
-            held, done = held.part(first, len(held)), len(held) - reach - first
-
-
 def _derived(segment: Segment, bandwidth: float) -> Segment:
-    """The segment with velocities; its ends go on by point reflection.
+    """The segment with velocities by the zero-phase differentiator.
+
+    Its ends go on by point reflection.
 
     One that is shorter than half a kernel has differences of neighbours.
     """

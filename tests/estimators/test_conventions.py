@@ -12,8 +12,11 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.estimators.convention_search import (
+    _TURNS,
     Judgement,
     Recorded,
+    _families,
+    _trials,
     judge,
     judge_together,
 )
@@ -237,6 +240,24 @@ def test_an_arm_with_one_motor_tells_its_convention(
     assert found.alone
     assert (found.best.convention == AS_READ) == (mistake == "none")
     np.testing.assert_allclose(found.best.k[:5], k[:5], rtol=0.02, atol=0.02 * k[:5].max())
+
+
+@pytest.mark.parametrize("row", ["none", "tau1", "absolute", "three at once", "noise"])
+def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) -> None:
+    """Every convention with its zeros by quarter turns, against those that bounds leave."""
+    theta, tau = measured(bench.bare)
+    if row == "noise":
+        tau = np.random.default_rng(2).standard_normal(tau.shape)
+    elif row != "none":
+        theta, tau = spoiled(row, theta, tau)
+    trials = _trials([Recorded(theta, tau, DT)], True)
+    assert trials is not None
+    looked_at = trials.unscaled()
+    every = [trials.under(one, *_TURNS) for families in _families() for one in families]
+    best = min((one.score for one in looked_at if not one.broken), default=np.inf)
+    seen = {one.convention for one in looked_at}
+    for one in (one for own in every for one in own if not one.broken):
+        assert one.convention in seen or one.score > best + trials.apart
 
 
 def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:

@@ -17,13 +17,12 @@ from algid.estimators import weak
 from algid.estimators.combine import LogInformation
 from algid.estimators.diagnostics import (
     broken_bounds,
-    by_themselves,
     constrained,
     length_by_constants,
     payload_distance,
     term_worths,
 )
-from algid.estimators.fit import Fit, finish
+from algid.estimators.fit import Fit, alone, finish
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
 from algid.model import Model
@@ -153,12 +152,12 @@ def test_the_distance_of_two_arms_is_that_of_what_no_payload_explains(bench: Ben
     """χ² of the loaded constants less the arm's and the payload's of another solver."""
     logs = [bench.log(loaded, 1e-3, 27) for loaded in (False, True)]
     fit = weak.fit(Problem([partial(list, logs[:1])], [partial(list, logs[1:])]))
-    (c, V, _), (c_loaded, W, _) = (by_themselves(fit.shared, [log]) for log in fit.logs)
-    whitening = np.linalg.inv(np.linalg.cholesky(V + W))
+    bare, burdened = (alone(fit.shared, [log]) for log in fit.logs)
+    whitening = np.linalg.inv(np.linalg.cholesky(bare.covariance + burdened.covariance))
 
     def left(p: FloatArray) -> FloatArray:
         z = payload_constants(p[0], p[1], p[2], 9.81)
-        return np.asarray(whitening @ (c_loaded - with_payload(c, z)))
+        return np.asarray(whitening @ (burdened.values - with_payload(bare.values, z)))
 
     start = np.array([bench.payload, bench.arm.l1, bench.arm.l2])
     squares = 2 * scipy.optimize.least_squares(left, start, x_scale=start).cost

@@ -12,7 +12,7 @@ import pytest
 from algid.arm import FloatArray
 from algid.estimators import weak
 from algid.estimators.combine import LogInformation
-from algid.estimators.fit import finish, own_estimates
+from algid.estimators.fit import alone, finish
 from algid.estimators.identifiability import examine, open_directions
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem
@@ -135,7 +135,7 @@ def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:
     assert fit.spread(share) == pytest.approx(np.sqrt(of_merged @ covariance @ of_merged), rel=0.02)
     assert fit.spread(axis(k5=1)) == np.inf
     assert fit.spread(axis(k1=1)) == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-6)
-    (own,) = own_estimates(fit)
+    own = alone(shared, [log])
     np.testing.assert_array_equal(
         np.isinf(own.std), [False, False, True, False, True, False, False]
     )
