@@ -380,37 +380,3 @@ def test_a_profile_is_given_in_any_form_and_its_settings_as_keywords(
     readings = [one.log.reading for one in found]
     assert all(one and one.zero == "hanging" for one in readings)
     assert [one and one.channels["tau1"].sign for one in readings] == [-1] * 6
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ({"estimater": "weak"}, "^estimater: no setting has this name; did you mean estimator\\?$"),
-        ({"xyzzy": 1}, "^xyzzy: no setting has this name; known are estimator, .*, zero, "),
-        ({"estimator": "weakest"}, "^--estimator: expected 'refined', .*, found 'weakest'$"),
-        (
-            {"model": "coulomb,nothing"},
-            "^--model: expected auto, plain or some of .*; found 'nothing'$",
-        ),
-        ({"gravity": -1}, "^--gravity: expected a number from "),
-        ({"bandwidth": None}, "^--set bandwidth: expected a number from "),
-        ({"poles": [1, 2]}, "^--set poles 1,2: "),
-        ({"poles": 7}, "^--set poles: expected six numbers, found 7$"),
-        (
-            {"zero": "down"},
-            r"^--zero \(profile: zero\): expected 'horizontal', .*, found 'down'$",
-        ),
-        ({"tau1": {"unit": "m"}}, r"^--set \(profile: tau1.unit\): expected "),
-        (
-            {"profile": {"zeros": "hanging"}},
-            "^setting zeros: extra inputs are not permitted, found 'hanging'$",
-        ),
-        ({"profile": "nowhere.toml"}, "^nowhere.toml: "),
-        ({"profile": 3}, "^profile: expected a path, a dict or a Profile, found int$"),
-    ],
-)
-def test_a_keyword_is_checked_as_its_flag(
-    columns: dict[str, Any], options: dict[str, Any], expected: str
-) -> None:
-    with pytest.raises(SettingError, match=expected):
-        algid.identify(columns, **options)

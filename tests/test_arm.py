@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -134,64 +133,6 @@ def test_energy_grows_by_what_the_drives_do_less_what_friction_takes() -> None:
     )
     power = np.sum(tau * omega, axis=0) - k[5] * omega[0] ** 2 - k[6] * omega[1] ** 2
     np.testing.assert_allclose((ahead - behind) / (2 * h), power, atol=1e-5 * np.abs(power).max())
-
-
-def _by_pinocchio(pin: Any, arm: Arm, payload: float) -> Any:
-    """The arm built body by body: x along each link, y up, both joints about z."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, -arm.g, 0.0])
-    first = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint1")
-    elbow = pin.SE3(np.eye(3), np.array([arm.l1, 0.0, 0.0]))
-    second = model.addJoint(first, pin.JointModelRZ(), elbow, "joint2")
-    links = [
-        (first, arm.m1, arm.lc1, arm.I1),
-        (second, arm.m2, arm.lc2, arm.I2),
-        (second, payload, arm.l2, 0.0),
-    ]
-    for joint, mass, along, inertia in links:
-        body = pin.Inertia(mass, np.array([along, 0.0, 0.0]), np.diag([0.0, inertia, inertia]))
-        model.appendBodyToJoint(joint, body, pin.SE3.Identity())
-    return model
-
-
-@pytest.mark.parametrize("g", [9.81, 1.62, 0.0])
-@pytest.mark.parametrize("payload", [0.0, PAYLOAD])
-def test_torque_inertia_and_energy_are_those_of_pinocchio(payload: float, g: float) -> None:
-    """Arms drawn at random, by recursive Newton-Euler, the composite rigid bodies and the bodies'
-    own energies.
-    """
-    pin = pytest.importorskip("pinocchio")
-    draw = np.random.default_rng(11)
-    theta, omega, alpha = states(20)
-    for _ in range(4):
-        m1, m2, l1, l2, i1, i2, b1, b2 = draw.uniform(0.05, 1.0, 8)
-        arm = Arm(m1, m2, 0.4 * l1, 0.6 * l2, l1, l2, i1, i2, b1, b2, g)
-        k = with_payload(arm.constants(), arm.payload_constants(payload))
-        model = _by_pinocchio(pin, arm, payload)
-        data = model.createData()
-        torque, accelerations = (
-            inverse_dynamics(k, theta, omega, alpha),
-            forward_dynamics(k, theta, omega, alpha),
-        )
-        m11, m12, m22 = mass_matrix(k, theta)
-        energies = energy(k, theta, omega)
-        for n in range(20):
-            q, v, a = theta[:, n], omega[:, n], alpha[:, n]
-            drag = np.array([b1, b2]) * v
-            expected = pin.rnea(model, data, q, v, a) + drag
-            # rounding of sums of terms up to 1e4 N m
-            np.testing.assert_allclose(torque[:, n], expected, rtol=1e-11, atol=1e-10)
-            np.testing.assert_allclose(
-                accelerations[:, n], pin.aba(model, data, q, v, a - drag), rtol=1e-8, atol=1e-8
-            )
-            M = np.triu(pin.crba(model, data, q))
-            np.testing.assert_allclose(
-                [m11[n], m12[n], m22[n]], [M[0, 0], M[0, 1], M[1, 1]], rtol=1e-12
-            )
-            whole = pin.computeKineticEnergy(model, data, q, v) + pin.computePotentialEnergy(
-                model, data, q
-            )
-            np.testing.assert_allclose(energies[n], whole, rtol=1e-12, atol=1e-12)
 
 
 def test_what_is_handed_out_read_only_cannot_be_written_to() -> None:

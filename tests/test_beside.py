@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from algid.base.runtime import Beside, Worker, ahead, executor, keep_to_one_core
+from algid.base.runtime import Beside, Worker, ahead, keep_to_one_core
 
 
 def test_items_read_ahead_keep_their_order() -> None:
@@ -34,14 +34,6 @@ def test_no_thread_is_left_when_the_consumer_leaves() -> None:
     assert threading.active_count() == before
 
 
-def test_items_are_worked_on_in_order_and_to_the_last_one() -> None:
-    seen: list[int] = []
-    with Worker(seen.append) as worker:
-        for item in range(100):
-            worker.push(item)
-    assert seen == list(range(100))
-
-
 @pytest.mark.parametrize("damaged", [1, 2])  # while items come, and behind the last one
 def test_an_error_of_the_work_reaches_whoever_hands_items_over(damaged: int) -> None:
     def work(item: int) -> None:
@@ -55,21 +47,6 @@ def test_an_error_of_the_work_reaches_whoever_hands_items_over(damaged: int) -> 
 
     with pytest.raises(ValueError, match="damaged"):
         hand_over()
-
-
-def test_an_error_beside_the_work_is_not_hidden_by_the_works_own() -> None:
-    def work(item: int) -> None:
-        raise ValueError(item)
-
-    def hand_over() -> None:
-        with Worker(work) as worker:
-            worker.push(0)
-            raise KeyError
-
-    before = threading.active_count()
-    with pytest.raises(KeyError):
-        hand_over()
-    assert threading.active_count() == before
 
 
 def test_work_beside_gives_its_result_or_its_error() -> None:
@@ -96,11 +73,3 @@ def test_a_process_that_keeps_to_one_core_starts_no_thread() -> None:
     assert Beside(threading.current_thread).result() is threading.current_thread()
     with pytest.raises(ZeroDivisionError):
         Beside(lambda: 1 // 0).result()
-
-
-@pytest.mark.usefixtures("one_core")
-def test_an_error_comes_where_the_work_was_done_at_once() -> None:
-    with executor(2) as pool:
-        assert pool.submit(divmod, 7, 2).result() == (3, 1)
-        with pytest.raises(ZeroDivisionError):
-            pool.submit(divmod, 7, 0).result()

@@ -245,12 +245,6 @@ def test_a_second_signal_kills_and_an_echo_of_the_first_does_not() -> None:
     assert (running.returncode, told) == (130, "algid: stopped; nothing half-written is left\n")
 
 
-def test_what_nohup_ignores_stays_ignored() -> None:
-    script = command("nothing", limit='trap "" HUP')
-    script[2] = script[2].replace("exec", "kill -HUP $$; exec")
-    assert subprocess.run(script, env=environment(), check=False, timeout=60).returncode == 0
-
-
 def test_the_command_dies_with_the_process_that_was_started(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,6 @@ from algid.base.errors import OutputError
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
 from algid.batches.jobs import Job, name_fault
-from algid.batches.manifest import read_manifest
 from algid.batches.records import (
     Input,
     JobRecord,
@@ -31,7 +30,6 @@ from algid.batches.records import (
     write_record,
 )
 from algid.batches.run import Batch, BatchConfig, BatchOutcome, sweep
-from algid.batches.table import jobs_frame, write_jobs
 from algid.settings import Settings
 
 
@@ -264,24 +262,6 @@ def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
     ):
         _run(logs, out, executor)
     assert executor.ran == []
-
-
-@pytest.mark.parametrize("year", ["1970-01-01T00:00:00+00:00", "2261-12-31T23:59:59", "2026-01-31"])
-def test_odd_times_of_logs_stand_in_the_table(tmp_path: Path, year: str) -> None:
-    (tmp_path / "m.toml").write_text(
-        f"[[job]]\nname = 'x'\nlogs = 'x.csv'\ntime = '{year}'\npayload = {2**63 - 1}\n"
-    )
-    (job,) = read_manifest(tmp_path / "m.toml")
-    far = Input(str(tmp_path / "x.csv"), 1, 10**22)  # a file's time of change may be any
-    record = replace(_record("x"), job=job, inputs=(far,))
-    write_jobs(
-        open_store(str(tmp_path)),
-        [record, replace(record, start_ns=2**63 - 1, job=replace(job, time=None))],
-    )
-    table = pl.read_parquet(tmp_path / "jobs.parquet")
-    assert [str(time)[:4] for time in table["time"]] == [year[:4], "2262"]
-    assert table["changed"].to_list() == [[None], [None]]
-    assert jobs_frame([record])["label_payload"].to_list() == [float(2**63 - 1)]
 
 
 def test_touched_logs_are_hashed_once_and_the_table_is_written_for_changes_alone(

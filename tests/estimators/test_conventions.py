@@ -260,19 +260,6 @@ def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) 
         assert one.convention in seen or one.score > best + trials.apart
 
 
-def test_without_gravity_the_zero_of_the_first_joint_means_nothing(bench: Bench) -> None:
-    theta, tau = measured(bench.bare)
-    k1, k2, k4 = (bench.truth[place] for place in (0, 1, 3))
-    weight = k2 * np.cos(theta.sum(axis=0))
-    level = tau - np.stack([weight + k4 * np.cos(theta[0]), weight])
-    for turned in (0.0, 1.0):
-        found = judge(theta + np.array([[turned], [0.0]]), level, DT, gravity=False)
-        assert found is not None
-        assert found.alone
-        assert found.best.convention == AS_READ
-        assert found.best.k[0] == pytest.approx(k1, rel=0.02)  # noise of 3e-4 rad
-
-
 def test_logs_that_cannot_tell() -> None:
     theta, tau = np.random.default_rng(0).standard_normal((2, 2, 900))
     assert judge(theta, tau, 1e-3) is None

@@ -122,22 +122,3 @@ def test_what_start_and_prior_know_stays_known(bench: Bench) -> None:
     assert told.prior is sure
     assert told.values[3] == pytest.approx(1.01 * k4, rel=1e-3)
     assert told.std[3] < 2e-5 * k4
-
-
-def test_logs_side_by_side_have_the_sums_that_each_has_alone(bench: Bench) -> None:
-    """Also where rates differ, so that windows need their own simulations, or clocks a little."""
-    k, log = bench.arm.constants(), bench.log()
-    drifting = replace(log, dt=1.001 * log.dt)
-    slower = Segment(0.0, 2 * log.dt, log.theta[:, ::2], log.tau[:, ::2])
-    short = Segment(0.0, log.dt, log.theta[:, :3000], log.tau[:, :3000])
-    none = Segment(0.0, log.dt, log.theta[:, :50], log.tau[:, :50])
-    sources: list[Source] = [
-        partial(list, [one]) for one in (log, drifting, short, slower, none, log)
-    ]
-    together = instruments.moments(sources, WeakSettings(), k)
-    for source, found in zip(sources, together, strict=True):
-        (alone,) = instruments.moments([source], WeakSettings(), k)
-        assert (found.rows, found.astray) == (alone.rows, alone.astray)
-        if found.rows:
-            ours, theirs = found.grams.values(), alone.grams.values()
-            np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-18)

@@ -10,7 +10,6 @@ from algid.model import (
     UNITS,
     Model,
     Motion,
-    partials,
     regressor,
     sensitivity,
     sine_cosine,
@@ -115,26 +114,6 @@ def test_sine_and_cosine_are_exact_at_every_angle() -> None:
     unit = np.finfo(float).eps  # a unit in the last place of 1
     assert np.max(np.abs(sine - [math.sin(angle) for angle in theta])) <= unit
     assert np.max(np.abs(cosine - [math.cos(angle) for angle in theta])) <= unit
-
-
-@pytest.mark.parametrize(
-    "model", [FULL, *(Model((term,)) for term in TERMS)], ids=lambda model: "+".join(model.terms)
-)
-def test_partials_are_the_slopes_of_the_torque(model: Model) -> None:
-    motion, step = _motion(), 1e-6
-    c = np.array([VALUES[name] for name in model.names])
-    slopes = partials(model, c, motion)
-    for order in range(3):
-        for joint in range(2):
-            signals = [motion.theta, motion.omega, motion.alpha]
-            move = np.zeros((2, 1))
-            move[joint] = step
-            ahead = [s + move * (place == order) for place, s in enumerate(signals)]
-            behind = [s - move * (place == order) for place, s in enumerate(signals)]
-            expected = (torque(model, c, Motion(*ahead)) - torque(model, c, Motion(*behind))) / (
-                2 * step
-            )
-            assert np.allclose(slopes[order, :, joint], expected, atol=1e-6)  # central differences
 
 
 def test_a_horizontal_arm_has_no_gravity_columns() -> None:

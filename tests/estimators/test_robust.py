@@ -14,8 +14,8 @@ import pytest
 from algid.arm import FloatArray
 from algid.base.criteria import AT_REST
 from algid.estimators import instruments, robust, weak
-from algid.estimators.combine import LogInformation, Prior, sandwich, scatters
-from algid.estimators.fit import Fit, finish
+from algid.estimators.combine import LogInformation, Prior
+from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.robust import Expected, RobustProblem, _crossed, dispersion, shrink
@@ -79,34 +79,6 @@ def test_dispersion_is_the_variance_of_scores_over_the_information() -> None:
     apart = [LogInformation(False, log.c0, log.S, log.g + rng.standard_normal(9)) for log in quiet]
     # what differs from log to log alone
     assert dispersion(SHARED, apart, np.zeros(9)) == pytest.approx(25.0, rel=0.2)
-
-
-def test_covariances_of_one_log_and_of_many() -> None:
-    """Of white scores all ways give the inverse information, the prior's part beside it."""
-    rng = np.random.default_rng(4)
-    prior = Prior(("o1", "o2"), np.zeros(2), np.diag([1e-9, 1e6]))
-    S = np.stack([np.eye(9)] * 30)
-    logs = [LogInformation(False, np.zeros(9), S, rng.standard_normal((30, 9))) for _ in range(60)]
-
-    def finished(logs: list[LogInformation]) -> Fit:
-        still = np.ones(2)
-        return finish(
-            "weak", SHARED, logs, np.zeros(9), still, prior, coloured=True, shrinkage=prior
-        )
-
-    many = finished(logs)
-    assert many.intervals == "jackknife"
-    # 60 squares a parameter: ± 18 %
-    np.testing.assert_allclose(np.diag(many.covariance)[:8], 1 / 1800, rtol=0.7)
-    assert np.mean(np.diag(many.covariance)[:8]) == pytest.approx(1 / 1800, rel=0.25)
-    assert many.covariance[8, 8] == pytest.approx(1e-6, rel=0.01)  # held by the prior, as wide
-    one = finished(logs[:1])
-    assert one.intervals == "sandwich"
-    # of one log nothing differs: half of it is the information's, half the sandwich's
-    meat, _ = sandwich(scatters(SHARED, logs[:1], one.values))
-    np.testing.assert_allclose(
-        np.diag(one.covariance)[:8], (1 / 30 + np.diag(meat)[:8] / 900) / 2, rtol=1e-6
-    )
 
 
 def least_squares(sources: Sequence[Source], settings: WeakSettings) -> Fit:

@@ -64,7 +64,7 @@ def test_intervals_of_a_long_log_hold() -> None:
         assert fit.intervals == "sandwich"
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
-    holds_95(np.array([ratios(seed) for seed in range(300)]))
+    holds_95(np.array([ratios(seed) for seed in range(120)]))
 
 
 def test_a_gap_starts_new_windows(bench: Bench) -> None:

@@ -45,7 +45,7 @@ def correlated(seed: int = 5, std: float = 0.01, value: dict[str, float] = VALUE
 
 
 def test_draws_are_students_with_the_estimates_covariance() -> None:
-    result, count = correlated(std=1e-3), 6000
+    result, count = correlated(std=1e-3), 3000
     several = list(islice(draws_of(result, "arm", 1, Knowns(), links=False), count))
     assert sum(refused for *_, refused in several) == 0
     assert result.fit is not None

@@ -1,5 +1,5 @@
-"""Some eighty identifications and exports, each as the few numbers and codes that its users
-rely on.
+"""Identifications, exports and files read, each as the few numbers and codes that its users rely
+on.
 
 The suite guards a rebuilding: whatever moves a number or a code shows here, meant or not. It
 proves nothing right; that is the work of the tests beside it, which compare with truth from
@@ -20,6 +20,7 @@ import numpy as np
 import algid
 from algid.log import Log
 from algid.synth.sensors import Sensors
+from tests.golden.files import sounds
 from tests.golden.scenes import SCENES
 from tests.processes import Outcome
 from tests.report.test_brief import shown
@@ -252,6 +253,8 @@ def cases() -> Iterator[Case]:
     yield Case("known arm", _known_arm)
     for form in ("urdf", "mjcf", "sdf", "python", "c", "payload"):
         yield Case(f"export {form}", _exported(form))
+    for sound in sounds():
+        yield Case(f"file {sound.name}", sound.read)
     yield Case("C.1, one run", _real("dfki/C1_sysid", slice(2, 3)), real=True)
     yield Case("C.1, three runs", _real("dfki/C1_sysid", slice(0, 3)), real=True)
     yield Case("A.0, two runs", _real("dfki/A0_sysid", slice(0, 2)), real=True)

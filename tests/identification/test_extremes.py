@@ -29,9 +29,7 @@ def log_of(t: FloatArray, theta: FloatArray, tau: FloatArray) -> Log:
     return Log(np.rint(t * 1e9).astype(np.int64), theta, tau, Origin("log", "", {}))
 
 
-@pytest.mark.parametrize(
-    ("rate", "seconds"), [(20, 1), (5, 5), (5, 10), (10, 2), (10, 5), (20, 2), (3, 10), (1, 30)]
-)
+@pytest.mark.parametrize(("rate", "seconds"), [(20, 1), (5, 10), (1, 30)])
 def test_a_log_too_short_for_the_likelihood_is_refused_with_what_it_takes(
     rate: float, seconds: float
 ) -> None:
@@ -50,7 +48,7 @@ def test_a_loaded_log_too_short_for_the_likelihood_is_refused() -> None:
         identify(log_of(*moving(100, 10)), log_of(*moving(10, 5)), report=False)
 
 
-@pytest.mark.parametrize("spike", [1e6, 1e12, 1e29])
+@pytest.mark.parametrize("spike", [1e6, 1e29])
 def test_a_spike_in_an_angle_is_no_convention(spike: float, tmp_path: Path) -> None:
     t, theta, tau = moving(100, 10)
     assert judge(theta, tau, 0.01) is not None
@@ -66,8 +64,7 @@ def test_a_spike_in_an_angle_is_no_convention(spike: float, tmp_path: Path) -> N
     ).parameters
 
 
-@pytest.mark.parametrize("spike", [1e6, 1e29])
-def test_a_spike_in_a_torque_overflows_nothing(spike: float) -> None:
+def test_a_spike_in_a_torque_overflows_nothing() -> None:
     t, theta, tau = moving(100, 10)
-    tau[1, 333] += spike
+    tau[1, 333] += 1e29
     assert identify(log_of(t, theta, tau), report=False).parameters

@@ -74,10 +74,9 @@ def test_a_delay_of_some_samples_is_a_delay() -> None:
     assert result.parameters["delay"].estimate == pytest.approx(4e-3, abs=2e-4)
 
 
-@pytest.mark.parametrize("held", [True, False], ids=["held", "even"])
-def test_where_a_log_does_not_tell_the_intervals_hold_both(held: bool) -> None:
+def test_where_a_log_does_not_tell_the_intervals_hold_both() -> None:
     """Three seconds of slow motion: half a sample hides among friction and weight."""
-    here = scene("slow", held, SEED)
+    here = scene("slow", True, SEED)
     log = here.log(np.random.default_rng(2)).part(2000, 5000)
     result = identify(log, settings=Settings(model="plain"), report=False)
     hold = result.fit.torque_hold if result.fit is not None else None
@@ -89,7 +88,7 @@ def test_where_a_log_does_not_tell_the_intervals_hold_both(held: bool) -> None:
     assert delay.ci95 is not None
     assert delay.ci95[0] is not None
     assert delay.ci95[1] is not None
-    assert delay.ci95[0] < (5e-4 if held else 0.0) < delay.ci95[1]
+    assert delay.ci95[0] < 5e-4 < delay.ci95[1]
     assert np.nanmax(np.abs(distances(result, here.arm.constants()))) < FARTHEST
 
 
@@ -102,18 +101,17 @@ def test_a_payload_is_weighed_with_the_hold_of_its_arm() -> None:
     assert again.fit.torque_hold.used == "zoh"
 
 
-@pytest.mark.parametrize("held", [True, False], ids=["held", "even"])
-def test_a_slow_log_of_a_faster_controller_leaves_open_how_late_it_acts(held: bool) -> None:
+def test_a_slow_log_of_a_faster_controller_leaves_open_how_late_it_acts() -> None:
     """A controller of 1 kHz, logged at 100 Hz: k6 would be three deviations off."""
-    here = scene("slow100", held, 302)
-    log = here.log(np.random.default_rng([302, 3, held]))
+    here = scene("slow100", True, 302)
+    log = here.log(np.random.default_rng([302, 3, True]))
     result = identify(log, report=False)
     assert "TORQUE_HOLD" in [one.code for one in result.notices]
     delay = result.parameters["delay"]
     assert delay.estimate is not None
     assert delay.std is not None
-    assert abs(delay.estimate - (5e-4 if held else 0.0)) < FARTHEST * delay.std < 1.5e-3
+    assert abs(delay.estimate - 5e-4) < FARTHEST * delay.std < 1.5e-3
     off = distances(result, here.arm.constants())
     assert abs(off[CONSTANT_NAMES.index("k6")]) < FARTHEST
     told = identify(log, settings=Settings(torque_hold="foh"), report=False)
-    assert (abs(distances(told, here.arm.constants())[5]) > 2) == held
+    assert abs(distances(told, here.arm.constants())[5]) > 2

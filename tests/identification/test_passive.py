@@ -24,8 +24,6 @@ from algid.signals.segments import Segment, segments
 from algid.synth.cases import load_case
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import SimulatedMotion, simulate
-from algid.tracks.result import track_json
-from algid.tracks.run import track_log
 from pipelines import passive as scenes
 from pipelines.accuracy_scenes import case_of
 from tests.cli.commands import app
@@ -110,7 +108,7 @@ def test_exact_logs_give_exact_constants(estimator: object, passive: int) -> Non
 @pytest.mark.parametrize("passive", [1, 2])
 def test_intervals_hold_where_a_joint_has_no_motor(passive: int) -> None:
     motion, k = moved("case1", passive), load_case("case1").arm.constants()
-    fits = [refined.fit(Problem([source(logged(motion, seed))])) for seed in range(140)]
+    fits = [refined.fit(Problem([source(logged(motion, seed))])) for seed in range(80)]
     # The motorless row has a noise of its own, a thousandth of the other joint's torque; here it
     # has none.
     holds_at_least_95(
@@ -128,22 +126,6 @@ def test_a_log_needs_no_torque_of_a_joint_without_motor(tmp_path: Path) -> None:
         np.testing.assert_allclose(read.tau, log.tau, rtol=1e-12)
 
 
-def test_what_a_joint_without_motor_logs_as_torque_is_not_read(tmp_path: Path) -> None:
-    log = logged(moved("case1", 2), 0)
-    columns = np.column_stack(
-        [np.arange(len(log)) * DT, *log.theta, log.tau[0], np.full(len(log), np.nan)]
-    )
-    np.savetxt(
-        tmp_path / "log.csv",
-        columns,
-        delimiter=",",
-        header="t,theta1,theta2,tau1,tau2",
-        comments="",
-    )
-    read = open_log(tmp_path / "log.csv", Profile(passive=2)).whole()
-    assert not read.tau[1].any()
-
-
 def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_path: Path) -> None:
     log = logged(moved("case1", 2), 0)
     columns = np.column_stack([np.arange(len(log)) * DT, *log.theta, *log.tau])
@@ -158,26 +140,11 @@ def test_a_torque_that_is_zero_is_refused_until_the_joint_is_called_passive(tmp_
     assert "EFFORT_ZERO" not in done.output
 
 
-def test_a_weak_result_tracks_where_a_joint_has_no_motor(tmp_path: Path) -> None:
-    """It has no noise levels: the log's first stretch tells them, that of the motorless joint by
-    the other's torque.
-    """
-    log = logged(moved("case1", 2), 0)
-    stamps = np.arange(len(log), dtype=np.int64) * round(1e9 * DT)
-    origin = Origin("pendubot.csv", "csv", {}, reading=Reading(passive=2))
-    memory = Log(stamps, log.theta, log.tau, origin)
-    identify(memory, settings=Settings(estimator="weak", model="plain"), out=tmp_path, report=False)
-    found = track_log(memory, tmp_path / "pendubot.algid", l1=0.162, l2=0.123)
-    assert found.complete
-    assert "NaN" not in track_json(found)
-
-
-@pytest.mark.parametrize("passive", [1, 2])
-def test_instruments_tell_what_least_squares_takes_for_nothing(passive: int) -> None:
+def test_instruments_tell_what_least_squares_takes_for_nothing() -> None:
     """Cables pull as hard as the weight of the passive joint: constants near nothing solve its
     equation all but exactly, and draw least squares.
     """
-    result = identify(log_of("case1", passive, 0), report=False)
+    result = identify(log_of("case1", 1, 0), report=False)
     assert result.estimator == "instruments"
     assert result.verdict.grade == "reservations"
     assert "INSTRUMENTS" in [notice.code for notice in result.notices]
@@ -189,15 +156,6 @@ def test_instruments_tell_what_least_squares_takes_for_nothing(passive: int) -> 
         assert low <= value <= high, name
         assert found.estimate is not None
         assert abs(found.estimate - value) < 0.5 * value, name  # nearer to it than to nothing
-
-
-def test_nothing_is_no_solution_where_instruments_do_not_tell_either(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(robust, "of_passive_joint", lambda *_: None)
-    result = identify(log_of("case1", 1, 0), report=False)
-    assert not any(result.parameters[name].usable for name in ("k1", "k2", "k3", "k4", "k5"))
-    assert "HARDLY_DRIVEN" in [notice.code for notice in result.notices]
 
 
 def test_instruments_that_forbidden_constants_come_of_do_not_stand() -> None:

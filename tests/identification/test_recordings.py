@@ -21,7 +21,6 @@ from algid.identification.open_logs import (
 )
 from algid.identification.recordings import Recording, Recordings
 from algid.log import Log, Origin, Truth
-from algid.notices import Notice
 from algid.synth.cases import load_case
 from algid.writers import write_log
 
@@ -160,21 +159,6 @@ def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(
     else:
         assert sum(map(len, survey.segments(survey.logs[0]))) == 600
         assert any(notice.code == "EFFORT_ZERO" for notice in survey.whole(survey.logs[0]).notices)
-
-
-def test_notices_of_the_log_its_blocks_and_the_checks_come_once_however_often_it_is_gone_over() -> (
-    None
-):
-    log, told = moving(), Notice("CUT", "CUT: some", lossy=True)
-    source = in_blocks(replace(log, notices=(told,)), [300])
-    source = replace(source, notices=(Notice("SAME_LOG", "SAME_LOG: twin"),))
-    survey = Recordings([source])
-    for _ in range(3):
-        assert sum(map(len, survey.segments(source))) == 600
-    codes = [notice.code for notice in survey.whole(source).notices]
-    assert codes[0] == "SAME_LOG"
-    assert codes.count("CUT") == 2  # `part` keeps a log's notices in both blocks
-    assert len(codes) == len([notice.code for notice in Recordings([source]).whole(source).notices])
 
 
 def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None:

@@ -84,7 +84,7 @@ def test_intervals_hold_where_the_second_motor_stands_at_the_base() -> None:
         fit = refined.fit(Problem([lambda: [log]]))
         return in_axes(fit.values - k, fit.covariance, fit.quantile)
 
-    holds_95(np.array([ratios(seed) for seed in range(140)]))
+    holds_95(np.array([ratios(seed) for seed in range(100)]))
 
 
 def test_masses_that_no_arm_has_are_asked_about() -> None:

@@ -74,11 +74,6 @@ def test_a_table_of_blanks_is_refused_at_its_row(tmp_path: Path) -> None:
         read_log(csv(tmp_path, *words[:10], *("1" + " " * 60_000 + "x" for _ in range(100))))
 
 
-def test_blanks_and_tabs_around_rows_of_blanks(tmp_path: Path) -> None:
-    rows = [" \t " + row.replace(",", " \t  ") + " \t\r" for row in ROWS]
-    assert len(read_log(csv(tmp_path, " ".join(COLUMNS) + "\r", *rows))) == 300
-
-
 def test_keys_of_metadata_are_looked_at_up_to_a_bound(limited: Limited) -> None:
     assert units_in({"units:a": "deg", "units:q1": "deg"}, ["q1"]) == {"q1": "deg"}
     limited(metadata_keys=1)

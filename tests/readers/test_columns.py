@@ -139,20 +139,6 @@ def test_who_said_which_joint_is_the_first() -> None:
     assert told.origin.mapping["tau1"] == "wrist_torque"
 
 
-@pytest.mark.parametrize(
-    ("header", "settings", "unit"),
-    [
-        (PLAIN, {}, None),
-        ("time_ms q1 q2 tau1 tau2", {}, "ms"),
-        (PLAIN, {"time_unit": "us"}, "us"),
-        ("time_ms q1 q2 tau1 tau2", {"time_unit": "us"}, "us"),
-        ("t theta1 theta2 tau1 tau2", {}, "s"),
-    ],
-)
-def test_the_unit_of_time(header: str, settings: dict[str, Any], unit: str | None) -> None:
-    assert assigned(header, settings).origin.reading.time_unit == unit
-
-
 def said(found: TableReader) -> list[tuple[str, str]]:
     return [(notice.code, notice.text) for notice in found.notices]
 
@@ -330,22 +316,6 @@ def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
     assert other_joints(["hip_pos", "knee_pos", "toe_pos", "max_pos"], ["hip_pos", "knee_pos"]) == {
         "toe": "toe_pos"
     }
-
-
-@pytest.mark.parametrize("named", ["column {}", "Var{}", "data[{}]", "x{}", "Unnamed: {}"])
-def test_columns_that_are_only_numbered_are_no_joints(named: str) -> None:
-    columns = [named.format(number) for number in range(1, 8)]
-    assert other_joints(columns, columns[1:3]) == {}
-
-
-def test_the_first_of_two_clocks_of_one_name_and_the_only_torque() -> None:
-    assert chosen(["t", "T", "q1", "q2", "tau1", "tau2"])["t"] == "t"
-    assert chosen(["T", "t", "q1", "q2", "tau1", "tau2"])["t"] == "T"
-    assert chosen(["t [s]", "T [ms]", "q1", "q2", "tau1", "tau2"])["t"] == "t [s]"
-    # of several torques that of the joint that has the motor
-    assert chosen(["t", "q1", "q2", "tau1", "tau7"], passive=2)["tau1"] == "tau1"
-    assert "no column for tau1" in refused(["t", "q1", "q2", "tau6", "tau7"], {"passive": 2})
-    assert chosen(["t", "q1", "q2", "effort"], passive=1)["tau2"] == "effort"
 
 
 def test_joint_and_axis_are_no_joints_names() -> None:

@@ -83,21 +83,6 @@ def test_plain_columns_stand_before_those_of_a_state(tmp_path: Path) -> None:
     assert np.array_equal(read_log(tmp_path / "a.parquet").theta[0], LOG.theta[0] + 1)
 
 
-def test_messages_of_unitree_are_read(tmp_path: Path) -> None:
-    messages = []
-    for row, stamp in enumerate(LOG.stamp_ns.tolist()):
-        motors = [
-            {"q": LOG.theta[one, row], "tau_est": LOG.tau[one, row], "mode": 1} for one in (0, 1)
-        ]
-        messages.append(("/lowstate", stamp, json.dumps({"motor_state": motors}).encode()))
-    write_mcap(
-        tmp_path / "a.mcap", messages, {"/lowstate": ("L", "jsonschema", b"{}")}, encoding="json"
-    )
-    log = read_log(tmp_path / "a.mcap")
-    assert np.array_equal(log.theta, LOG.theta)
-    assert np.array_equal(log.tau, LOG.tau)
-
-
 def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Path) -> None:
     messages = [
         *messages_of(LOG),

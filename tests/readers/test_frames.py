@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from datetime import UTC, datetime, time, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from algid.base.errors import LogError
-from algid.log import Log
 from algid.profile import Profile
 from algid.readers import open_log, read_log
 
@@ -72,59 +71,6 @@ def test_other_joints_are_looked_at_in_the_first_samples_only(
 
 
 START = datetime(2024, 3, 1, 23, 59, 59, 500_000, tzinfo=UTC)
-STAMPS: dict[str, tuple[list[Any], Any, int]] = {
-    "a date in ns": (
-        [START + timedelta(milliseconds=k) for k in range(9)],
-        pl.Datetime("ns", "UTC"),
-        1709337599500000000,
-    ),
-    "a date in ms": (
-        [START + timedelta(milliseconds=k) for k in range(9)],
-        pl.Datetime("ms", "UTC"),
-        1709337599500000000,
-    ),
-    "a duration": (
-        [timedelta(seconds=2, milliseconds=k) for k in range(9)],
-        pl.Duration("us"),
-        2_000_000_000,
-    ),
-    "a time of day": ([time(0, 1, 0, 1000 * k) for k in range(9)], pl.Time(), 60_000_000_000),
-}
-
-
-@pytest.mark.parametrize("form", WRITERS)
-@pytest.mark.parametrize("name", STAMPS)
-def test_dates_and_durations_are_times_in_ns(name: str, form: str, tmp_path: Path) -> None:
-    """Also where a column is named after a unit, or the user says one: a date has its own."""
-    values, kind, first = STAMPS[name]
-    frame = arm(9, 2).drop("t").with_columns(pl.Series("t_ms", values, kind))
-    WRITERS[form](frame, tmp_path / f"log.{form}")
-    for profile in (None, Profile(time_unit="s")):
-        log = read_log(tmp_path / f"log.{form}", profile)
-        assert log.stamp_ns.tolist() == [first + k * 1_000_000 for k in range(9)]
-        assert log.origin.reading.time_unit == "ns"
-
-
-@pytest.mark.parametrize("form", [*WRITERS, "memory"])
-@pytest.mark.parametrize("name", STAMPS)
-def test_an_index_of_dates_without_a_name_is_the_time(name: str, form: str, tmp_path: Path) -> None:
-    """As pandas hands over and writes an index: under a name of its own."""
-    values, kind, first = STAMPS[name]
-    frame = arm(9, 2).with_columns(pl.Series("__index_level_0__", values, kind))
-    dated = frame.drop("t")
-
-    def read(frame: pl.DataFrame) -> Log:
-        if form == "memory":
-            return read_log(frame.to_arrow())
-        WRITERS[form](frame, tmp_path / f"log.{form}")
-        return read_log(tmp_path / f"log.{form}")
-
-    assert read(dated).stamp_ns.tolist() == [first + k * 1_000_000 for k in range(9)]
-    # a column that is named after a time comes first
-    assert read(frame).stamp_ns.tolist() == [k * 1_000_000 for k in range(9)]
-    # numbers of rows are no time
-    with pytest.raises(LogError, match="no column for t; found"):
-        read(dated.with_columns(pl.int_range(9).alias("__index_level_0__")))
 
 
 @pytest.mark.parametrize("form", WRITERS)

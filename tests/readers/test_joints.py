@@ -4,7 +4,6 @@ said.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -128,21 +127,6 @@ def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> Non
     assert read_log(path, profile).origin.reading.joints_told == "profile"
 
 
-@pytest.mark.parametrize("names", [("elbow", "shoulder"), ("left", "right")])
-def test_columns_of_named_joints(names: tuple[str, str], tmp_path: Path) -> None:
-    columns = [f"/js/{name}/{field}" for name in names for field in ("position", "effort")]
-    rows = "\n".join(f"{step * 1e-3},1,10,2,20" for step in range(5))
-    (tmp_path / "log.csv").write_text(",".join(["time", *columns]) + "\n" + rows + "\n")
-    log = read_log(tmp_path / "log.csv")
-    known = names[0] == "elbow"
-    assert log.tau[:, 0].tolist() == ([20, 10] if known else [10, 20])
-    assert log.origin.reading.joints_told == ("names" if known else "order")
-    assert len(told(log)) == 1
-    plain = read_log(tmp_path / "log.csv", with_settings(Profile(), {"joints": list(names)}))
-    assert plain.tau[:, 0].tolist() == [10, 20]
-    assert told(plain) == []
-
-
 def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("ms,q1_deg,q2_deg,tau1,tau2\n1,10,20,30,40\n2,10,20,30,40\n")
     settings = {
@@ -176,30 +160,6 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
     for name, row, value in (("theta1", log.theta[0] + np.pi / 2, 10), ("tau1", log.tau[0], 30)):
         channel = reading.channels[name]
         assert np.allclose(row, channel.factor * value + channel.offset, rtol=1e-14)
-
-
-FLAT = [
-    {"q1": 0.1, "q2": 0.2, "tau1": 1.0, "tau2": 2.0},
-    {"q": [0.1, 0.2], "tau": [1.0, 2.0], "temperature": 30.5},
-    {"elbow_pos": 0.2, "shoulder_pos": 0.1, "elbow_torque": 2.0, "shoulder_torque": 1.0},
-    {"joint1": {"position": 0.1, "torque": 1.0}, "joint2": {"position": 0.2, "torque": 2.0}},
-    {"q1_deg": np.degrees(0.1), "q2_deg": np.degrees(0.2), "tau1": 1.0, "tau2": 2.0},
-]
-
-
-@pytest.mark.parametrize("content", FLAT)
-def test_flat_json_messages_are_read_by_their_names(
-    content: dict[str, object], tmp_path: Path
-) -> None:
-    stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
-    messages = [("/arm", one, json.dumps(content).encode()) for one in stamps]
-    schema = ("arm", "jsonschema", b'{"type": "object"}')
-    write_mcap(tmp_path / "log.mcap", messages, {"/arm": schema}, encoding="json")
-    log = read_log(tmp_path / "log.mcap")
-    assert np.allclose(log.theta[:, 3], [0.1, 0.2])
-    assert log.tau[:, 3].tolist() == [1, 2]
-    assert log.stamp_ns.tolist() == stamps
-    assert log.origin.reading.clock == "log"
 
 
 def test_a_raised_digit_is_no_number(tmp_path: Path) -> None:

@@ -26,9 +26,7 @@ from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, TRUTH, noise_log, same
 from tests.readers.mcaps import (
     NO_INDEX,
-    TOPIC,
     chunks_of,
-    joint_state,
     messages_of,
     write_mcap,
 )
@@ -338,19 +336,6 @@ def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -
     path.write_bytes(whole[: place + 100])
     with pytest.raises(LogError, match=rf"damaged \(.*breaks off at byte {place}.*no topic"):
         read_log(path)
-
-
-def test_damage_is_not_blamed_for_a_choice_that_is_missing(tmp_path: Path) -> None:
-    names = [f"joint{number}" for number in range(7)]
-    messages = [
-        (TOPIC, row, joint_state(row, names, [0.0] * 7, (), [1.0] * 7).done()) for row in range(100)
-    ]
-    write_mcap(tmp_path / "log.mcap", messages, compression=PLAIN)
-    content = (tmp_path / "log.mcap").read_bytes()
-    (tmp_path / "log.mcap").write_bytes(content[: len(content) // 2])
-    with pytest.raises(LogError, match="has 7 joints") as caught:
-        read_log(tmp_path / "log.mcap")
-    assert "damaged" not in str(caught.value)
 
 
 def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> None:

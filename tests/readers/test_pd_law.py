@@ -81,9 +81,3 @@ def test_without_velocities_a_law_differentiates_the_angles(tmp_path: Path) -> N
     # kd h² / 6 of the third derivative, 8 rad/s³ at most; first order at both ends
     np.testing.assert_allclose(log.tau[:, 1:-1], tau[:, 1:-1], atol=2.0 * 0.01**2 / 6 * 8)
     np.testing.assert_allclose(log.tau, tau, atol=2.0 * 0.01 / 2 * 4)
-
-
-def test_a_log_without_torque_names_the_law(tmp_path: Path) -> None:
-    path, _ = written(tmp_path)
-    with pytest.raises(LogError, match="a PD law makes them of q_des, kp and kd"):
-        read_log(path)

@@ -129,15 +129,6 @@ def test_the_unit_is_the_angles_where_nothing_else_is_said(
     assert (read.unit, read.told) == (unit, by)
 
 
-def test_the_desired_angle_of_a_pd_law_is_one(tmp_path: Path) -> None:
-    path = table(tmp_path, **columns("t q1 q2 go1 go2", T, THETA, REFERENCE))
-    laws = {f"tau{joint}": {"q_des": f"go{joint}", "kp": 2.0} for joint in (1, 2)}
-    found = read_log(path, with_settings(Profile(), laws))
-    assert found.reference is not None
-    assert found.reference == pytest.approx(REFERENCE)
-    assert found.tau == pytest.approx(2 * (REFERENCE - THETA))
-
-
 def test_samples_may_lack_one(tmp_path: Path) -> None:
     holed = REFERENCE.copy()
     holed[:, :50] = np.nan
@@ -209,22 +200,3 @@ def test_a_trajectory_controller_tells_it(field: str, tmp_path: Path) -> None:
     assert np.all(np.isnan(found.reference[:, 201:]))
     assert not any(notice.lossy for notice in found.notices)
     assert found.origin.mapping["q_des1"] == f"/arm_controller/state: {field}.positions[2]"
-
-
-def test_one_that_cannot_be_read_leaves_the_log(tmp_path: Path) -> None:
-    messages = []
-    for step in range(len(T)):
-        stamp = 10**9 + step * 10_000_000
-        state = joint_state(
-            stamp, ["hip", "knee"], THETA[:, step].tolist(), (), TAU[:, step].tolist()
-        )
-        messages.append(("/joint_states", stamp, state.done()))
-        back = stamp - (10**9 if step > 150 else 0)  # its clock is set back
-        data = controller_state(back, ["hip", "knee"], REFERENCE[:, step].tolist())
-        messages.append(("/state", stamp, data))
-    kind = "control_msgs/msg/JointTrajectoryControllerState"
-    schemas = {"/state": (kind, "ros2msg", state_definition("reference"))}
-    write_mcap(tmp_path / "log.mcap", messages, schemas)
-    found = read_log(tmp_path / "log.mcap")
-    assert found.reference is None
-    assert [notice.code for notice in found.notices] == ["MESSAGES_LEFT_OUT"]

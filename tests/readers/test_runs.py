@@ -115,12 +115,6 @@ def test_a_file_of_two_runs_and_each_alone(tmp_path: Path) -> None:
         inspect(path, segment=0)
 
 
-def test_runs_are_cut_by_their_own_time(tmp_path: Path) -> None:
-    _, theta1, path = two_runs(tmp_path)
-    log = read_log(path, Profile(segment=2, start=1.0))
-    assert np.array_equal(log.theta[0], theta1[3000:])
-
-
 @pytest.mark.parametrize("lost", [0, 60])
 def test_the_pause_between_runs_is_no_gap(lost: int, tmp_path: Path) -> None:
     _, _, path = two_runs(tmp_path)
@@ -132,13 +126,6 @@ def test_the_pause_between_runs_is_no_gap(lost: int, tmp_path: Path) -> None:
     assert found.clock.longest_gap == pytest.approx((lost + 1) / 500 if lost else 0.0)
     assert "GAPS" in [one.code for one in found.notices]
     assert ("GAPS" in [one.code for one in found.findings]) == bool(lost)
-
-
-def test_a_clock_that_stands_still_starts_no_run() -> None:
-    stamps = np.concatenate([np.arange(1000), np.full(30, 999), np.arange(1000, 2000)]) * MS
-    found = read([table(stamps, np.arange(stamps.size) * 1.0)])
-    (said,) = found.notices
-    assert (said.code, said.lossy) == ("UNEVEN_STAMPS", True)
 
 
 def test_a_clock_set_back_by_more_than_a_short_log_so_far_starts_a_run() -> None:

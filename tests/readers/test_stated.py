@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -64,13 +63,6 @@ def test_what_a_user_says_is_not_told_again(tmp_path: Path) -> None:
     assert "STATED_UNUSED" not in {notice.code for notice in log.notices}
 
 
-@pytest.mark.parametrize(("rate", "told"), [("100", 0), ("50 Hz", 1)])
-def test_a_rate_that_stamps_contradict_is_told(rate: str, told: int, tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table(f"# fs: {rate}"))
-    said = [one for one in read_log(tmp_path / "log.csv").notices if one.code == "STATED_UNUSED"]
-    assert len(said) == told
-
-
 @pytest.mark.parametrize(
     "settings",
     [
@@ -96,45 +88,6 @@ def test_a_unit_in_a_name_beats_an_attribute_and_says_so() -> None:
     log = read_log(named.replace_schema_metadata({"tau.unit": "mNm"}))
     assert log.tau[0, 0] == 1
     assert sum(notice.code == "OTHER_UNIT" for notice in log.notices) == 2
-
-
-def test_a_current_in_mA_is_not_one_in_A(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table("#", "time,q1,q2,current1 [mA],current2 [mA]"))
-    drive = Torque(torque_constant=0.5)
-    assert read_log(tmp_path / "log.csv", Profile(tau1=drive, tau2=drive)).tau[
-        0, 0
-    ] == pytest.approx(0.0025, rel=1e-12)
-
-
-def arrow(field_units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
-    """A table with units beside its columns."""
-    values = {name: np.arange(ROWS) + 1.0 for name in COLUMNS} | {"time": np.arange(ROWS) / 100}
-    fields = [
-        pa.field(
-            name,
-            pa.float64(),
-            metadata={"unit": field_units[name]} if name in field_units else None,
-        )
-        for name in COLUMNS
-    ]
-    return pa.table(values, schema=pa.schema(fields, metadata=metadata or None))
-
-
-@pytest.mark.parametrize(
-    ("field_units", "metadata"),
-    [
-        ({"q1": "deg", "q2": "deg", "tau1": "mNm", "tau2": "mNm"}, {}),
-        ({}, {"units": json.dumps({"q": "deg", "tau1": "mNm", "tau2": "mNm"})}),
-        (
-            {"q1": "deg", "q2": "deg"},
-            {"unit:tau1": "mNm", "tau2.unit": "mNm", "author": "A. N. Other"},
-        ),
-    ],
-)
-def test_units_of_a_schema_are_used(field_units: dict[str, str], metadata: dict[str, str]) -> None:
-    log = read_log(arrow(field_units, metadata))
-    assert np.allclose(np.rad2deg(log.theta), np.arange(ROWS) + 1, rtol=1e-12)
-    assert np.allclose(1000 * log.tau, np.arange(ROWS) + 1, rtol=1e-12)
 
 
 def test_metadata_that_are_no_units_are_left_alone() -> None:

@@ -127,13 +127,6 @@ def test_columns_of_either_file_are_named_and_turned(tmp_path: Path) -> None:
     assert log.tau[1] == pytest.approx(-1e-3 * TAU[1, 1000:])
 
 
-def test_a_frame_takes_its_torques_from_a_file(tmp_path: Path) -> None:
-    torques(tmp_path / "t.csv", slice(None))
-    frame = pl.DataFrame({"stamp_ns": STAMPS, "q1": THETA[0], "q2": THETA[1]})
-    log = read_log(frame, Profile(torque_file=str(tmp_path / "t.csv")))
-    assert np.array_equal(log.tau, TAU)
-
-
 def test_what_is_wrong_is_said_in_one_line(tmp_path: Path) -> None:
     path = angles(tmp_path / "a.csv")
     with pytest.raises(LogError, match=r"no column for tau1, tau2; .*--torque-file FILE"):

@@ -64,16 +64,6 @@ def test_only_what_was_set_or_read_otherwise_is_shown(result: Result) -> None:
     assert compare([result, result], ["a", "b"]).tables()[1].note.startswith("Every setting")
 
 
-def test_a_parameter_that_only_one_has_is_shown_without_a_difference(result: Result) -> None:
-    paper = result.model_copy(
-        update={"parameters": {"kx": Estimate(estimate=1.0, unit="kg")}, "payload": {}}
-    )
-    found = compare([result, paper])
-    assert found.sigma["kx"] == found.sigma["k1"] == (None,)
-    assert found.labels == ("1 case1-unloaded.mcap", "2 case1-unloaded.mcap")
-    assert verdict(found).headline == "no parameter has error bars in two results"
-
-
 def apart(result: Result, *sigmas: float) -> Comparison:
     """Results whose k1 and, by a hair less, k2 lie so many combined σ from the first one's."""
     several = [result]

@@ -90,12 +90,6 @@ def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) ->
     assert messages["/algid/loaded"][0].message.log_time == START_NS
 
 
-def test_series_are_flat_fields(messages: dict[str, list[Any]], case_folder: Path) -> None:
-    rows = pl.read_parquet(case_folder / "loaded.parquet")
-    found = [message.decoded_message.k5_k3_z1_z2 for message in messages["/algid/loaded"]]
-    np.testing.assert_array_equal(found, rows["k5+k3+z1+z2"].to_numpy())
-
-
 def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ResultError, match=r"result\.json: cannot read it"):
         export_mcap(tmp_path)

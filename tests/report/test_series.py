@@ -10,7 +10,7 @@ import pytest
 
 from algid.base.errors import ResultError
 from algid.report import series
-from algid.report.series import between, blocks, drawn
+from algid.report.series import blocks, drawn
 
 RATE = 100.0
 
@@ -79,17 +79,6 @@ def test_samples_are_whole_rows_and_never_in_step_with_the_motion(tmp_path: Path
     phase = np.sort(np.mod(samples["t"], 1.0))
     assert np.diff(phase).max() < 0.02
     assert np.unique(samples["t"]).size == 2000
-
-
-def test_what_lies_between_two_moments_is_read_alone(tmp_path: Path) -> None:
-    frame = write(tmp_path / "a.parquet")
-    frame.write_parquet(tmp_path / "a.parquet", row_group_size=100)
-    found = between(tmp_path / "a.parquet", 1, 8.0, 8.5)
-    wanted = frame.filter((pl.col("log") == 1) & pl.col("t").is_between(8.0, 8.5))
-    assert found["t"].size == 51
-    np.testing.assert_array_equal(found["tau1"], wanted["tau1"].to_numpy())
-    ends = between(tmp_path / "a.parquet", 0, 49.9, 60.0)["t"]
-    np.testing.assert_allclose(ends, [49.9 + 0.01 * place for place in range(10)])
 
 
 def test_what_is_no_series_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
 from algid.arm import FloatArray
 from algid.tracks.cells import CELL, Cells
-from algid.tracks.drift import between, drift_of, knots_of
+from algid.tracks.drift import drift_of
 
 COUNT, ROWS = 600, 8
 STARTS = np.array([0, 180, 400])
@@ -76,17 +73,3 @@ def test_friction_as_it_was_is_left_alone() -> None:
     for _ in range(40):
         found = drift_of(summed(*rows(np.zeros((COUNT, 2)), rng)), STARTS, 1.0)
         assert not found.phi.any()
-
-
-@pytest.mark.parametrize("duration", [1.0, 12.0, 3600.0])
-def test_knots_span_the_log_and_lines_run_between_them(duration: float) -> None:
-    cells = summed(*rows(rising(), np.random.default_rng(3)))
-    start, end = cells.start * duration / 12, cells.end * duration / 12
-    stretched = replace(cells, start=start, end=end)
-    knots = knots_of(stretched)
-    assert knots[[0, -1]] == pytest.approx([0, duration])
-    assert 2 <= knots.size <= 61
-    values = np.random.default_rng(4).standard_normal((knots.size, 3))
-    t = np.linspace(0, duration, 57)
-    expected = np.stack([np.interp(t, knots, one) for one in values.T], axis=1)
-    np.testing.assert_allclose(between(knots, values, t), expected, atol=1e-12)

@@ -137,19 +137,6 @@ def test_a_track_is_read_back_as_it_was(result: TrackResult, tmp_path: Path) -> 
     np.testing.assert_allclose(again.track.std, result.track.std, rtol=1e-9)
 
 
-def test_the_report_of_a_track_is_made_again(result: TrackResult, tmp_path: Path) -> None:
-    folder = tmp_path / "picking.track"
-    write_track(result, folder)
-    markdown_before = (folder / "report.md").read_text(encoding="utf-8")
-    (folder / "report.html").unlink()
-    (folder / "report.md").unlink()
-    done = CliRunner().invoke(app, ["report", str(folder)])
-    assert done.exit_code == 0, done.output
-    assert "Payload by stretch" in done.stdout
-    assert "Payload in time" in (folder / "report.html").read_text(encoding="utf-8")
-    assert (folder / "report.md").read_text(encoding="utf-8") == markdown_before
-
-
 @pytest.mark.parametrize("damage", ['{"stretches": []}', "[]", "{", '{"stretches": 3}'])
 def test_a_damaged_track_is_refused_in_one_line(
     result: TrackResult, tmp_path: Path, damage: str

@@ -4,8 +4,6 @@ estimates.
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import sympy as sp
@@ -16,11 +14,8 @@ from algid.estimators.paper import (
     PaperSeries,
     Summary,
     columns,
-    stage1_series,
-    stage2_series,
     wanders,
 )
-from algid.signals.segments import Segment
 from algid.synth.cases import load_case
 
 
@@ -83,50 +78,6 @@ def test_joint_2_at_rest_leaves_k7_open_and_its_condition_infinite() -> None:
     )
     assert np.isinf(found.k7_condition).all()
     assert np.isnan(found.k[6]).all()
-
-
-def _log(duration: float) -> Segment:
-    t = 1e-3 * np.arange(round(duration / 1e-3) + 1)
-    theta = np.stack([np.sin(5 * t) - 1, 0.8 * np.sin(9 * t)])
-    omega = np.stack([5 * np.cos(5 * t), 7.2 * np.cos(9 * t)])
-    alpha = np.stack([-25 * np.sin(5 * t), -64.8 * np.sin(9 * t)])
-    return Segment(
-        0.0,
-        1e-3,
-        theta,
-        inverse_dynamics(load_case("case1").arm.constants(), theta, omega, alpha),
-        omega,
-    )
-
-
-def test_windows_are_what_they_are_alone_and_together(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By twos in a block or one by one; a segment's last window is what is left of it.
-
-    Crumbs are left out.
-    """
-    log = _log(2.4)
-    k = load_case("case1").arm.constants()
-    found = {}
-    for block in (600, 1200, 16384):
-        monkeypatch.setattr(paper, "BLOCK_SAMPLES", block)
-        found[block] = [*stage1_series([log], 0.6), *stage2_series([log], 0.6, k, 9.81)]
-    assert [one.values.shape[1] for one in found[600]] == 2 * [600, 600, 600, 601]
-    for several in (1200, 16384):
-        for alone, together in zip(found[600], found[several], strict=True):
-            np.testing.assert_array_equal(alone.t, together.t)
-            # rounding times condition numbers of up to 1e10, beyond which there is no estimate
-            np.testing.assert_allclose(
-                np.minimum(alone.values, 1e10), np.minimum(together.values, 1e10), rtol=1e-5
-            )
-    ends = [one.t[-1] for one in found[600][:4]]
-    assert np.allclose(np.diff(ends), 0.6, atol=2e-3)
-    for before, after in pairwise(found[600][:4]):
-        assert after.t[0] - before.t[-1] == pytest.approx(1e-3)
-    assert [*stage1_series([], 0.6)] == []
-    assert [*stage1_series([log.part(0, 7)], 0.6)] == []
-    assert [one.values.shape[1] for one in stage1_series([log.part(0, 8)], 0.6)] == [8]
-    lone = [*stage1_series([log.part(0, 7), log.part(0, 500)], 0.6)]
-    assert [one.values.shape[1] for one in lone] == [500]
 
 
 def _series(*rows: list[float]) -> PaperSeries:

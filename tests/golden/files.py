@@ -1,7 +1,4 @@
-"""Sound files of every format and state, each with what reading it must give to the bit.
-
-`python -m tests.readers.sound_files` writes that anew; the commit that does so says what moved.
-"""
+"""Sound files of every format and state, each with what reading it must give to the bit."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import gzip
 import hashlib
 import json
 import sqlite3
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -35,7 +31,6 @@ from tests.readers.logs import EPOCH_NS, TRUTH
 from tests.readers.mcaps import NO_INDEX, TOPIC, messages_of, write_mcap
 from tests.readers.ways import STORES, Message, States, fill, written
 
-EXPECTED = Path(__file__).with_name("sound_files.json")
 ROWS = 300
 DRAW = np.random.default_rng(5)
 # whole multiples of 2**-20: every library writes and reads them alike
@@ -584,7 +579,7 @@ def bags() -> dict[str, Callable[[Path], Made]]:
     }
 
 
-def cases() -> list[Sound]:
+def sounds() -> list[Sound]:
     """Every kind of sound file."""
     found = {}
     for kind in FORMATS:
@@ -605,17 +600,3 @@ def cases() -> list[Sound]:
     found |= {f"MCAP: {name}": make for name, make in mcaps().items()}
     found |= {f"bag: {name}": make for name, make in bags().items()}
     return [Sound(name, make) for name, make in found.items()]
-
-
-def main() -> None:
-    """Write what reading each of them gives."""
-    lines = []
-    for case in cases():
-        with tempfile.TemporaryDirectory() as folder:
-            lines.append(f"{json.dumps(case.name)}: {json.dumps(case.read(Path(folder)))}")
-    EXPECTED.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
-    print(f"{len(lines)} sound files in {EXPECTED.name}")
-
-
-if __name__ == "__main__":
-    main()
