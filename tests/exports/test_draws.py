@@ -122,7 +122,7 @@ def test_draws_cover_held_out_torques_as_often_as_stated() -> None:
     """Torques of an arm's truth at states of no log, within 95 % of what draws say of them."""
     covered = []
     theta, omega, alpha = states(40)
-    for seed in range(24):
+    for seed in range(16):
         log, _ = algid.synthesise(
             "case1",
             duration=3.0,

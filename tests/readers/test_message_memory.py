@@ -10,9 +10,9 @@ import pytest
 from algid.readers import read_log
 from tests.readers.large import WRITERS, peak_of_reading
 
-SAMPLES = 3_000_000
-MOST_BYTES = 200e6
-"""The samples' arrays alone take 120 MB, beside some 60 MB of a program that reads nothing."""
+SAMPLES = 1_500_000
+MOST_BYTES = 160e6
+"""The samples' arrays alone take 60 MB, beside some 60 MB of a program that reads nothing."""
 INDEXED = 200.0
 """Bytes a message that rosbags takes for the index of a ROS 1 bag."""
 
