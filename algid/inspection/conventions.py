@@ -15,14 +15,19 @@ from typing import Any, Protocol
 import numpy as np
 
 from algid.estimators.convention_search import (
+    APART,
+    EVIDENCE,
     EXPLAINED,
+    MET,
     MOST_LOGS,
+    Candidate,
     Judgement,
     Recorded,
     judge_together,
     tried_together,
     zeroed_together,
 )
+from algid.estimators.convention_sums import WINDOW
 from algid.estimators.conventions import AS_READ, Convention
 from algid.log import ZEROS, Log, Origin, Reading
 from algid.model import K2, K3, K4, K5
@@ -37,7 +42,6 @@ _DEGREES, _TURNS = 180 / pi, 1 / (2 * pi)  # scales of angles that are no motor'
 # weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m
 _LEAST_PULL = 1.3
 _OF_WEIGHT = 0.01  # of a torque: what weight must explain to be there
-_CLEAR = 5.0  # of summed log residuals: what sets two conventions apart in the shortest log
 _OTHER_WAY = Convention(torque_signs=(-1, -1))
 GUESSES = (
     _OTHER_WAY,
@@ -209,11 +213,13 @@ def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
     guesses = [tried_together(parts, guess) for guess in GUESSES]
     turned = [zeroed_together(parts, family) for family in (AS_READ, _OTHER_WAY)]
     turned = [one for one in turned if one and abs(one.zero[0]) > _SMALL]
-    every = [one for one in (*guesses, *turned) if one and one.plausible]
+    every = [one for one in (*guesses, *turned) if one and one.plausible and _weighs(one)]
+    seconds = sum(part.theta.shape[1] * part.dt for part in parts)
+    apart = max(APART, 2 * EVIDENCE * WINDOW / seconds)
     best = min((one.score for one in every), default=math.inf)
-    if as_read.plausible and as_read.score < best + _CLEAR:
+    if as_read.plausible and as_read.score < best + apart:
         return None
-    near = [one for one in every if one.score < best + _CLEAR]
+    near = [one for one in every if one.score < best + apart]
     # a named zero or sign before the zeros that fit best
     named = [one for one in near if one in guesses] or near
     if not named:
@@ -223,6 +229,11 @@ def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
         turn = {"turn": -degrees(named[0].zero[0])}
         return Notice("WRONG_ZERO", numbers=turn, remedies=offered)
     return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
+
+
+def _weighs(one: Candidate) -> bool:
+    """True if gravity pulls down under a convention, beyond doubt."""
+    return max(one.demands.get("k2 > 0", 0.0), one.demands.get("k4 > 0", 0.0)) > MET
 
 
 def _clauses(convention: Convention) -> Iterator[str]:
