@@ -155,7 +155,7 @@ def draw(title: str, arm: str, number: int) -> Seen:
         passed = _noticed(result, NOTICED[title], k)
     else:
         passed = grade == "failed" and named is not None and mended(log, k)
-    flags = "" if named is None else f", {' '.join(named.remedy.flags)}"
+    flags = "" if named is None else f", {' '.join(named.remedies[0].flags)}"
     return _seen(arm, number, f"{grade}, {furthest(result, k):.3g} σ{flags}", passed)
 
 

@@ -226,7 +226,7 @@ class Recordings:
             return {}
         mended = mends(known, gravity=known[0][0].weight > 0)
         pairs = zip(known, mended, strict=True)
-        return {log: mend.notice for (log, _), mend in pairs if mend is not None}
+        return {log: notice for (log, _), notice in pairs if notice is not None}
 
     def _blocks(self, log: Recording) -> Iterator[Log]:
         """The log's blocks, each counted.

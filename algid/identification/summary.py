@@ -41,8 +41,6 @@ def _is_doubtful(outcome: Identified) -> bool:
 def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]:
     """Checks, as code and case, of single logs that the fit of all of them makes more precisely."""
     codes = []
-    if has_code(outcome.notices, "PHASES:gravity", "PHASES:no gravity"):
-        codes.append("PHASES:zeros")
     if has_code(outcome.notices, "WRONG_ZERO"):
         codes.append("WRONG_ZERO:")
     if settings.effort is not None:
@@ -51,7 +49,7 @@ def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]
 
 
 _OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO")
-"""Checks of single logs by a rough fit, on which the estimator's own has the last word."""
+"""Checks of single logs, on which the estimator's own has the last word."""
 
 
 def _pulled_down(outcome: Identified, count: int) -> list[bool]:

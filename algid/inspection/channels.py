@@ -209,13 +209,8 @@ def spikes(log: Log) -> Iterator[Notice]:
     """
     if len(log) < 20:
         return
-    channels = {
-        "theta1": log.theta[0],
-        "theta2": log.theta[1],
-        "tau1": log.tau[0],
-        "tau2": log.tau[1],
-    }
-    for name, values in channels.items():
+    names = ("theta1", "theta2", "tau1", "tau2")
+    for name, values in zip(names, (*log.theta, *log.tau), strict=True):
         off = values[:-2] + values[2:]  # in place: a long log's arrays cost more than the sums
         off *= -0.5
         off += values[1:-1]

@@ -83,7 +83,7 @@ def examine(
         return tuple(notices)
     mended = mend(log, tried())
     if mended is not None:
-        return *notices, mended.notice
+        return *notices, mended
     doubt = doubted(log, tried()) if gravity > 0 else None
     return (*notices, doubt) if doubt else tuple(notices)
 

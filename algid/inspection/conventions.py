@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import degrees, isclose, pi, remainder
 from typing import Any, Protocol
 
@@ -31,7 +31,7 @@ from algid.estimators.convention_sums import WINDOW
 from algid.estimators.conventions import AS_READ, Convention
 from algid.log import ZEROS, Log, Origin, Reading
 from algid.model import K2, K3, K4, K5
-from algid.notices import Notice, Remedy, flat
+from algid.notices import Notice, Remedy
 from algid.signals.segments import stretches
 
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
@@ -43,9 +43,10 @@ _DEGREES, _TURNS = 180 / pi, 1 / (2 * pi)  # scales of angles that are no motor'
 _LEAST_PULL = 1.3
 _OF_WEIGHT = 0.01  # of a torque: what weight must explain to be there
 _OTHER_WAY = Convention(torque_signs=(-1, -1))
+_BEHIND = Convention(signs=(-1, -1), torque_signs=(-1, -1))
 GUESSES = (
     _OTHER_WAY,
-    Convention(signs=(-1, -1), torque_signs=(-1, -1)),
+    _BEHIND,
     *(replace(one, zero=(off, 0.0)) for one in (AS_READ, _OTHER_WAY) for off in (-pi / 2, pi / 2)),
 )
 """Under which gravity pulls down where it pulls up, or to a side, as the log was read."""
@@ -58,37 +59,6 @@ class Read(Protocol):
     def origin(self) -> Origin:
         """Where its samples come from."""
         ...
-
-
-@dataclass(frozen=True)
-class Mend:
-    """How a log has to be read.
-
-    Parameters
-    ----------
-    words : what is wrong, in clauses
-    contradiction : what physics says against the convention that the log was read by
-    settings : the profile's settings that mend it; a channel's are a dictionary of their own
-    another : whether it is another convention, not the same one with its zeros a little off
-    """
-
-    words: str
-    contradiction: str
-    settings: dict[str, Any]
-    another: bool
-
-    @property
-    def notice(self) -> Notice:
-        """What there is to say of the log."""
-        numbers = {"wrong": self.words, "contradiction": self.contradiction}
-        if not self.another:
-            return Notice("PHASES", numbers={"case": "zeros"} | numbers)
-        return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(self.remedy,))
-
-    @property
-    def remedy(self) -> Remedy:
-        """The same settings by dotted names."""
-        return Remedy(flat(self.settings))
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
@@ -126,10 +96,11 @@ def is_to_scale(judgement: Judgement | None) -> bool:
     return judgement.as_read.convincing and judgement.best.convention.scale == AS_READ.scale
 
 
-def mend(log: Read, judgement: Judgement | None) -> Mend | None:
+def mend(log: Read, judgement: Judgement | None) -> Notice | None:
     """What sets a log right that physics contradicts as it was read.
 
-    None where it is right, or the log leaves it open.
+    None where it is right but for zeros that may be centres of mass off their links, or the log
+    leaves it open.
 
     Parameters
     ----------
@@ -139,58 +110,36 @@ def mend(log: Read, judgement: Judgement | None) -> Mend | None:
     if judgement is None or not judgement.alone or judgement.best.convention == AS_READ:
         return None
     convention = judgement.best.convention
-    mirrored = convention.mirrored()
-    if len(list(_clauses(mirrored))) < len(list(_clauses(convention))):
-        convention = mirrored
     only_zeros = replace(convention, zero=(0.0, 0.0)) == AS_READ
-    small = max(abs(angle) for angle in convention.zero) < _SMALL
-    words = " and ".join(_clauses(convention))
-    if only_zeros and convention.mirrored().zero == (0.0, 0.0):
-        convention = convention.mirrored()
-        words = (
-            "both joints count the other way round, or θ1 counts from the other horizontal (the "
-            "same arm seen from behind)"
-        )
+    if only_zeros and max(abs(angle) for angle in convention.zero) < _SMALL:
+        return None
+    mirrored = convention.mirrored()
+    if mirrored == _BEHIND or len(list(_clauses(mirrored))) < len(list(_clauses(convention))):
+        convention = mirrored
     settings = _settings(convention, log)
     if not settings:  # it is how the log was read
         return None
-    return Mend(
-        words,
-        _contradiction(judgement),
-        settings,
-        another=not (small and only_zeros),
-    )
-
-
-def _contradiction(judgement: Judgement) -> str:
-    """What physics says against the convention that the log was read by."""
-    broken = judgement.as_read.broken
-    if not broken:
-        left = 100 * float(judgement.as_read.left.max())
-        then = 100 * float(judgement.best.left.max())
-        return f"{left:.3g} % of a torque stays unexplained, {then:.2g} % otherwise"
-    name = min(broken, key=lambda name: broken[name])
-    return f"{name} is broken by {round(-broken[name]):,} σ"
+    broken, left = judgement.as_read.broken, 100 * float(judgement.as_read.left.max())
+    then = 100 * float(judgement.best.left.max())
+    contradiction = f"{left:.3g} % of a torque stays unexplained, {then:.2g} % otherwise"
+    if broken:
+        name = min(broken, key=lambda name: broken[name])
+        contradiction = f"{name} is broken by {round(-broken[name]):,} σ"
+    numbers = {"wrong": " and ".join(_clauses(convention)), "contradiction": contradiction}
+    return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(Remedy(settings),))
 
 
 def mends(
     logs: Sequence[tuple[Read, list[Recorded]]], *, gravity: bool = True
-) -> list[Mend | None]:
+) -> list[Notice | None]:
     """What sets each of several logs of one arm right: see `mend`.
 
-    They are judged together. Where that leaves it open, each is judged alone, and only for another
-    convention: in a single run, friction can look like zeros that are off.
+    They are judged together. Where that leaves it open, each is judged alone.
     """
     judgement = judge_together([part for _, parts in logs for part in parts], gravity=gravity)
     if judgement is not None and judgement.alone:
         return [mend(log, judgement) for log, _ in logs]
-    own: list[Mend | None] = []
-    for log, parts in logs:
-        one = mend(log, judge_together(parts, gravity=gravity))
-        if one is not None and not one.another:
-            one = None
-        own.append(one)
-    return own
+    return [mend(log, judge_together(parts, gravity=gravity)) for log, parts in logs]
 
 
 def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
@@ -224,7 +173,7 @@ def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
     named = [one for one in near if one in guesses] or near
     if not named:
         return None
-    offered = tuple(Remedy(flat(_settings(one.convention, log))) for one in named)
+    offered = tuple(Remedy(_settings(one.convention, log)) for one in named)
     if named[0].zero[0]:
         turn = {"turn": -degrees(named[0].zero[0])}
         return Notice("WRONG_ZERO", numbers=turn, remedies=offered)
@@ -238,6 +187,12 @@ def _weighs(one: Candidate) -> bool:
 
 def _clauses(convention: Convention) -> Iterator[str]:
     """What is wrong with a log that has to be read by `convention`."""
+    if convention == _BEHIND:
+        yield (
+            "both joints count the other way round, or θ1 counts from the other horizontal (the "
+            "same arm seen from behind)"
+        )
+        return
     if convention.swapped and convention.torques_swapped:
         yield "the joints are swapped"
     elif convention.swapped:
@@ -273,15 +228,14 @@ def _clauses(convention: Convention) -> Iterator[str]:
 
 
 def _settings(convention: Convention, log: Read, off: float = _SAME) -> dict[str, Any]:
-    """The settings that read the log by `convention`, over those that it was read by.
+    """The settings, by dotted names, that read the log by `convention`.
 
     A named zero stands for one that is `off` by as many rad.
     """
     reading = log.origin.reading
     mending: dict[str, Any] = dict(_sources(convention, log))
     for joint in (0, 1):
-        theta = mending.setdefault(f"theta{joint + 1}", {})
-        tau = mending.setdefault(f"tau{joint + 1}", {})
+        theta, tau = f"theta{joint + 1}", f"tau{joint + 1}"
         # A channel that is swapped keeps what the profile says of its joint: names and units go
         # with the joint.
         if convention.signs[joint] < 0 and convention.torque_signs[joint] < 0:
@@ -289,28 +243,27 @@ def _settings(convention: Convention, log: Read, off: float = _SAME) -> dict[str
             signs[joint] = -signs[joint]
             mending["signs"] = signs
         elif convention.signs[joint] < 0:
-            theta["sign"] = -_own_sign(reading, f"theta{joint + 1}")
+            mending[f"{theta}.sign"] = -_own_sign(reading, theta)
         elif convention.torque_signs[joint] < 0:
-            tau["sign"] = -_own_sign(reading, f"tau{joint + 1}")
+            mending[f"{tau}.sign"] = -_own_sign(reading, tau)
         scale = convention.scale[joint]
         if isclose(scale, _DEGREES):
-            theta["unit"] = "deg"
+            mending[f"{theta}.unit"] = "deg"
         elif isclose(scale, _TURNS):
-            theta["unit"] = "rev"
+            mending[f"{theta}.unit"] = "rev"
         elif scale != 1:
-            theta["gear_ratio"] = float(f"{scale:.6g}")
+            mending[f"{theta}.gear_ratio"] = float(f"{scale:.6g}")
     if convention.absolute:
         mending["second_angle"] = "absolute"
     if convention.base:
         mending["drive"] = "base"
-    mending |= _zeros(convention, reading, off)
-    return {name: value for name, value in mending.items() if value != {}}
+    return mending | _zeros(convention, reading, off)
 
 
 def zeroed(log: Read, turn: float, half: float) -> Remedy:
     """What reads θ1 further on by `turn` ± `half` rad, by a named zero that lies within that."""
     convention = replace(AS_READ, zero=(round(turn, 3), 0.0))
-    return Remedy(flat(_settings(convention, log, half)))
+    return Remedy(_settings(convention, log, half))
 
 
 def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
@@ -326,7 +279,7 @@ def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
         for joint, other in ((1, 2), (2, 1)):
             name = f"{quantity}{other}"
             source = log.origin.mapping.get(name, name)
-            yield f"{quantity}{joint}", {"source": source.partition(": ")[2] or source}
+            yield f"{quantity}{joint}.source", source.partition(": ")[2] or source
 
 
 def _own_sign(reading: Reading, name: str) -> int:
@@ -338,10 +291,9 @@ def _own_sign(reading: Reading, name: str) -> int:
 
 def _zeros(convention: Convention, reading: Reading, within: float) -> dict[str, Any]:
     """The profile's zero and offsets, to add to recorded angles once signs and scales are right."""
-    own = np.zeros(2)  # what the channels' offsets added as the log was read
-    for joint, name in enumerate(("theta1", "theta2")):
-        if name in reading.channels:
-            own[joint] = reading.channels[name].offset
+    channels = (reading.channels.get(name) for name in ("theta1", "theta2"))
+    # what the channels' offsets added as the log was read
+    own = np.array([one.offset if one else 0.0 for one in channels])
     read = own + [ZEROS[reading.zero], 0.0]
     if reading.second_angle == "absolute":
         read[1] -= own[0]

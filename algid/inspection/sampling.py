@@ -9,7 +9,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.quantiles import median, medians, quantile
-from algid.inspection.figures import ENOUGH, clock_figures, differences, noise_floor, signal_figures
+from algid.inspection.figures import clock_figures, differences, noise_floor, signal_figures
 from algid.log import Log
 from algid.notices import Notice, Remedy
 from algid.signals.spacing import NEAR, near_stamps
@@ -144,13 +144,8 @@ def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> floa
 
     `room` (2,) is how far noise and encoder let it be from there.
     """
-    places = medians(theta[:, :few])[:, None]
     moved = t.size
-    for first in range(0, t.size, ENOUGH):  # few arms rest for the whole of a long log
-        away = np.any(np.abs(theta[:, first : first + ENOUGH] - places) > room[:, None], axis=0)
-        if away.any():
-            moved = first + int(np.argmax(away))
-            break
-    if moved == 0:
-        return 0.0
-    return float(t[moved - 1])
+    for angle, place, least in zip(theta, medians(theta[:, :few]), room, strict=True):
+        away = np.abs(angle - place) > least
+        moved = min(moved, int(np.argmax(away)) if away.any() else t.size)
+    return float(t[moved - 1]) if moved else 0.0

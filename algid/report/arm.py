@@ -1,6 +1,6 @@
 """The arm itself: a drawing to scale, and a player that moves it through a log or a plan.
 
-The drawing stands without JavaScript at the motion's start.
+The drawing stands without JavaScript at the motion's start; a script draws the tip's path.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from algid.results import Result
 
 FRAMES = 30.0  # a second
 MOST_FRAMES = 6_000
-MARGIN = 0.12  # of the reach, around the drawing
 READING = "Play it: does this arm move as yours did?"
 
 
@@ -59,30 +58,6 @@ class ArmDrawing:
         t = np.linspace(self.t[0], self.t[-1], count)
         return t, np.stack([np.interp(t, self.t, row) for row in self.theta])
 
-    @property
-    def tip(self) -> FloatArray:
-        """The path of the tip (2, n), m, as SVG has it, whose y points down."""
-        one, both = self.frames[1].cumsum(axis=0)
-        x = self.l1 * np.cos(one) + self.l2 * np.cos(both)
-        return np.stack([x, -self.l1 * np.sin(one) - self.l2 * np.sin(both)])
-
-    @property
-    def path(self) -> str:
-        """The tip's path, as SVG writes it."""
-        return " ".join(f"{x:.4g},{y:.4g}" for x, y in self.tip.T)
-
-    @property
-    def start(self) -> tuple[float, float]:
-        """The joints' angles at first in degrees, as SVG turns them: clockwise."""
-        one, two = -np.degrees(self.theta[:, 0])
-        return float(one), float(two)
-
-    @property
-    def box(self) -> str:
-        """The view of the drawing: all that the arm can reach."""
-        reach = (1 + MARGIN) * (self.l1 + self.l2)
-        return f"{-reach} {-reach} {2 * reach} {2 * reach}"
-
 
 def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
     """The arm of a result, to scale as far as its lengths are known, moved through the first log.
@@ -99,21 +74,19 @@ def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
     known = np.isfinite(own["theta1"]) & np.isfinite(own["theta2"])
     if np.count_nonzero(known) < 2:
         return None
-    turn = 0.0  # θ1's zero against gravity
-    if set(value) & set(SINES):
-        first, second, _ = moments_of(value)
-        if first and second:
-            turn = cmath.phase(second / first)
+    first, second, _ = moments_of(value)
+    # θ1's zero against gravity, of an arm whose moments have phases
+    turn = cmath.phase(second / first) if first and second and set(value) & set(SINES) else 0.0
     reading = f"{READING} l1 is {significant(l1, 3)} m."
     if l2 is None:
         reading += (
             f" Link 2's length is not known: it is drawn as long as link 1 (give {flag('l2')})."
         )
-    payload, aside = "", 0.0
-    if "m_p" in result.payload and result.payload["m_p"].estimate is not None:
-        payload = f"payload of {significant(result.payload['m_p'].estimate, 3)} kg"
-    if "y_p" in result.payload:
-        aside = result.payload["y_p"].estimate or 0.0
+    mass, beside = (result.payload.get(name) for name in ("m_p", "y_p"))
+    payload = ""
+    if mass is not None and mass.estimate is not None:
+        payload = f"payload of {significant(mass.estimate, 3)} kg"
+    aside = beside.estimate or 0.0 if beside else 0.0
     theta = np.stack([own["theta1"][known] + turn, own["theta2"][known]])
     return ArmDrawing(l1, l2 or l1, own["t"][known], theta, reading, payload, aside=aside)
 

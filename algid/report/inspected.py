@@ -37,31 +37,24 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
 
 def _held(found: Inspection) -> Iterator[Table | str]:
     """Columns or topics, then what the messages of each topic hold."""
-    shown = found.entries[:MOST_SHOWN]
     columns: dict[str, Kind] = {
         "Name": "name", "Type": "text", "Samples": "number", "Hz": "number",
     }  # fmt: skip
-    rows = []
+    rows, shown = [], found.entries[:MOST_SHOWN]
     for one in shown:
-        count = rate = ""
-        if one.count is not None:
-            count = str(one.count)
-        if one.rate is not None:
-            rate = f"{one.rate:.4g}"
+        count = "" if one.count is None else str(one.count)
+        rate = "" if one.rate is None else f"{one.rate:.4g}"
         rows.append((visible(one.name, NAME), visible(one.type, TYPE), count, rate))
-    left = len(found.entries) - len(shown)
-    note = f"and {left} more" if left else ""
+    left = len(found.entries) - MOST_SHOWN
+    note = f"and {left} more" if left > 0 else ""
     if rows:
         yield Table("Channels", columns, tuple(rows), note).without_empty()
     for one in shown:
         if one.joints or one.fields:
-            held = "fields "
-            if one.joints:
-                held = f"joints {', '.join(one.joints)}; fields "
-            held += ", ".join(one.fields[:MOST_FIELDS]) or "without a number"
-            if len(one.fields) > MOST_FIELDS:
-                held += " …"
-            yield visible(f"{one.name}: {held}", 2000)
+            joints = f"joints {', '.join(one.joints)}; " if one.joints else ""
+            fields = ", ".join(one.fields[:MOST_FIELDS]) or "without a number"
+            more = " …" if len(one.fields) > MOST_FIELDS else ""
+            yield visible(f"{one.name}: {joints}fields {fields}{more}", 2000)
 
 
 def _figures(found: Inspection) -> Iterator[Table | str]:

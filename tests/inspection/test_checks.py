@@ -97,8 +97,6 @@ def spoiled(name: str) -> Log:
             return replace(log, stamp_ns=log.stamp_ns + late)
         case "FLIPPED_SIGN" | "WRONG_CONVENTION":
             return replace(log, tau=-tau)
-        case "PHASES":
-            return replace(log, theta=theta + np.array([[np.radians(4)], [0.0]]), omega=None)
         case "WRONG_ZERO":
             return replace(log, theta=with_row(theta, 0, theta[0] + np.pi / 2))
         case _:
@@ -119,7 +117,7 @@ TOLD = (
     "UNEVEN_STAMPS",
 )
 TOLD_OF_GRAVITY = ("FLIPPED_SIGN", "WRONG_ZERO", "GRAVITY_COMPENSATED")
-TOLD_OF_CONVENTIONS = ("WRONG_CONVENTION", "PHASES")
+TOLD_OF_CONVENTIONS = ("WRONG_CONVENTION",)
 
 
 @pytest.mark.usefixtures("signals_alone")

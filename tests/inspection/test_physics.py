@@ -15,10 +15,11 @@ import pytest
 
 from algid.arm import Arm, inverse_dynamics
 from algid.estimators.conventions import Convention
-from algid.inspection.conventions import Mend, doubted, is_right, judged, mend
+from algid.inspection.conventions import doubted, is_right, judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
 from algid.log import Log, Origin, Reading
+from algid.notices import Notice
 from algid.profile import load_profile
 from algid.readers import read_log
 from algid.readers.table import CHANNELS
@@ -69,7 +70,7 @@ def test_conventions_are_judged_over_all_stretches() -> None:
     flipped = replace(log, tau=-log.tau)
     found = mend(flipped, judged(flipped))
     assert found is not None
-    assert found.settings == {"tau1": {"sign": -1}, "tau2": {"sign": -1}}
+    assert found.remedies[0].settings == {"tau1.sign": -1, "tau2.sign": -1}
     alone = log.part(0, int(np.argmax(np.diff(log.stamp_ns))) + 1)
     assert judged(alone) is None
 
@@ -147,7 +148,7 @@ def read_by(reading: Reading | None = None, mapping: dict[str, str] | None = Non
     )
 
 
-def mended(convention: Convention, reading: Reading | None = None) -> Mend:
+def mended(convention: Convention, reading: Reading | None = None) -> Notice:
     found = mend(read_by(reading), judgement(convention))
     assert found is not None
     return found
@@ -203,21 +204,16 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             "the zero of θ2 is off by 90°",
             "--set offsets=[0.0, 1.5708]",
         ),
-        (
-            Convention(zero=(0.2, -0.3)),
-            "the zero of θ1 is off by 11.46° and the zero of θ2 is off by -17.19°",
-            "--set offsets=[0.2, -0.3]",
-        ),
     ],
 )
 def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
     convention: Convention, words: str, flags: str
 ) -> None:
     found = mended(convention)
-    assert found.words == words
-    assert " ".join(found.remedy.flags) == flags
-    assert found.another == (convention.zero != (0.2, -0.3))  # below 45° a phase
-    pairs = zip(found.remedy.flags[::2], found.remedy.flags[1::2], strict=True)
+    assert found.numbers["wrong"] == words
+    flat = found.remedies[0].flags
+    assert " ".join(flat) == flags
+    pairs = zip(flat[::2], flat[1::2], strict=True)
     given: dict[str, Any] = {"set": []}
     for flag, text in pairs:
         if flag == "--set":
@@ -229,15 +225,15 @@ def test_what_is_wrong_is_said_in_words_and_in_flags_that_are_taken(
     plain = profile.model_dump(exclude_unset=True)
     assert {
         name: [*value] if isinstance(value, tuple) else value for name, value in plain.items()
-    } == found.settings
+    } == found.remedies[0].keywords
 
 
 def test_what_contradicts_is_the_worst_that_is_broken() -> None:
     broken = {"k1 > 0": -5.4, "k3 > 0": -60.2, "k5 > 0": -7.0}
     found = mend(read_by(), judgement(Convention(base=True), broken=broken))
     assert found is not None
-    assert found.contradiction == "k3 > 0 is broken by 60 σ"
-    unexplained = mended(Convention(base=True)).contradiction
+    assert found.numbers["contradiction"] == "k3 > 0 is broken by 60 σ"
+    unexplained = mended(Convention(base=True)).numbers["contradiction"]
     assert unexplained == "45.6 % of a torque stays unexplained, 1.2 % otherwise"
 
 

@@ -50,8 +50,7 @@ def test_links_are_as_long_as_the_payload_or_the_constants_have_it(
 
 def test_the_arm_stands_as_the_log_begins_and_moves_as_it_does(result: Result, raw: Drawn) -> None:
     drawing = arm(result, raw)
-    theta1 = raw.samples["theta1"][0]
-    assert drawing.start[0] == pytest.approx(-np.degrees(theta1))  # SVG turns clockwise
+    assert drawing.theta[0, 0] == raw.samples["theta1"][0]
     t, theta = drawing.frames
     assert t.size == 121
     assert (t[0], t[-1]) == pytest.approx((0.0, 4.0), abs=2e-3)

@@ -112,6 +112,10 @@
     const [first, second, button, slider, shown] = [".link1", ".link2", "button", "input", "output"].map((what) => figure.querySelector(what));
     const { t, theta1, theta2 } = arm;
     const span = t.at(-1) - t[0] || 1;
+    const [l1, l2] = [Number(second.dataset.at), Number(second.querySelector("line").getAttribute("x2"))];
+    const tip = theta1.map((one, at) => [one, one + theta2[at]]).map(([one, both]) =>
+      `${(l1 * Math.cos(one) + l2 * Math.cos(both)).toFixed(4)},${(-l1 * Math.sin(one) - l2 * Math.sin(both)).toFixed(4)}`);
+    figure.querySelector(".path").setAttribute("points", tip.join(" "));
     let before = null;
     const show = () => {
       const at = Math.round(slider.value * (t.length - 1));
