@@ -8,7 +8,7 @@ omega   joint velocities θ̇1, θ̇2             (2, ...)    rad/s
 alpha   joint accelerations θ̈1, θ̈2          (2, ...)    rad/s^2
 tau     joint torques τ1, τ2                (2, ...)    N m
 k       constants k1 … k7 (Table 1)         (7,)        `algid.model.UNITS`
-z       payload constants z1 … z5 (Table 2) (5,)        `PAYLOAD_UNITS`
+z       payload constants z1 … z5 (Table 2) (5,)        kg m^2 and N m
 m_p     tip payload                         scalar      kg
 ======  ==================================  ==========  ===============
 
@@ -42,7 +42,6 @@ def keep_arrays(holder: object) -> None:
 
 
 CONSTANT_NAMES = ("k1", "k2", "k3", "k4", "k5", "k6", "k7")
-PAYLOAD_UNITS = {"z1": "kg m^2", "z2": "kg m^2", "z3": "kg m^2", "z4": "N m", "z5": "N m"}
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class Arm:
         return np.concatenate([k, self.sines() + np.array([z[2].imag, z[4].imag, z[3].imag])])
 
     def payload_constants(self, m_p: float) -> FloatArray:
-        """Constants z1 … z5 of a tip payload of `m_p` kg (Table 2): (5,), in `PAYLOAD_UNITS`."""
+        """Constants z1 … z5 of a tip payload of `m_p` kg (Table 2): (5,), in kg m^2 and N m."""
         return payload_constants(m_p, self.l1, self.l2, self.g)
 
 
@@ -265,12 +264,3 @@ def regressor(theta: FloatArray, omega: FloatArray, alpha: FloatArray) -> FloatA
             ),
         ]
     )
-
-
-def energy(k: FloatArray, theta: FloatArray, omega: FloatArray) -> FloatArray:
-    """Kinetic and potential energy (...) in J, zero for the arm at rest along the horizontal."""
-    _, k2, _, k4, _, _, _ = k
-    m11, m12, m22 = mass_matrix(k, theta)
-    kinetic = 0.5 * m11 * omega[0] ** 2 + m12 * omega[0] * omega[1] + 0.5 * m22 * omega[1] ** 2
-    potential: FloatArray = k4 * np.sin(theta[0]) + k2 * np.sin(theta[0] + theta[1])
-    return np.asarray(kinetic + potential)

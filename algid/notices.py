@@ -21,15 +21,7 @@ from typing import Any
 
 from algid.base.text import joined
 from algid.base.words import counted
-from algid.options import BY_SET, FLAGS, VALUES, flag
-
-
-def _own(name: str, value: object) -> bool:
-    """Whether a setting has a flag of its own; any other is one of a profile, behind ``--set``.
-
-    A profile's `velocity` is true or false and has none: the option says where velocities are from.
-    """
-    return "." not in name and name not in BY_SET and not isinstance(value, bool)
+from algid.options import FLAGS, SET, VALUES, flag
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,15 +47,14 @@ class Remedy:
         words: list[str] = []
         for name, value in self.settings.items():
             shown = _shown(name, value)
-            if _own(name, value):
-                if isinstance(shown, list | tuple):
-                    shown = ",".join(map(str, shown))
-                words += [flag(name), str(shown)]
-            else:
+            typed, behind, _ = flag(name).partition(SET)
+            if behind:
                 plain = value is None or (isinstance(value, str) and value.isalpha())
-                if not plain:
-                    shown = _toml(name, value)
-                words += [flag("set"), f"{name}={shown}"]
+                words += [SET.strip(), f"{name}={shown if plain else _toml(name, value)}"]
+            elif isinstance(shown, list | tuple):
+                words += [typed, ",".join(map(str, shown))]
+            else:
+                words += [typed, str(shown)]
         return tuple(words)
 
     @property

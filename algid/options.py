@@ -7,14 +7,18 @@ seldom set has no flag of its own: ``--set NAME=VALUE`` sets it, like every line
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from algid.base.limits import Range
 
+SET = "--set "
+"""Before a setting without a flag of its own."""
 EVERYDAY, ADVANCED = "Options", "Advanced"
 """Panels of a command's help."""
+EVERYDAY_FIELDS = ("angle_unit", "torque_unit", "joints", "zero", "cross_validate")
+"""Of settings and profiles; the others are for seldom."""
 BY_SET = frozenset(
     {
         *("acceleration", "bandwidth", "clock", "columns", "constrain", "delay", "drive", "drop"),
@@ -41,7 +45,9 @@ VALUES: Mapping[str, str | tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Option:
-    """What a keyword's annotation tells the command line beside its type.
+    """A keyword of a verb, or a field of `Settings` or `Profile`, as the command line has it.
+
+    An annotation states what its type does not say, `algid.api.signature.options_of` the rest.
 
     Parameters
     ----------
@@ -52,19 +58,38 @@ class Option:
     panel : str
         Where help shows it.
     flag : str
-        How it is typed, where that is not the flag of its name.
+        How it is typed.
     default : object
         What a command takes where Python's default is None.
-    words : callable
+    suggested : callable
         Gives what completes it, where no type states that.
+    name : str
+    help : str
+        The first sentence of its entry in the docstring; its words where there is none.
+    words : list of str
+        The words that it may be; none where it may be others.
+    argument : bool
+        Whether it is typed without a flag.
+    or_file : bool
+        Whether it may be the path of a file.
     """
 
     kind: Any = None
     range: Range | None = None
-    panel: str = EVERYDAY
-    flag: str | None = None
+    panel: str = ""
+    flag: str = ""
     default: Any = None
-    words: Callable[[], list[str]] | None = None
+    suggested: Callable[[], list[str]] | None = None
+    name: str = ""
+    help: str = ""
+    words: Sequence[str] = ()
+    argument: bool = False
+    or_file: bool = False
+
+    @property
+    def by_set(self) -> bool:
+        """Whether it has no flag of its own."""
+        return flag(self.name).startswith(SET)
 
 
 def flag(name: str, *, off: bool = False) -> str:
@@ -78,8 +103,8 @@ def flag(name: str, *, off: bool = False) -> str:
     """
     if name == "out":
         return "-o"
-    if name in BY_SET:
-        return f"--set {name}"
+    if name in BY_SET or "." in name:
+        return f"{SET}{name}"
     return f"--{'no-' if off else ''}{name.rstrip('_').replace('_', '-')}"
 
 

@@ -6,10 +6,9 @@ refused.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
@@ -17,7 +16,7 @@ from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
 from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.base.units import names_of, unit_of
-from algid.options import EVERYDAY, Option, flag
+from algid.options import Option, flag
 
 
 def _usual(unit: object) -> object:
@@ -64,17 +63,14 @@ CHANNELS_OF: Mapping[str, tuple[str, ...]] = {
     "torque_unit": ("tau1", "tau2"),
 }
 """Settings that are the unit of each of several channels."""
-NO_BOUNDS = (None, None)
 OF_ONE_LOG = ("torque_file", "segment")
 """Settings that no other log shares."""
 
 
-def field(
-    default: Any, text: str, panel: str = "", bounds: tuple[float | None, float | None] = NO_BOUNDS
-) -> Any:
-    """A field with its help, its panel and its least and largest value."""
+def field(default: Any, bounds: tuple[float | None, float | None]) -> Any:
+    """A field with its least and largest value."""
     low, high = bounds
-    return Field(default, ge=low, le=high, description=text, json_schema_extra={"panel": panel})
+    return Field(default, ge=low, le=high)
 
 
 def _parts(text: object) -> object:
@@ -100,15 +96,7 @@ def _plain(path: object) -> object:
     return path
 
 
-def _number(text: object) -> object:
-    """The number that a flag's text is."""
-    if isinstance(text, str) and text.isdecimal():
-        return int(text)
-    return text
-
-
 PathText = Annotated[str | None, Field(min_length=1), BeforeValidator(_plain), Option(kind=Path)]
-Model = TypeVar("Model", bound=BaseModel)
 
 
 class _Strict(BaseModel):
@@ -172,24 +160,74 @@ class Torque(Channel):
         return self.q_des or self.source
 
 
-def documented(model: type[Model]) -> type[Model]:
-    """The model, whose docstring tells of each field what its description says."""
-    told = ["Parameters", "----------"]
-    for name, one in model.model_fields.items():
-        told += [name, f"    {one.description}"]
-    head, raises, rest = inspect.cleandoc(model.__doc__ or "").partition("Raises\n")
-    model.__doc__ = "\n".join((head + told[0], *told[1:], "", raises + rest))
-    return model
-
-
-@documented
 class Profile(_Strict):
-    """What a log's names, units and signs mean: each field's description says what it is.
+    """What a log's names, units and signs mean: each entry of it that is set beats the log.
 
     Angles become θ1 from the horizontal, θ2 from link 1. Of each channel, ``theta1`` to ``q_des2``,
     a dict holds its `source`, `unit`, `sign`, `offset`, `gear_ratio` and what else its kind has.
     The reference that a controller follows, q_des, is recorded as its angle is, where nothing else
     is said.
+
+    Parameters
+    ----------
+    topic : str
+        Topic with the joint states.
+    angle_unit : str
+    torque_unit : str
+        N m, mN m, A, mA, lbf in, ….
+    joints : two str
+        The two joints, as NAME,NAME.
+    clock : str
+        Stamps of the messages' own header, or of the log (the recorder).
+    time : str
+        The column of the time.
+    time_unit : str
+        Its unit: s, ms, us or ns.
+    rate : float, Hz
+        Samples a second, Hz, of a table without time.
+    columns : str
+        Names of the columns of a CSV without a header, as t,theta1,….
+    zero : str
+        Where θ1 is zero: horizontal, hanging or upright.
+    second_angle : str
+        θ2 is relative (to link 1) or absolute.
+    drive : str
+        Where the second motor stands: in its joint, or at the base, where a belt or a parallelogram
+        takes its torque to θ1 + θ2; torques become τ1 + τ2 and τ2.
+    passive : 1 or 2
+        The joint without a motor, 1 or 2: its torque is zero, whatever the log says.
+    gravity : float, m/s²
+        m/s².
+    effort : str
+        What the driver logs as torque.
+    velocity : str
+        Joint velocities: observer (a log's are not read), or measured.
+    signs : two of 1 and -1
+        Of the joints.
+    offsets : two float, rad
+        Of the joints, rad.
+    start : float, s
+        Leave out what is before, s from the first sample.
+    end : float, s
+        Leave out what is after, s from the first sample.
+    torque_file : path
+        File with the torques, joined on the stamps.
+    prior : path
+        URDF file or result that says what k1 … k5 are.
+    prior_error : float
+        Per cent that it errs by.
+    segment : int
+        One run alone, 1 for the first, where the log's clock starts again.
+    accept : codes
+        Checks that warn but do not refuse: CODE,CODE.
+    theta1, theta2 : dict
+        Of that angle its source, unit, sign, ….
+    tau1, tau2 : dict
+        Of that torque its source, unit, sign, ….
+    omega1, omega2 : dict
+        Of that velocity its source, unit, sign, ….
+    q_des1, q_des2 : dict
+        Of that joint's reference its source, unit, sign, ….
 
     Raises
     ------
@@ -197,69 +235,40 @@ class Profile(_Strict):
         If a setting or its value is not known.
     """
 
-    topic: str | None = field(None, "Topic with the joint states.")
-    angle_unit: AngleUnit | None = field(None, f"{', '.join(names_of('angle'))}.", EVERYDAY)
-    torque_unit: TorqueUnit | None = field(None, "N m, mN m, A, mA, lbf in, ….", EVERYDAY)
-    joints: Annotated[tuple[str, str] | None, BeforeValidator(_two_names)] = field(
-        None, "The two joints, as NAME,NAME.", EVERYDAY
-    )
-    clock: Literal["header", "log"] | None = field(
-        None, "Stamps of the messages' own header, or of the log (the recorder)."
-    )
-    time: str | None = field(None, "The column of the time.")
-    time_unit: TimeUnit | None = field(None, "Its unit: s, ms, us or ns.")
-    rate: float | None = field(
-        None, "Samples a second, Hz, of a table without time.", bounds=PHYSICAL.rate
-    )
-    columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = field(
-        None, "Names of the columns of a CSV without a header, as t,theta1,…."
-    )
-    zero: Literal["horizontal", "hanging", "upright"] = field(
-        "horizontal", "Where θ1 is zero: horizontal, hanging or upright.", EVERYDAY
-    )
-    second_angle: Literal["relative", "absolute"] = field(
-        "relative", "θ2 is relative (to link 1) or absolute."
-    )
-    drive: Literal["joint", "base"] = field(
-        "joint",
-        "Where the second motor stands: in its joint, or at the base, where a belt or a "
-        "parallelogram takes its torque to θ1 + θ2; torques become τ1 + τ2 and τ2.",
-    )
-    passive: Annotated[Literal[1, 2] | None, BeforeValidator(_number)] = field(
-        None, "The joint without a motor, 1 or 2: its torque is zero, whatever the log says."
-    )
-    gravity: float = field(9.81, "m/s².", bounds=(0, None))
-    effort: Effort | None = field(None, "What the driver logs as torque.")
-    velocity: bool = field(True, "Whether recorded velocities are read.")
-    signs: tuple[Literal[1, -1], Literal[1, -1]] = field((1, 1), "Of the joints.")
-    offsets: tuple[float, float] = field((0.0, 0.0), "Of the joints, rad.")
-    start: float | None = field(
-        None, "Leave out what is before, s from the first sample.", bounds=(0, None)
-    )
-    end: Annotated[float | None, Field(gt=0)] = field(
-        None, "Leave out what is after, s from the first sample."
-    )
-    torque_file: PathText = field(None, "File with the torques, joined on the stamps.")
-    prior: PathText = field(None, "URDF file or result that says what k1 … k5 are.")
-    prior_error: float | None = field(None, "Per cent that it errs by.", bounds=PRIOR_ERROR)
-    segment: Annotated[int | None, BeforeValidator(_number)] = field(
-        None,
-        "One run alone, 1 for the first, where the log's clock starts again.",
-        bounds=(1, None),
-    )
-    accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = field(
-        (), "Checks that warn but do not refuse: CODE,CODE."
-    )
-    theta1: Angle = field(Angle(), "θ1: its source, unit, sign, ….")
-    theta2: Angle = field(Angle(), "θ2: its source, unit, sign, ….")
-    tau1: Torque = field(Torque(), "τ1: its source, unit, sign, ….")
-    tau2: Torque = field(Torque(), "τ2: its source, unit, sign, ….")
-    omega1: Velocity = field(Velocity(), "ω1: its source, unit, sign, ….")
-    omega2: Velocity = field(Velocity(), "ω2: its source, unit, sign, ….")
-    q_des1: Angle = field(Angle(), "The reference of θ1: its source, unit, sign, ….")
-    q_des2: Angle = field(Angle(), "The reference of θ2: its source, unit, sign, ….")
+    topic: str | None = None
+    angle_unit: AngleUnit | None = None
+    torque_unit: TorqueUnit | None = None
+    joints: Annotated[tuple[str, str] | None, BeforeValidator(_two_names)] = None
+    clock: Literal["header", "log"] | None = None
+    time: str | None = None
+    time_unit: TimeUnit | None = None
+    rate: float | None = field(None, PHYSICAL.rate)
+    columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = None
+    zero: Literal["horizontal", "hanging", "upright"] = "horizontal"
+    second_angle: Literal["relative", "absolute"] = "relative"
+    drive: Literal["joint", "base"] = "joint"
+    passive: Literal[1, 2] | None = None
+    gravity: float = Field(default=9.81, ge=0)
+    effort: Effort | None = None
+    velocity: Literal["observer", "measured"] | None = None
+    signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)
+    offsets: tuple[float, float] = (0.0, 0.0)
+    start: float | None = Field(default=None, ge=0)
+    end: float | None = Field(default=None, gt=0)
+    torque_file: PathText = None
+    prior: PathText = None
+    prior_error: float | None = field(None, PRIOR_ERROR)
+    segment: int | None = Field(default=None, ge=1)
+    accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = ()
+    theta1: Angle = Angle()
+    theta2: Angle = Angle()
+    tau1: Torque = Torque()
+    tau2: Torque = Torque()
+    omega1: Velocity = Velocity()
+    omega2: Velocity = Velocity()
+    q_des1: Angle = Angle()
+    q_des2: Angle = Angle()
 
-    _flags: frozenset[str] = PrivateAttr(frozenset())
     _channels: tuple[str, ...] = PrivateAttr(ALL_CHANNELS)
 
     @property
@@ -277,12 +286,6 @@ class Profile(_Strict):
         half = self.model_copy(update=dict.fromkeys(("torque_file", "start", "end", "segment")))
         half._channels = tuple(name for name in ALL_CHANNELS if name[:-1] in quantities)
         return half
-
-    def told_by(self, setting: str) -> Literal["flag", "profile"]:
-        """Who set `setting`, such as ``joints`` or ``tau1.unit``: a flag beats the file."""
-        if setting in self._flags:
-            return "flag"
-        return "profile"
 
     def place(self, name: str) -> tuple[str | None, str | None]:
         """Topic and field of the canonical channel `name`.
@@ -314,29 +317,22 @@ def with_settings(profile: Profile, settings: Mapping[str, Any], *, typed: bool 
         If a setting or its value is not known; it names the flag where settings are `typed`.
     """
     merged = profile.model_dump(exclude_unset=True)
-    flags = set(profile._flags)
     for name, value in settings.items():
         if isinstance(value, Mapping):  # settings of one channel
             merged[name] = merged.get(name, {}) | dict(value)
-            flags |= {f"{name}.{inner}" for inner in value}
             continue
         for channel in CHANNELS_OF.get(name, ()):
             merged.get(channel, {}).pop("unit", None)
-            flags.add(f"{channel}.unit")
         merged[name] = value
-        flags.add(name)
     try:
-        changed = Profile.model_validate(merged)
+        return Profile.model_validate(merged)
     except ValidationError as error:
         place, why = misfit(error)
         name, where = place.partition(".")[0], f"setting {place}"
         if typed:
-            behind_set = isinstance(settings.get(name), Mapping) or name == "velocity"
-            typed_as = flag("set" if behind_set else name).partition(" ")[0]
-            where = f"{typed_as} (profile: {place})"
+            typed_as = flag("set" if isinstance(settings.get(name), Mapping) else name)
+            where = f"{typed_as.partition(' ')[0]} (profile: {place})"
         raise SettingError(f"{where}: {why}") from error
-    changed._flags = frozenset(flags)
-    return changed
 
 
 def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
@@ -352,12 +348,9 @@ def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
     if not earlier:
         return profile
     known = with_settings(Profile(), earlier)
-    known._flags = frozenset()
     if profile is None:
         return known
-    together = with_settings(known, profile.model_dump(exclude_unset=True))
-    together._flags = profile._flags
-    return together
+    return with_settings(known, profile.model_dump(exclude_unset=True))
 
 
 def load_profile(path: Path) -> Profile:

@@ -1,7 +1,7 @@
 """Everything that decides an identification, as one value that travels into its result.
 
-Each field holds its type, default, bounds, help and panel: the command line, Python's keywords and
-the guide read them off it.
+Each field holds its type, default and bounds, the docstring its help: the command line, Python's
+keywords and the guide read them off it.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from algid.base.errors import SettingError
 from algid.base.files import misfit
 from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
-from algid.options import EVERYDAY, Option, flag
-from algid.profile import Effort, PathText, documented, field
+from algid.options import Option, flag
+from algid.profile import Effort, PathText, field
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
     from algid.signals.shift import TorqueShift
@@ -27,7 +27,7 @@ else:
     EstimatorName = Literal[NAMES]
 
 
-OF_BOTH = ("gravity", "effort")
+OF_BOTH = ("gravity", "effort", "velocity")
 """Settings that a profile has too: there they are of its log's driver and arm."""
 OF_PRIOR = ("prior", "prior_error")
 """The same of its arm alone: they do not say how a log is read."""
@@ -49,32 +49,24 @@ def refuse_contradictions(given: Mapping[str, Any]) -> None:
         raise SettingError(EXTERNAL_GRAVITY)
 
 
-def _poles(given: object) -> object:
+def _poles(given: Any) -> object:
     """Six poles out of text or a list; complex ones like -80+20j."""
-    if given is None or (
-        isinstance(given, tuple) and all(isinstance(one, complex) for one in given)
-    ):
+    if given is None:
         return given
     from algid.signals.observers import observer_gain
 
-    like = "give six like -80,-390,-391,-392,-393,-394"
-    if isinstance(given, list | tuple):
-        given = ",".join(map(str, given[:7]))
-    if not isinstance(given, str):
-        raise SettingError(f"{flag('poles')}: expected six numbers, found {reprlib.repr(given)}")
-    try:
-        poles = tuple(complex(part.strip()) for part in given.split(","))
-    except ValueError:
-        raise SettingError(
-            f"{flag('poles')} {given:.200}: expected numbers between commas; {like}"
-        ) from None
     low, high = PHYSICAL.pole
     try:
+        parts = given.split(",") if isinstance(given, str) else given
+        poles = tuple(complex(str(part).strip()) for part in parts)
         if not all(low <= abs(pole) <= high for pole in poles):
             raise ValueError(f"each must be from {low:g} to {high:g} rad/s in size")
         observer_gain(poles)
-    except ValueError as error:
-        raise SettingError(f"{flag('poles')} {given:.200}: {error}; {like}") from None
+    except (TypeError, ValueError) as error:
+        raise SettingError(
+            f"{flag('poles')}: expected six numbers like -80,-390,-391,-392,-393,-394, found "
+            f"{reprlib.repr(given)} ({error!s:.120})"
+        ) from None
     return poles
 
 
@@ -84,9 +76,46 @@ def _terms() -> list[str]:
     return ["auto", "plain", *CHOICES]
 
 
-@documented
 class Settings(BaseModel):
-    """How to identify: each field's description says what it is.
+    """How to identify.
+
+    Parameters
+    ----------
+    estimator : str
+    velocity : str
+        Joint velocities: observer, or measured (the log's).
+    observer : str
+        luenberger (the paper's) or zero-phase; by default the estimator's.
+    poles : six complex, rad/s
+        Six poles of the paper's observer, rad/s, three a joint.
+    window : float, s
+        s: the paper's integrals restart after it (2 s); the weak form's windows (0.4 s).
+    bandwidth : float, Hz
+        Bandwidth of the zero-phase differentiator, Hz.
+    gravity : float, m/s²
+        m/s²; 0 for an arm in a horizontal plane [9.81].
+    effort : str
+        Logged torque: raw, current, external, command, ….
+    model : str
+        Torque terms: auto, plain, or coulomb,rotor,….
+    torque_hold : str
+        Torque between samples: auto, foh (linear), zoh.
+    delay : float, s
+        From torque to angle, s; the term delay estimates it.
+    l1 : float, m
+        Length of link 1, m, where known.
+    l2 : float, m
+        Length of link 2, m, where known.
+    payload_mass : float, kg
+        Known payload, kg: gives the torques' gain.
+    prior : path
+        URDF file or result that says what k1 … k5 are.
+    prior_error : float
+        Per cent that a URDF's masses, centres and inertias err by (1 σ); 20.
+    constrain : bool
+        Solve within the physical bounds.
+    cross_validate : bool
+        Predict each log from the others.
 
     Raises
     ------
@@ -96,50 +125,24 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
-    estimator: EstimatorName = field(NAMES[0], f"{', '.join(NAMES[:-1])} or {NAMES[-1]}.")
-    velocity: Literal["observer", "measured"] = field(
-        "observer", "Joint velocities: observer, or measured (the log's)."
-    )
-    observer: Literal["luenberger", "zero-phase"] | None = field(
-        None, "luenberger (eq. 6 of the paper) or zero-phase; by default the estimator's."
-    )
-    poles: Annotated[tuple[complex, ...] | None, BeforeValidator(_poles)] = field(
-        None, "Six poles of the paper's observer, rad/s, three a joint."
-    )
-    window: float | None = field(
-        None,
-        "s: the paper's integrals restart after it (2 s); the weak form's windows (0.4 s).",
-        bounds=PHYSICAL.window,
-    )
-    bandwidth: float = field(
-        60.0, "Bandwidth of the zero-phase differentiator, Hz.", bounds=PHYSICAL.bandwidth
-    )
-    gravity: float = field(
-        9.81, "m/s²; 0 for an arm in a horizontal plane [9.81].", bounds=PHYSICAL.gravity
-    )
-    effort: Effort | None = field(None, "Logged torque: raw, current, external, command, ….")
-    model: Annotated[str, Option(words=_terms)] = field(
-        "auto", "Torque terms: auto, plain, or coulomb,rotor,…."
-    )
-    torque_hold: Literal["auto", "foh", "zoh"] = field(
-        "auto", "Torque between samples: auto, foh (linear), zoh."
-    )
-    delay: float = field(
-        0.0, "From torque to angle, s; the term delay estimates it.", bounds=PHYSICAL.delay
-    )
-    l1: float | None = field(None, "Length of link 1, m, where known.", bounds=PHYSICAL.length)
-    l2: float | None = field(None, "Length of link 2, m, where known.", bounds=PHYSICAL.length)
-    payload_mass: float | None = field(
-        None, "Known payload, kg: gives the torques' gain.", bounds=PHYSICAL.mass
-    )
-    prior: PathText = field(None, "URDF file or result that says what k1 … k5 are.")
-    prior_error: float | None = field(
-        None,
-        "Per cent that a URDF's masses, centres and inertias err by (1 σ); 20.",
-        bounds=PRIOR_ERROR,
-    )
-    constrain: bool = field(False, "Solve within the physical bounds.")
-    cross_validate: bool = field(False, "Predict each log from the others.", panel=EVERYDAY)
+    estimator: EstimatorName = NAMES[0]
+    velocity: Literal["observer", "measured"] = "observer"
+    observer: Literal["luenberger", "zero-phase"] | None = None
+    poles: Annotated[tuple[complex, ...] | None, BeforeValidator(_poles)] = None
+    window: float | None = field(None, PHYSICAL.window)
+    bandwidth: float = field(60.0, PHYSICAL.bandwidth)
+    gravity: float = field(9.81, PHYSICAL.gravity)
+    effort: Effort | None = None
+    model: Annotated[str, Option(suggested=_terms)] = "auto"
+    torque_hold: Literal["auto", "foh", "zoh"] = "auto"
+    delay: float = field(0.0, PHYSICAL.delay)
+    l1: float | None = field(None, PHYSICAL.length)
+    l2: float | None = field(None, PHYSICAL.length)
+    payload_mass: float | None = field(None, PHYSICAL.mass)
+    prior: PathText = None
+    prior_error: float | None = field(None, PRIOR_ERROR)
+    constrain: bool = False
+    cross_validate: bool = False
 
     if not TYPE_CHECKING:
 
@@ -147,7 +150,8 @@ class Settings(BaseModel):
             try:
                 super().__init__(**given)
             except ValidationError as error:
-                raise _refusal(error) from None
+                place, why = misfit(error)
+                raise SettingError(f"{flag(place.partition('.')[0])}: {why}") from None
 
     def model_post_init(self, _context: Any, /) -> None:
         """Refuse what no single field shows."""
@@ -194,12 +198,8 @@ class Settings(BaseModel):
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are known, in m."""
-        lengths = {}
-        if self.l1 is not None:
-            lengths["l1"] = self.l1
-        if self.l2 is not None:
-            lengths["l2"] = self.l2
-        return lengths
+        both = {"l1": self.l1, "l2": self.l2}
+        return {name: length for name, length in both.items() if length is not None}
 
     def torque_shift(self, delay: float | None = None) -> TorqueShift:
         """After how long a logged torque acts: its hold, and the `delay` in s, or the one set."""
@@ -263,17 +263,3 @@ class Settings(BaseModel):
 
 DEFAULTS: Mapping[str, Any] = {name: field.default for name, field in Settings.model_fields.items()}
 """Of each setting."""
-
-
-def _refusal(error: ValidationError) -> SettingError:
-    """The first misfit in one line: a number's is told with both of its bounds."""
-    place, why = misfit(error)
-    name = place.partition(".")[0]
-    ends: dict[str, float] = {}
-    if name in Settings.model_fields:
-        for bound in Settings.model_fields[name].metadata:
-            ends |= {end: getattr(bound, end) for end in ("ge", "le") if hasattr(bound, end)}
-    if len(ends) == 2:
-        found = reprlib.repr(error.errors()[0]["input"])
-        why = f"expected a number from {ends['ge']:g} to {ends['le']:g}, found {found}"
-    return SettingError(f"{flag(name)}: {why}")

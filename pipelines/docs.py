@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import algid
-from algid.api.guide import text_of, topics
+from algid.api.guide import TOPICS, text_of
 
 ROOT = Path(__file__).parents[1]
 PICTURES = Path("data/pictures")  # as the README names them
@@ -22,7 +22,7 @@ def pages(folder: Path) -> None:
     """Write a Markdown file a topic, the README with its pictures, and the reference."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for topic in topics():
+    for topic in TOPICS:
         (folder / f"{topic}.md").write_text(_linked(text_of(topic)), encoding="utf-8")
     first = (ROOT / "README.md").read_text(encoding="utf-8").replace("(algid/guide/", "(")
     (folder / "index.md").write_text(

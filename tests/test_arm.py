@@ -10,7 +10,6 @@ import sympy as sp
 
 from algid.arm import (
     Arm,
-    energy,
     forward_dynamics,
     inverse_dynamics,
     mass_matrix,
@@ -111,28 +110,6 @@ def test_mass_matrix_of_a_real_arm_is_positive_definite() -> None:
     m11, m12, m22 = mass_matrix(k, np.stack([np.zeros(361), np.linspace(-np.pi, np.pi, 361)]))
     assert np.all(m11 > 0)
     assert np.all(m11 * m22 > m12**2)
-
-
-def test_energy_of_an_arm_at_rest_is_its_height_times_its_weight() -> None:
-    arm = load_case("case1").arm
-    upright = energy(arm.constants(), np.array([np.pi / 2, 0.0]), np.zeros(2))
-    assert upright == pytest.approx(
-        arm.g * (arm.m1 * arm.lc1 + arm.m2 * (arm.l1 + arm.lc2)), rel=1e-14
-    )
-
-
-def test_energy_grows_by_what_the_drives_do_less_what_friction_takes() -> None:
-    """dE/dt = τ·θ̇ − k6 θ̇1² − k7 θ̇2², at random states under random torques."""
-    k = load_case("case1").arm.constants()
-    theta, omega, _ = states()
-    tau = np.random.default_rng(8).normal(0, 1, omega.shape)
-    alpha = forward_dynamics(k, theta, omega, tau)
-    h = 1e-6
-    ahead, behind = (
-        energy(k, theta + sign * h * omega, omega + sign * h * alpha) for sign in (1, -1)
-    )
-    power = np.sum(tau * omega, axis=0) - k[5] * omega[0] ** 2 - k[6] * omega[1] ** 2
-    np.testing.assert_allclose((ahead - behind) / (2 * h), power, atol=1e-5 * np.abs(power).max())
 
 
 def test_what_is_handed_out_read_only_cannot_be_written_to() -> None:

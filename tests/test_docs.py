@@ -25,7 +25,7 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.api.guide import topics
+from algid.api.guide import TOPICS
 from pipelines.docs import pages
 from pipelines.typed import run
 
@@ -264,7 +264,7 @@ def test_the_sites_configuration_names_what_is_there() -> None:
     assert "mkdocs-material" in needed
     assert "mkdocstrings[python]" in needed
     listed = re.findall(r"^  - ([\w-]+)\.md$", text, re.MULTILINE)
-    assert listed == ["index", *topics(), "reference"]
+    assert listed == ["index", *TOPICS, "reference"]
 
 
 @pytest.mark.parametrize(

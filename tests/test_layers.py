@@ -103,7 +103,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "fleet": room("arm errors files limits model notices physics progress report "
                   "significance text verdict words", "numpy polars scipy"),
     "api": room(
-        "arm batches check designs errors estimators exits exports files fleet identification "
+        "arm batches check designs errors exits exports files fleet identification "
         "inspection limits log methods moved notices options physics profile progress "
         "readers report results runtime settings stores synth text tracks units words writers",
         "numpy plotly polars pydantic",

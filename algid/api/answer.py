@@ -35,10 +35,6 @@ class Answer:
     complaints : sequence of str
         Lines for standard error that say what is wrong.
     exit : Exit
-    brief : callable, or None
-        Gives the lines that are printed where the whole is not asked for.
-    details : sequence of str
-        Lines for standard error where the whole is asked for.
     """
 
     shown: Callable[[], Iterable[Document | Table | str]] = _nothing
@@ -46,5 +42,3 @@ class Answer:
     remarks: Sequence[str] = ()
     complaints: Sequence[str] = ()
     exit: Exit = Exit.OK
-    brief: Callable[[], Iterable[str]] | None = None
-    details: Callable[[], Iterable[str]] = _nothing

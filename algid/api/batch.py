@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 import sys
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
@@ -16,7 +15,7 @@ from algid.api.answer import Answer
 from algid.api.given import opened
 from algid.api.options import OUT, AnyResult, Options, ProfileLike, meant, settings_of
 from algid.api.signature import verb
-from algid.base.errors import AlgidError, SettingError
+from algid.base.errors import SettingError
 from algid.base.exits import Exit
 from algid.base.text import visible
 from algid.options import Option, flag
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.batches.jobs import Job
     from algid.batches.records import JobRecord
-    from algid.batches.run import Batch, BatchOutcome
+    from algid.batches.run import Batched
     from algid.profile import Profile
     from algid.settings import Settings
 
@@ -35,55 +34,6 @@ UNIT = "jobs"
 """What progress counts."""
 Complaint = Callable[[str], None]
 """Hears, in one line, what goes wrong while a batch goes on."""
-
-
-@dataclass(frozen=True)
-class Batched:
-    """How a batch ended.
-
-    Parameters
-    ----------
-    records : of its jobs, each with name, status and the reason of a failure
-    ran, left : how many were run now, and how many are left where it was stopped
-    out : where results and ``jobs.parquet`` are, less what opens it
-    interrupted : whether it was stopped by a signal
-    stopped : why it could not go on, where it could not
-    unreadable : why records that are there cannot be read, by their places
-    links : to folders, that were passed over
-    anew : how many jobs that had ended were run again, by why
-    """
-
-    records: list[JobRecord]
-    ran: int
-    left: int
-    out: str
-    interrupted: bool = False
-    stopped: str | None = None
-    unreadable: dict[str, str] = field(default_factory=dict)
-    links: list[str] = field(default_factory=list)
-    anew: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def failed(self) -> list[JobRecord]:
-        """Jobs without a result, or with one that must not be used."""
-        from algid.batches.records import FAILURES
-
-        return [record for record in self.records if record.status in FAILURES]
-
-    @property
-    def incomplete(self) -> bool:
-        """Whether a job's result leaves a parameter open."""
-        from algid.batches.records import JobStatus
-
-        return any(record.status is JobStatus.INCOMPLETE for record in self.records)
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Jobs by status, those there are."""
-        from algid.batches.records import JobStatus
-
-        counts = Counter(record.status for record in self.records)
-        return {end.value: counts[end] for end in JobStatus if end in counts}
 
 
 @verb
@@ -179,26 +129,23 @@ def batch(
     if isinstance(sources, str | Path):
         sources = [sources]
     names, place = [str(one) for one in sources], str(out)
+    links = None if watch else list[str]()
     if not place.strip():
         raise SettingError("-o: expected a folder or a URL, found none; name where results go")
     store = open_store(place)
-    bytes_each = None
-    if memory_limit is not None:
-        bytes_each = bytes_of(memory_limit)
-    if scheduler is not None and (workers is not None or memory_limit is not None):
-        raise SettingError(
-            f"{flag('scheduler')}: workers and their memory are the cluster's; set them where it "
-            "is started"
-        )
+    bytes_each = None if memory_limit is None else bytes_of(memory_limit)
     asked, of_profile = settings_of(settings, profile, options)
     said = meant(profile, of_profile)
-    known, alone = None, "logs"
-    if parameters is not None:
-        known, alone = opened(parameters), "loaded"
+    known = None if parameters is None else opened(parameters)
     statement_of(asked)  # what cannot be read is told once
-    if scheduler is not None and asked.prior is not None:
-        asked = asked.but(prior=absolute(asked.prior))
     if scheduler is not None:  # a worker's own folder is another
+        if workers is not None or memory_limit is not None:
+            raise SettingError(
+                f"{flag('scheduler')}: workers and their memory are the cluster's; set them where "
+                "it is started"
+            )
+        if asked.prior is not None:
+            asked = asked.but(prior=absolute(asked.prior))
         names, place = [absolute(source) for source in names], absolute(place)
 
     def profile_of(file: str | None) -> Profile | None:
@@ -211,11 +158,12 @@ def batch(
         if progress is not None:
             progress(f"{last.job.name[:50]}: {last.status.value}", done, total)
 
+    def look() -> list[Job]:
+        return jobs_of(names, place, "logs" if known is None else "loaded", links)
+
     recipe = BatchConfig(place, asked, cache(profile_of), known, report)  # each file once
     recipe.profile(None)
-    jobs, links = [], list[str]()
-    if not watch:
-        jobs = jobs_of(names, place, alone, links)
+    jobs = [] if watch else look()
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
     if part is not None:
@@ -229,22 +177,13 @@ def batch(
                 )
                 with stopped_by_signals(running.stop):
                     if watch:
-                        ended = watched(running, names, place, alone, retry_failed, complain)
+                        ended = running.watch(look, retry_failed, complain)
                     else:
                         ended = running.run(jobs, retry_failed)
         finally:
             sweep(store)
-    return Batched(
-        ended.records,
-        ended.ran,
-        ended.left,
-        shown(place),
-        running.stop.is_set() and not watch,
-        ended.stopped,
-        running.unreadable,
-        links,
-        dict(running.anew),
-    )
+    stopped = running.stop.is_set() and not watch
+    return replace(ended, out=shown(place), interrupted=stopped, links=links or ())
 
 
 def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
@@ -270,9 +209,7 @@ def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
         f"{summary or 'nothing done'}; {ended.ran} run now, {ended.left} left; "
         f"{ended.out}/jobs.parquet"
     )
-    ended_as = Exit.OK
-    if ended.incomplete:
-        ended_as = Exit.FAILED
+    ended_as = Exit.FAILED if "incomplete" in ended.counts else Exit.OK
     if ended.failed or ended.left or ended.stopped is not None:
         ended_as = Exit.LIMIT
     if ended.stopped is not None:
@@ -288,32 +225,29 @@ def _workers(
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
     from algid.base.runtime import cores
+    from algid.base.stores import is_url
+    from algid.batches.records import FOLDER
     from algid.batches.workers import Workers
 
-    if scheduler is not None:
-        from algid.base.stores import is_url
-        from algid.batches.cluster import cluster
-        from algid.batches.records import FOLDER
-
-        folder = None if is_url(out) else Path(out, FOLDER)
-        with cluster(scheduler, folder, timeout) as pool_and_size:
-            yield pool_and_size
+    if scheduler is None:
+        count = workers or cores()
+        with Workers(count, memory_limit, timeout) as executor:
+            yield executor, 2 * count
         return
-    count = workers or cores()
-    executor = Workers(count, memory_limit, timeout)
-    try:
-        yield executor, 2 * count
-    finally:
-        executor.shutdown()
+    from algid.batches.cluster import cluster
+
+    with cluster(scheduler, None if is_url(out) else Path(out, FOLDER), timeout) as both:
+        yield both
 
 
 def share_of(jobs: list[Job], part: str, watch: bool = False) -> list[Job]:
     """The jobs of a part like ``2/40``, every 40th from the second; raises `SettingError`."""
-    number, count = part.split("/") if re.fullmatch("[0-9]{1,9}/[0-9]{1,9}", part) else ("0", "0")
-    if watch or not 1 <= int(number) <= int(count):
+    found = re.fullmatch("([0-9]{1,9})/([0-9]{1,9})", part)
+    number, count = map(int, found.groups()) if found else (0, 0)
+    if watch or not 1 <= number <= count:
         expected = f"expected 1/N to N/N, and no {flag('watch')}"
         raise SettingError(f"{flag('part')}: {expected}, found {part!r:.60}")
-    return jobs[int(number) - 1 :: int(count)]
+    return jobs[number - 1 :: count]
 
 
 def bytes_of(text: str) -> int:
@@ -333,36 +267,3 @@ def bytes_of(text: str) -> int:
             f"{flag('memory_limit')}: expected at least 512MiB, like 2GB, found {text!r}"
         )
     return size
-
-
-def watched(
-    running: Batch,
-    sources: Sequence[str],
-    out: str,
-    alone: str,
-    retry_failed: bool,
-    complain: Complaint | None = None,
-) -> BatchOutcome:
-    """Look for logs until stopped.
-
-    Nothing but settled ones are taken, and a trouble is reported once.
-    """
-    from algid.batches.discover import jobs_of
-    from algid.batches.run import LOOK_EVERY, StableFiles
-
-    settling = StableFiles()
-    complaint = ""
-    ended = running.run([])
-    while not running.stop.is_set():
-        try:
-            jobs = settling.settled(jobs_of(sources, out, alone))
-        except AlgidError as error:  # a store may be away for a while
-            jobs = []
-            if str(error) != complaint:
-                complaint = str(error)
-                if complain is not None:
-                    complain(complaint)
-        if jobs:
-            ended, retry_failed = running.run(jobs, retry_failed), False
-        running.stop.wait(LOOK_EVERY)
-    return ended

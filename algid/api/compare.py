@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -67,12 +68,10 @@ def compare(
     """
     from algid.report.comparison import compare as compared
 
-    given: list[Result | str | Path] = []
-    for one in results:
-        if isinstance(one, str | Path | Result):
-            given.append(one)
-        else:
-            given += one
+    several = (
+        one if isinstance(one, Sequence) and not isinstance(one, str) else [one] for one in results
+    )
+    given: list[Any] = [one for part in several for one in part]
     if len(given) < 2:
         raise SettingError(
             f"compare: expected two results or more, found {len(given)}; name another one"
@@ -109,17 +108,7 @@ def answer(found: Comparison, given: Mapping[str, Any]) -> Answer:
 
 
 def labels_of(paths: Sequence[Path]) -> list[str]:
-    """The folders' names without the suffix, with as many folders above them as tell them apart."""
-    folders, parts = [], []
-    for path in paths:
-        folder = path
-        if path.name == "result.json":
-            folder = path.parent
-        folder = folder.resolve()
-        folders.append(str(folder))
-        parts.append(folder.parent.parts + (folder.name.removesuffix(".algid"),))
-    for depth in range(1, max(map(len, parts)) + 1):
-        names = ["/".join(part[-depth:]) for part in parts]
-        if len(set(names)) == len(names):
-            return names
-    return folders  # one of them is named twice
+    """The folders' names without the suffix, below what they share."""
+    folders = [one.parent if one.name == "result.json" else one for one in map(Path.resolve, paths)]
+    shared = os.path.commonpath([folder.parent for folder in folders])
+    return [str(folder.relative_to(shared)).removesuffix(".algid") for folder in folders]

@@ -3,86 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
-from algid.api.given import called, folder_or_none, parts_of
-from algid.api.options import AnyLog, Folder, Force, Length, cases, meant
+from algid.api.given import called, folder_or_none
+from algid.api.options import AnyLog, Folder, Force, Length, Mass, Seed, cases, meant
 from algid.api.signature import verb
-from algid.base.errors import SettingError
 from algid.base.exits import exit_of
 from algid.base.files import refuse_existing
-from algid.base.limits import KNOWN_MASS, PHYSICAL, PLANNED, PRIOR_ERROR, Range
-from algid.options import Option, flag
+from algid.base.limits import PHYSICAL, PLANNED, PRIOR_ERROR
+from algid.options import Option
 from algid.results import Result
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from algid.base.progress import Progress
-    from algid.designs.campaign import Campaign, Design
-    from algid.designs.prior import PriorArm
-    from algid.designs.request import Request
-    from algid.designs.write import Provenance
-    from algid.estimators.whitening import NoiseLevels
-    from algid.identification.open_logs import LogLike
-    from algid.report.document import Document
+    from algid.designs.write import Planned
 
-NOISE: Range = (1e-12, PHYSICAL.noise[1])
-SEED: Range = (0, 2**63)
 UNIT = "steps"
 """What progress counts."""
 
+Noise = Annotated[float, Option(range=(1e-12, PHYSICAL.noise[1]))]
 Pair = float | tuple[float, float] | str
 Span = float | tuple[float, float] | str | tuple[tuple[float, float], tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class Planned:
-    """A planned motion: what it is, what it will tell, and where it comes from."""
-
-    design: Design
-    origin: Provenance
-
-    def __repr__(self) -> str:
-        return f"Planned({', '.join(f'{name} ± {std:.2g}' for name, std in self.bounds.items())})"
-
-    @property
-    def open_parameters(self) -> list[str]:
-        """Names of those asked for whose error bar is as large as they are."""
-        return self.design.open_parameters
-
-    @property
-    def bounds(self) -> dict[str, float]:
-        """By parameter the standard deviation that is to be expected."""
-        return dict(zip(self.design.names, self.design.std.tolist(), strict=True))
-
-    def to_frame(self) -> pl.DataFrame:
-        """The trajectory of ``trajectory.csv``: time, angle, velocity, acceleration, torque."""
-        import polars as pl
-
-        from algid.designs.write import trajectory
-
-        return pl.DataFrame(trajectory(self.design))
-
-    def document(self) -> Document:
-        """Its report."""
-        from algid.designs.page import design_document
-
-        return design_document(self.design, self.origin.source, self.origin.doubts)
-
-    def as_json(self) -> str:
-        """The text of ``design.json``."""
-        from algid.designs.write import design_json
-
-        return design_json(self.design, self.origin)
-
-
 @verb
 def design(
-    prior: Annotated[Result | str | Path, Option(kind=str, words=cases)],
+    prior: Annotated[Result | str | Path, Option(kind=str, suggested=cases)],
     *,
     limits: str | Path | None = None,
     range: Span | None = None,  # noqa: A002  # as the flag
@@ -94,16 +42,16 @@ def design(
     rate: Annotated[float, Option(range=PLANNED["rate"])] | None = None,
     runs: tuple[int, int] | str | None = None,
     for_: Sequence[str] | str | None = None,
-    position_noise: Annotated[float, Option(range=NOISE)] | None = None,
-    torque_noise: Annotated[float, Option(range=NOISE)] | None = None,
+    position_noise: Noise | None = None,
+    torque_noise: Noise | None = None,
     noise_from: AnyLog | None = None,
     prior_error: Annotated[float, Option(range=PRIOR_ERROR)] | None = None,
-    payload: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
+    payload: Mass | None = None,
     l1: Length | None = None,
     l2: Length | None = None,
     margin: Annotated[float, Option(range=(0, 0.5))] = 0.05,
     joints: tuple[str, str] | str = "joint1,joint2",
-    seed: Annotated[int, Option(range=SEED)] = 0,
+    seed: Seed = 0,
     out: Folder | None = None,
     force: Force = False,
     command: str = "",
@@ -196,48 +144,38 @@ def design(
     from algid.base.runtime import one_blas_thread
     from algid.designs.campaign import plan
     from algid.designs.prior import PriorKnowledge, prior_of
-    from algid.designs.request import request
-    from algid.designs.write import Provenance, write_design
+    from algid.designs.request import Request, campaign_of, noise_of, request
+    from algid.designs.write import Planned, write_design
+    from algid.log import Log
+    from algid.readers import read_log
 
-    asked_for = {
-        "range": range,
-        "speed": speed,
-        "acceleration": acceleration,
-        "torque": torque,
-        "tip_height": tip_height,
-        "duration": duration,
-        "rate": rate,
-        "runs": runs,
-    }
-    file = None
-    if limits is not None:
-        file = Path(limits)
-    asked = request(file, asked_for)
-    names = meant(None, {"joints": joints}).joints
-    source = called(prior)
+    own = locals()
+    asked = request(
+        None if limits is None else Path(limits), {name: own[name] for name in Request.model_fields}
+    )
+    names, source = meant(None, {"joints": joints}).joints, called(prior)
     folder = None
     if out is not None:
         folder = folder_of(source, Path(out))
         refuse_existing(folder, force)
-    loaded = None
-    if asked.runs is not None:
-        loaded = bool(asked.runs[1] > 0)
     known = prior_of(
         prior if isinstance(prior, Result) else source,
-        loaded,
+        None if asked.runs is None else bool(asked.runs[1] > 0),
         PriorKnowledge(l1, l2, payload, None if prior_error is None else prior_error / 100),
     )
-    noise = noise_of(known, position_noise, torque_noise, noise_from)
+    log: Any = noise_from
+    if log is not None and not isinstance(log, Log):
+        log = read_log(log)
+    noise = noise_of(known, position_noise, torque_noise, log)
     campaign = campaign_of(known, asked, noise, for_, margin, seed)
-    origin = Provenance(source, command, names, known.doubts)
     if progress is not None:
         progress("searching", 0, 0)
     with folder_or_none(folder, force) as temporary:
         with one_blas_thread():
-            planned = plan(campaign, progress)
+            planned = Planned(plan(campaign, progress), source, command, names, known.doubts)
         if temporary is not None:
-            write_design(planned, temporary, origin)
-    return Planned(planned, origin)
+            write_design(planned, temporary)
+    return planned
 
 
 def answer(planned: Planned, given: Mapping[str, Any]) -> Answer:
@@ -253,73 +191,3 @@ def answer(planned: Planned, given: Mapping[str, Any]) -> Answer:
 def folder_of(prior: str, out: Path) -> Path:
     """Where the design for a prior goes."""
     return out / f"{Path(prior).stem or 'arm'}.design"
-
-
-def campaign_of(
-    prior: PriorArm,
-    asked: Request,
-    noise: NoiseLevels,
-    wanted: Sequence[str] | str | None,
-    margin: float,
-    seed: int,
-) -> Campaign:
-    """The campaign that is asked for, with defaults where nothing is."""
-    from algid.designs.belief import objective_of
-    from algid.designs.campaign import Campaign
-    from algid.designs.information import Experiment
-    from algid.designs.request import limits_of
-
-    shared = prior.belief.shared
-    unloaded, loaded = (1, shared.payload) if asked.runs is None else asked.runs
-    names = None
-    if wanted is not None:
-        names = [name.strip() for name in parts_of(wanted)]
-    return Campaign(
-        experiment=Experiment(shared, (int(unloaded), int(loaded)), noise, asked.rate),
-        belief=prior.belief,
-        limits=limits_of(asked, prior.lengths),
-        asked=objective_of(prior.belief, names, prior.source),
-        duration=asked.duration,
-        margin=margin,
-        seed=seed,
-    )
-
-
-def noise_of(
-    prior: PriorArm, position: float | None, torque: float | None, log: LogLike | None
-) -> NoiseLevels:
-    """Noise that is given, else of a log, else of the logs behind the prior.
-
-    Raises
-    ------
-    SettingError
-        Where none is known.
-    """
-    import numpy as np
-
-    from algid.estimators.noise import first_guess
-    from algid.estimators.whitening import NoiseLevels
-
-    measured = prior.noise
-    if log is not None:
-        from algid.log import Log
-        from algid.readers import read_log
-
-        if not isinstance(log, Log):
-            log = read_log(log)
-        measured = first_guess(log.theta, log.tau)
-    levels = {}
-    for option, given, name in (
-        ("position_noise", position, "theta"),
-        ("torque_noise", torque, "tau"),
-    ):
-        if given is not None:
-            levels[name] = np.full(2, given)
-        elif measured is not None and np.all(getattr(measured, name) > 0):
-            levels[name] = getattr(measured, name)
-        else:
-            raise SettingError(
-                f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give it, "
-                f"or {flag('noise_from')}=LOG"
-            )
-    return NoiseLevels(**levels)

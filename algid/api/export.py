@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from algid.api.answer import Answer
 from algid.api.given import called, numbers, opened
-from algid.api.options import AnyResult, Folder, Force, Length
+from algid.api.options import AnyResult, Folder, Force, Length, Mass, Seed
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file, whole_folder
-from algid.base.limits import KNOWN_MASS
 from algid.options import Option, flag
 
 if TYPE_CHECKING:
@@ -51,11 +50,11 @@ def export(
     *,
     l1: Length | None = None,
     l2: Length | None = None,
-    m1: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
-    m2: Annotated[float, Option(range=KNOWN_MASS)] | None = None,
+    m1: Mass | None = None,
+    m2: Mass | None = None,
     rotor1: Annotated[float, Option(range=(0, 1e6))] | None = None,
     draws: Annotated[int, Option(range=(1, 100_000))] | None = None,
-    seed: Annotated[int, Option(range=(0, 2**63))] = 0,
+    seed: Seed = 0,
     flange: Sequence[float] | str | None = None,
     out: Folder | None = None,
     force: Force = False,

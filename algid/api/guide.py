@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Mapping
 from importlib import resources
+from pathlib import Path
 from typing import Annotated, Any
 
 from algid.api.answer import Answer, Manual
+from algid.api.signature import fields_of
 from algid.base.errors import SettingError
-from algid.base.exits import rows
-from algid.notices import Message, code_of_now, message, messages
-from algid.options import BY_SET, Option, flag
+from algid.notices import code_of_now, message, messages
+from algid.options import Option
 
-FIRST = (
+FOLDER = Path(str(resources.files("algid"))) / "guide"
+TOPICS = (
     *("start", "arm", "lab", "logs", "motion", "report", "warnings", "payload", "export", "batch"),
     *("python", "estimators", "measured", "contributing"),
 )
-"""The order of the pages; one that is not named here comes behind them."""
+"""The pages, in their order."""
 
 
-def topics() -> dict[str, str]:
-    """The pages of the guide by name, with their titles."""
-    folder = resources.files("algid") / "guide"
-    names = sorted(one.name.removesuffix(".md") for one in folder.iterdir())
-    found = {}
-    for name in sorted(names, key=lambda name: (*FIRST, name).index(name)):
-        with (folder / f"{name}.md").open(encoding="utf-8") as lines:
-            found[name] = next(lines).removeprefix("# ").rstrip()
-    return found
-
-
-def guide(topic: Annotated[str, Option(words=lambda: [*topics()])] | None = None) -> str:
+def guide(topic: Annotated[str, Option(suggested=lambda: [*TOPICS])] | None = None) -> str:
     """Read the guide in the terminal.
 
     Parameters
@@ -53,14 +45,14 @@ def guide(topic: Annotated[str, Option(words=lambda: [*topics()])] | None = None
     $ algid guide start
     """
     if topic is None:
-        table = "".join(f"| `algid guide {name}` | {words} |\n" for name, words in topics().items())
-        return f"# The guide\n\n| | |\n|---|---|\n{table}"
-    if topic in topics():
+        titles = {name: text_of(name).partition("\n")[0][2:] for name in TOPICS}
+        return str(_tables().contents(titles))
+    if topic in TOPICS:
         return text_of(topic)
     try:
-        return _entry(message(code_of_now(topic.upper())), "#")
+        return str(_tables().entry(message(code_of_now(topic.upper())), "#"))
     except KeyError:
-        known = ", ".join(topics())
+        known = ", ".join(TOPICS)
         raise SettingError(
             f"guide: expected one of {known}, or a message's code; found {topic!r:.60}"
         ) from None
@@ -72,119 +64,54 @@ def answer(text: str, _given: Mapping[str, Any]) -> Answer:
 
 
 def text_of(topic: str) -> str:
-    """A topic's Markdown; what the registries hold stands in place of their marks."""
-    text = (resources.files("algid") / "guide" / f"{topic}.md").read_text(encoding="utf-8")
-    for mark, table in TABLES.items():
-        if mark in text:
-            text = text.replace(mark, _markdown(*table()))
-    return text.replace("<!-- messages -->", "\n".join(_messages()))
+    """A topic's Markdown; what the registries hold stands in place of ``<!-- terms -->``."""
+    text = (FOLDER / f"{topic}.md").read_text(encoding="utf-8")
+
+    def table(mark: re.Match[str]) -> str:
+        return str(getattr(_tables(), mark[1])(_registry(mark[1])))
+
+    return re.sub(r"<!-- (\w+) -->\n", table, text)
 
 
-def _messages() -> Iterator[str]:
-    """The entries of all codes, under the headings of their groups."""
-    for one in messages():
-        if one.group:
-            yield f"## {one.group}\n"
-        yield _entry(one, "###")
+def _tables() -> Any:
+    """The macros of ``tables.md.j2``, which write what the registries hold."""
+    from algid.exports.templating import template
+
+    return template(FOLDER / "tables.md.j2").module
 
 
-def _entry(one: Message, mark: str) -> str:
-    """Markdown of what `messages.toml` says of a code."""
-    lossy = "*Lossy.* " if one.lossy is True and "*Lossy.*" not in one.cause else ""
-    text = f"{mark} {one.code}\n\n{lossy}{one.cause}\n"
-    if one.do:
-        text += f"\n**Do:** {one.do}\n"
-    if one.was:
-        text += f"\nBefore 0.3: {', '.join(one.was)}.\n"
-    return text
+def _registry(mark: str) -> Any:
+    """What a table is made of."""
+    if mark == "exits":
+        from algid.base import exits
 
+        return exits
+    if mark == "units":
+        from algid.base.units import UNITS
 
-def _markdown(*rows: Sequence[str]) -> str:
-    """A table; the first row is its head."""
-    lines = [f"| {' | '.join(cells)} |" for cells in rows]
-    lines.insert(1, "|---" * len(rows[0]) + "|")
-    return "\n".join(lines)
+        return UNITS
+    if mark == "estimators":
+        from algid.methods import ESTIMATORS
 
+        return ESTIMATORS
+    if mark == "moved":
+        from algid.moved import MOVED
 
-def _terms() -> Iterator[Sequence[str]]:
-    from algid.physics.terms import OPTIONAL
+        return MOVED
+    if mark == "terms":
+        from algid.physics.terms import OPTIONAL
 
-    yield "term", "what it is", "what it adds to the torque", "its parameters"
-    for term in OPTIONAL:
-        meanings = "; ".join(f"{one.name}, {one.unit}: {one.meaning}" for one in term.parameters)
-        title = term.title
-        if term.needs:
-            title += f", beside `{term.needs}`"
-        yield f"`{term.name}`", title, term.equation.replace("|", "\\|"), meanings
+        return OPTIONAL
+    if mark == "formats":
+        from algid.readers.formats import FORMATS
 
+        return FORMATS
+    if mark == "profile":
+        from algid.profile import Profile
 
-def _estimators() -> Iterator[Sequence[str]]:
-    from algid.methods import ESTIMATORS
+        return fields_of(Profile)
+    if mark == "settings":
+        from algid.settings import Settings
 
-    yield f"`{flag('estimator')}`", "what it does", "when"
-    for one in ESTIMATORS:
-        name = f"`{one.name}`"
-        if one is ESTIMATORS[0]:
-            name += " (default)"
-        yield name, one.does, one.when
-
-
-def _formats() -> Iterator[Sequence[str]]:
-    from algid.readers.formats import FORMATS
-
-    yield "format", "names end in"
-    for form in FORMATS:
-        yield form.title, ", ".join(f"`{suffix}`" for suffix in form.suffixes) or "a folder"
-
-
-def _units() -> Iterator[Sequence[str]]:
-    from algid.base.units import UNITS
-
-    yield "unit", "of", "also written"
-    for unit in UNITS:
-        yield f"`{unit.name}`", ", ".join(unit.quantities), unit.spellings.replace(" ", ", ")
-
-
-def _settings() -> Iterator[Sequence[str]]:
-    from algid.settings import Settings
-
-    yield from _fields(Settings)
-
-
-def _profile() -> Iterator[Sequence[str]]:
-    from algid.profile import Profile
-
-    yield from _fields(Profile)
-
-
-def _fields(model: Any) -> Iterator[Sequence[str]]:
-    """Fields: as they are typed, and what they are."""
-    from algid.profile import ALL_CHANNELS
-
-    yield "option", "what it says"
-    for name, field in model.model_fields.items():
-        typed = f"{flag(name)}=…" if name in BY_SET else flag(name)
-        if name in ALL_CHANNELS or field.default is True:  # a profile's velocity
-            typed = f"{flag('set')} {name}{'.unit' if name in ALL_CHANNELS else ''}=…"
-        yield f"`{typed}`", field.description.replace("|", "\\|")
-
-
-def _moved() -> Iterator[Sequence[str]]:
-    from algid.moved import MOVED
-
-    yield "in 0.2", "now"
-    for old, new in MOVED.items():
-        yield f"`{old}`", new
-
-
-TABLES: Mapping[str, Callable[[], Iterable[Sequence[str]]]] = {
-    "<!-- terms -->": _terms,
-    "<!-- estimators -->": _estimators,
-    "<!-- formats -->": _formats,
-    "<!-- units -->": _units,
-    "<!-- settings -->": _settings,
-    "<!-- profile -->": _profile,
-    "<!-- moved -->": _moved,
-    "<!-- exits -->": rows,
-}
-"""Rows of a table by the mark in whose place it stands."""
+        return fields_of(Settings)
+    return messages()

@@ -150,14 +150,15 @@ def answer(result: PlainResult, given: Mapping[str, Any]) -> Answer:
     from algid.report.page import result_document
     from algid.results import result_json
 
-    wrote = f"wrote {result_folder(result.log.path, given['out'], given.get('name'))}"
+    remarks = [f"wrote {result_folder(result.log.path, given['out'], given.get('name'))}"]
+    if given["verbose"]:
+        notes = (f"note: {visible(note)}" for note in result.notes)
+        remarks = [*_reading(result), *notes, *remarks]
     return Answer(
-        lambda: [result_document(result)],
+        lambda: [result_document(result)] if given["verbose"] else brief(result),
         lambda: result_json(result),
-        [*(f"note: {visible(note)}" for note in result.notes), wrote],
+        remarks,
         exit=exit_of(failed=result.verdict.failed or not result.complete, lost=result.data_lost),
-        brief=lambda: brief(result),
-        details=lambda: _reading(result),
     )
 
 

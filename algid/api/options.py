@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
 from algid.api.signature import refuse_unknown
 from algid.base.errors import SettingError
 from algid.base.files import parsed_toml
-from algid.base.limits import KNOWN_LENGTH, LIMITS
+from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS
 from algid.options import ADVANCED, Option, flag
 from algid.profile import Effort, Profile, load_profile, over, with_settings
 from algid.settings import OF_BOTH, Settings, refuse_contradictions
@@ -30,6 +31,8 @@ OUT = "-o"
 Folder = Annotated[str | Path, Option(default=Path())]
 """Where a command writes: the working folder by default."""
 Length = Annotated[float, Option(range=KNOWN_LENGTH)]
+Mass = Annotated[float, Option(range=KNOWN_MASS)]
+Seed = Annotated[int, Option(range=(0, 2**63))]
 Force = Annotated[bool, Option(panel=ADVANCED)]
 Export = Annotated[bool | Literal["mcap"], Option(panel=ADVANCED)]
 """Whether what is shown over time is also written as MCAP."""
@@ -40,16 +43,19 @@ def cases() -> list[str]:
     return ["case1", "case2"]
 
 
-class _OfLogs(TypedDict, total=False):
-    """What a log means: the fields of `Profile`."""
+Channel = Mapping[str, Any]
+
+
+class LogOptions(TypedDict, total=False):
+    """Keywords of a verb that reads logs: the fields of `Profile`."""
 
     topic: str | None
-    joints: tuple[str, str] | list[str] | str | None
+    joints: Sequence[str] | None
     clock: Literal["header", "log"] | None
     time: str | None
     time_unit: Literal["s", "ms", "us", "ns"] | None
     rate: float | None
-    columns: Iterable[str] | str | None
+    columns: Iterable[str] | None
     angle_unit: str
     torque_unit: str
     zero: Literal["horizontal", "hanging", "upright"]
@@ -58,36 +64,30 @@ class _OfLogs(TypedDict, total=False):
     passive: Literal[1, 2] | None
     gravity: float
     effort: Effort | None
-    signs: tuple[int, int] | list[int]
-    offsets: tuple[float, float] | list[float]
+    velocity: Literal["observer", "measured"] | None
+    signs: Sequence[int]
+    offsets: Sequence[float]
     start: float | None
     end: float | None
     torque_file: str | Path | None
     prior: str | Path | None
     prior_error: float | None
     segment: int | None
-    accept: Iterable[str] | str
-    theta1: Mapping[str, Any]
-    theta2: Mapping[str, Any]
-    tau1: Mapping[str, Any]
-    tau2: Mapping[str, Any]
-    omega1: Mapping[str, Any]
-    omega2: Mapping[str, Any]
-    q_des1: Mapping[str, Any]
-    q_des2: Mapping[str, Any]
+    accept: Iterable[str]
+    theta1: Channel
+    theta2: Channel
+    tau1: Channel
+    tau2: Channel
+    omega1: Channel
+    omega2: Channel
+    q_des1: Channel
+    q_des2: Channel
 
 
-class LogOptions(_OfLogs, total=False):
-    """Keywords of a verb that reads logs."""
-
-    velocity: bool
-
-
-class Options(_OfLogs, total=False):
+class Options(LogOptions, total=False):
     """Keywords of a verb that identifies: the fields of `Settings` beside those of `Profile`."""
 
     estimator: Literal["refined", "weak", "instruments", "paper"]
-    velocity: Literal["observer", "measured"]
     observer: Literal["luenberger", "zero-phase"] | None
     poles: Iterable[complex] | str | None
     window: float | None
@@ -114,16 +114,11 @@ def settings_of(
     """
     refuse_unknown(options, (*Settings.model_fields, *Profile.model_fields))
     refuse_contradictions(options)
-    own, of_profile = dict[str, Any](), dict[str, Any]()
-    for name, value in options.items():
-        # a profile's velocity is true or false
-        of_run = name in Settings.model_fields and not (
-            name == "velocity" and isinstance(value, bool)
-        )
-        (own if of_run else of_profile)[name] = value
+    own = {name: options[name] for name in options if name in Settings.model_fields}
+    of_profile = {name: options[name] for name in options if name not in own}
     of_both = {name: own[name] for name in OF_BOTH if name in own}
     # a driver's effort says how its torques are read, gravity alone says nothing of a log
-    if profile is not None or of_profile or "effort" in of_both:
+    if profile is not None or of_profile or of_both.keys() - {"gravity"}:
         of_profile |= of_both
     return (settings or Settings()).but(**own), of_profile
 
@@ -183,16 +178,11 @@ def setting_of(line: str) -> dict[str, Any]:
     SettingError
         If it is none.
     """
-    key, _, value = line.partition("=")
-    like = "expected KEY=VALUE like tau1.sign=-1"
-    if "=" not in line or not key.strip():
-        raise SettingError(f"{flag('set')} {line}: {like}")
-    try:
-        return parsed_toml(f"{key} = {value}")
-    except (ValueError, RecursionError) as error:  # a bare word
-        if key.count(".") > LIMITS.toml_key_parts:
-            raise SettingError(f"{flag('set')} {key[:40]}…: {error}; {like}") from error
-        setting: Any = value.strip()
-        for part in reversed(key.split(".")):
-            setting = {part.strip(): setting}
-        return dict(setting)
+    name, equals, text = line.partition("=")
+    channel, dot, key = name.strip().partition(".")
+    if not (equals and channel):
+        raise SettingError(f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1")
+    value: Any = text.strip()
+    with suppress(ValueError, RecursionError):
+        value = parsed_toml(f"value = {text}")["value"]
+    return {channel: {key.strip(): value} if dot else value}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 @verb
 def report(
-    *results: Annotated[str | Path, Option(kind=list[Path])],
+    results: Annotated[Iterable[str | Path], Option(kind=list[Path])],
+    *,
     out: str | Path | None = None,
     export: Export = False,
     shared_library: bool = False,
@@ -33,7 +34,7 @@ def report(
 
     Parameters
     ----------
-    *results : path
+    results : paths
         Folders of algid identify, algid track or algid batch.
     out : path
         Folder for a batch's history; the batch's own by default.

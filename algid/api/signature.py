@@ -12,73 +12,19 @@ import re
 import sys
 import types
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from algid.base.errors import SettingError
 from algid.moved import refuse_moved_keywords
-from algid.options import ADVANCED, BY_SET, Option, flag
+from algid.options import ADVANCED, EVERYDAY, EVERYDAY_FIELDS, Option, flag
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
 EMPTY = inspect.Parameter.empty
 Verb = TypeVar("Verb", bound=Callable[..., Any])
-
-
-@dataclass(frozen=True)
-class Keyword:
-    """A parameter of a verb, or a field of `Settings` or `Profile`.
-
-    Parameters
-    ----------
-    name : str
-    hint : its annotation
-    default : object
-        `EMPTY` where it must be given.
-    help : str
-        The first sentence of its entry in the docstring, or the field's description.
-    option : Option
-    place : an `inspect` kind of parameter
-    by_set : bool
-        Whether it has no flag of its own.
-    """
-
-    name: str
-    hint: Any
-    default: Any
-    help: str
-    option: Option
-    place: Any = inspect.Parameter.KEYWORD_ONLY
-    by_set: bool = False
-
-    @property
-    def kind(self) -> Any:
-        """What a command line takes: text where Python takes several forms."""
-        if self.option.kind is not None:
-            return self.option.kind
-        parts = [part for part in _parts(self.hint) if not isinstance(part, Option)]
-        if Path in parts:
-            return Path
-        return parts[0] if len(parts) == 1 and get_origin(parts[0]) is None else str
-
-    @property
-    def words(self) -> list[str]:
-        """The words that it may be; none where that is the user's own."""
-        if self.option.words is not None:
-            return self.option.words()
-        return words_of(self.hint)
-
-    @property
-    def or_file(self) -> bool:
-        """Whether it may be the path of a file too."""
-        return Path in _parts(self.hint)
-
-    @property
-    def flag(self) -> str:
-        """How it is typed."""
-        return self.option.flag or flag(self.name, off=self.default is True)
 
 
 class _Names(dict[str, Any]):
@@ -89,44 +35,53 @@ class _Names(dict[str, Any]):
 
 
 @cache
-def keywords(verb: Callable[..., Any]) -> Mapping[str, Keyword]:
-    """The parameters of a verb that a command line has, by name, without ``**options``."""
+def options_of(verb: Callable[..., Any]) -> Mapping[str, Option]:
+    """What a verb takes that a command line has, by name, without ``**options``."""
     module = vars(sys.modules[verb.__module__])
-    names = _Names(module)
-    helps = _described(verb)
-    found = {}
-    for one in inspect.signature(verb).parameters.values():
-        if one.name in CALLERS or one.kind is one.VAR_KEYWORD:
-            continue
-        hint = eval(one.annotation, module, names)  # our own source
-        option = next((part for part in _parts(hint) if isinstance(part, Option)), Option())
-        default = one.default
-        if default is None and option.default is not None:
-            default = option.default
-        text, by_set = helps.get(one.name, ""), one.name in BY_SET
-        found[one.name] = Keyword(one.name, hint, default, text, option, one.kind, by_set)
+    helps, found = _described(verb), {}
+    for name, one in inspect.signature(verb).parameters.items():
+        if name not in CALLERS and one.kind is not one.VAR_KEYWORD:
+            hint = eval(one.annotation, module, _Names(module))  # our own source
+            option = _option(name, hint, helps, EVERYDAY)
+            argument = one.kind is not one.KEYWORD_ONLY and not option.flag
+            default = option.default if one.default is None else one.default
+            typed = option.flag or flag(name, off=one.default is True)
+            found[name] = replace(option, default=default, flag=typed, argument=argument)
     return found
 
 
-def fields(model: Any, kind: Any = None, of: str = "") -> list[Keyword]:
-    """The fields of `Settings` or `Profile`, and `of` a channel; `kind` is what is typed."""
-    found = []
-    for name, one in model.model_fields.items():
+@cache
+def fields_of(model: Any, of: str = "") -> Mapping[str, Option]:
+    """The fields of `Settings` or `Profile`, and `of` a channel, by name."""
+    helps, found = _described(model), dict[str, Option]()
+    for name, one in inspect.signature(model).parameters.items():
         if hasattr(one.annotation, "model_fields"):
-            found += fields(one.annotation, kind, f"{name}.")
+            found |= fields_of(one.annotation, f"{name}.")
             continue
-        panel = (one.json_schema_extra or {}).get("panel") or ADVANCED
-        option = next((part for part in one.metadata if isinstance(part, Option)), Option(kind))
-        keyword = Keyword(
-            of + name,
-            one.annotation,
-            False if one.annotation is bool and kind is None else None,
-            one.description or "",
-            replace(option, panel=panel),
-            by_set=bool(of) or name in BY_SET,
-        )
-        found.append(keyword)
+        panel = EVERYDAY if name in EVERYDAY_FIELDS else ADVANCED
+        option = _option(of + name, one.annotation, helps, panel)
+        default = False if option.kind is bool else None  # one that is not typed is not said
+        found[of + name] = replace(option, default=default, flag=flag(of + name))
     return found
+
+
+def _option(name: str, hint: Any, helps: Mapping[str, str], panel: str) -> Option:
+    """What an annotation and a docstring say."""
+    parts, words = _parts(hint), _words(hint)
+    stated = next((part for part in parts if isinstance(part, Option)), Option())
+    kinds, kind = [part for part in parts if not isinstance(part, Option)], stated.kind
+    if kind is None:  # text where Python takes several forms
+        kind = kinds[0] if len(kinds) == 1 and get_origin(kinds[0]) is None else str
+        kind = Path if Path in kinds else kind
+    return replace(
+        stated,
+        name=name,
+        kind=kind,
+        panel=stated.panel or panel,
+        help=helps.get(name) or f"{', '.join(words)}.",
+        words=words,
+        or_file=Path in kinds,
+    )
 
 
 def verb(function: Verb) -> Verb:
@@ -139,27 +94,23 @@ def verb(function: Verb) -> Verb:
     def called(*args: Any, **given: Any) -> Any:
         refuse_moved_keywords(function.__name__, given)
         said = inspect.signature(function).bind(*args, **given).arguments
-        for name, one in keywords(function).items():
-            refuse(one, said.get(name))
+        for name, one in options_of(function).items():
+            value = said.get(name)
+            if value is None or isinstance(value, bool):
+                continue
+            right, expected = True, ""
+            if one.words:
+                right, expected = value in one.words, f"one of {', '.join(one.words)}"
+            elif one.range is not None:
+                low, high = one.range
+                expected = f"a number from {low:g} to {high:g}"
+                finite = isinstance(value, int | float) and math.isfinite(value)
+                right = finite and low <= value <= high
+            if not right:
+                raise SettingError(f"{one.flag}: expected {expected}, found {value!r:.60}")
         return function(*args, **given)
 
     return called  # type: ignore[return-value]  # it takes and gives the same
-
-
-def refuse(one: Keyword, value: Any) -> None:
-    """Raise `SettingError` at a number or a word that a keyword does not take."""
-    if value is None or isinstance(value, bool):
-        return
-    words = words_of(one.hint)
-    if words and value not in words:
-        expected = f"expected one of {', '.join(words)}"
-        raise SettingError(f"{one.flag}: {expected}, found {value!r:.60}")
-    if one.option.range is not None:
-        low, high = one.option.range
-        finite = isinstance(value, int | float) and math.isfinite(value)
-        if not (finite and low <= value <= high):
-            expected = f"expected a number from {low:g} to {high:g}"
-            raise SettingError(f"{one.flag}: {expected}, found {value!r:.60}")
 
 
 def refuse_unknown(options: Iterable[str], known: Iterable[str]) -> None:
@@ -173,12 +124,6 @@ def refuse_unknown(options: Iterable[str], known: Iterable[str]) -> None:
             for near in get_close_matches(name, names, n=1):
                 mend = f"did you mean {near}?"
             raise SettingError(f"{name}: no setting has this name; {mend}")
-
-
-def summary(text: str, name: str) -> str:
-    """The first sentence of a function's docstring, out of its module's source."""
-    found = re.search(rf'^def {name}\(.*?"""(.+?)(?:\n\n|""")', text, re.M | re.S)
-    return " ".join(found[1].split()) if found else ""
 
 
 def head(verb: Callable[..., Any]) -> list[str]:
@@ -217,10 +162,8 @@ def _parts(hint: Any) -> list[Any]:
     return [hint]
 
 
-def words_of(hint: Any) -> list[str]:
+def _words(hint: Any) -> list[str]:
     """The words that a type states, anywhere in it."""
     if get_origin(hint) is Literal:
         return [str(word) for word in get_args(hint)]
-    if hint is bool:
-        return []
-    return list(dict.fromkeys(word for part in get_args(hint) for word in words_of(part)))
+    return list(dict.fromkeys(word for part in get_args(hint) for word in _words(part)))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from algid.api.answer import Answer
 from algid.api.given import numbers
-from algid.api.options import Folder, Force, cases
-from algid.api.signature import keywords, verb
+from algid.api.options import Folder, Force, Seed, cases
+from algid.api.signature import options_of, verb
 from algid.base.errors import SettingError
-from algid.base.files import refuse_existing
+from algid.base.files import refuse_existing, whole_file
 from algid.base.limits import PHYSICAL
 from algid.log import Log
 from algid.options import Option, flag
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors
+from algid.writers import write_log
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
@@ -33,27 +34,28 @@ MOST = (PHYSICAL.angle[1], PHYSICAL.angle[1], PHYSICAL.speed[1], PHYSICAL.speed[
 """Of a state: angles in rad and velocities in rad/s."""
 
 State = Sequence[float]
+Noise = Annotated[float, Option(range=PHYSICAL.noise)]
 Schedule = Sequence[tuple[float, float]]
 
 
 @verb
 def synthesise(
-    case: Annotated[str | Path, Option(kind=str, words=cases)],
+    case: Annotated[str | Path, Option(kind=str, suggested=cases)],
     *,
     duration: Annotated[float, Option(range=PHYSICAL.duration)] | None = None,
     rate: Annotated[float, Option(range=PHYSICAL.rate)] = 1000.0,
-    torque: Annotated[str | Path | Log, Option(kind=str, words=lambda: [*run.EXCITATIONS])]
+    torque: Annotated[str | Path | Log, Option(kind=str, suggested=lambda: [*run.EXCITATIONS])]
     | None = None,
     motion: str | Path | None = None,
     torque_hold: Literal["exact", "zoh", "foh"] = "exact",
     initial: State | str | None = None,
     sensors: Sensors | None = None,
-    position_noise: Annotated[float, Option(range=PHYSICAL.noise)] | None = None,
-    torque_noise: Annotated[float, Option(range=PHYSICAL.noise)] | None = None,
+    position_noise: Noise | None = None,
+    torque_noise: Noise | None = None,
     encoder_bits: Annotated[int, Option(range=(4, 32))] | None = None,
-    jitter: Annotated[float, Option(range=PHYSICAL.noise)] | None = None,
+    jitter: Noise | None = None,
     drop: Annotated[float, Option(range=(0, 0.9))] | None = None,
-    seed: Annotated[int, Option(range=(0, 2**63))] | None = None,
+    seed: Seed | None = None,
     start_time: datetime | date | str | None = None,
     payload_schedule: Schedule | str | None = None,
     out: Folder | None = None,
@@ -156,107 +158,95 @@ def synthesise(
                 )
         plan = read_plan(Path(motion))
         duration = duration or plan.duration
-    recording = _recording(rate, duration or 1.0, measured)
-    if initial is not None:
-        recording = replace(
-            recording, initial=numbers("initial", initial, MOST, "four numbers like -1.57,0,0,0")
+    duration = duration or 1.0
+    samples, (least, most) = round(rate * duration) + 1, PHYSICAL.samples
+    if not least <= samples <= most:
+        raise SettingError(
+            f"{flag('duration')}: {duration:g} s at {flag('rate')} {rate:g} Hz are "
+            f"{samples:.3g} samples; expected {least:g} to {most:g}"
         )
+    recording = run.Acquisition(rate, duration, sensors=measured)
+    if initial is not None:
+        state = numbers("initial", initial, MOST, "four numbers like -1.57,0,0,0")
+        recording = replace(recording, initial=state)
     drive = _drive(arm, "case" if torque is None else torque, torque_hold, recording)
     roles, schedule = ["unloaded", "loaded"][: 1 + bool(arm.payload)], None
     if payload_schedule is not None:
         roles, schedule = ["schedule"], _schedule(payload_schedule)
-    files = []
-    if out is not None:
-        files = [Path(out) / f"{arm.name}-{role}.{format}" for role in roles]
-    for file in files:
-        refuse_existing(file, force)
+    files = _files(out, [f"{arm.name}-{role}.{format}" for role in roles], force)
     logs = run.synthesise(arm, plan or drive, recording, progress, schedule)
-    if files:
-        from algid.writers import write_log
-
-        for file, log in zip(files, logs, strict=True):
-            write_log(file, log, truth=log.origin.truth, force=force)
+    for file, log in zip(files, logs, strict=False):
+        write_log(file, log, truth=log.origin.truth, force=force)
     return tuple(logs)  # type: ignore[return-value]  # of a schedule one, as its docstring says
 
 
 def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     """The files."""
-    from algid.api.example import PROFILE
-
     names = [f"{log.origin.path}.{given['format']}" for log in logs]
     if given["case"] == "example":
-        names = [*(f"{log.origin.path}.csv" for log in logs), PROFILE]
+        names = _example_names()
     return Answer(lambda: [str(Path(given["out"]) / name) for name in names])
+
+
+def _example_names() -> list[str]:
+    from algid.api.example import LOGS, PROFILE
+
+    return [*(f"{name}.csv" for name in LOGS), PROFILE]
 
 
 def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
     """The logs of `algid.api.example`, which are what they are."""
-    from algid.api.example import example_logs, write_example
+    from algid.api.example import PROFILE_TEXT, example_logs
 
-    for name, one in keywords(synthesise).items():
+    for name, one in options_of(synthesise).items():
         if name not in ("case", "out", "force") and given[name] not in (None, one.default):
             raise SettingError(f"{one.flag}: the example is always the same; leave it out")
-    logs = example_logs()
-    if given["out"] is not None:
-        write_example(given["out"], logs, given["force"])
+    force = given["force"]
+    files, logs = _files(given["out"], _example_names(), force), example_logs()
+    for file, log in zip(files, logs, strict=False):
+        write_log(file, log, force=force)
+    for file in files[len(logs) :]:
+        with whole_file(file, force=force) as temporary:
+            temporary.write_text(PROFILE_TEXT, encoding="utf-8")
     return tuple(logs)
 
 
-def _recording(rate: float, duration: float, sensors: Sensors) -> run.Acquisition:
-    """How it is recorded; raises `SettingError` for fewer than two samples, or too many."""
-    most, samples = PHYSICAL.samples[1], rate * duration
-    if samples > most:
-        raise SettingError(
-            f"{flag('duration')}: {duration:g} s at {flag('rate')} {rate:g} Hz are {samples:.3g} "
-            f"samples; expected at most {most:g}, more than a day at 1 kHz"
-        )
-    if round(samples) < 1:
-        raise SettingError(
-            f"{flag('duration')}: expected at least {1 / rate:g} s, two samples at "
-            f"{flag('rate')} {rate:g}, found {duration:g}"
-        )
-    return run.Acquisition(rate, duration, sensors=sensors)
+def _files(out: str | Path | None, names: Sequence[str], force: bool) -> list[Path]:
+    """What is to be written, of which nothing is there yet; nothing where there is no `out`."""
+    files = [] if out is None else [Path(out) / name for name in names]
+    for file in files:
+        refuse_existing(file, force)
+    return files
 
 
 def _start_ns(given: datetime | date | str) -> int:
     """A date in ns since 1970, in UTC where it names no zone."""
-    try:
+    with suppress(ValueError):
         start = datetime.fromisoformat(str(given))
-    except ValueError:
-        raise SettingError(
-            f"{flag('start_time')}: expected a date like 2026-01-31T12:00:00, found {given!r:.60}"
-        ) from None
-    if not FIRST_YEAR <= start.year <= LAST_YEAR:
-        span = f"from {FIRST_YEAR} to {LAST_YEAR}"
-        raise SettingError(
-            f"{flag('start_time')}: expected a date {span}, found {start.isoformat()}"
-        )
-    if start.tzinfo is None:
-        start = start.replace(tzinfo=UTC)
-    return int(start.timestamp()) * 10**9
+        if FIRST_YEAR <= start.year <= LAST_YEAR:
+            return int(start.replace(tzinfo=start.tzinfo or UTC).timestamp()) * 10**9
+    raise SettingError(
+        f"{flag('start_time')}: expected a date from {FIRST_YEAR} to {LAST_YEAR} like "
+        f"2026-01-31T12:00:00, found {given!r:.60}"
+    )
 
 
 def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
     """Times in s, increasing, and payloads in kg out of pairs, or of S=KG,…."""
-    pairs: Sequence[Sequence[float | str]] | Schedule = given
+    pairs: Any = given
     if isinstance(given, str):
         pairs = [part.split("=") for part in given.split(",")]
     longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
-    schedule, before = [], -math.inf
-    try:
-        for time, mass in ((float(time), float(mass)) for time, mass in pairs):
-            if not (before < time and 0 <= time <= longest and 0 <= mass <= heaviest):
-                raise ValueError
-            schedule.append((time, mass))
-            before = time
-        if not schedule:
-            raise ValueError
-    except (TypeError, ValueError):
-        raise SettingError(
-            f"{flag('payload_schedule')}: expected increasing times and payloads of 0 or more like "
-            f"2=0.05,4=0, found {given!r}"
-        ) from None
-    return schedule
+    with suppress(TypeError, ValueError):
+        schedule = [(float(time), float(mass)) for time, mass in pairs]
+        within = all(0 <= time <= longest and 0 <= mass <= heaviest for time, mass in schedule)
+        times = [time for time, _ in schedule]
+        if schedule and within and times == sorted(set(times)):
+            return schedule
+    raise SettingError(
+        f"{flag('payload_schedule')}: expected increasing times and payloads of 0 or more like "
+        f"2=0.05,4=0, found {given!r}"
+    )
 
 
 def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquisition) -> Torque:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from enum import IntEnum
 
 
@@ -62,10 +62,3 @@ def epilog(command: str) -> str:
     """The codes of a command as its help ends with them."""
     codes = OF_COMMAND.get(command, _ALWAYS)
     return "Exit codes: " + "; ".join(f"{int(code)} {MEANINGS[code]}" for code in codes) + "."
-
-
-def rows() -> Iterator[tuple[str, str, str]]:
-    """All codes as rows of a table, its head first, as README and guide have it."""
-    yield "exit code", "meaning", "what a scheduler should do"
-    for code, meaning in MEANINGS.items():
-        yield str(int(code)), meaning, WHAT_TO_DO[code]

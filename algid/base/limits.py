@@ -20,8 +20,6 @@ class FileLimits:
 
     toml_bytes: int = 1 << 22
     """Of a TOML file: a manifest of 60,000 jobs; tomllib takes up to three seconds a MiB."""
-    toml_key_parts: int = 32
-    """Of a dotted name that a flag sets."""
 
     # tables of every format
     columns: int = 4096

@@ -7,10 +7,10 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -59,16 +59,41 @@ class BatchConfig:
 
 
 @dataclass(frozen=True)
-class BatchOutcome:
-    """Outcome of a batch: its jobs' records, the number run now, and the number left when stopped.
+class Batched:
+    """How a batch ended.
 
-    `stopped` says why it could not go on, where it could not.
+    Parameters
+    ----------
+    records : of its jobs, each with name, status and the reason of a failure
+    ran, left : how many were run now, and how many are left where it was stopped
+    stopped : why it could not go on, where it could not
+    unreadable : why records that are there cannot be read, by their places
+    anew : how many jobs that had ended were run again, by why
+    out : where results and ``jobs.parquet`` are, less what opens it
+    interrupted : whether it was stopped by a signal
+    links : to folders, that were passed over
     """
 
     records: list[JobRecord]
     ran: int
     left: int
     stopped: str | None = None
+    unreadable: Mapping[str, str] = field(default_factory=dict)
+    anew: Mapping[str, int] = field(default_factory=dict)
+    out: str = ""
+    interrupted: bool = False
+    links: Sequence[str] = ()
+
+    @property
+    def failed(self) -> list[JobRecord]:
+        """Jobs without a result, or with one that must not be used."""
+        return [record for record in self.records if record.status in FAILURES]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Jobs by status, those there are."""
+        counts = Counter(record.status for record in self.records)
+        return {end.value: counts[end] for end in JobStatus if end in counts}
 
 
 class Batch:
@@ -108,7 +133,7 @@ class Batch:
         self.records, self.unreadable = read_records(store)
         """Why records that are there cannot be read, by their places."""
 
-    def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> BatchOutcome:
+    def run(self, jobs: Sequence[Job], retry_failed: bool = False) -> Batched:
         """Bring `jobs` to an end, and write ``jobs.parquet``.
 
         Labels, robot and time decide nothing about a job's outcome: a record that stands takes
@@ -161,7 +186,32 @@ class Batch:
             self._cannot_go_on(error)
         now = {**self.records, **unreachable}
         records = [now[job.name] for job in jobs if job.name in now]
-        return BatchOutcome(records, self._ran, left, self._stopped)
+        return Batched(records, self._ran, left, self._stopped, self.unreadable, self.anew)
+
+    def watch(
+        self,
+        look: Callable[[], list[Job]],
+        retry_failed: bool = False,
+        complain: Callable[[str], object] | None = None,
+    ) -> Batched:
+        """Run what is found until stopped.
+
+        Nothing but settled logs are taken, and a trouble is reported once.
+        """
+        settling, complaint = StableFiles(), ""
+        ended = self.run([])
+        while not self.stop.is_set():
+            jobs = list[Job]()
+            try:
+                jobs = settling.settled(look())
+            except AlgidError as error:  # a store may be away for a while
+                if str(error) != complaint and complain is not None:
+                    complain(str(error))
+                complaint = str(error)
+            if jobs:
+                ended, retry_failed = self.run(jobs, retry_failed), False
+            self.stop.wait(LOOK_EVERY)
+        return ended
 
     def _up_to_date(self, record: JobRecord, task: Task, retry_failed: bool) -> JobRecord | str:
         """The record with its job and logs as they are now, or why its job is run anew.

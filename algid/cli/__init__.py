@@ -48,26 +48,6 @@ def _command() -> int:
         gc.freeze()  # else the interpreter's end searches all that was imported for cycles
 
 
-def _called(arguments: Sequence[str]) -> int:
-    """Call the command; what click refuses is one line too."""
-    from click import UsageError
-
-    from algid.base.errors import SettingError
-    from algid.cli import app
-    from algid.moved import refuse_moved
-
-    if not arguments:
-        app.called(["--help"])
-        return Exit.USAGE
-    refuse_moved(arguments)
-    try:
-        return app.called(arguments)
-    except UsageError as error:
-        text = error.format_message().rstrip(".?")
-        more = "" if error.ctx is None else f"; {error.ctx.command_path} --help lists all"
-        raise SettingError(f"{text}{more}") from error
-
-
 def run(arguments: Sequence[str]) -> int:
     """Run a command and return its exit code: the outermost place, where errors become lines.
 
@@ -78,22 +58,30 @@ def run(arguments: Sequence[str]) -> int:
     KeyboardInterrupt
         If a caller without a guard is stopped.
     """
+    from click import UsageError
+
     from algid.base.errors import AlgidError
     from algid.base.faults import fault
+    from algid.cli import app
     from algid.cli.output import complain, remark
     from algid.guard import TRACEBACK
+    from algid.moved import refuse_moved
 
     try:
         try:
-            return _called(arguments)
+            refuse_moved(arguments)
+            return app.called(arguments)
         finally:
             sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
     except (SystemExit, KeyboardInterrupt):
         raise
     except BaseException as error:  # whatever a library raises, a panic too
         line, code = fault(error)
-        if isinstance(error, AlgidError):
+        if isinstance(error, AlgidError | UsageError):
             line, code = str(error), Exit.USAGE
+        if isinstance(error, UsageError):
+            more = "" if error.ctx is None else f"; {error.ctx.command_path} --help lists all"
+            line = error.format_message().rstrip(".?") + more
         cause = error
     if os.environ.get(TRACEBACK) == "1":
         import traceback

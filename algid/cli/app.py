@@ -11,6 +11,7 @@ from click.shell_completion import get_completion_class
 
 from algid import __version__
 from algid.base.errors import SettingError
+from algid.base.exits import Exit
 from algid.cli.derive import COMMANDS, command, listed
 from algid.cli.output import say
 
@@ -86,6 +87,9 @@ def called(arguments: Sequence[str]) -> int:
     """Run a command and return its exit code."""
     if COMPLETE in os.environ:
         app.main(prog_name="algid")
+    if not arguments:
+        called(["--help"])
+        return Exit.USAGE
     try:
         with app.make_context("algid", list(arguments)) as context:
             app.invoke(context)

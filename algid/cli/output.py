@@ -68,25 +68,18 @@ def console(**options: Any) -> Console:
     return Printable(**options)
 
 
-def shown(answer: Answer, json: bool, quiet: bool, verbose: bool) -> None:
+def shown(answer: Answer, json: bool, quiet: bool) -> None:
     """Print what a verb gave: results alone to standard output, so that they can be piped."""
-    for line in answer.details() if verbose else ():
-        remark(line)
     for line in answer.complaints:
         complain(line)
     if quiet:
         return
-    remarks = answer.remarks
     if json and answer.json is not None:
         say(answer.json(), end="")
-    elif answer.brief is not None and not verbose:
-        remarks = remarks[-1:]
-        for line in answer.brief():
-            say(line)
     else:
         for part in answer.shown():
             _print(part)
-    for line in remarks:
+    for line in answer.remarks:
         remark(line)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,14 @@ from algid.arm import FloatArray
 from algid.base.errors import SettingError
 from algid.base.files import misfit, toml_content
 from algid.base.limits import PLANNED
+from algid.designs.belief import objective_of
+from algid.designs.campaign import Campaign
+from algid.designs.information import Experiment
 from algid.designs.limits import HANGING, Limits
+from algid.designs.prior import PriorArm
+from algid.estimators.noise import first_guess
+from algid.estimators.whitening import NoiseLevels
+from algid.log import Log
 from algid.options import flag
 
 RATE, DURATION = 1000.0, 10.0  # Hz and s
@@ -151,3 +158,58 @@ def limits_of(asked: Request, lengths: FloatArray) -> Limits:
             f"{flag('range')}: without any limit no motion is the best, found inf for all; give one"
         )
     return limits
+
+
+def campaign_of(
+    prior: PriorArm,
+    asked: Request,
+    noise: NoiseLevels,
+    wanted: Sequence[str] | str | None,
+    margin: float,
+    seed: int,
+) -> Campaign:
+    """The campaign that is asked for, with defaults where nothing is."""
+    shared = prior.belief.shared
+    unloaded, loaded = (1, shared.payload) if asked.runs is None else asked.runs
+    names = wanted
+    if isinstance(wanted, str):
+        names = [name.strip() for name in wanted.split(",")]
+    return Campaign(
+        experiment=Experiment(shared, (int(unloaded), int(loaded)), noise, asked.rate),
+        belief=prior.belief,
+        limits=limits_of(asked, prior.lengths),
+        asked=objective_of(prior.belief, names, prior.source),
+        duration=asked.duration,
+        margin=margin,
+        seed=seed,
+    )
+
+
+def noise_of(
+    prior: PriorArm, position: float | None, torque: float | None, log: Log | None
+) -> NoiseLevels:
+    """Noise that is given, else of a log, else of the logs behind the prior.
+
+    Raises
+    ------
+    SettingError
+        Where none is known.
+    """
+    measured = prior.noise
+    if log is not None:
+        measured = first_guess(log.theta, log.tau)
+    levels = {}
+    for option, given, name in (
+        ("position_noise", position, "theta"),
+        ("torque_noise", torque, "tau"),
+    ):
+        if given is not None:
+            levels[name] = np.full(2, given)
+        elif measured is not None and np.all(getattr(measured, name) > 0):
+            levels[name] = getattr(measured, name)
+        else:
+            raise SettingError(
+                f"{flag(option)}: {prior.source} does not tell how noisy the sensors are; give it, "
+                f"or {flag('noise_from')}=LOG"
+            )
+    return NoiseLevels(**levels)

@@ -10,7 +10,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,28 +25,73 @@ from algid.model import UNITS
 from algid.notices import Notice
 from algid.report.render import page, write_texts
 
+if TYPE_CHECKING:
+    import polars as pl
+
+    from algid.report.document import Document
+
 # a second, of the joint trajectory: its controller joins them by polynomials of fifth degree
 POINTS = 50.0
 SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
-class Provenance:
-    """Origin of a design: its prior's file and doubts, command line, and names of the joints."""
+class Planned:
+    """A planned motion, and where it comes from.
 
+    Parameters
+    ----------
+    design : Design
+    source : str, the prior's file
+    command : str, the command line behind it
+    joints : names of the joints
+    doubts : of the prior
+    """
+
+    design: Design
     source: str
-    command: str
+    command: str = ""
     joints: tuple[str, str] = ("joint1", "joint2")
     doubts: Sequence[Notice] = ()
 
+    def __repr__(self) -> str:
+        return f"Planned({', '.join(f'{name} ± {std:.2g}' for name, std in self.bounds.items())})"
 
-def write_design(design: Design, folder: Path, origin: Provenance) -> None:
+    @property
+    def open_parameters(self) -> list[str]:
+        """Names of those asked for whose error bar is as large as they are."""
+        return self.design.open_parameters
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """By parameter the standard deviation that is to be expected."""
+        return dict(zip(self.design.names, self.design.std.tolist(), strict=True))
+
+    def to_frame(self) -> pl.DataFrame:
+        """The trajectory of ``trajectory.csv``: time, angle, velocity, acceleration, torque."""
+        import polars as pl
+
+        columns = {"t": self.design.t}
+        for name in ("theta", "omega", "alpha"):
+            columns |= _of_joints(name, getattr(self.design.motion, name))
+        for name, torque in zip(("tau", "loaded_tau"), self.design.torque.values(), strict=False):
+            columns |= _of_joints(name, torque)
+        return pl.DataFrame(columns)
+
+    def document(self) -> Document:
+        """Its report."""
+        return design_document(self.design, self.source, self.doubts)
+
+    def as_json(self) -> str:
+        """The text of ``design.json``: everything that decides the design, what it predicts."""
+        return json.dumps(_content(self), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_design(planned: Planned, folder: Path) -> None:
     """Write everything into `folder`. Raises `OutputError`."""
-    import polars as pl
-
     from algid.writers import write_log
 
-    frame = pl.DataFrame(trajectory(design))
+    design, frame = planned.design, planned.to_frame()
     with whole_file(folder / "trajectory.csv") as temporary:
         frame.write_csv(temporary)
     with whole_file(folder / "trajectory.parquet") as temporary:
@@ -59,23 +104,13 @@ def write_design(design: Design, folder: Path, origin: Provenance) -> None:
         Origin("trajectory.mcap", "design", {}),
         design.motion.omega,
     )
-    write_log(folder / "trajectory.mcap", log, kind="mcap")
+    write_log(folder / "trajectory.mcap", log)
     texts = {
-        "design.json": design_json(design, origin),
-        "report.html": page(design_document(design, origin.source, origin.doubts)),
-        "joint_trajectory.yaml": joint_trajectory(design, origin.joints),
+        "design.json": planned.as_json(),
+        "report.html": page(planned.document()),
+        "joint_trajectory.yaml": joint_trajectory(design, planned.joints),
     }
     write_texts(folder, texts)
-
-
-def trajectory(design: Design) -> dict[str, FloatArray]:
-    """The trajectory's columns: time, angles, velocities, accelerations, feed-forward torques."""
-    columns = {"t": design.t}
-    for name in ("theta", "omega", "alpha"):
-        columns |= _of_joints(name, getattr(design.motion, name))
-    for name, torque in zip(("tau", "loaded_tau"), design.torque.values(), strict=False):
-        columns |= _of_joints(name, torque)
-    return columns
 
 
 def _of_joints(name: str, rows: FloatArray) -> dict[str, FloatArray]:
@@ -117,22 +152,18 @@ def _numbers(values: FloatArray) -> str:
     return str([round(float(value), 9) + 0.0 for value in values])
 
 
-def design_json(design: Design, origin: Provenance) -> str:
-    """The text of ``design.json``: everything that decides the design, and what it predicts."""
-    return json.dumps(content(design, origin), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def content(design: Design, origin: Provenance) -> dict[str, Any]:
+def _content(planned: Planned) -> dict[str, Any]:
     """What ``design.json`` holds."""
+    design = planned.design
     campaign = design.campaign
     experiment, limits = campaign.experiment, campaign.limits
     noise = _of_joints("theta", experiment.noise.theta) | _of_joints("tau", experiment.noise.tau)
     return {
         "schema_version": SCHEMA_VERSION,
         "version": __version__,
-        "prior": origin.source,
-        "command": origin.command,
-        "verdict": asdict(verdict(design, origin.doubts)),
+        "prior": planned.source,
+        "command": planned.command,
+        "verdict": asdict(verdict(design, planned.doubts)),
         "drive": "position",
         "duration": campaign.duration,
         "rate": experiment.rate,
@@ -153,7 +184,7 @@ def content(design: Design, origin: Provenance) -> dict[str, Any]:
         },
         "used": [_used(design, row, share) for row, share in design.binding],
         "start": design.motion.theta[:, 0].tolist(),
-        "joints": list(origin.joints),
+        "joints": list(planned.joints),
     }
 
 

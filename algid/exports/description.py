@@ -31,66 +31,35 @@ from algid.identification.known import (
     torque_constants,
     wrong_inertia,
 )
-from algid.model import K1, K2, SINES, Model, length_by_coupling, phasor
+from algid.model import K1, K2, SINE_OF, Model, length_by_coupling, phasor
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
 
 
-@dataclass(frozen=True)
-class Coefficients:
-    """The torque's model, its coefficients by name, and half their 95 % intervals where known.
-
-    `value` holds a zero for every coefficient that the model lacks; `conditioned` says whether l1
-    moved them.
-    """
-
-    model: Model
-    value: Mapping[str, float]
-    half: Mapping[str, float]
-    conditioned: bool = False
-
-
-def coefficients_of(result: Result, file: str, l1: float | None = None) -> Coefficients:
-    """Coefficients of the result in `file`, conditioned on link 1's length `l1` in m if given.
-
-    Raises
-    ------
-    ResultError
-        If a coefficient has no estimate, or no arm has such an inertia matrix.
-    """
-    model = model_of(result)
-    c = torque_constants(result, model, "unloaded", file)
-    known = [name for name in model.names if has_error_bar(result, name)]
-    C = covariance_of(result, model.names, known)
-    conditioned = l1 is not None and model.gravity > 0
-    if l1 is not None and conditioned:
-        c, C = _conditioned(model, c, C, l1)
-    value = model.values(c)
-    half = result.quantile * np.sqrt(np.maximum(np.diag(C), 0.0))
-    halves = dict(zip(model.names, half.tolist(), strict=True))
-    wrong = wrong_inertia(value)
-    if wrong is not None:
-        mend = "identify it from more informative logs"
-        if conditioned:
-            mend = f"check {flag('l1')}"
-        raise ResultError(f"{file}: {wrong}, so that masses would come out negative; {mend}")
-    return Coefficients(model, value, {name: halves[name] for name in known}, conditioned)
-
-
 def _conditioned(
     model: Model, c: FloatArray, C: FloatArray, l1: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients and covariance under g |K1| = l1 |K2|, which is linear without sine parts."""
+    """Coefficients and covariance under g |K1| = l1 |K2|, by Newton's steps.
+
+    Without sine parts one is enough.
+    """
+    a = np.zeros(c.size)  # the gradient of g |K1| - l1 |K2|
     for _ in range(_STEPS):
-        wrong, a = _mismatch(model, c, l1)
+        wrong = 0.0
+        for name, factor in ((K1, model.gravity), (K2, -l1)):
+            at = [model.names.index(one) for one in (name, SINE_OF.get(name)) if one in model.names]
+            unit: FloatArray = np.ones(1)  # a straight arm's moment has its sign
+            if len(at) > 1:
+                unit = c[at] / max(float(np.linalg.norm(c[at])), 1e-300)
+            wrong += factor * float(unit @ c[at])
+            a[at] = factor * unit
         if abs(wrong) <= _ROUNDING * l1 * abs(phasor(model, c, K2)):
             break
         toward = C @ a
         if not a @ toward > 0:  # no error bars: the moments are equally wrong for their size
             toward = c**2 * a
         c = c - toward * wrong / (a @ toward)
-    _, a = _mismatch(model, c, l1)
     spread = a @ C @ a
     if spread > 0:
         C = C - np.outer(C @ a, a @ C) / spread
@@ -98,25 +67,7 @@ def _conditioned(
 
 
 _STEPS, _ROUNDING = 20, 1e-15
-"""Newton's, of which a plane needs one, and what of l1 |K2| is rounding."""
-
-
-def _mismatch(model: Model, c: FloatArray, l1: float) -> tuple[float, FloatArray]:
-    """How far g |K1| is from l1 |K2|, and the gradient of their difference (q,)."""
-    a = np.zeros(c.size)
-    wrong = 0.0
-    sines = {of: own for own, of in SINES.items() if own in model.names}
-    for name, factor in ((K1, model.gravity), (K2, -l1)):
-        K = phasor(model, c, name)
-        if name not in sines:
-            wrong += factor * K.real
-            a[model.names.index(name)] = factor
-            continue
-        size = max(abs(K), 1e-300)
-        wrong += factor * size
-        a[model.names.index(name)] = factor * K.real / size
-        a[model.names.index(sines[name])] = factor * K.imag / size
-    return wrong, a
+"""Steps at most, and what of l1 |K2| is rounding."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +78,10 @@ class Description:
     ----------
     name : str, a word of letters, digits and underscores
     source : str, the result's file and estimator
-    coefficients : Coefficients
+    model : Model, of its torque
+    value : its coefficients by name, zero for those that the model lacks
+    half : half their 95 % intervals, where known
+    conditioned : bool, whether l1 moved them
     known : Knowns, of the user and of the result's own call
     delay : float or None, s, estimated between torque and angle
     links : two of Link, or None where the format needs none
@@ -141,7 +95,10 @@ class Description:
 
     name: str
     source: str
-    coefficients: Coefficients
+    model: Model
+    value: Mapping[str, float]
+    half: Mapping[str, float]
+    conditioned: bool
     known: Knowns
     delay: float | None
     links: tuple[Link, Link] | None
@@ -168,8 +125,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     SettingError
         If what is known leaves no positive mass or inertia.
     """
-    known = Knowns(**(given_lengths(result) | knowns.given))
-    lengths = {name: one for name, one in known.given.items() if name in ("l1", "l2")}
+    model, known = model_of(result), Knowns(**(given_lengths(result) | knowns.given))
     l1, told, second = known.l1, ", g k1 / k2", result.payload.get("l2")
     weighed = second is not None and second.usable and bool(second.estimate)
     if links and l1 is None:
@@ -179,31 +135,44 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         by = by_payload or by_constants
         if by is not None:
             told += f", ± {result.quantile * by[1]:.2g} (95 %)"
-    coefficients = coefficients_of(result, file, l1)
-    value, gravity = coefficients.value, coefficients.model.gravity
+    c = torque_constants(result, model, "unloaded", file)
+    sure = [name for name in model.names if has_error_bar(result, name)]
+    C = covariance_of(result, model.names, sure)
+    conditioned = l1 is not None and model.gravity > 0
+    if l1 is not None and conditioned:
+        c, C = _conditioned(model, c, C, l1)
+    value = model.values(c)
+    half = result.quantile * np.sqrt(np.maximum(np.diag(C), 0.0))
+    halves = dict(zip(model.names, half.tolist(), strict=True))
+    wrong = wrong_inertia(value)
+    if wrong is not None:
+        mend = f"check {flag('l1')}" if conditioned else "identify it from more informative logs"
+        raise ResultError(f"{file}: {wrong}, so that masses would come out negative; {mend}")
     chosen = None
     if links:
-        if l1 is None:
-            l1 = _first_length(value, gravity, file)
         full = known
         if known.l2 is None and second is not None and second.usable:
             full = replace(known, l2=second.estimate)
-        chosen = links_of(value, gravity, l1, full, file)
-    found = result.parameters.items()
+        l1 = l1 or _first_length(value, model.gravity, file)
+        chosen = links_of(value, model.gravity, l1, full, file)
     path = Path(file)
     if path.name == "result.json":
         path = path.parent
+    found, lengths = result.parameters.items(), {"l1": known.l1, "l2": known.l2}
     return Description(
         name=re.sub(r"\W|^(?=\d)", "_", path.stem),
         source=f"{file}, estimator {result.estimator}",
-        coefficients=coefficients,
+        model=model,
+        value=value,
+        half={name: halves[name] for name in sure},
+        conditioned=conditioned,
         known=known,
         delay=None if result.delay is None else result.delay.estimate,
         links=chosen,
-        turn=turn_of(value, gravity),
+        turn=turn_of(value, model.gravity),
         told=told,
         weighed=weighed,
-        warnings=contradictions(result, lengths),
+        warnings=contradictions(result, {name: one for name, one in lengths.items() if one}),
         from_prior=tuple(name for name, one in found if one.status == "FROM_PRIOR"),
     )
 

@@ -99,7 +99,7 @@ def draws_of(
         if why is not None:
             refused += 1
             continue
-        numbers |= {name: one.coefficients.value[name] for name in arm}  # as l1 moved them
+        numbers |= {name: one.value[name] for name in arm}  # as l1 moved them
         yield numbers, replace(one, word="drawn", warnings=best.warnings), refused
         refused = 0
     raise ResultError(

@@ -11,7 +11,6 @@ import cmath
 import json
 import math
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from algid.base.errors import ResultError, SettingError
 from algid.exports.description import Description, describe
 from algid.exports.links import Knowns, Link
 from algid.exports.programs import program
+from algid.exports.templating import numbers, template
 from algid.identification.known import contradictions, covariance_of
 from algid.model import EVERY_TERM, SINES, TERMS, UNITS
 from algid.notices import Notice
@@ -53,6 +53,7 @@ FORMATS = {
     "c": Format("arm.c"),
 }
 PAYLOAD = "payload"
+TEMPLATES = Path(__file__).parent / "templates"
 
 
 def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, tuple[Notice, ...]]:
@@ -72,25 +73,24 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     ResultError
         If the result lacks an estimate, or no arm is like it.
     SettingError
-        If what is known leaves no positive mass or inertia, is no positive number, or has no place
-        in the format.
+        If what is known leaves no positive mass or inertia, or has no place in the format.
     """
     takes(to, knowns)
     if to == PAYLOAD:
         content = _payload(result, file, knowns)
-        return _template("payload.yaml").render(content), contradictions(result, knowns.given)
+        return template(TEMPLATES / "payload.yaml.j2").render(content), contradictions(
+            result, knowns.given
+        )
     arm = describe(result, file, knowns, links=FORMATS[to].links)
     return written(arm, to), arm.warnings
 
 
 def takes(to: str, knowns: Knowns) -> None:
-    """Raise `SettingError` where what is known is no positive number, or has no place in `to`."""
+    """Raise `SettingError` where what is known has no place in `to`."""
     taken = {"l2" if to == PAYLOAD else "l1"}
     if to in FORMATS and FORMATS[to].links:
         taken = set(vars(knowns))
-    for name, value in knowns.given.items():
-        if not 0 < value < float("inf") and not (name == "rotor1" and value == 0):
-            raise SettingError(f"{flag(name)}: expected a positive number, found {value:g}")
+    for name in knowns.given:
         if name not in taken:
             raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
 
@@ -99,8 +99,8 @@ def written(arm: Description, to: str) -> str:
     """The text of an arm in the format `to`."""
     form = FORMATS[to]
     content = _robot(arm, rotors=form.rotors) if form.links else program(arm)
-    content |= {"arm": arm, "units": UNITS, "bent": set(SINES) & set(arm.coefficients.model.names)}
-    header = _template("header").render(content).rstrip()
+    content |= {"arm": arm, "units": UNITS, "bent": set(SINES) & set(arm.model.names)}
+    header = template(TEMPLATES / "header.j2").render(content).rstrip()
     # nothing in it ends a comment of C or a string of Python
     header = header.replace("*/", "* /").replace("\\", "/").replace('"""', "'''")
 
@@ -108,31 +108,7 @@ def written(arm: Description, to: str) -> str:
         """What a file says of itself, with something before each line."""
         return "\n".join(f"{before}{line}".rstrip() for line in header.split("\n"))
 
-    return _template(form.template).render(content | {"comment": comment})
-
-
-@cache
-def _template(name: str) -> Any:
-    """A template; no value in its text comes from outside but numbers and cleaned names."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {"n": _numbers, "repr": repr}
-    return environment.get_template(f"{name}.j2")
-
-
-def _numbers(values: float | tuple[float, ...] | None) -> str:
-    """Numbers that read back as they are; null for what is not known."""
-    if values is None:
-        return "null"
-    each = values if isinstance(values, tuple) else (values,)
-    return " ".join(repr(float(value) + 0.0) for value in each)  # + 0.0: no -0.0
+    return template(TEMPLATES / f"{form.template}.j2").render(content | {"comment": comment})
 
 
 def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
@@ -141,8 +117,8 @@ def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
     Without `rotors` that of joint 1 is in link 1's inertia, which turns about the same axis.
     """
     assert arm.links is not None
-    (first, second), value = arm.links, arm.coefficients.value
-    model, rotor_within = arm.coefficients.model, bool(arm.rotor1 and not rotors)
+    (first, second), value = arm.links, arm.value
+    model, rotor_within = arm.model, bool(arm.rotor1 and not rotors)
     if rotor_within:
         first = replace(first, inertia=first.inertia + arm.rotor1)
     kinds = (*LOSSES, "rotor") if rotors else LOSSES
@@ -164,7 +140,7 @@ def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
     def centre(link: Link) -> str:
         """A link's centre of mass in its frame: to the left of its line is up, or on the plane."""
         x, y = link.centre, link.aside
-        return _numbers((x, 0, y) if model.gravity else (x, y, 0))
+        return numbers((x, 0, y) if model.gravity else (x, y, 0))
 
     return {
         "axis": "0 -1 0" if model.gravity else "0 0 1",
@@ -206,18 +182,10 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
             f"{file}: the result does not tell where the payload hangs; give {flag('l2')}"
         )
 
-    def body(name: str) -> tuple[float, float | None]:
-        """Estimate and standard deviation of a part of the payload's body: zero without one."""
-        estimate = result.payload.get(name)
-        if estimate is None or estimate.estimate is None:
-            return 0.0, 0.0
-        return estimate.estimate, estimate.std
-
-    (y, y_std), (J, J_std) = body("y_p"), body("J_p")
     # nothing is shared with what is given or not determined
     shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
     covariance = np.nan_to_num(covariance_of(result, ("m_p", "l2", "y_p", "J_p"), shared))
-    return {
+    content: dict[str, Any] = {
         "file": json.dumps(file),
         "estimator": result.estimator,
         "given": bool(given),
@@ -225,12 +193,14 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
         "mass_std": mass.std,
         "x": length,
         "x_std": 0.0 if given or identified is None else identified.std,
-        "y": y,
-        "y_std": y_std,
-        "J": J,
-        "J_std": J_std,
         "covariance": covariance.tolist(),
     }
+    for symbol, name in (("y", "y_p"), ("J", "J_p")):  # of its body: zero without one
+        found = result.payload.get(name)
+        known = found is not None and found.estimate is not None
+        content[symbol] = found.estimate if found and known else 0.0
+        content[f"{symbol}_std"] = found.std if found and known else 0.0
+    return content
 
 
 def controller_call(
@@ -258,5 +228,5 @@ def controller_call(
         apart = complex(payload["x"] - flange[0], payload["y"] - flange[1])
         centre = apart * cmath.exp(-1j * math.radians(flange[2]))
         x, y = (f"{round(one, 5) + 0.0:.5f}" for one in (centre.real, centre.imag))
-    numbers = {"mass": f"{payload['mass']:.5f}", "x": x, "y": y, "flag": flag("flange")}
-    return str(_template("controller.txt").render(numbers))
+    filled = {"mass": f"{payload['mass']:.5f}", "x": x, "y": y, "flag": flag("flange")}
+    return str(template(TEMPLATES / "controller.txt.j2").render(filled))

@@ -33,6 +33,7 @@ import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NoReturn
 
 from scipy.optimize import minimize_scalar
 from scipy.special import expit
@@ -104,91 +105,53 @@ def links_of(
     SettingError
         If what is known leaves no positive mass or inertia.
     """
-    first, second, fourth = moments_of(k)
+    K1, K2, K4 = moments_of(k)
     level = cmath.exp(-1j * turn_of(k, gravity))
-    s2, h2 = second * level / gravity if gravity else first / l1, k[K3]
-    h = k[K5] - (knowns.rotor1 or 0.0)
-    arm = _Free(s2, h2, h, fourth * level / gravity if gravity else None, l1, knowns)
-    low, high = abs(s2) ** 2 / h2, h / l1**2
+    s2, h2 = K2 * level / gravity if gravity else K1 / l1, k[K3]
+    h, s = k[K5] - (knowns.rotor1 or 0.0), K4 * level / gravity if gravity else 0j  # at m2 = 0
+
+    def first(m2: float) -> Link:
+        left, m1 = h - m2 * l1**2, knowns.m1
+        if not gravity:  # nothing tells link 1's first moment
+            m1 = m1 or 3 * left / l1**2
+            return _link(l1, m1, complex(l1 * left * m1 / (left + m1 * l1**2 / 3)), left)
+        own = s - m2 * l1
+        m1 = m1 or 3 * left / l1**2 - 3 * own.real / l1 + 2 * abs(own) ** 2 / left
+        return _link(l1, m1, own, left)
+
+    def second(m2: float) -> Link:
+        return _link(knowns.l2 or math.sqrt(3 * h2 / m2), m2, s2, h2)
+
+    def refuse(name: str, why: str) -> NoReturn:
+        others = [one for one in knowns.given if one != name]
+        checked = " or ".join(map(flag, (name, *others)))
+        raise SettingError(f"{flag(name)}: {file}: {why}; check {checked}, or leave it out")
+
+    low, high, m1, m2 = abs(s2) ** 2 / h2, h / l1**2, knowns.m1, knowns.m2
     if not low < high:
-        why = f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²"
-        raise SettingError(_refusal(file, knowns, why, "rotor1"))
-    if knowns.m1 is not None and gravity:
-        low, high = _within(arm, knowns.m1, low, high, file, knowns)
-    m2 = knowns.m2
-    if m2 is None:
-        m2 = arm.nearest(low, high)
-    elif not low < m2 < high:
-        why = (
-            f"with link 2 of {m2:g} kg an inertia comes out negative; between {low:.4g} and "
-            f"{high:.4g} kg"
-        )
-        raise SettingError(_refusal(file, knowns, why, "m2"))
-    return arm.first(m2), arm.second(m2)
+        refuse("rotor1", f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²")
+    if m1 is not None and gravity:  # possible is link 1 where left m1 > |own|²
+        middle = s.real / l1 - 0.5 * m1
+        square = middle**2 - (abs(s) ** 2 - h * m1) / l1**2
+        half = math.sqrt(max(square, 0.0))
+        low, high = max(low, middle - half), min(high, middle + half)
+        if square <= 0 or low >= high:
+            refuse("m1", f"with link 1 of {m1:g} kg a mass or an inertia comes out negative")
+    if m2 is not None and not low < m2 < high:
+        bounds = f"between {low:.4g} and {high:.4g} kg"
+        refuse("m2", f"with link 2 of {m2:g} kg an inertia comes out negative; {bounds}")
+    if m2 is None:  # the least D of both links together
 
-
-def _within(
-    arm: _Free, m1: float, low: float, high: float, file: str, knowns: Knowns
-) -> tuple[float, float]:
-    """Masses of link 2 that leave a link 1 of `m1` kg possible: (h - m2 l1²) m1 > |s - m2 l1|²."""
-    assert arm.s is not None
-    middle = arm.s.real / arm.l1 - 0.5 * m1
-    square = middle**2 - (abs(arm.s) ** 2 - arm.h * m1) / arm.l1**2
-    if square > 0:
-        low, high = max(low, middle - math.sqrt(square)), min(high, middle + math.sqrt(square))
-    if square <= 0 or low >= high:
-        why = f"with link 1 of {m1:g} kg a mass or an inertia comes out negative"
-        raise SettingError(_refusal(file, knowns, why, "m1"))
-    return low, high
-
-
-def _refusal(file: str, knowns: Knowns, why: str, name: str) -> str:
-    others = " or ".join(flag(other) for other in knowns.given if other != name)
-    typed = flag(name)
-    return (
-        f"{typed}: {file}: {why}; check {typed}{' or ' + others if others else ''}, or leave it out"
-    )
-
-
-@dataclass(frozen=True)
-class _Free:
-    """The arm but for its masses: see the module's table.
-
-    `s` and `h` are link 1's moments at m2 = 0.
-    """
-
-    s2: complex
-    h2: float
-    h: float
-    s: complex | None
-    l1: float
-    knowns: Knowns
-
-    def second(self, m2: float) -> Link:
-        length = self.knowns.l2 or math.sqrt(3 * self.h2 / m2)
-        return _link(length, m2, self.s2, self.h2)
-
-    def first(self, m2: float) -> Link:
-        h, l1, m1 = self.h - m2 * self.l1**2, self.l1, self.knowns.m1
-        if self.s is None:  # without gravity nothing tells link 1's first moment
-            m1 = m1 or 3 * h / l1**2
-            s = complex(l1 * h * m1 / (h + m1 * l1**2 / 3))
-        else:
-            s = self.s - m2 * l1
-            m1 = m1 or 3 * h / l1**2 - 3 * s.real / l1 + 2 * abs(s) ** 2 / h
-        return _link(l1, m1, s, h)
-
-    def nearest(self, low: float, high: float) -> float:
-        """m2 between its bounds with the least D of both links together."""
+        def mass(logit: float) -> float:
+            return low + (high - low) * float(expit(logit))
 
         def distance(logit: float) -> float:
-            m2 = low + (high - low) * float(expit(logit))
-            return _distance(self.first(m2)) + _distance(self.second(m2))
+            return _distance(first(mass(logit))) + _distance(second(mass(logit)))
 
-        minimum = minimize_scalar(
-            distance, bounds=(-_ENDS, _ENDS), method="bounded", options={"xatol": 1e-10}
-        )
-        return low + (high - low) * float(expit(minimum.x))
+        ends = (-_ENDS, _ENDS)
+        minimum = minimize_scalar(distance, bounds=ends, method="bounded", options={"xatol": 1e-10})
+        m2 = mass(minimum.x)
+    return first(m2), second(m2)
 
 
 def _link(length: float, mass: float, s: complex, h: float) -> Link:

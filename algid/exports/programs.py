@@ -9,7 +9,7 @@ t2 tanh(ω / ω_s); parameters have their names in capitals.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
@@ -19,72 +19,34 @@ from algid.model import TERMS, Model, Weighted, attributes
 from algid.physics.expressions import Atom
 from algid.physics.motion import Widths
 
-_FUNCTIONS = ("cos", "exp", "sin", "tanh")
-
 
 def program(arm: Description) -> dict[str, Any]:
-    """What the templates of programs are made of."""
+    """What the templates of programs are made of.
+
+    M and n are inertia, by joint of torque and of acceleration, and rest of the columns that are
+    the joints' load; X and r those of the others; g is what of n stays at rest.
+    """
     lacking = [
         TERMS[name]
-        for name in arm.coefficients.model.terms
+        for name in arm.model.terms
         if TERMS[name].timing is not None or TERMS[name].elastic
     ]
-    held_terms = outside(arm.coefficients.model.terms, names_in(lacking))
-    model = replace(arm.coefficients.model, terms=held_terms)
-    compiled, loads = model.compiled, list(model.compiled.loads)
-    others = sorted(set(range(len(compiled.names))) - set(loads))
-
-    def inertia(places: list[int]) -> list[list[Weighted]]:
-        """What multiplies the accelerations, of the columns at `places`."""
-        entries = compiled.inertia
-        return [[compiled.only(entries[i, j], places) for j in (0, 1)] for i in (0, 1)]
-
-    def rest(places: list[int]) -> list[Weighted]:
-        """The torque at zero acceleration, of the columns at `places`."""
-        return [compiled.only(weighted, places) for weighted in compiled.rest]
-
-    M, X, n, r = inertia(loads), inertia(others), rest(loads), rest(others)
+    model = replace(arm.model, terms=outside(arm.model.terms, names_in(lacking)))
+    (M, n), (X, r) = model.compiled.of_load, model.compiled.beside_load
     g = [{p: pairs for p, pairs in weighted.items() if not _moves(p)} for weighted in n]
-    held: dict[str, Sequence[Weighted]] = {
-        "gravity": g,
-        "inertia": [*M[0], *M[1], *X[0], *X[1]],
-        "load": [*M[0], *M[1]],
-        "rest": n,
-        "friction": r,
-    }
-    atoms = {name: _definitions(expressions) for name, expressions in held.items()}
-    of_joint = {
-        kind: [[name.upper() for name, one in attributes(model, kind) if one == j] for j in (0, 1)]
-        for kind in ("gains", "by_load")
-    }
-    share = [
-        " + ".join(f"{name} * tanh(omega[{j}] / COULOMB_SPEED)" for name in names) or "0.0"
-        for j, names in enumerate(of_joint["by_load"])
-    ]
-    extra = [[_source(model, weighted, "") for weighted in row] for row in X]
-    body = " ".join([*(line for lines in atoms.values() for line in lines), *share])
-    return {
+    held = {"gravity": g, "inertia": (*M, *X), "load": M, "rest": n, "friction": r}
+    content: dict[str, Any] = {
         "lacking": lacking,
-        "jump": False,
-        "negative": (),
-        "rotor_within": False,
-        "constants": _constants(model, arm.coefficients.value),
-        "functions": [name for name in _FUNCTIONS if re.search(rf"\b{name}\(", body)],
-        "atoms": atoms,
-        "M": [[_source(model, weighted) for weighted in row] for row in M],
-        "X": [[f" + {text}" if text else "" for text in row] for row in extra],
-        "n": [_source(model, weighted) for weighted in n],
-        "r": [_source(model, weighted) for weighted in r],
-        "g": [_source(model, weighted) for weighted in g],
-        "extra": [
-            "".join(f" + ({text}) * alpha[{j}]" for j, text in enumerate(row) if text)
-            for row in extra
-        ],
-        "gain": ["".join(f"(1 + {name}) * " for name in names) for names in of_joint["gains"]],
-        "ungain": ["".join(f" / (1 + {name})" for name in names) for names in of_joint["gains"]],
-        "share": share,
-        "by_load": any(of_joint["by_load"]),
+        "constants": _constants(model, arm.value),
+        "atoms": {name: _definitions(expressions) for name, expressions in held.items()},
     }
+    for name, expressions in {"M": M, "n": n, "r": r, "g": g}.items():
+        content[name] = [_source(model, weighted) or "0.0" for weighted in expressions]
+    content["X"] = [_source(model, weighted) for weighted in X]
+    for kind in ("gains", "by_load"):
+        names = attributes(model, kind)
+        content[kind] = [[one.upper() for one, of in names if of == joint] for joint in (0, 1)]
+    return content
 
 
 def _constants(model: Model, value: Mapping[str, float]) -> dict[str, float]:
@@ -97,8 +59,8 @@ def _constants(model: Model, value: Mapping[str, float]) -> dict[str, float]:
     return constants
 
 
-def _source(model: Model, weighted: Weighted, nothing: str = "0.0") -> str:
-    """An expression that is linear in the parameters, as text."""
+def _source(model: Model, weighted: Weighted) -> str:
+    """An expression that is linear in the parameters, as text; none where it is nothing."""
     text = ""
     for product, pairs in weighted.items():
         for place, factor in pairs:
@@ -108,7 +70,7 @@ def _source(model: Model, weighted: Weighted, nothing: str = "0.0") -> str:
             if abs(factor) != 1:
                 factors.insert(0, f"{abs(factor):g}")
             text += " * ".join(factors)
-    return text or nothing
+    return text
 
 
 def _definitions(expressions: Iterable[Weighted]) -> list[str]:

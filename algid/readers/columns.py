@@ -61,7 +61,9 @@ def choose_columns(
             # what the controller follows makes the torque
             sources.setdefault(reference, torque.q_des)
     for pair in (REFERENCES, VELOCITIES):
-        if not sources.keys() >= set(pair) or (pair is VELOCITIES and not profile.velocity):
+        if not sources.keys() >= set(pair) or (
+            pair is VELOCITIES and profile.velocity == "observer"
+        ):
             sources = {name: column for name, column in sources.items() if name not in pair}
     sources = {name: one for name, one in sources.items() if name in ("t", *profile.channels)}
     needed = profile.needed if profile.rate is not None else ("t", *profile.needed)

@@ -19,7 +19,7 @@ from algid.readers.table import CHANNELS, REFERENCES, SampleTable
 if TYPE_CHECKING:
     from algid.profile import Angle, Profile, Torque, Velocity
 
-UnitSource = Literal["flag", "profile", "names", "assumed"]
+UnitSource = Literal["profile", "names", "assumed"]
 """Who says a unit: a flag, a profile, the channel's own name, or nobody."""
 Law = tuple[float, float] | None
 """Of a joint's PD law τ = kp (q_des − θ) − kd θ̇ the gains in N m/rad and N m s/rad."""
@@ -130,7 +130,7 @@ def channel_readings(
             if there and (there in known or like not in REFERENCES):
                 unit, source = there, "names"
             if given:
-                unit, source = given, profile.told_by(f"{place}.unit")
+                unit, source = given, "profile"
         file = stated.get(name, unit) if like == name else unit
         numbers = {"column": mapping[name], "name": like, "unit": file}
         if unit not in known:

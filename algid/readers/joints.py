@@ -79,7 +79,7 @@ def reading_of(names: Sequence[str], profile: Profile) -> tuple[Reading, tuple[N
     Nothing is said where names and log agree.
     """
     if profile.joints:
-        return Reading(joints=profile.joints, joints_told=profile.told_by("joints")), ()
+        return Reading(joints=profile.joints, joints_told="profile"), ()
     joints, by = along_the_arm(names)
     reading = Reading(joints=joints, joints_told=by)
     if by == "names" and list(names) == list(joints):

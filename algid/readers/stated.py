@@ -239,7 +239,9 @@ def settings_unused(
         useless = {"time", "time_unit", "rate", "columns"}
     for pair in (VELOCITIES, REFERENCES):
         if pair[0] in profile.channels and pair[0] not in mapping:
-            useless |= {*pair, *(["velocity"] if pair is VELOCITIES and profile.velocity else [])}
+            useless |= set(pair)
+            if pair is VELOCITIES and profile.velocity == "measured":
+                useless.add("velocity")
     given = {name for name in profile.model_fields_set if getattr(profile, name) is not None}
     names = [name for name in useless if name.partition(".")[0] in given]
     if names:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
 
 from algid.log import Log, Truth
@@ -15,7 +16,7 @@ def write_log(
     log: Log | Iterable[Log],
     *,
     truth: Truth | None = None,
-    kind: str | None = None,
+    format: str | None = None,  # noqa: A002  # as the flag
     force: bool = True,
 ) -> None:
     """Write a log, or the blocks of one, whole or not at all.
@@ -26,7 +27,7 @@ def write_log(
     log : Log, or the blocks of one in their order
     truth : Truth
         The arm and the payload behind a synthetic log, which is written beside its samples.
-    kind : 'mcap', 'parquet' or 'csv'
+    format : 'mcap', 'parquet' or 'csv'
         Format; that of `path`'s suffix by default.
     force : bool
         Replace a file that is there, also one that another process has written meanwhile.
@@ -49,18 +50,7 @@ def write_log(
     1001
     """
     path = Path(path)
-    name = kind or path.suffix.lstrip(".").lower()
-    if name == "mcap":
-        from algid.writers import mcap
-
-        mcap.write(path, log, truth=truth, force=force)
-    elif name == "parquet":
-        from algid.writers import parquet
-
-        parquet.write(path, log, truth=truth, force=force)
-    elif name == "csv":
-        from algid.writers import csv
-
-        csv.write(path, log, truth=truth, force=force)
-    else:
+    name = format or path.suffix.lstrip(".").lower()
+    if name not in FORMATS:
         raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")
+    import_module(f"algid.writers.{name}").write(path, log, truth=truth, force=force)

@@ -21,7 +21,7 @@ from algid.base.stores import connect, list_urls, open_store, put_folder
 from algid.batches.discover import jobs_of
 from algid.batches.job import fetched
 from algid.batches.records import JobStatus
-from algid.batches.run import Batch, BatchConfig, BatchOutcome
+from algid.batches.run import Batch, BatchConfig, Batched
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
 from tests.batches.test_run import Here
@@ -79,7 +79,7 @@ CONFIG = BatchConfig(
 )
 
 
-def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> BatchOutcome:
+def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> Batched:
     out = served.url("out", user) if place is None else place
     jobs = jobs_of([served.url("logs", user)], out)
     return Batch(
@@ -87,7 +87,7 @@ def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any
     ).run(jobs)
 
 
-def _ends(ended: BatchOutcome) -> dict[str, JobStatus]:
+def _ends(ended: Batched) -> dict[str, JobStatus]:
     return {record.job.name: record.status for record in ended.records}
 
 

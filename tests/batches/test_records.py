@@ -29,7 +29,7 @@ from algid.batches.records import (
     stat_of,
     write_record,
 )
-from algid.batches.run import Batch, BatchConfig, BatchOutcome, sweep
+from algid.batches.run import Batch, BatchConfig, Batched, sweep
 from algid.settings import Settings
 
 
@@ -63,7 +63,7 @@ def _batch(out: Path, executor: Executor | None = None) -> Batch:
     )
 
 
-def _run(logs: Path, out: Path, executor: Executor | None = None) -> BatchOutcome:
+def _run(logs: Path, out: Path, executor: Executor | None = None) -> Batched:
     return _batch(out, executor).run(jobs_of([str(logs)], str(out)))
 
 

@@ -23,7 +23,7 @@ from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
 from algid.batches.lock import locked
 from algid.batches.records import JobStatus
-from algid.batches.run import Batch, BatchConfig, BatchOutcome, StableFiles, sweep
+from algid.batches.run import Batch, BatchConfig, Batched, StableFiles, sweep
 from algid.batches.workers import WorkerDiedError
 from algid.identification.identify import identify
 from algid.notices import Notice
@@ -77,7 +77,7 @@ CONFIG = BatchConfig("", WEAK, lambda _file: None, report=False)
 
 def _run(
     logs: Path, executor: Executor | None = None, recipe: BatchConfig = CONFIG, **more: bool
-) -> BatchOutcome:
+) -> Batched:
     out = logs.parent / "out"
     store = open_store(str(out))
     batch = Batch(store, replace(recipe, out=str(out)), executor or Here(), 1, lambda *_: None)

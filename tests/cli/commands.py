@@ -42,5 +42,5 @@ def profile_from(flags: Mapping[str, Any]) -> Profile | None:
     """The profile that flags mean, as a command hands them to its verb."""
     options = {name: value for name, value in flags.items() if name != "set"}
     for line in flags.get("set", []):
-        take(options, line, None)
+        take(options, line, Profile.model_fields)
     return meant(None, options)

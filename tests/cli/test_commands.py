@@ -74,37 +74,6 @@ def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Pat
     assert f"wrote {tmp_path / 'case1-unloaded.algid'}" in found.err
 
 
-def broken(folder: Path, logs: Path, name: str, change: str) -> Path:
-    """A copy of the unloaded log with one thing wrong."""
-    table = pl.read_csv(logs / "case1-unloaded.csv")
-    path = folder / f"{name}.csv"
-    if change == "missing column":
-        table = table.drop("tau2")
-    elif change == "too short":
-        table = table.head(40)
-    elif change == "zero torque":
-        table = table.with_columns(pl.lit(0.0).alias("tau1"))
-    table.write_csv(path)
-    return path
-
-
-@pytest.mark.parametrize(
-    "change",
-    ["missing column", "too short", "zero torque"],
-)
-def test_bad_logs_get_one_line_and_nothing_is_written(
-    change: str, logs: Path, tmp_path: Path
-) -> None:
-    path = broken(tmp_path, logs, "bad", change)
-    out = tmp_path / "out"
-    found = Outcome("identify", path, "-o", out, "--estimator", "paper")
-    assert found.code == 2, found.err + found.out
-    assert found.out == ""
-    assert len(found.err.strip().splitlines()) == 1
-    assert found.err.startswith(f"algid: {path}")
-    assert not list(out.iterdir()) if out.exists() else True
-
-
 def test_swapped_logs_are_told(logs: Path, tmp_path: Path) -> None:
     found = Outcome("identify", logs / "case1-loaded.csv", "-o", tmp_path)
     assert found.code == 2
@@ -128,20 +97,6 @@ def test_a_failed_result_ends_with_three_and_says_what_to_run(logs: Path, tmp_pa
     said = found.out.replace(" \\\n    ", " ").splitlines()  # a long command goes on below
     assert f"Run first: algid inspect {tmp_path / 'wrong.csv'}" in said
     assert " OK " not in found.out
-
-
-def test_synth_overwrites_nothing_unless_forced(tmp_path: Path) -> None:
-    call = ("synth", "case1", "-o", tmp_path, "--duration", "0.1", "--format", "csv")
-    assert Outcome(*call).code == 0
-    (tmp_path / "case1-unloaded.csv").unlink()
-    (tmp_path / "case1-loaded.csv").write_text("mine")
-    refused = Outcome(*call)
-    assert (refused.code, refused.err.count("\n")) == (2, 1)
-    assert "case1-loaded.csv: exists already" in refused.err
-    assert not (tmp_path / "case1-unloaded.csv").exists()
-    assert (tmp_path / "case1-loaded.csv").read_text() == "mine"
-    assert Outcome(*call, "--force").code == 0
-    assert (tmp_path / "case1-loaded.csv").read_text() != "mine"
 
 
 def test_identify_says_where_it_wrote_and_takes_a_name(logs: Path, tmp_path: Path) -> None:

@@ -13,11 +13,11 @@ import click
 import pytest
 
 import algid
-from algid.api.guide import text_of, topics
+from algid.api.guide import TOPICS, text_of
 from algid.api.options import LogOptions, Options
-from algid.api.signature import keywords
+from algid.api.signature import options_of
 from algid.base.errors import AlgidError, SettingError
-from algid.base.exits import epilog, rows
+from algid.base.exits import MEANINGS, WHAT_TO_DO, epilog
 from algid.cli.derive import COMMANDS, Command, command, listed
 from algid.methods import ESTIMATORS
 from algid.moved import MOVED
@@ -71,8 +71,8 @@ def options() -> Iterator[Any]:
             wrong: list[str] = []
             if isinstance(option.type, click.types.FloatParamType | click.types.IntParamType):
                 wrong = ["much", "", "nan", "-inf"]
-                if taken.option.range is not None:
-                    low, high = taken.option.range
+                if taken.range is not None:
+                    low, high = taken.range
                     wrong += [f"{low - 1e-3:.17g}", f"{1.001 * high:.17g}"]
                 if isinstance(option.type, click.types.IntParamType):
                     wrong += ["1.5", "-1"]
@@ -177,7 +177,8 @@ def test_text_that_means_nothing_is_one_line_that_names_its_flag(
     flag, _, text = flags[0].partition("=")
     line = refused(name, *flags)
     named = f"--set {text.partition('=')[0]}" if flag == "--set" else flag
-    assert line.startswith((f"{named}:", f"{named} ", f"{flag} (profile:")), line
+    by_type = f"Invalid value for '{flag}'"
+    assert line.startswith((f"{named}:", f"{named} ", f"{flag} (profile:", by_type)), line
 
 
 @pytest.mark.parametrize(
@@ -229,7 +230,7 @@ def test_help_has_every_keyword_the_example_and_the_exit_codes(name: str) -> Non
     shown = call(name, "--help").out
     words = " ".join(shown.split())
     verb: Callable[..., Any] = getattr(import_module(f"algid.api.{name}"), COMMANDS[name])
-    for one in keywords(verb).values():
+    for one in options_of(verb).values():
         assert one.help.endswith((".", "…")), one.name
         assert one.name.upper().removesuffix("S") in shown or one.flag[6:] in shown, one.name
     assert max(map(len, shown.splitlines())) <= 80
@@ -268,7 +269,7 @@ def completed(one: Command, name: str, begun: str) -> list[str]:
         ("inspect", "torque_unit", "m", ["mN m", "mA"]),
         ("batch", "zero", "h", ["horizontal", "hanging"]),
         ("identify", "set", "tau1.s", ["tau1.source=", "tau1.sign=1", "tau1.sign=-1"]),
-        ("identify", "set", "velocity=t", ["velocity=true"]),
+        ("identify", "set", "velocity=m", ["velocity=measured"]),
         ("identify", "set", "obs", ["observer=luenberger", "observer=zero-phase"]),
         ("synth", "set", "jit", ["jitter="]),
         ("track", "accept", "DEGREES,EFFORT_Z", ["DEGREES,EFFORT_ZERO"]),
@@ -304,8 +305,8 @@ def test_the_completion_of_a_shell_is_printed_and_installed(
 
 
 def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
-    for cells in rows():
-        line = f"| {' | '.join(cells)} |\n"
+    for code, meaning in MEANINGS.items():
+        line = f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |\n"
         assert line in text_of("batch")
         assert line in (ROOT / "README.md").read_text(encoding="utf-8")
     for one in ESTIMATORS:
@@ -313,7 +314,7 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
     for old, new in MOVED.items():
         assert f"| `{old}` | {new} |" in text_of("start")
     assert call("guide", "estimators").out == text_of("estimators")
-    assert all(f"algid guide {topic}" in call("guide").out for topic in topics())
+    assert all(f"algid guide {topic}" in call("guide").out for topic in TOPICS)
 
 
 @pytest.mark.parametrize(

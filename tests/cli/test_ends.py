@@ -5,6 +5,7 @@ asked.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,15 +14,16 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.api.batch import Batched, answer, watched
+import algid
+from algid.api.batch import answer
 from algid.api.compare import labels_of as labels
-from algid.api.design import noise_of
 from algid.base.errors import SettingError
 from algid.batches.jobs import Job
 from algid.batches.records import JobRecord, JobStatus
-from algid.batches.run import BatchOutcome
+from algid.batches.run import Batch, Batched
 from algid.cli.output import shown
 from algid.designs.prior import PriorKnowledge, prior_of
+from algid.designs.request import noise_of
 from algid.estimators.whitening import NoiseLevels
 from tests.cli.commands import call
 
@@ -40,16 +42,16 @@ BAD, DEAD = (
 @pytest.mark.parametrize(
     ("ended", "stopped", "code", "lines"),
     [
-        (BatchOutcome([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
-        (BatchOutcome([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
+        (Batched([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
+        (Batched([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
         (
-            BatchOutcome([GOOD, PART], 1, 0),
+            Batched([GOOD, PART], 1, 0),
             False,
             3,
             ["1 ok, 1 incomplete; 1 run now, 0 left; out/jobs.parquet"],
         ),
         (
-            BatchOutcome([GOOD, PART, BAD, DEAD], 4, 0),
+            Batched([GOOD, PART, BAD, DEAD], 4, 0),
             False,
             1,
             [
@@ -58,21 +60,21 @@ BAD, DEAD = (
                 "1 ok, 1 incomplete, 1 failed, 1 killed; 4 run now, 0 left; out/jobs.parquet",
             ],
         ),
-        (BatchOutcome([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
+        (Batched([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
         (
-            BatchOutcome([GOOD, PART], 2, 3),
+            Batched([GOOD, PART], 2, 3),
             True,
             130,
             ["1 ok, 1 incomplete; 2 run now, 3 left; out/jobs.parquet"],
         ),
         (
-            BatchOutcome([GOOD], 1, 3, "out: the disk is full"),
+            Batched([GOOD], 1, 3, "out: the disk is full"),
             True,
             1,
             ["1 ok; 1 run now, 3 left; out/jobs.parquet"],
         ),
         (
-            BatchOutcome([GOOD], 1, 0, "out: the disk is full"),
+            Batched([GOOD], 1, 0, "out: the disk is full"),
             False,
             1,
             ["1 ok; 1 run now, 0 left; out/jobs.parquet"],
@@ -80,19 +82,17 @@ BAD, DEAD = (
     ],
 )
 def test_a_batch_says_what_became_of_its_jobs(
-    ended: BatchOutcome,
+    ended: Batched,
     stopped: bool,
     code: int,
     lines: list[str],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    batched = Batched(
-        ended.records, ended.ran, ended.left, "out", interrupted=stopped, stopped=ended.stopped
-    )
+    batched = replace(ended, out="out", interrupted=stopped)
     for quiet in (False, True):
         told = answer(batched, {})
         assert told.exit == code
-        shown(told, False, quiet, False)
+        shown(told, False, quiet)
         printed = capsys.readouterr()
         assert printed.out.splitlines() == ([] if quiet else lines)
         assert printed.err == ("" if ended.stopped is None else f"algid: {ended.stopped}\n")
@@ -109,9 +109,9 @@ class Watched:
     def look(self, _seconds: float) -> None:
         self.looks -= 1
 
-    def run(self, jobs: list[Any], retry_failed: bool = False) -> BatchOutcome:
+    def run(self, jobs: list[Any], retry_failed: bool = False) -> Batched:
         self.heard.append((jobs, retry_failed))
-        return BatchOutcome([GOOD] * len(self.heard), len(jobs), 0)
+        return Batched([GOOD] * len(self.heard), len(jobs), 0)
 
 
 def test_a_watch_complains_once_and_retries_what_failed_once(
@@ -126,19 +126,18 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
         ["b"],
     ]
 
-    def jobs_of(*_: object) -> Any:
+    def look() -> Any:
         found = looks.pop(0)
         if isinstance(found, SettingError):
             raise found
         return found
 
-    monkeypatch.setattr("algid.batches.discover.jobs_of", jobs_of)
     monkeypatch.setattr(
         "algid.batches.run.StableFiles", lambda: SimpleNamespace(settled=lambda jobs: jobs)
     )
     running: Any = Watched(6)
     heard: list[str] = []
-    ended = watched(running, ["logs"], "out", "logs", True, heard.append)
+    ended = Batch.watch(running, look, True, heard.append)
     assert running.heard == [([], False), (["a"], True), (["b"], False)]
     assert len(ended.records) == 3
     assert heard == ["logs: gone", "twice"]
@@ -150,9 +149,8 @@ def test_results_are_named_by_what_tells_them_apart(tmp_path: Path) -> None:
 
     assert named("a.algid", "b.algid/result.json") == ["a", "b"]
     assert named("mon/a.algid", "fri/a.algid") == ["mon/a", "fri/a"]
-    assert named("x/1/a.algid", "x/2/a.algid", "y/1/b.algid") == ["1/a", "2/a", "1/b"]
-    twice = str((tmp_path / "a.algid").resolve())
-    assert named("a.algid", "a.algid") == [twice, twice]
+    assert named("x/1/a.algid", "x/2/a.algid", "y/1/b.algid") == ["x/1/a", "x/2/a", "y/1/b"]
+    assert named("a.algid", "a.algid/result.json") == ["a", "a"]
     assert call("compare", tmp_path / "a.algid").err == (
         "algid: compare: expected two results or more, found 1; name another one\n"
     )
@@ -251,7 +249,7 @@ def test_noise_is_the_flags_then_a_logs_then_the_results(tmp_path: Path) -> None
         "--duration",
         "2",
     )
-    log = tmp_path / "case1-unloaded.csv"
+    log = algid.read_log(tmp_path / "case1-unloaded.csv")
     measured = noise_of(prior(), None, None, log)
     # a first guess from differences: to a fifth or so
     assert measured.theta == pytest.approx(1e-3, rel=0.3)

@@ -13,7 +13,7 @@ from algid.designs.belief import Belief, Objective
 from algid.designs.campaign import Campaign, Design
 from algid.designs.information import Experiment
 from algid.designs.limits import Limits, Row, Usage
-from algid.designs.write import Provenance, design_json
+from algid.designs.write import Planned
 from algid.estimators.parametrisation import Shared
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model, Motion
@@ -68,10 +68,8 @@ def made_up(*, loaded: tuple[bool, ...] = (False, True)) -> Design:
 
 def test_the_json_holds_what_decides_and_what_is_predicted() -> None:
     one = made_up()
-    origin = Provenance(
-        "arm.algid", "algid design arm.algid", ("a", "b"), (Notice("DOUBT", "something"),)
-    )
-    text = design_json(one, origin)
+    doubts = (Notice("DOUBT", "something"),)
+    text = Planned(one, "arm.algid", "algid design arm.algid", ("a", "b"), doubts).as_json()
     assert text.endswith("}\n")
     content = json.loads(text)
     assert content["version"] == __version__

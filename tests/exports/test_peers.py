@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
-from algid.exports.description import coefficients_of
+from algid.exports.description import describe
 from algid.exports.formats import exported
 from algid.exports.links import Knowns
 from algid.model import Model, Motion, acceleration, torque
@@ -131,7 +131,7 @@ def test_bent_links_in_a_plane_and_of_a_length_that_is_given() -> None:
     assert_close(by_mujoco(text_of("mjcf", value, model, l1=0.4)), wanted(value, model), CLOSE)
     assert_close(by_pinocchio(text_of("urdf", value, model, l1=0.4)), wanted(value, model), CLOSE)
     value = bent(0.1)
-    found = coefficients_of(result_of(value, BENT), "arm", 0.41)
+    found = describe(result_of(value, BENT), "arm", Knowns(l1=0.41), links=False)
     K1, K2 = (complex(found.value[name], found.value[f"{name}s"]) for name in ("k1", "k2"))
     assert 9.81 * abs(K1) == pytest.approx(0.41 * abs(K2), rel=1e-14)
     text = text_of("mjcf", value, BENT, l1=0.41)

@@ -220,7 +220,7 @@ done = algid.identify(
 )
 assert done.settings["toy_level"] == 2.0 and done.profile == {"toy_side": "right"}
 for wrong, message in (
-    ({"toy_level": 9.0}, "--toy-level: expected a number from 0 to 5, found 9.0"),
+    ({"toy_level": 9.0}, "--toy-level: expected less than or equal to 5, found 9.0"),
     ({"toy_side": "up"}, "toy_side"),
     ({"toy_sidee": "up"}, "did you mean toy_side?"),
 ):
@@ -284,13 +284,23 @@ def add_options(package: Path) -> None:
     """A field of how to identify and one of what a log means."""
     inserted(
         package / "settings.py",
-        "    constrain: bool = field(",
-        '    toy_level: float = field(1.0, "How much the toy plays.", bounds=(0.0, 5.0))\n',
+        "    constrain: bool = False",
+        "    toy_level: float = field(1.0, (0.0, 5.0))\n",
+    )
+    inserted(
+        package / "settings.py",
+        "    constrain : bool\n",
+        "    toy_level : float\n        How much the toy plays.\n",
     )
     inserted(
         package / "profile.py",
         '    drive: Literal["joint", "base"]',
-        '    toy_side: Literal["left", "right"] = field("left", "Where the toy stands.")\n',
+        '    toy_side: Literal["left", "right"] = "left"\n',
+    )
+    inserted(
+        package / "profile.py",
+        "    drive : str\n",
+        "    toy_side : str\n        Where the toy stands.\n",
     )
 
 

@@ -568,7 +568,7 @@ _LATE = np.random.default_rng(1).integers(0, 3_000_000, N)
 _WILD = {"tau1": spoiled(TA[0], BAD, 40.0), "q2": spoiled(TH[1], BAD, 0.0)}
 _COMMENTED = ("csv", "tsv", "parquet", "feather", "h5", "mat", "npz", "pandas")
 _TEXT = ("csv", "tsv")
-_VELOCITY = {"velocity": True}
+_VELOCITY = {"velocity": "measured"}
 _SCALED = {"scale_factor": "0.001", "add_offset": "0.5"}
 _TEN = {"scale_factor": "0.01", "units": "N m"}
 _BY_ATTRIBUTE = "s", "rad", "rad"
@@ -1148,7 +1148,7 @@ CALLERS = (
         truth=(T, TH[::-1], TA[::-1]),
     ),
     _caller("segment=2 of one run", {"segment": 2}, says_other=True),
-    _caller("velocity=True, none recorded", _VELOCITY, says_other=True),
+    _caller("velocity=measured, none recorded", _VELOCITY, says_other=True),
     _caller("start=1, end=2", {"start": 1.0, "end": 2.0}, says_other=True),
     _caller("accept=[NO_SUCH_CODE]", {"accept": ["NO_SUCH_CODE"]}, says_other=True),
 )

@@ -114,7 +114,7 @@ def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
 def test_velocities_are_taken_in_pairs_and_if_wanted() -> None:
     both = f"{PLAIN} dq1 dq2"
     assert assigned(both).origin.mapping["omega2"] == "dq2"
-    assert not {"omega1", "omega2"} & assigned(both, {"velocity": False}).origin.mapping.keys()
+    assert not {"omega1", "omega2"} & assigned(both, {"velocity": "observer"}).origin.mapping.keys()
     assert not {"omega1", "omega2"} & assigned(f"{PLAIN} dq1").origin.mapping.keys()
     named = assigned(f"{PLAIN} speed_a dq2", {"omega1": {"source": "speed_a"}})
     assert "omega1" not in named.origin.mapping
@@ -134,7 +134,7 @@ def test_who_said_which_joint_is_the_first() -> None:
     assert assigned(PLAIN, sources).origin.reading.joints_told == "profile"
     told = assigned(named, {"joints": ["wrist", "elbow"]})
     reading = told.origin.reading
-    assert (reading.joints, reading.joints_told) == (("wrist", "elbow"), "flag")
+    assert (reading.joints, reading.joints_told) == (("wrist", "elbow"), "profile")
     assert told.notices == ()
     assert told.origin.mapping["tau1"] == "wrist_torque"
 

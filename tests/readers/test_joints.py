@@ -122,7 +122,7 @@ def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> Non
     assert "--joints right,left" in text
     swapped = read_log(path, with_settings(Profile(), {"joints": ["right", "left"]}))
     assert swapped.tau[:, 0].tolist() == [20, 10]
-    assert (swapped.origin.reading.joints_told, told(swapped)) == ("flag", [])
+    assert (swapped.origin.reading.joints_told, told(swapped)) == ("profile", [])
     profile = Profile.model_validate({"joints": ["right", "left"]})
     assert read_log(path, profile).origin.reading.joints_told == "profile"
 
@@ -154,7 +154,7 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
     assert [reading.channels[name].told for name in ("theta1", "tau1", "tau2")] == [
         "names",
         "profile",
-        "flag",
+        "profile",
     ]
     assert [reading.channels[name].sign for name in ("tau1", "tau2")] == [-1, 1]
     for name, row, value in (("theta1", log.theta[0] + np.pi / 2, 10), ("tau1", log.tau[0], 30)):

@@ -107,9 +107,9 @@ def test_a_profile_names_them_and_they_are_recorded_as_the_angles_are(tmp_path: 
         ("theta{}", "q_des{}", {}, "rad", "assumed"),
         ("theta{} [deg]", "q_des{}", {}, "deg", "names"),
         ("theta{} [deg]", "q_des{} [rad]", {}, "rad", "names"),
-        ("theta{}", "q_des{}", {"theta{}": {"unit": "deg"}}, "deg", "flag"),
+        ("theta{}", "q_des{}", {"theta{}": {"unit": "deg"}}, "deg", "profile"),
         ("theta{}", "q_des{} [rad]", {"theta{}": {"unit": "deg"}}, "rad", "names"),
-        ("theta{} [deg]", "q_des{}", {"q_des{}": {"unit": "rad"}}, "rad", "flag"),
+        ("theta{} [deg]", "q_des{}", {"q_des{}": {"unit": "rad"}}, "rad", "profile"),
     ],
 )
 def test_the_unit_is_the_angles_where_nothing_else_is_said(

@@ -70,7 +70,7 @@ def test_what_a_user_says_is_not_told_again(tmp_path: Path) -> None:
         {"topic": "/joint_states"},
         {"clock": "log"},
         {"columns": ("a", "b", "c", "d", "e")},
-        {"velocity": True},
+        {"velocity": "measured"},
         {"omega1": {"unit": "deg"}},
     ],
     ids=str,

@@ -128,7 +128,9 @@ def plan(file: MessageFile, profile: Profile) -> Plan:
             )
         sources[channel] = (place, path)
     for pair in (VELOCITIES, REFERENCES):  # both joints', or none
-        if not sources.keys() >= set(pair) or (pair == VELOCITIES and not profile.velocity):
+        if not sources.keys() >= set(pair) or (
+            pair == VELOCITIES and profile.velocity == "observer"
+        ):
             for name in pair:
                 sources.pop(name, None)
     homes = tuple(dict.fromkeys(topic for topic, _ in sources.values()))
