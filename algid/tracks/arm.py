@@ -8,7 +8,7 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.errors import ResultError
-from algid.base.names import vector, within
+from algid.base.names import outside, vector, within
 from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
@@ -37,26 +37,41 @@ FRICTION = (K6, K7) + COULOMB.names
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedArm:
-    """The arm that carries the payload: model, coefficients k (q,), link lengths in m, noise."""
+    """The arm that carries the payload.
 
-    model: Model
-    k: FloatArray
-    l1: float
-    l2: float
+    Parameters
+    ----------
+    shared : Shared
+        Its parameters: model, payload, lengths, and what the payload has that is no point.
+    beta : (Q,)
+        Theirs, with a payload of 1 kg.
+    noise : NoiseLevels
+    shift : float, s, after which a logged torque acts
+    """
+
+    shared: Shared
+    beta: FloatArray
     noise: NoiseLevels
     shift: float = 0.0
-    y: float = 0.0
-    """m, of a payload's centre of mass off link 2's line."""
-    gyration: float = 0.0
-    """m, a payload's radius of gyration."""
-    body: tuple[str, ...] = ()
-    """What of the payload's body is uncertain: y_p, and J_p for each kilogram."""
+
+    @property
+    def model(self) -> Model:
+        """The torque's model."""
+        return self.shared.model
+
+    @property
+    def k(self) -> FloatArray:
+        """Coefficients (q,) of the bare arm."""
+        return self.beta[: len(self.model.names)]
+
+    def value(self, name: str) -> float:
+        """The parameter of that name."""
+        return float(self.beta[self.shared.names.index(name)])
 
     @property
     def unit(self) -> FloatArray:
         """D (q,): what a payload of 1 kg adds to the coefficients."""
-        shared, beta = self._loaded
-        return shared.coefficients(beta, True) - shared.coefficients(beta, False)
+        return self.shared.coefficients(self.beta, True) - self.k
 
     @property
     def friction(self) -> list[int]:
@@ -71,24 +86,12 @@ class IdentifiedArm:
     @property
     def tip_equivalent(self) -> float:
         """Mass in kg that at the tip has the inertia k3 of link 2 about joint 2."""
-        return abs(float(self.k[self.model.names.index(K3)])) / self.l2**2
+        return abs(self.value(K3)) / self.value("l2") ** 2
 
     @property
     def by_shape(self) -> FloatArray:
-        """Derivatives (2 + b, q) of `unit` by l1, l2 and the uncertain parts of payload `body`."""
-        shared, beta = self._loaded
-        places = list(map(shared.names.index, ("l1", "l2") + self.body))
-        return shared.jacobian(beta, True).T[places]
-
-    @property
-    def _loaded(self) -> tuple[Shared, FloatArray]:
-        """Parameters of the arm with a payload of 1 kg."""
-        shape = {"m_p": 1.0, "l1": self.l1, "l2": self.l2, "J_p": self.gyration**2}
-        if not set(SINES).isdisjoint(self.model.names):
-            shape["y_p"] = self.y
-        body = within(BODY_PARAMETERS, shape)
-        shared = Shared(self.model, payload=True, body=body)
-        return shared, np.append(self.k, vector(shared.names[self.k.size :], shape))
+        """Derivatives (2 + b, q) of `unit` by l1, l2 and the payload's body."""
+        return self.shared.jacobian(self.beta, True).T[self.k.size + 1 :]
 
     def linearised(self, piece: Segment, c: FloatArray, *, settle: bool = True) -> Linearised:
         """A piece of log, linearised at the coefficients `c` and whitened.
@@ -111,7 +114,7 @@ def arm_of(
 ) -> tuple[IdentifiedArm, FloatArray]:
     """The arm of a result with link lengths from it or given, and the covariance (p, p) of both.
 
-    After the q coefficients come l1, l2 and the uncertain parts of the payload's body. The model
+    After the q coefficients come l1, l2 and the payload's body. The model
     always has Coulomb friction, zero with no error where the result has none: friction may drift.
 
     Noise levels are the result's; where it has none, those of the log's first stretch.
@@ -132,32 +135,36 @@ def arm_of(
         model = replace(model, terms=model.terms + (COULOMB.name,))
     payload = {name: float(one.estimate or 0.0) for name, one in result.payload.items()}
     m_p, J = payload.get("m_p", 0.0), payload.get("J_p", 0.0)
-    body = with_error_bar(result, BODY_PARAMETERS) if m_p else ()
-    names = model.names + ("l1", "l2") + body + ("m_p",)
-    uncertain = set(prior.names + body)
-    if "J_p" in body and "m_p" in result.fit.covariance_names:
-        uncertain.add("m_p")
+    value = dict(zip(prior.names, prior.mean, strict=True)) | {"m_p": 1.0}
+    if not set(SINES).isdisjoint(model.names):
+        value["y_p"] = payload.get("y_p", 0.0)
+    if m_p > 0:
+        value["J_p"] = max(J, 0.0) / m_p
+    known = with_error_bar(result, BODY_PARAMETERS) if m_p else ()
+    body = tuple(name for name in BODY_PARAMETERS if value.get(name) or name in known)
+    shared = Shared(model, payload=True, body=body)
+    names, mass = shared.names, len(model.names)
+    kept = outside(names, ("m_p",))
+    T = np.delete(np.eye(len(names)), mass, axis=0)
+    uncertain = set(prior.names + known)
+    if "J_p" in known:  # of each kilogram: the derivatives of J_p / m_p
+        T[kept.index("J_p"), [names.index("J_p"), mass]] = 1 / m_p, -J / m_p**2
+        if "m_p" in result.fit.covariance_names:
+            uncertain.add("m_p")
     lengths = {"l1": l1, "l2": l2}
     uncertain |= {name for name in lengths if lengths[name] is None and has_error_bar(result, name)}
-    T = np.eye(len(names) - 1, len(names))
     if l1 is None and result.settings.get("l1") is None and payload_length(result) is None:
         constants = by_constants(result)
         if constants is not None and constants[0] > 0:
             lengths["l1"], slopes = constants
-            T[names.index("l1")] = vector(names, slopes, otherwise=0.0)
-    if "J_p" in body:  # of each kilogram: the derivatives of J_p / m_p
-        T[names.index("J_p"), [names.index("J_p"), -1]] = 1 / m_p, -J / m_p**2
-    first_link, second_link = (_length(result, name, given) for name, given in lengths.items())
+            T[kept.index("l1")] = vector(names, slopes, otherwise=0.0)
+    for name, given in lengths.items():
+        value[name] = _length(result, name, given)
     arm = IdentifiedArm(
-        model=model,
-        k=vector(model.names, dict(zip(prior.names, prior.mean, strict=True)), otherwise=0.0),
-        l1=first_link,
-        l2=second_link,
-        noise=noise_of(result) or first_guess(first.theta, first.tau),
-        shift=shift_of(result).at(first.dt),
-        y=payload.get("y_p", 0.0),
-        gyration=float(np.sqrt(max(J, 0.0) / m_p)) if m_p > 0 else 0.0,
-        body=body,
+        shared,
+        vector(names, value, otherwise=0.0),
+        noise_of(result) or first_guess(first.theta, first.tau),
+        shift_of(result).at(first.dt),
     )
     return arm, T @ covariance_of(result, names, uncertain) @ T.T
 

@@ -65,8 +65,9 @@ def first_segmentation(cells: Cells) -> tuple[list[int], Drift, float]:
         drift = drift_of(cells, blocks, rough_variance(cells))
         freed = drift.freed(cells)
         # a change must stand up to slow errors whatever their reason, wrong constants of the arm
-        # included
-        spread = variance(freed, calm, spans)
+        # included; rows scatter about masses that hold for a few cells, and err alike over longer
+        # blocks: the larger of both
+        spread = max(rough_variance(freed), excess(freed.A, freed.B, calm, spans))
         before = places
         places = [0] + cuts(freed.A, freed.B, PENALTY * spread, SHORTEST) + [len(cells)]
         if places == before and spans is SPANS:
@@ -81,23 +82,6 @@ def calm_parts(places: Sequence[int]) -> list[tuple[int, int]]:
     begins[1:] += BEHIND
     ends[:-1] -= AHEAD
     return list(zip(begins.tolist(), np.maximum(begins, ends).tolist(), strict=True))
-
-
-def variance(
-    cells: Cells,
-    parts: Sequence[tuple[int, int]],
-    spans: Sequence[int] = SPANS,
-    known: tuple[FloatArray, FloatArray] | None = None,
-    *,
-    robust: bool = True,
-) -> float:
-    """Variance of the rows about masses that are constant in each of `parts`; one at least.
-
-    Rows scatter about masses that hold for a few cells, and err alike over longer blocks: the
-    larger of both. Parameters are those of `excess`.
-    """
-    slow = excess(cells.A, cells.B, parts, spans, known, robust=robust)
-    return max(rough_variance(cells), slow)
 
 
 def rough_variance(cells: Cells) -> float:

@@ -255,12 +255,11 @@ def payload_figure(result: TrackResult) -> Plot:
     reach.append(float(np.percentile(curve["low"][certain], 1)))
     reach.append(float(np.percentile(curve["high"][certain], 99)))
     if result.schedule is not None:
-        last = float(ends[-1])
-        steps = [(max(time, float(ends[0])), mass) for time, mass in result.schedule if time < last]
-        corners = [float(ends[0]), *(time for time, _ in steps), last]
-        true = [0.0, *(mass for _, mass in steps)]
-        x, y = np.repeat(corners, 2)[1:-1], np.repeat(true, 2)
-        panels.curve(0, x, y, "true schedule", ORANGE, 1.6, "dash")
+        steps = [(time, mass) for time, mass in result.schedule if time < ends[-1]]
+        times, true = zip((-np.inf, 0.0), *steps, strict=True)
+        x = np.clip([*times, np.inf], ends[0], ends[-1])
+        look = {"color": ORANGE, "width": 1.6, "dash": "dash", "shape": "hv"}
+        panels.add(0, x, np.array([*true, true[-1]]), "true schedule", mode="lines", line=look)
         reach += true
     if len(track.changes) <= MOST_MARKS:
         for _, start, end in track.changes.tolist():

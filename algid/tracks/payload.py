@@ -28,10 +28,10 @@ from algid.tracks.change_points import (
     BEHIND,
     PENALTY,
     SHORTEST,
+    excess,
     first_segmentation,
     rough_variance,
     sums,
-    variance,
 )
 from algid.tracks.change_times import ChangeTime, Confirmation, windows
 from algid.tracks.drift import Drift, drift_of
@@ -156,7 +156,8 @@ def _weigh(
     masses = np.repeat(weights, counts)
     T = drift.followed(calm, starts, calm.sensitivity(arm, masses))
     parts = list(pairwise(places.tolist()))
-    colour = variance(calm, parts, known=(T, covariance), robust=False)
+    slow = excess(calm.A, calm.B, parts, known=(T, covariance), robust=False)
+    colour = max(rough_variance(calm), slow)
     squares = calm.squares(masses)
     own = np.add.reduceat(squares, starts) / (np.add.reduceat(calm.rows, starts) - 1)
     noise = np.maximum(own, colour)  # a stretch's own, or the log's where that is larger

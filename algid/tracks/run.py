@@ -85,7 +85,8 @@ def track_log(
     schedule = None
     if truth is not None:
         schedule = truth.schedule or ((0.0, truth.payload),)
-    own_settings = {"l1": arm.l1, "l2": arm.l2, "gravity": arm.model.gravity}
+    own_settings = {name: arm.value(name) for name in ("l1", "l2")}
+    own_settings["gravity"] = arm.model.gravity
     return TrackResult(
         track=weighed,
         log=survey.summary(source),

@@ -7,12 +7,28 @@ from dataclasses import replace
 import numpy as np
 
 from algid.arm import FloatArray
+from algid.estimators.parametrisation import Shared
+from algid.estimators.whitening import NoiseLevels
 from algid.log import Log
 from algid.model import Model
 from algid.synth.cases import load_case
 from algid.tracks.arm import IdentifiedArm
 
 CASE = load_case("case1")
+NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
+
+
+def carrier(
+    model: Model | None = None,
+    k: FloatArray | None = None,
+    l1: float = CASE.arm.l1,
+    l2: float = CASE.arm.l2,
+    **body: float,
+) -> IdentifiedArm:
+    """An arm, case 1's by default, whose payload has the `body` of each kilogram."""
+    constants = CASE.arm.constants() if k is None else k
+    shared = Shared(model or Model(), payload=True, body=tuple(body))
+    return IdentifiedArm(shared, np.array([*constants, 1.0, l1, l2, *body.values()]), NOISE)
 
 
 def noisy(log: Log, rng: np.random.Generator) -> Log:
@@ -37,10 +53,11 @@ def without_coulomb(
 ) -> tuple[IdentifiedArm, FloatArray]:
     """An arm and its covariance less the Coulomb friction that a track adds, which is zero."""
     arm, covariance = found
-    names = [*arm.model.names, "l1", "l2", *arm.body]
+    names = [*arm.model.names, "l1", "l2", *arm.shared.body]
     added = [names.index(name) for name in ("f1", "f2")]
     assert not covariance[added].any()
     assert not arm.k[added].any()
     terms = tuple(name for name in arm.model.terms if name != "coulomb")
-    lean = replace(arm, model=replace(arm.model, terms=terms), k=np.delete(arm.k, added))
+    shared = replace(arm.shared, model=replace(arm.model, terms=terms))
+    lean = replace(arm, shared=shared, beta=np.delete(arm.beta, added))
     return lean, np.delete(np.delete(covariance, added, axis=0), added, axis=1)

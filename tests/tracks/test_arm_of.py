@@ -57,8 +57,8 @@ def _with(result: Result, **settings: Any) -> Result:
 
 def test_lengths_that_were_estimated_come_with_their_errors(result: Result, first: Segment) -> None:
     arm, covariance = without_coulomb(arm_of(result, first))
-    assert arm.l1 == result.payload["l1"].estimate == pytest.approx(CASE.arm.l1, rel=0.05)
-    assert arm.l2 == result.payload["l2"].estimate == pytest.approx(CASE.arm.l2, rel=0.05)
+    assert arm.value("l1") == result.payload["l1"].estimate == pytest.approx(CASE.arm.l1, rel=0.05)
+    assert arm.value("l2") == result.payload["l2"].estimate == pytest.approx(CASE.arm.l2, rel=0.05)
     assert result.fit is not None
     stds = [
         result.estimates[name].std
@@ -76,12 +76,12 @@ def test_a_length_that_is_given_goes_before_the_results_and_is_exact(
     result: Result, first: Segment
 ) -> None:
     arm, covariance = without_coulomb(arm_of(result, first, l1=0.4))
-    assert (arm.l1, arm.l2) == (0.4, result.payload["l2"].estimate)
+    assert (arm.value("l1"), arm.value("l2")) == (0.4, result.payload["l2"].estimate)
     assert not covariance[7].any()
     assert covariance[8, 8] > 0
     told = _with(result, l1=0.5, l2=0.6).model_copy(update={"payload": {}})
     arm, _ = arm_of(told, first, l2=0.3)
-    assert (arm.l1, arm.l2) == (0.5, 0.3)
+    assert (arm.value("l1"), arm.value("l2")) == (0.5, 0.3)
 
 
 def test_without_a_length_or_error_bars_it_is_refused(result: Result, first: Segment) -> None:
@@ -114,8 +114,8 @@ def test_a_bodys_shape_comes_with_its_error_of_each_kilogram(
     )
     bodied = result.model_copy(update={"payload": {**result.payload, "J_p": J}, "fit": fit})
     arm, found = without_coulomb(arm_of(bodied, first))
-    assert arm.body == ("J_p",)
-    assert arm.gyration**2 == pytest.approx(4e-4 / m_p.estimate)
+    assert arm.shared.body == ("J_p",)
+    assert arm.value("J_p") == pytest.approx(4e-4 / m_p.estimate)
     assert found.shape == (len(arm.model.names) + 3,) * 2
     draws = np.random.default_rng(0).multivariate_normal(
         [m_p.estimate, 4e-4], covariance[np.ix_([place, -1], [place, -1])], 40_000
@@ -162,7 +162,7 @@ def test_the_first_length_by_the_constants_comes_with_what_it_shares_with_them(
     moments = {name: draws[order.index(name)] for name in order if name[:2] in ("k1", "k2")}
     K1, K2 = (moments[name] + 1j * moments.get(f"{name}s", 0.0) for name in ("k1", "k2"))
     l1 = 9.81 * np.abs(K1) / np.abs(K2)
-    assert arm.l1 == pytest.approx(l1.mean(), rel=1e-5)
+    assert arm.value("l1") == pytest.approx(l1.mean(), rel=1e-5)
     both = np.cov(np.vstack([draws[:-1], l1, draws[-1:]])) / small**2
     scale = np.sqrt(np.diag(both))
     q = len(order) - 1

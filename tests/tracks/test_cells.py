@@ -11,7 +11,6 @@ import pytest
 from algid.arm import FloatArray, with_payload
 from algid.base.criteria import HOLE
 from algid.base.errors import LogError
-from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log, Origin
 from algid.model import Model
@@ -26,10 +25,9 @@ from algid.tracks.cells import CELL, Cells, cells_of, joined
 from algid.tracks.payload import HALF_BAND, Stretch, Track, track
 from algid.tracks.result import StretchStatus, TrackResult
 from algid.tracks.run import track_log
-from tests.tracks.folders import CASE, noisy
+from tests.tracks.folders import CASE, carrier, noisy
 
-NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
-ARM = IdentifiedArm(Model(), CASE.arm.constants(), CASE.arm.l1, CASE.arm.l2, NOISE)
+ARM = carrier()
 NOTHING = np.zeros((9, 9))
 
 
@@ -177,8 +175,7 @@ def test_an_object_is_shaped_like_the_payload_that_was_identified() -> None:
     model = Model(("phases",))
     # arg K1 = arg K2: θ1's zero is right
     k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.1, 0.05])
-    noise = NoiseLevels(np.full(2, 1e-4), np.full(2, 1e-2))
-    arm = IdentifiedArm(model, k, 0.4, 0.3, noise, 0.0, 0.05, 0.07)
+    arm = carrier(model, k, 0.4, 0.3, y_p=0.05, J_p=0.07**2)
     added = dict(zip(model.names, arm.unit.tolist(), strict=True))
     r = complex(0.3, 0.05)
     assert added["k3"] == pytest.approx(abs(r) ** 2 + 0.07**2)
@@ -192,16 +189,13 @@ def test_scores_shift_with_a_bodys_shape_by_its_derivatives(name: str) -> None:
     """Of an arm with bent links: against central differences of what a kilogram adds."""
     model = Model(("phases",))
     k = np.array([0.1, 0.5, 0.2, 0.9, 0.4, 0.1, 0.1, 0.02, 0.15, 0.05])
-    arm = IdentifiedArm(model, k, 0.4, 0.3, NOISE, 0.0, 0.05, 0.07, ("y_p", "J_p"))
-    step = 1e-6
+    arm = carrier(model, k, 0.4, 0.3, y_p=0.05, J_p=0.07**2)
+    step = 1e-6 * np.isin(arm.shared.names, name)
 
-    def moved(by: float) -> IdentifiedArm:
-        if name == "J_p":  # of each kilogram
-            return replace(arm, gyration=np.sqrt(arm.gyration**2 + by))
-        field = {"y_p": "y"}.get(name, name)
-        return replace(arm, **{field: getattr(arm, field) + by})
+    def moved(by: FloatArray) -> IdentifiedArm:
+        return replace(arm, beta=arm.beta + by)
 
-    slope = (moved(step).unit - moved(-step).unit) / (2 * step)
+    slope = (moved(step).unit - moved(-step).unit) / 2e-6
     row = ("l1", "l2", "y_p", "J_p").index(name)
     np.testing.assert_allclose(arm.by_shape[row], slope, atol=1e-8)
     P = np.arange(1.0, 4.0)[:, None, None] * np.arange(30.0).reshape(3, 10)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.estimators.whitening import Linearised, NoiseLevels, covariance_factor
+from algid.estimators.whitening import Linearised, covariance_factor
 from algid.log import Log
-from algid.model import Model, Motion
+from algid.model import Motion
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import segments
-from algid.tracks.arm import IdentifiedArm
 from algid.tracks.change_times import (
     ChangeTime,
     Confirmation,
@@ -21,15 +20,9 @@ from algid.tracks.change_times import (
     windows,
 )
 from algid.tracks.drift import Drift
-from tests.tracks.folders import CASE, noisy
+from tests.tracks.folders import carrier, noisy
 
-ARM = IdentifiedArm(
-    Model(),
-    CASE.arm.constants(),
-    CASE.arm.l1,
-    CASE.arm.l2,
-    NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2)),
-)
+ARM = carrier()
 STEADY = Drift(np.array([0.0, 5.0]), np.zeros((2, 2)), np.zeros((4, 4)), np.zeros((1, 4)))
 
 

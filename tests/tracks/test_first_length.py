@@ -42,12 +42,12 @@ def test_the_better_of_constants_and_payload_is_taken(weighed: Result) -> None:
     unsure = with_payload_std(weighed, by_constants[1] * 2)
     assert payload_length(sure) == (told, by_constants[1] / 2)
     assert payload_length(unsure) is None
-    assert arm_of(sure, segment())[0].l1 == told
-    assert arm_of(unsure, segment())[0].l1 == pytest.approx(by_constants[0])
+    assert arm_of(sure, segment())[0].value("l1") == told
+    assert arm_of(unsure, segment())[0].value("l1") == pytest.approx(by_constants[0])
     lengths = [
         found.links[0].length
         for found in (describe(one, "arm", Knowns(), links=True) for one in (sure, unsure))
         if found.links
     ]
     assert lengths == [told, pytest.approx(by_constants[0])]
-    assert arm_of(unsure, segment(), l1=0.3)[0].l1 == 0.3
+    assert arm_of(unsure, segment(), l1=0.3)[0].value("l1") == 0.3

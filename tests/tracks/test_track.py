@@ -12,31 +12,23 @@ from scipy.stats import chi2
 import algid
 from algid.arm import FloatArray
 from algid.base.errors import LogError
-from algid.estimators.whitening import NoiseLevels
 from algid.identification.identify import identify
 from algid.log import Log
-from algid.model import Model
 from algid.signals.segments import segments
 from algid.synth.run import Acquisition, excitation, synthesise
 from algid.tracks import drift
-from algid.tracks.arm import IdentifiedArm
 from algid.tracks.cells import CELL
 from algid.tracks.payload import HALF_BAND, Track, track
 from algid.writers import write_log
 from tests.intervals import holds_95, holds_at_least_95
-from tests.tracks.folders import CASE, RUBBING, noisy, rubbing
+from tests.tracks.folders import CASE, RUBBING, carrier, noisy, rubbing
 
 MASSES = (0.0, 0.05, 0.0)
-NOISE = NoiseLevels(np.full(2, 1e-3), np.full(2, 1e-2))
 
 
 def _track(log: Log, k: FloatArray | None = None, covariance: FloatArray | None = None) -> Track:
-    arm = IdentifiedArm(
-        Model(), CASE.arm.constants() if k is None else k, CASE.arm.l1, CASE.arm.l2, NOISE
-    )
-    return track(
-        lambda: segments([log]), arm, np.zeros((9, 9)) if covariance is None else covariance
-    )
+    known = np.zeros((9, 9)) if covariance is None else covariance
+    return track(lambda: segments([log]), carrier(k=k), known)
 
 
 def test_changes_of_50_g_are_found(picking: Log) -> None:
@@ -94,9 +86,7 @@ def test_an_uncertain_arm_widens_the_intervals_by_what_moves_the_masses(
     before = _track(log)
     moves = []
     for k, (l1, l2) in ((known[:7] + step[:7], known[7:] + step[7:]) for step in spread):
-        after = track(
-            lambda: segments([log]), IdentifiedArm(Model(), k, l1, l2, NOISE), np.zeros((9, 9))
-        )
+        after = track(lambda: segments([log]), carrier(None, k, l1, l2), np.zeros((9, 9)))
         moves.append(
             [a.m_p - b.m_p for a, b in zip(after.stretches, before.stretches, strict=True)]
         )
@@ -113,7 +103,7 @@ def test_friction_that_changed_biases_no_mass(picking: Log, known: float) -> Non
     two to three of their own deviations, all to one side.
     """
     k = np.append(CASE.arm.constants(), [known, known])
-    arm = IdentifiedArm(RUBBING, k, CASE.arm.l1, CASE.arm.l2, NOISE)
+    arm = carrier(RUBBING, k)
     log, rng, errors = rubbing(picking, 0.1), np.random.default_rng(0), []
     for _ in range(6):
         noise = noisy(log, rng)
