@@ -170,34 +170,6 @@ def cuts(A: FloatArray, B: FloatArray, penalty: float, shortest: int) -> list[in
 
     Notes
     -----
-    Ends come in blocks of `shortest`: the best cut before an end of a block rests on starts before
-    the block alone. Starts that are the best at no mass are dropped after each block (`Starts`).
-    """
-    count = A.size
-    a, b = np.concatenate([[0.0], np.cumsum(A)]), np.concatenate([[0.0], np.cumsum(B)])
-    last = np.zeros(count + 1, dtype=np.int64)
-    best = np.full(count + 1, np.inf)
-    best[0] = -penalty
-    starts = Starts(penalty)
-    for block in range(shortest, count + 1, shortest):
-        ends = np.arange(block, min(block + shortest, count + 1))
-        new = ends - shortest
-        starts.add(new[(new == 0) | (new >= shortest)], a, b, best)
-        # the block's own starts serve only the ends that lie `shortest` later
-        value = starts.values(a[ends], b[ends])
-        value[starts.place[:, None] > new] = np.inf
-        rows = np.argmin(value, axis=0)
-        best[ends], last[ends] = value[rows, np.arange(ends.size)] + penalty, starts.place[rows]
-        starts.prune(int(rows[-1]))
-    places = [int(last[-1])]
-    while places[-1] > 0:
-        places.append(int(last[places[-1]]))
-    return places[-2::-1]
-
-
-class Starts:
-    """Starts of the last stretch that may serve an end to come.
-
     Up to an end with the sums a and b, a stretch from start s that holds a mass m costs
 
         a m² − 2 b m + f_s(m),    f_s(m) = best_s − a_s m² + 2 b_s m,
@@ -205,60 +177,63 @@ class Starts:
     so a start whose f is the least of all at no m is never used again (Maidstone et al. 2017).
     An older start o beats a newer one s between the roots of f_s − f_o, a concave parabola in m,
     and nowhere else. Of each start the masses are kept at which it beats every newer one.
+
+    Ends come in blocks of `shortest`: the best cut before an end of a block rests on starts before
+    the block alone.
     """
+    count = A.size
+    f = np.zeros((3, count + 1))  # a, b and best at each start
+    f[0, 1:], f[1, 1:] = np.cumsum(A), np.cumsum(B)
+    a, b, best = f
+    best[0], best[1:] = -penalty, np.inf
+    last = np.zeros(count + 1, dtype=np.int64)
+    place, masses = np.empty(0, dtype=np.int64), np.empty((2, 0))
+    for block in range(shortest, count + 1, shortest):
+        ends = np.arange(block, min(block + shortest, count + 1))
+        fresh = ends - shortest
+        added = fresh[(fresh == 0) | (fresh >= shortest)]
+        place = np.append(place, added)
+        masses = np.hstack([masses, np.tile([[-np.inf], [np.inf]], added.size)])
+        own = f[:, place, None]
+        value = own[2] - (b[ends] - own[1]) ** 2 / np.maximum(a[ends] - own[0], 1e-300)
+        # the block's own starts serve only the ends that lie `shortest` later
+        value[place[:, None] > fresh] = np.inf
+        rows = np.argmin(value, axis=0)
+        best[ends], last[ends] = value[rows, np.arange(ends.size)] + penalty, place[rows]
+        # Drop the starts that the newest ones, or the one that leads, beat at every mass.
+        low, high = _won(f[:, place], f[:, added], penalty, _ROUNDING)
+        newer = added > place[:, None]
+        masses[0] = np.maximum(masses[0], np.where(newer, low, -np.inf).max(axis=1))
+        masses[1] = np.minimum(masses[1], np.where(newer, high, np.inf).min(axis=1))
+        beaten = masses[0] > masses[1]
+        behind = slice(rows[-1] + 1, None)
+        leader, low_high = f[:, place[rows[-1:]]], masses[:, behind]
+        low, high = _won(leader, f[:, place[behind]], penalty, -_ROUNDING)
+        beaten[behind] |= (low[0] <= low_high[0]) & (low_high[1] <= high[0])
+        place, masses = place[~beaten], masses[:, ~beaten]
+    places = [int(last[-1])]
+    while places[-1] > 0:
+        places.append(int(last[places[-1]]))
+    return places[-2::-1]
 
-    def __init__(self, penalty: float) -> None:
-        self.place = np.empty(0, dtype=np.int64)
-        self._penalty = penalty
-        self._sums = np.empty((3, 0))  # a, b and best at each start
-        self._masses = np.empty((2, 0))  # from and to which it beats the newer ones
-        self._fresh = 0
 
-    def add(self, place: NDArray[np.int64], a: FloatArray, b: FloatArray, best: FloatArray) -> None:
-        """Take in starts that are newer than all before."""
-        self._fresh = self.place.size
-        everywhere = np.broadcast_to([[-np.inf], [np.inf]], (2, place.size))
-        self.place = np.concatenate([self.place, place])
-        self._sums = np.hstack([self._sums, [a[place], b[place], best[place]]])
-        self._masses = np.hstack([self._masses, everywhere])
+def _won(
+    older: FloatArray, newer: FloatArray, penalty: float, rounding: float
+) -> tuple[FloatArray, FloatArray]:
+    """From and to which mass each older start (3, O) beats each newer one (3, N): (O, N).
 
-    def values(self, a: FloatArray, b: FloatArray) -> FloatArray:
-        """What the best cut up to ends of the sums a and b (E,) costs by last start (S, E)."""
-        own_a, own_b, best = self._sums[:, :, None]
-        return np.asarray(best - (b - own_b) ** 2 / np.maximum(a - own_a, 1e-300))
-
-    def prune(self, leading: int) -> None:
-        """Drop the starts that the newest ones, or the `leading` one, beat at every mass."""
-        low, high = self._won(
-            np.arange(self.place.size), np.arange(self._fresh, self.place.size), _ROUNDING
-        )
-        newer = self.place[self._fresh :] > self.place[:, None]
-        self._masses[0] = np.maximum(self._masses[0], np.where(newer, low, -np.inf).max(axis=1))
-        self._masses[1] = np.minimum(self._masses[1], np.where(newer, high, np.inf).min(axis=1))
-        beaten = self._masses[0] > self._masses[1]
-        after = np.arange(leading + 1, self.place.size)
-        (low,), (high,) = self._won(np.array([leading]), after, -_ROUNDING)
-        beaten[after] |= (low <= self._masses[0, after]) & (self._masses[1, after] <= high)
-        self.place = self.place[~beaten]
-        self._sums, self._masses = self._sums[:, ~beaten], self._masses[:, ~beaten]
-
-    def _won(
-        self, older: NDArray[np.int64], newer: NDArray[np.int64], rounding: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """From and to which mass each older start beats each newer one (O, N).
-
-        The first lies above the second where it never does. Sums of squares are off by `rounding`,
-        in its favour.
-        """
-        a, b, best = self._sums[:, None, newer] - self._sums[:, older, None]
-        slack = rounding * (self._penalty + np.abs(self._sums[2, newer]))
-        # between starts without information the older one is better throughout, or the newer one
-        flat = a <= 1e-300
-        divisor = np.where(flat, 1.0, a)
-        square = b * b + divisor * (best + slack)
-        reach = np.sqrt(np.maximum(square, 0.0)) / divisor
-        middle = b / divisor
-        low = np.where(flat, -np.inf, middle - reach)
-        high = np.where(flat, np.inf, middle + reach)
-        never = np.where(flat, best < -slack, square < 0.0)
-        return np.where(never, np.inf, low), np.where(never, -np.inf, high)
+    The first lies above the second where it never does. Sums of squares are off by `rounding`, in
+    its favour.
+    """
+    a, b, best = newer[:, None] - older[:, :, None]
+    slack = rounding * (penalty + np.abs(newer[2]))
+    # between starts without information the older one is better throughout, or the newer one
+    flat = a <= 1e-300
+    divisor = np.where(flat, 1.0, a)
+    square = b * b + divisor * (best + slack)
+    reach = np.sqrt(np.maximum(square, 0.0)) / divisor
+    middle = b / divisor
+    low = np.where(flat, -np.inf, middle - reach)
+    high = np.where(flat, np.inf, middle + reach)
+    never = np.where(flat, best < -slack, square < 0.0)
+    return np.where(never, np.inf, low), np.where(never, -np.inf, high)
