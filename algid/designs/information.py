@@ -87,33 +87,11 @@ class Sensitivities:
 
     def _differences(self, function: Callable[[Motion], FloatArray]) -> FloatArray:
         """Central differences (6, ...) of a function of the motion by each of its components."""
-        slopes = []
-        for ahead, behind in self._beside:
+        signals, slopes = np.stack([self.motion.theta, self.motion.omega, self.motion.alpha]), []
+        for move in _STEP * np.eye(COMPONENTS).reshape(COMPONENTS, 3, 2, 1):
+            ahead, behind = Motion(*(signals + move)), Motion(*(signals - move))
             slopes.append((function(ahead) - function(behind)) / (2 * _STEP))
         return np.stack(slopes)
-
-    @cached_property
-    def _beside(self) -> list[tuple[Motion, Motion]]:
-        """The motion with each of its six components a step ahead, and a step behind."""
-        moves = np.eye(COMPONENTS).reshape(COMPONENTS, 3, 2, 1)
-        signals = np.stack([self.motion.theta, self.motion.omega, self.motion.alpha])
-        beside = []
-        for move in moves:
-            ahead, behind = Motion(*(signals + _STEP * move)), Motion(*(signals - _STEP * move))
-            beside.append((ahead, behind))
-        return beside
-
-
-@dataclass(frozen=True, eq=False)
-class _Log:
-    """One kind of run, whitened: its W over σ_τ, H, and what its information counts for."""
-
-    c: FloatArray
-    T: FloatArray
-    count: float
-    W: FloatArray
-    H: FloatArray
-    Z: FloatArray
 
 
 class Information:
@@ -128,32 +106,21 @@ class Information:
     """
 
     def __init__(self, experiment: Experiment, beta: FloatArray, slopes: Sensitivities) -> None:
-        self._slopes = slopes
         shared, noise = experiment.shared, experiment.noise
+        self._slopes, self._noise = slopes, noise
         self._weights = Stencil(1 / slopes.rate).weights
-        self._noise = noise
-        self._delay = shared.delay
+        # of each kind of run c, T, what its information counts for, and H, L and Z
         self._logs = []
         for loaded in experiment.kinds:
-            c, T = shared.coefficients(beta, loaded), shared.jacobian(beta, loaded)
+            c, T, Y = shared.coefficients(beta, loaded), shared.jacobian(beta, loaded), slopes.Y
+            if shared.delay:  # a torque that is late by dt differs by its slope times dt
+                torque = np.einsum("aqn,q->an", Y, c[: Y.shape[1]])
+                slope = np.gradient(torque, 1 / slopes.rate, axis=1)
+                Y = np.concatenate([Y, slope[:, None]], axis=1)
+            G = along_stencil(partials(slopes.model, c, slopes.motion), self._weights)
             # samples at another rate than is recorded weigh as many times more
-            self._logs.append(
-                self._whitened(c, T, experiment.runs[loaded] * (experiment.rate / slopes.rate))
-            )
-
-    def _whitened(self, c: FloatArray, T: FloatArray, count: float) -> _Log:
-        slopes = self._slopes
-        Y = slopes.Y
-        if self._delay:  # a torque that is late by dt differs by its slope times dt
-            torque = np.einsum("aqn,q->an", Y, c[: Y.shape[1]])
-            slope = np.gradient(torque, 1 / slopes.rate, axis=1)
-            Y = np.concatenate([Y, slope[:, None]], axis=1)
-        q, n = Y.shape[1:]
-        G = along_stencil(partials(slopes.model, c, slopes.motion), self._weights)
-        H, factor, Z = whitened(Y.swapaxes(0, 1), G, self._noise)
-        W = triangular(factor, Z, "T")
-        by_joint = np.ascontiguousarray(W.reshape(q, n, 2).transpose(0, 2, 1))
-        return _Log(c, T, count, by_joint, H, Z)
+            count = experiment.runs[loaded] * (experiment.rate / slopes.rate)
+            self._logs.append((c, T, count, *whitened(Y.swapaxes(0, 1), G, noise)))
 
     @cached_property
     def S(self) -> FloatArray:
@@ -167,9 +134,9 @@ class Information:
         """
         total = []
         starts = 2 * samples * np.arange(max(1, round(self._slopes.Y.shape[2] / samples)))
-        for log in self._logs:
-            pieces = np.split(log.Z, starts[1:], axis=1)
-            total.append(log.count * log.T.T @ np.stack([Z @ Z.T for Z in pieces]) @ log.T)
+        for _, T, count, _, _, Z in self._logs:
+            pieces = np.split(Z, starts[1:], axis=1)
+            total.append(count * T.T @ np.stack([part @ part.T for part in pieces]) @ T)
         return np.sum(total, axis=0)
 
     def gradient(self, A: FloatArray) -> FloatArray:
@@ -181,13 +148,14 @@ class Information:
         ratio = noise.theta[None, :] / noise.tau[:, None]
         q, n = slopes.Y.shape[1:]
         to_Y, total = np.zeros_like(slopes.Y), np.zeros((COMPONENTS, n))
-        for log in self._logs:
-            inner = log.count * log.T @ A @ log.T.T
-            AW = np.tensordot(inner, log.W, axes=1)
+        for c, T, count, H, factor, Z in self._logs:
+            by_sample = triangular(factor, Z, "T").reshape(-1, n, 2)
+            W = np.ascontiguousarray(by_sample.transpose(0, 2, 1))
+            AW = np.tensordot(count * T @ A @ T.T, W, axes=1)
             to_Y += 2 * AW[:q].transpose(1, 0, 2) / noise.tau[:, None, None]
-            back = np.stack([adjoint(log.H, w, 0, n + POINTS - 1) for w in log.W])  # Gᵀ W
+            back = np.stack([adjoint(H, w, 0, n + POINTS - 1) for w in W])  # Gᵀ W
             windows = np.lib.stride_tricks.sliding_window_view(back, n, axis=2)
             along = np.tensordot(self._weights, windows, axes=(1, 2))
             to_P = -2 * np.einsum("qan,oqbn->oabn", AW, along) * ratio[None, :, :, None]
-            total += np.einsum("oabn,coabn->cn", to_P, slopes.dP(log.c))
+            total += np.einsum("oabn,coabn->cn", to_P, slopes.dP(c))
         return total + np.einsum("aqn,caqn->cn", to_Y, slopes.dY)

@@ -93,12 +93,21 @@ class Limits:
 
 @dataclass(frozen=True)
 class Row:
-    """A limit and its side: flag, joint, whether the upper end, and for torque whether loaded."""
+    """A limit and its side: flag, joint, whether the upper end, and for torque whether loaded.
+
+    `allowed` is the limit in its unit and with its sign, of which nothing is used at `still`.
+    """
 
     limit: str
     joint: int | None
+    allowed: float
+    still: float = 0.0
     upper: bool = True
     loaded: bool | None = None
+
+    def reached(self, used: float) -> float:
+        """What the motion reaches where it uses that share, in the limit's unit."""
+        return self.still + used * (self.allowed - self.still)
 
     @property
     def kind(self) -> str:
@@ -168,7 +177,9 @@ def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
             for sign in (1.0, -1.0):
                 slope = np.zeros((COMPONENTS, values.shape[1]))
                 slope[2 * order + joint] = sign / limit[joint]
-                yield Row(name, joint, sign > 0), sign * values[joint] / limit[joint], slope
+                still = float(limits.middle[joint]) if name == "range" else 0.0
+                row = Row(name, joint, still + sign * float(limit[joint]), still, sign > 0)
+                yield row, sign * values[joint] / limit[joint], slope
     if np.isfinite(limits.height):
         l1, l2 = limits.lengths
         room = l1 + l2 - limits.height
@@ -177,7 +188,8 @@ def _kinematic(limits: Limits, motion: Motion) -> Iterator[_Use]:
         slope[0] = -(l1 * np.cos(motion.theta[0]) + l2 * np.cos(both)) / room
         slope[1] = -l2 * np.cos(both) / room
         used = (l1 + l2 - limits.height_of(motion.theta)) / room
-        yield Row("tip-height", None, upper=False), used, slope
+        row = Row("tip-height", None, limits.height, float(l1 + l2), upper=False)
+        yield row, used, slope
 
 
 def _torque(
@@ -191,7 +203,8 @@ def _torque(
             if derivatives:
                 to_Y = (sign * load.c[:, None] + by_Y[joint]) / limit[joint]
                 slope = np.einsum("qn,cqn->cn", to_Y, slopes.dY[:, joint])
-            yield Row("torque", joint, sign > 0, load.loaded), values, slope
+            allowed = sign * float(limit[joint])
+            yield Row("torque", joint, allowed, 0.0, sign > 0, load.loaded), values, slope
 
 
 def resting(limits: Limits, model: Model, loads: Sequence[Load]) -> FloatArray:

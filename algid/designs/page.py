@@ -109,8 +109,8 @@ def limit_table(design: Design) -> Table:
         tightest.setdefault(row.kind, (row, used))
     rows = []
     for kind, (row, used) in tightest.items():
-        limit, value = amounts(design, row, used)
-        numbers = (significant(value, 4), significant(limit, 4), percent(used, 1.0, 3))
+        value = row.reached(used)
+        numbers = (significant(value, 4), significant(row.allowed, 4), percent(used, 1.0, 3))
         binds = _YES[used >= BINDS * most]
         rows.append((kind, *numbers, binds, SIGNS[row.limit], row.place or ABSENT))
     note = (
@@ -126,21 +126,6 @@ def limit_table(design: Design) -> Table:
         tuple(rows),
         note,
     )  # fmt: skip
-
-
-def amounts(design: Design, row: Row, used: float) -> tuple[float, float]:
-    """A limit and the most extreme value of the motion, in the limit's unit and with its sign."""
-    limits = design.campaign.limits
-    if row.joint is None:
-        reach = float(limits.lengths.sum())
-        return limits.height, reach - used * (reach - limits.height)
-    if row.limit == "range":
-        low, high = float(limits.low[row.joint]), float(limits.high[row.joint])
-        middle, half = 0.5 * (low + high), used * 0.5 * (high - low)
-        return (high, middle + half) if row.upper else (low, middle - half)
-    limit = float(getattr(limits, row.limit)[row.joint])
-    limit = limit if row.upper else -limit
-    return limit, used * limit
 
 
 _WIDER = tuple(Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs"))

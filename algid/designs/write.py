@@ -18,8 +18,7 @@ from algid import __version__
 from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.designs.campaign import Design
-from algid.designs.limits import Row
-from algid.designs.page import amounts, design_document, verdict
+from algid.designs.page import design_document, verdict
 from algid.log import Log, Origin
 from algid.model import UNITS
 from algid.notices import Notice
@@ -158,6 +157,11 @@ def _content(planned: Planned) -> dict[str, Any]:
     campaign = design.campaign
     experiment, limits = campaign.experiment, campaign.limits
     noise = _of_joints("theta", experiment.noise.theta) | _of_joints("tau", experiment.noise.tau)
+    used = []
+    for row, share in design.binding:
+        joint = None if row.joint is None else row.joint + 1
+        about = {"limit": row.limit, "joint": joint, "loaded": row.loaded}
+        used.append(about | {"allowed": row.allowed, "most": row.reached(share), "share": share})
     return {
         "schema_version": SCHEMA_VERSION,
         "version": __version__,
@@ -182,22 +186,9 @@ def _content(planned: Planned) -> dict[str, Any]:
             "tip_height": limits.height if np.isfinite(limits.height) else None,
             "margin": campaign.margin,
         },
-        "used": [_used(design, row, share) for row, share in design.binding],
+        "used": used,
         "start": design.motion.theta[:, 0].tolist(),
         "joints": list(planned.joints),
-    }
-
-
-def _used(design: Design, row: Row, share: float) -> dict[str, Any]:
-    """A limit and the share of it that the motion uses."""
-    limit, most = amounts(design, row, share)
-    return {
-        "limit": row.limit,
-        "joint": None if row.joint is None else row.joint + 1,
-        "loaded": row.loaded,
-        "allowed": limit,
-        "most": most,
-        "share": share,
     }
 
 

@@ -52,7 +52,11 @@ def made_up(*, loaded: tuple[bool, ...] = (False, True)) -> Design:
         seed=3,
     )
     torque: dict[bool, FloatArray] = {one: np.stack([T + one, T - one]) for one in loaded}
-    rows = (Row("range", 1, False), Row("speed", 0), Row("torque", 0, False, loaded=True))
+    rows = (
+        Row("range", 1, -1.0, 1.0, upper=False),
+        Row("speed", 0, 2.0),
+        Row("torque", 0, -5.0, upper=False, loaded=True),
+    )
     return Design(
         campaign=campaign,
         t=T,
