@@ -120,17 +120,3 @@ def test_what_is_handed_out_read_only_cannot_be_written_to() -> None:
     own[0] = 5.0
     assert view[0] == 5.0  # a view: no copy was made, and whose it is may still write
     assert own.flags.writeable
-
-
-def test_states_and_constants_of_any_shape_agree_one_by_one() -> None:
-    """A grid of states gives what each of its states gives by itself."""
-    k = load_case("case2").arm.constants()
-    theta, omega, alpha = (signal.reshape(2, 4, 5, 10) for signal in states())
-    torque = inverse_dynamics(k, theta, omega, alpha)
-    Y = regressor(theta, omega, alpha)
-    assert (torque.shape, Y.shape) == ((2, 4, 5, 10), (2, 7, 4, 5, 10))
-    for place in np.ndindex(4, 5, 10):
-        here = (slice(None), *place)
-        alone = inverse_dynamics(k, theta[here], omega[here], alpha[here])
-        np.testing.assert_allclose(torque[here], alone, rtol=1e-13, atol=1e-13)
-        np.testing.assert_allclose(Y[(slice(None), *here)] @ k, alone, rtol=1e-12, atol=1e-12)

@@ -143,18 +143,6 @@ def test_a_record_that_is_none_counts_as_none_and_is_told(
     assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["a", "b"]
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"\xff", b"[" * 100_000, b"5" * 5000, b"\0" * 100])
-def test_bytes_that_are_no_record_count_as_none(logs: Path, content: bytes) -> None:
-    out = logs.parent / "out"
-    (out / ".jobs").mkdir(parents=True)
-    (out / ".jobs/a.json").write_bytes(content)
-    batch = _batch(out)
-    assert list(batch.unreadable) == [".jobs/a.json"]
-    batch.run(jobs_of([str(logs)], str(out)))
-    assert batch.unreadable == {}  # the job has run, and has a record
-    assert _batch(out).unreadable == {}
-
-
 def test_records_of_other_versions_keep_their_rows(logs: Path) -> None:
     out = logs.parent / "out"
     older, newer = _sound(), _sound()

@@ -144,17 +144,6 @@ def test_a_changed_prior_is_another_setting(logs: Path) -> None:
         assert len(executor.ran) == count
 
 
-def test_a_changed_log_of_equal_size_runs_again(logs: Path) -> None:
-    _run(logs)
-    log = logs / "bad.csv"
-    before = log.stat()
-    log.write_text("not,a,log\n1,2,4\n")
-    assert log.stat().st_size == before.st_size
-    executor = Here()
-    _run(logs, executor)
-    assert executor.ran == ["bad"]
-
-
 def test_a_job_that_kills_three_workers_is_set_aside(logs: Path) -> None:
     def die(name: str) -> None:
         if name == "r1/a":

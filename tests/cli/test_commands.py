@@ -56,24 +56,6 @@ def test_synth_identify_check(logs: Path, tmp_path: Path) -> None:
     assert bad.out.splitlines()[1].startswith("ok    k2")
 
 
-def test_verbose_tells_on_stderr_what_was_read_and_how(logs: Path, tmp_path: Path) -> None:
-    found = Outcome(
-        "identify",
-        logs / "case1-unloaded.csv",
-        "-o",
-        tmp_path,
-        "--no-report",
-        "--format",
-        "json",
-        "-v",
-    )
-    assert found.code == 0, found.err
-    assert json.loads(found.out)["estimator"] == "refined"
-    assert "2,001 samples" in found.err
-    assert "  theta1 from theta1" in found.err
-    assert f"wrote {tmp_path / 'case1-unloaded.algid'}" in found.err
-
-
 def test_swapped_logs_are_told(logs: Path, tmp_path: Path) -> None:
     found = Outcome("identify", logs / "case1-loaded.csv", "-o", tmp_path)
     assert found.code == 2
@@ -237,40 +219,3 @@ def test_a_stop_gets_one_line_and_leaves_nothing_half_written(
         "algid: stopped; nothing half-written is left\n",
     )
     assert list(out.iterdir()) == []
-
-
-def test_results_that_fit_no_arm_get_one_line(logs: Path, tmp_path: Path) -> None:
-    quick = ("--no-report", "--estimator", "weak", "--model", "plain")
-    Outcome("identify", logs / "case1-unloaded.csv", "-o", tmp_path, *quick)
-    content = json.loads((tmp_path / "case1-unloaded.algid" / "result.json").read_text())
-    empty = {**content, "parameters": {}}
-    lost = {
-        **content,
-        "parameters": {
-            **content["parameters"],
-            "k3": {**content["parameters"]["k3"], "estimate": None},
-        },
-    }
-    texts = [json.dumps(empty), "[" * 100_000]
-    for text, said in zip(texts, ("the result has no k1", "not JSON"), strict=True):
-        path = tmp_path / "result.json"
-        path.write_text(text)
-        found = Outcome(
-            "identify", "--parameters", path, logs / "case1-loaded.csv", "-o", tmp_path / "out"
-        )
-        assert (found.code, found.err.count("\n")) == (2, 1), found.err
-        assert said in found.err
-    path.write_text(json.dumps(lost))
-    for call in (
-        ("validate", path),
-        ("identify", "--parameters", path),
-        ("identify", "--estimator", "paper", "--parameters", path),
-    ):
-        wrong = Outcome(
-            *call,
-            logs / f"case1-{'unloaded' if call[0] == 'validate' else 'loaded'}.csv",
-            cwd=tmp_path,
-        )
-        assert (wrong.code, wrong.out) == (2, "")
-        # the file at fault, not its log
-        assert wrong.err.startswith(f"algid: {path}: the result "), wrong.err

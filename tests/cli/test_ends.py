@@ -174,22 +174,6 @@ def synthetic(folder: Path, *flags: str, role: str = "unloaded") -> pl.DataFrame
     return pl.read_csv(folder / f"case1-{role}.csv")
 
 
-def test_a_drive_holds_or_ramps_the_torque(tmp_path: Path) -> None:
-    """The log holds what was commanded at its stamps, whatever the drive does between.
-
-    The motion differs.
-    """
-    logs = {
-        hold: synthetic(tmp_path / hold, "--torque-hold", hold) for hold in ("exact", "zoh", "foh")
-    }
-    moved = {hold: log["theta1"].to_numpy() for hold, log in logs.items()}
-    torque = {hold: log["tau1"].to_numpy() for hold, log in logs.items()}
-    assert torque["foh"] == pytest.approx(torque["exact"], abs=1e-12)
-    held = np.abs(moved["zoh"] - moved["exact"]).max()
-    ramped = np.abs(moved["foh"] - moved["exact"]).max()
-    assert 0 < ramped < held / 20  # of first order in the step, and of second
-
-
 def test_a_start_and_a_schedule_are_taken(tmp_path: Path) -> None:
     began = synthetic(tmp_path / "began", "--set", "initial=-1,0.25,0.5,-0.75")
     first = began.row(0, named=True)

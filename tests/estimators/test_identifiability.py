@@ -90,23 +90,6 @@ def test_a_joint_that_never_moved_is_why(moved: tuple[float, float], reason: str
     assert texts == [f"k3 and k5 only as a sum{reason}", f"k6 is not determined{reason}"]
 
 
-def test_a_direction_is_open_from_half_the_size_on_and_a_share_of_it_counts() -> None:
-    """A standard deviation of 0.49 sizes is told, one of 0.51 is not.
-
-    a seventh of a direction is no part in it.
-    """
-    for deviation, told in ((0.49, True), (0.51, False)):
-        S = information(axis(k7=1)) + np.diag(axis(k7=1) / (deviation * SIZES) ** 2)
-        assert examine(NAMES, VALUES, S, MOVED).determined == (True,) * 6 + (told,)
-    for share, told in ((0.14, True), (0.16, False)):
-        direction = axis(k7=np.sqrt(1 - share**2), k4=share)
-        assert examine(NAMES, VALUES, information(direction), MOVED).determined[3] is told
-    # what has a part is said in one sentence with the rest
-    faint = axis(k1=np.sqrt(1 - 0.151**2), k5=0.151)
-    (together,) = examine(NAMES, VALUES, information(faint), MOVED).left_open
-    assert together.numbers["names"] == ["k1", "k5"]
-
-
 def test_a_sum_is_known_whose_terms_are_not(bench: Bench) -> None:
     """Of k3 + k5 the standard deviation is that of a model whose parameter is the sum.
 

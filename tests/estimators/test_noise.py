@@ -124,17 +124,6 @@ def test_the_score_is_that_of_dense_algebra(linear: Linearised) -> None:
     assert traces.mean(axis=0).sum() == pytest.approx(len(V), rel=0.03)  # Σ V_i = V
 
 
-def test_a_torque_that_is_none_has_a_share_of_the_others_as_noise() -> None:
-    """Bearings rub and cables pull on a joint without a motor: its zero is not exact."""
-    t = np.arange(2000) * 1e-3
-    tau = np.stack([np.sin(9 * t), np.zeros_like(t)])
-    rms = float(np.sqrt(np.mean(tau[0] ** 2)))
-    np.testing.assert_allclose(first_guess(np.stack([t, t]), tau).tau[1], 1e-3 * rms, rtol=1e-12)
-    np.testing.assert_allclose(
-        first_guess(np.stack([t, t]), tau[::-1]).tau[0], 1e-3 * rms, rtol=1e-12
-    )
-
-
 def _loop(noise: float, count: int = 6000) -> tuple[FloatArray, FloatArray]:
     """A smooth motion's angles with white noise of 1e-3 rad, and torques that a PD law makes of
     them, with `noise`.

@@ -7,19 +7,15 @@ import pytest
 from algid.arm import inverse_dynamics
 from algid.estimators import log_likelihood as evidence
 from algid.estimators import refined
-from algid.estimators.combine import Prior
 from algid.estimators.problem import Problem, WeakSettings
 from algid.estimators.whitening import NoiseLevels
 from algid.model import Model
 from algid.signals.differences import POINTS
 from algid.signals.segments import Segment
-from algid.signals.shift import TorqueShift
 from algid.synth.cases import load_case
-from algid.synth.excitation import SampledTorque
-from algid.synth.simulator import simulate
 from tests.intervals import holds_95, in_axes
 
-from .conftest import DT, Bench
+from .conftest import Bench
 
 
 def test_noise_levels_and_error_bars_are_honest(bench: Bench) -> None:
@@ -69,19 +65,6 @@ def test_noise_levels_of_zero_are_refused(bench: Bench) -> None:
         refined.fit(Problem([lambda: [bench.log()]]), noise=NoiseLevels(np.zeros(2), np.ones(2)))
 
 
-def test_a_loaded_log_alone_with_an_earlier_result(bench: Bench) -> None:
-    before = refined.fit(Problem([lambda: [bench.log(sigma=1e-3)]]))
-    prior = Prior.of(before.names, before.values, before.covariance)
-    together = refined.fit(
-        Problem([lambda: [bench.log(sigma=1e-3)]], [lambda: [bench.log(True, 1e-3)]])
-    )
-    after = refined.fit(Problem([], [lambda: [bench.log(True, 1e-3)]], prior=prior))
-    assert np.allclose(
-        after.values, together.values, atol=0.3 * together.std.min() + 0.3 * together.std
-    )
-    assert np.allclose(after.std, together.std, rtol=0.1)
-
-
 @pytest.mark.parametrize("seed", [2, 3, 4])
 def test_what_noisy_accelerations_alone_tell_apart_settles(seed: int) -> None:
     k, t = load_case("case1").arm.constants(), 1e-3 * np.arange(10_000)
@@ -99,17 +82,6 @@ def test_what_noisy_accelerations_alone_tell_apart_settles(seed: int) -> None:
     assert found.iterations < 12  # a rotor and a delay go to and fro for ever without
     truth = np.append(k, [0.0, 0.0])
     assert np.all(np.abs(found.values - truth) < 4 * found.std)
-
-
-def test_a_held_torque_does_not_bias_friction(bench: Bench) -> None:
-    t, k = np.arange(1501) * DT, bench.arm.constants()
-    torque = SampledTorque(t, bench.bare.tau[:, :1501], "zoh")
-    log = Segment(0.0, DT, simulate(k, torque, t).theta, torque.tau)
-    held = refined.fit(
-        Problem([lambda: [log]], settings=WeakSettings(shift=TorqueShift(held=True)))
-    ).values
-    assert np.allclose(held[5:7], k[5:7], rtol=5e-4)
-    assert refined.fit(Problem([lambda: [log]])).refuted  # half a sample late, without noise
 
 
 def test_an_encoder_sets_the_floor(bench: Bench) -> None:

@@ -13,7 +13,6 @@ from algid.estimators.rollout import (
 )
 from algid.model import Model
 from algid.signals.segments import Segment
-from algid.signals.shift import TorqueShift
 from algid.synth.simulator import simulate
 from tests.exports.arms import ODD
 
@@ -61,17 +60,3 @@ def test_a_wrong_arm_does_as_its_simulation_says(segment: Segment) -> None:
     np.testing.assert_allclose(
         score.rmse[1], np.sqrt(np.mean(np.square(errors), axis=0)), rtol=0.02
     )
-
-
-def test_a_delay_that_is_known_is_made_up_for(segment: Segment) -> None:
-    late = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, 8:])
-    # torques that act 8 samples before their stamp
-    early = Segment(0.0, DT, segment.theta[:, 8:], segment.tau[:, :-8])
-    good = rollouts(Model(), K, [late], 8.0).rmse
-    np.testing.assert_allclose(
-        rollouts(Model(), K, [early], 8.0, TorqueShift(delay=-8 * DT)).rmse,
-        good,
-        rtol=0.1,
-        atol=1e-4,
-    )
-    assert rollouts(Model(), K, [early], 8.0).rmse[1].min() > 10 * good[1].max()

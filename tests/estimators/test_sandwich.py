@@ -62,13 +62,6 @@ def test_covariance_and_quantile_are_those_of_n_less_p_rows(rows: int) -> None:
     assert fit.intervals == "sandwich"
 
 
-def test_rows_that_are_no_more_than_parameters_leave_two_degrees() -> None:
-    X, y = _regression(Q + 1, seed=1)
-    fit = _fit(X, y)
-    assert fit.freedom == 2
-    assert fit.quantile == pytest.approx(student.ppf(0.975, 2), rel=1e-9)
-
-
 def test_lags_are_those_of_andrews() -> None:
     """Eq. (6.2), (6.4) of 1991: 1.1447 (α n)^⅓, with α = 4 ρ² / ((1 − ρ)² (1 + ρ)²) of one
     autoregression.

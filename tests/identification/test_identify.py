@@ -15,7 +15,6 @@ from scipy.signal import lfilter
 import algid
 from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError, ResultError
-from algid.estimators import refined
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
 from algid.inspection.checks import noticed
@@ -64,32 +63,6 @@ def test_exact_logs_give_the_arm_and_the_payload(estimator: str, wide: tuple[Log
     assert all(
         row.error_percent is not None and row.error_percent < limit for row in result.table4
     ), result.table4
-
-
-def test_the_robust_estimate_has_its_own_verdict_where_the_likelihood_does_not_converge(
-    noisy: tuple[Log, Log], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(refined, "_STEPS", 1)
-    failed = identify(*noisy, Settings(model="plain"), report=False)
-    weak = identify(*noisy, WEAK, report=False)
-    assert failed.estimates == weak.estimates
-    assert (failed.verdict.grade, failed.verdict.reasons[0].code) == (
-        "reservations",
-        "REFUTED",
-    )
-    # with no terms chosen it is the fit of shrunk ones, whose intervals hold the truth
-    result = identify(*noisy, report=False)
-    assert (result.verdict.grade, result.verdict.reasons[0].code) == (
-        "reservations",
-        "REFUTED",
-    )
-    assert noisy[0].origin.truth is not None
-    truth = noisy[0].origin.truth.arm.constants()
-    for name, true in zip(CONSTANT_NAMES, truth, strict=True):
-        one = result.parameters[name]
-        assert one.estimate is not None
-        assert one.std is not None
-        assert abs(one.estimate - true) < 4.5 * one.std
 
 
 def test_folder_holds_schema_valid_result_and_flat_series(

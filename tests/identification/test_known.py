@@ -64,25 +64,6 @@ def test_a_torque_acts_after_half_its_hold_and_the_delay_found_or_else_set(
     )
 
 
-def test_the_prior_of_a_model_is_the_results_estimate_and_the_inverse_of_its_covariance(
-    weighed: Result,
-) -> None:
-    assert weighed.fit is not None
-    names = ("k3", "k1", "f2", "k7", "k2", "k4", "k5", "k6", "f1")
-    model = model_of(weighed)
-    prior = prior_of(weighed, model)
-    assert set(prior.names) == set(names)
-    np.testing.assert_array_equal(
-        prior.mean, [weighed.parameters[name].estimate for name in prior.names]
-    )
-    places = [weighed.fit.covariance_names.index(name) for name in prior.names]
-    covariance = np.array(weighed.fit.covariance, dtype=np.float64)[np.ix_(places, places)]
-    size = np.sqrt(np.diag(covariance))
-    product = (prior.precision * np.outer(size, size)) @ (covariance / np.outer(size, size))
-    # correlations of .99: conditions to 1e4
-    np.testing.assert_allclose(product, np.eye(9), atol=1e-6)
-
-
 def test_a_prior_that_a_result_cannot_give_is_refused_with_what_to_do(weighed: Result) -> None:
     assert weighed.fit is not None
     where = weighed.log.path

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import algid
-from algid.arm import Arm
 from algid.base.errors import AlgidError
 from algid.estimators.fit import Fit
 from algid.identification.prior import Statement, drawn_covariance, with_prior
@@ -17,7 +16,7 @@ from algid.model import RIGID
 from algid.results import Status
 from algid.settings import Settings
 from pipelines.accuracy_scenes import random_arm
-from pipelines.prior import drawing, log_of, urdf
+from pipelines.prior import log_of, urdf
 from tests.identification.fits import K, fit_of
 
 ARM = random_arm(1)[0]
@@ -79,18 +78,6 @@ def test_what_the_prior_knows_better_is_its_own(share: float, own: bool) -> None
     both = with_prior(fit, said(fit, share))
     assert (set(both.status[: len(RIGID)]) == {"FROM_PRIOR"}) is own
     assert "FROM_PRIOR" not in both.status[len(RIGID) :]
-
-
-def test_what_logs_leave_open_or_doubt_is_the_priors() -> None:
-    fit = fit_of(payload=False)
-    for status in ("NOT_IDENTIFIABLE", "WEAK_EXCITATION"):
-        word = ("OK", "OK", status, "OK", "OK", "OK", "OK")
-        statement = said(fit, 0.2, 3.0)
-        statement = replace(statement, mean=np.where(np.arange(5) == 2, statement.mean, K[:5]))
-        both = with_prior(replace(fit, status=word), statement)  # type: ignore[arg-type]
-        assert both.status == ("OK", "OK", "FROM_PRIOR", "OK", "OK", "OK", "OK")
-        assert both.values[2] == pytest.approx(1.6 * K[2])
-        assert both.std[2] == pytest.approx(0.2 * K[2])
 
 
 def test_an_arm_at_rest_tells_its_weight_and_no_inertia() -> None:
@@ -195,9 +182,3 @@ def test_an_export_says_what_is_from_the_prior(cad: Path) -> None:
     result = algid.identify(log_of(ARM, "faint", SEED), prior=cad, prior_error=1)
     assert not result.complete
     assert "from the prior, not measured" in algid.export(result, to="urdf").text
-
-
-def test_drawings_err_as_they_are_asked_to() -> None:
-    assert drawing(ARM, "exact", 1) == ARM
-    off: Arm = drawing(ARM, "20 % off", 1)
-    assert abs(off.m1 / ARM.m1 - 1) == pytest.approx(0.2)

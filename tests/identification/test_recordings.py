@@ -17,7 +17,6 @@ from algid.identification.open_logs import (
     Staged,
     open_source,
     open_sources,
-    with_twins_marked,
 )
 from algid.identification.recordings import Recording, Recordings
 from algid.log import Log, Origin, Truth
@@ -135,18 +134,6 @@ def test_twins_count_once_and_others_of_their_length_stay() -> None:
     assert open_sources(one, "unloaded", None, 1.6)[0].gravity == 1.6
 
 
-def test_logs_of_lengths_of_their_own_are_not_hashed_before_the_first_pass() -> None:
-    def never() -> str:
-        raise AssertionError("hashed")
-
-    one, two = (
-        replace(open_source(moving(samples=n), "unloaded"), digest=never) for n in (300, 301)
-    )
-    assert with_twins_marked([one], [two]) == [one, two]
-    with pytest.raises(AssertionError, match="hashed"):
-        with_twins_marked([one], [replace(two, promised=300)])
-
-
 @pytest.mark.parametrize(("cuts", "alone"), [([], True), ([599], False), ([300], False)])
 def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(
     cuts: list[int], alone: bool
@@ -159,27 +146,3 @@ def test_the_named_checks_refuse_a_log_only_where_they_see_all_of_it(
     else:
         assert sum(map(len, survey.segments(survey.logs[0]))) == 600
         assert any(notice.code == "EFFORT_ZERO" for notice in survey.whole(survey.logs[0]).notices)
-
-
-def test_progress_goes_from_nothing_to_all_samples_and_names_the_stage() -> None:
-    told: list[tuple[str, int, int]] = []
-    one, other = (
-        in_blocks(moving(samples=600), [200], 600),
-        in_blocks(moving("b.csv", samples=300), [], 300),
-    )
-    survey = Recordings([one, other], lambda *what: told.append(what))
-    survey.begin("choosing terms")
-    for log in survey.logs:
-        list(survey.segments(log))
-    assert told == [
-        *(("reading", rows, 900) for rows in (0, 200, 600, 600, 900)),
-    ]
-    told.clear()
-    list(survey.segments(one))
-    assert {(stage, total) for stage, _, total in told} == {("choosing terms", 900)}
-    assert told[0][1] == 0
-    assert max(rows for _, rows, _ in told) == 600
-    told.clear()
-    survey.begin("series", [other])
-    list(survey.segments(other))
-    assert [told[0], told[-1]] == [("series", 0, 300), ("series", 300, 300)]

@@ -31,7 +31,7 @@ from algid.identification.series import (
 )
 from algid.log import Log, Origin
 from algid.model import Model
-from algid.signals.shift import AT_ONCE, TorqueShift
+from algid.signals.shift import AT_ONCE
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from tests.identification.fits import CASE, K, fit_of
@@ -116,25 +116,6 @@ def test_the_predicted_torque_is_that_of_the_equation_of_motion(
             )
             off = known[inner] - log.tau[joint, inner]
             assert np.sqrt(np.mean(off**2)) < 0.02 * np.sqrt(np.mean(log.tau[joint] ** 2))
-
-
-def test_a_torque_that_is_logged_early_is_shown_where_it_was_logged(
-    both: tuple[tuple[Log, FloatArray], tuple[Log, FloatArray]],
-) -> None:
-    early, _ = moved(K, 3, lead=5)
-    survey = Recordings([open_source(early, "unloaded")])
-    known, wrong = (
-        np.concatenate(
-            [
-                b["tau1_predicted"]
-                for b in torque_blocks(survey, Model(), {"unloaded": K}, TorqueShift(delay=s))
-            ]
-        )
-        for s in (5 * DT, 0.0)
-    )
-    rms = [np.sqrt(np.nanmean((one - early.tau[0]) ** 2)) for one in (known, wrong)]
-    assert rms[0] < 0.2 * rms[1]
-    assert len(both[0][0]) == len(early) + 5
 
 
 def test_information_is_added_up_by_second_and_carried_to_the_shared_parameters() -> None:

@@ -98,16 +98,6 @@ def test_a_hold_out_score_is_that_of_scipys_filters_on_the_true_motion(
     )
 
 
-def test_a_log_too_short_to_judge_is_none_and_does_not_count(
-    motions: list[SimulatedMotion],
-) -> None:
-    one, other = logged(motions[0], 1), logged(motions[1], 2).part(0, 100)
-    both = validate(known(K), survey((one, "unloaded"), (other, "unloaded")))
-    assert both.logs["log2"] is None
-    assert both.total == both.logs["log1"]
-    assert validate(known(K), survey((other, "unloaded"))).total is None
-
-
 def test_a_torque_that_acts_late_is_predicted_where_it_acts(motions: list[SimulatedMotion]) -> None:
     early = logged(motions[0], 1, lead=6)
     right, wrong = (

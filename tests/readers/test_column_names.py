@@ -10,9 +10,7 @@ import pytest
 from algid.base.errors import LogError
 from algid.notices import Notice
 from algid.readers import read_log
-from algid.readers.clock import in_order
-from algid.readers.flat import time_unit, to_nanoseconds
-from algid.readers.table import SampleTable
+from algid.readers.flat import to_nanoseconds
 from tests.readers.headers import opened
 
 FIELD = {
@@ -46,40 +44,9 @@ def test_names_of_the_field_are_recognised(header: str) -> None:
     assert [chosen[name] for name in ("t", "theta1", "theta2", "tau1", "tau2")] == wanted
 
 
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        *(
-            ("t_ms", "ms"),
-            ("time_us", "us"),
-            ("timestamp_nanoseconds", "ns"),
-            ("Time (msec)", "ms"),
-        ),
-        *(("seconds", "s"), ("millis", "ms"), ("elapsed_s", "s"), ("t", None), ("time", None)),
-    ],
-)
-def test_units_of_time_in_names(name: str, unit: str | None) -> None:
-    origin = opened([name, "q1", "q2", "tau1", "tau2"]).origin
-    assert origin.mapping["t"] == name
-    assert origin.reading.time_unit == unit
-
-
 def test_torques_of_other_joints_are_not_taken() -> None:
     with pytest.raises(LogError, match="no column for tau2; found"):
         opened(["t", "q1", "q2", "tau2", "tau9"])
-
-
-@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
-@pytest.mark.parametrize("start", [0, 1_700_000_000])
-def test_units_of_time_are_told_by_size_and_step(unit: str, start: int) -> None:
-    factor = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
-    times = start * factor + np.arange(100) * (factor * 2e-3)
-    assert time_unit(times) == unit
-    # float64 seconds since 1970 resolve 0.24 µs; half of that is the rounding
-    assert (
-        np.abs(to_nanoseconds(times, unit) - (start * 10**9 + np.arange(100) * 2_000_000)).max()
-        <= 240
-    )
 
 
 def test_whole_nanoseconds_stay_exact() -> None:
@@ -115,20 +82,3 @@ def test_dialects(text: str, tmp_path: Path) -> None:
     assert found.tau.tolist() == [[3, 3], [4, 4]]
     cut = [Notice("CUT_OFF", numbers={"case": "cell"}, lossy=True)]
     assert [one for one in found.notices if one.lossy] == (cut if text.endswith("2") else [])
-
-
-def sorted_stamps(*tables: list[int]) -> tuple[list[int], list[str]]:
-    made = [SampleTable(np.array(stamps), {"theta1": np.array(stamps, float)}) for stamps in tables]
-    found = list(in_order("log", iter(made)))
-    for table in found:
-        samples = table.columns["theta1"].tolist() if table.columns else []  # the last has remarks
-        assert samples == table.stamp_ns.tolist()
-    stamps = [stamp for table in found for stamp in table.stamp_ns.tolist()]
-    return stamps, [notice.code for table in found for notice in table.notices]
-
-
-def test_two_recordings_in_one_file_are_not_mixed() -> None:
-    with pytest.raises(LogError, match="time goes backwards"):
-        sorted_stamps([*range(0, 6000, 2), *range(1, 6000, 2)])
-    with pytest.raises(LogError, match="time goes backwards"):
-        sorted_stamps(list(range(0, 6000, 2)), list(range(1, 6000, 2)))

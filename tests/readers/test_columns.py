@@ -15,7 +15,7 @@ from algid.log import Companion
 from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers.arrays import of_arrays
-from algid.readers.column_names import Name, on_motor_side, other_joints, take_apart
+from algid.readers.column_names import Name, take_apart
 from algid.readers.flat import open_table
 from tests.readers.headers import TableReader, opened
 
@@ -109,15 +109,6 @@ def test_a_joint_without_motor_needs_no_torque(passive: int) -> None:
     assert "no column for tau" in refusal(
         "t q1 q2 tau7 tau8 tau9".replace("tau8 tau9", ""), {"passive": passive}
     )
-
-
-def test_velocities_are_taken_in_pairs_and_if_wanted() -> None:
-    both = f"{PLAIN} dq1 dq2"
-    assert assigned(both).origin.mapping["omega2"] == "dq2"
-    assert not {"omega1", "omega2"} & assigned(both, {"velocity": "observer"}).origin.mapping.keys()
-    assert not {"omega1", "omega2"} & assigned(f"{PLAIN} dq1").origin.mapping.keys()
-    named = assigned(f"{PLAIN} speed_a dq2", {"omega1": {"source": "speed_a"}})
-    assert "omega1" not in named.origin.mapping
 
 
 def test_who_said_which_joint_is_the_first() -> None:
@@ -257,14 +248,6 @@ def test_a_name_taken_apart(column: str, stem: str, joint: str | None, unit: str
     assert take_apart(column) == Name(stem, joint, unit)
 
 
-def test_a_name_that_holds_a_topic() -> None:
-    name = take_apart("/left/joint_states/elbow/position")
-    assert (name.own, name.topic) == ("elbow", "/left/joint_states")
-    assert (take_apart("q2").own, take_apart("q2").topic, take_apart("q").own) == ("2", "", "")
-    assert on_motor_side("left Motor_1 torque")
-    assert not on_motor_side("motorised_joint_1")
-
-
 @pytest.mark.parametrize(
     ("columns", "joints", "chosen"),
     [
@@ -306,16 +289,6 @@ def test_a_time_is_known_by_its_whole_name_first() -> None:
     assert chosen(["clock", "time [ms]", *others])["t"] == "time [ms]"
     assert chosen(["stamp", "time", "stamp_ns", *others])["t"] == "stamp_ns"
     assert refused(others).startswith("no column for t; found")
-
-
-def test_other_joints_are_those_of_the_same_quantity_and_topic() -> None:
-    flat = ["t", "q1", "q2", "q3", "tau3", "q_filt4", "dq3"]
-    assert other_joints(flat, ["q1", "q2"]) == {"3": "q3"}
-    topics = ["/a/x/position", "/a/y/position", "/a/z/position", "/b/w/position", "/a/z/effort"]
-    assert other_joints(topics, topics[:2]) == {"z": "/a/z/position"}
-    assert other_joints(["hip_pos", "knee_pos", "toe_pos", "max_pos"], ["hip_pos", "knee_pos"]) == {
-        "toe": "toe_pos"
-    }
 
 
 def test_joint_and_axis_are_no_joints_names() -> None:

@@ -14,7 +14,6 @@ import pytest
 from scipy.io import savemat
 
 from algid.arm import FloatArray
-from algid.readers import open_log
 from tests.readers.large import peak_of_reading
 
 MOST_BYTES = 600e6
@@ -62,21 +61,6 @@ def _write(path: Path, kind: str, rows: int) -> None:
     WRITERS[kind](path, columns)
 
 
-@pytest.mark.parametrize("kind", WRITERS)
-def test_blocks_of_a_table_are_its_rows(kind: str, tmp_path: Path) -> None:
-    path = tmp_path / f"log.{kind}"
-    _write(path, kind, 12_000)
-    blocks = list(open_log(path).blocks(5000))
-    sizes = [len(block) for block in blocks]
-    assert max(sizes) <= 5000
-    assert sum(sizes) == 12_000
-    stamps = np.concatenate([block.stamp_ns for block in blocks])
-    assert np.array_equal(stamps, np.arange(12_000) * 1_000_000)
-    assert np.allclose(
-        np.concatenate([block.tau[1] for block in blocks]), np.sin(2e-9 * np.pi * stamps), atol=1e-6
-    )
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(
     not Path("/proc/self/status").exists(), reason="the system does not tell a program's peak"
@@ -97,18 +81,3 @@ def test_long_tables_are_read_in_bounded_memory(kind: str, tmp_path: Path) -> No
     assert rows == samples
     print(f"{kind}: {peak / 1e6:.0f} MB")
     assert peak < most, f"{peak / 1e6:.0f} MB"
-
-
-def test_what_was_read_of_parquet_is_not_kept(tmp_path: Path) -> None:
-    """Numbers that do not pack: Arrow holds some row groups of thirty, and not the file."""
-    path, rows, draw = tmp_path / "log.parquet", 1_500_000, np.random.default_rng(1)
-    columns = {name: draw.standard_normal(rows) for name in ("theta1", "theta2", "tau1", "tau2")}
-    table = pa.table({"t": np.arange(rows) / 1000, **columns})
-    pq.write_table(table, path, row_group_size=50_000)
-    del table
-    pool = pa.default_memory_pool()
-    before, held = pool.bytes_allocated(), 0
-    for block in open_log(path).blocks(50_000):
-        assert len(block)
-        held = max(held, pool.bytes_allocated() - before)
-    assert held < path.stat().st_size / 2

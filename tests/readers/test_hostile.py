@@ -20,8 +20,6 @@ import pytest
 import zstandard
 
 from algid.base.errors import LogError
-from algid.base.files import read_whole, sha256_of
-from algid.batches.manifest import is_manifest
 from algid.readers import read_log
 from algid.writers import write_log
 from pipelines.mutations import clean_log
@@ -89,25 +87,6 @@ def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
     for path in (tmp_path / "log.csv", Path("/dev/zero"), Path("/dev/null")):
         with pytest.raises(LogError, match="no regular file"):
             read_log(path)
-
-
-@pytest.mark.skipif(not os.access("/proc/kmsg", os.R_OK), reason="needs a file that waits for ever")
-def test_what_the_kernel_makes_up_is_an_empty_file(tmp_path: Path) -> None:
-    endless = Path("/proc/kmsg")
-    write_log(tmp_path / "log.csv", clean_log(20))
-    (tmp_path / "bag").mkdir()
-    (tmp_path / "bag" / "metadata.yaml").symlink_to(endless)
-    (tmp_path / "endless.csv").symlink_to(endless)
-    assert read_whole(endless) == b""
-    assert not is_manifest(tmp_path / "endless.csv")
-    assert sha256_of(tmp_path / "bag") == sha256_of(Path("/dev/null"))
-    with pytest.raises(LogError, match="the file is empty"):
-        read_log(endless)
-    with pytest.raises(LogError, match="expected the metadata of a rosbag2 folder"):
-        read_log(tmp_path / "bag")
-    (tmp_path / "log.csv.truth.json").symlink_to(endless)
-    with pytest.raises(LogError, match="the truth beside the log cannot be read"):
-        read_log(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize("name", ["col[1]", "a*", "q?", "**", "{a,b}", "~"])

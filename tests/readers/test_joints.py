@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.base.errors import LogError
 from algid.log import Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
@@ -204,13 +203,3 @@ def test_the_four_that_move_furthest_are_named() -> None:
     assert (moving(a=1, b=2, c=3, d=4, e=5, f=6) or "").endswith(
         "joint of d by 4 rad, joint of c by 3 rad and 2 more"
     )
-
-
-def test_joints_that_cannot_be_read_or_were_not_recorded_tell_nothing() -> None:
-    def none(_paths: Mapping[str, str]) -> Iterator[SampleTable]:
-        return iter(())
-
-    def torn(_paths: Mapping[str, str]) -> Iterator[SampleTable]:
-        raise LogError("torn")
-
-    assert moving_joints({"a": "q3"}, none) == moving_joints({"a": "q3"}, torn) == ()

@@ -17,7 +17,7 @@ from algid.log import Log, Origin, join
 from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers.log_reader import TableReader, make_reader
-from algid.readers.table import CHANNELS, SampleTable, cut
+from algid.readers.table import CHANNELS, SampleTable
 
 MS = 1_000_000
 MAPPING = {name: f"column {name}" for name in CHANNELS[:4]}
@@ -132,10 +132,3 @@ def test_a_torque_of_a_joint_called_passive_is_warned_of(share: float) -> None:
     assert not any(block.tau[1].any() for block in blocks)
     shared = replace(log.origin, mapping={**MAPPING, "tau2": MAPPING["tau1"]})
     assert "PASSIVE_TORQUE" not in codes(replace(log, origin=shared).whole())
-
-
-def test_tables_are_cut_with_their_notices_first() -> None:
-    parts = list(cut(tables(7, 2), 3))
-    assert [len(part) for part in parts] == [3, 3, 1, 2]
-    assert [len(part.notices) for part in parts] == [1, 0, 0, 1]
-    assert [stamp // MS for part in parts for stamp in part.stamp_ns.tolist()] == list(range(9))

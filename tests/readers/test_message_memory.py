@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from algid.readers import read_log
 from tests.readers.large import WRITERS, peak_of_reading
 
 SAMPLES = 1_500_000
@@ -15,18 +13,6 @@ MOST_BYTES = 160e6
 """The samples' arrays alone take 60 MB, beside some 60 MB of a program that reads nothing."""
 INDEXED = 200.0
 """Bytes a message that rosbags takes for the index of a ROS 1 bag."""
-
-
-@pytest.mark.parametrize("form", WRITERS)
-def test_what_long_logs_are_made_of_is_read(form: str, tmp_path: Path) -> None:
-    path = tmp_path / f"log.{form}"
-    WRITERS[form](path, 12_000)
-    log = read_log(path)
-    ticks = np.arange(12_000)
-    assert np.array_equal(log.stamp_ns, ticks * 1_000_000)
-    assert np.array_equal(log.theta[1], 2 * np.sin(ticks * (0.001 + 0.0003)))
-    assert np.array_equal(log.tau[1], 6 * np.sin(ticks * (0.001 + 0.0003 * 5)))
-    assert log.notices == () or [notice.code for notice in log.notices] == ["NO_CHECKSUM"]
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.profile import Angle, Profile
+from algid.profile import Profile
 from algid.readers import read_log
 
 T = np.arange(400) * 0.01
@@ -42,16 +42,6 @@ def test_angles_in_degrees_are_told_in_rad(tmp_path: Path) -> None:
     _arm("q{}_deg", "tau{}", ("1", "2", "3", "4"), np.pi / 180).write_csv(tmp_path / "log.csv")
     (text,) = _told(tmp_path / "log.csv", Profile(joints=("2", "3")))
     assert "4 by 0.6 rad" in text
-
-
-def test_of_counts_nobody_knows_how_far_they_are(tmp_path: Path) -> None:
-    _arm("q{}", "tau{}", ("1", "2", "3", "4"), 1e-3).write_csv(tmp_path / "log.csv")
-    counts = Profile(
-        joints=("2", "3"),
-        theta1=Angle(unit="counts", counts=6283),
-        theta2=Angle(unit="counts", counts=6283),
-    )
-    assert _told(tmp_path / "log.csv", counts) == []
 
 
 @pytest.mark.parametrize("position", ["/joint_states/{}/position", "{}_pos"])

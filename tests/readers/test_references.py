@@ -129,16 +129,6 @@ def test_the_unit_is_the_angles_where_nothing_else_is_said(
     assert (read.unit, read.told) == (unit, by)
 
 
-def test_samples_may_lack_one(tmp_path: Path) -> None:
-    holed = REFERENCE.copy()
-    holed[:, :50] = np.nan
-    found = read_log(table(tmp_path, **PLAIN, **columns("q_des1 q_des2", holed)))
-    assert len(found) == len(T)
-    assert found.reference is not None
-    assert np.array_equal(found.reference, holed, equal_nan=True)
-    assert not any(notice.lossy for notice in found.notices)
-
-
 def test_one_joint_or_seven_are_no_reference(tmp_path: Path) -> None:
     one = table(tmp_path, **PLAIN, **columns("q_des1", REFERENCE[0]))
     assert read_log(one).reference is None

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import pytest
 
-from algid.profile import Profile, Torque
+from algid.profile import Profile
 from algid.readers import open_log, read_log
 
 COLUMNS = ("time", "q1", "q2", "tau1", "tau2")
@@ -56,13 +55,6 @@ def test_what_a_comment_states_is_told_and_not_used(
     assert len(said) == bool(settings)
 
 
-def test_what_a_user_says_is_not_told_again(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(table("# tau in mNm\n# zero: hanging"))
-    torque = Torque(unit="mN m")
-    log = read_log(tmp_path / "log.csv", Profile(tau1=torque, tau2=torque, zero="horizontal"))
-    assert "STATED_UNUSED" not in {notice.code for notice in log.notices}
-
-
 @pytest.mark.parametrize(
     "settings",
     [
@@ -80,14 +72,6 @@ def test_a_setting_of_no_use_is_told(settings: dict[str, object], tmp_path: Path
     log = read_log(tmp_path / "log.csv", Profile.model_validate(settings))
     (said,) = [one for one in log.notices if one.code == "STATED_UNUSED"]
     assert set(settings) <= set(said.numbers["said"].split(", "))
-
-
-def test_a_unit_in_a_name_beats_an_attribute_and_says_so() -> None:
-    columns = {name: np.arange(ROWS) + 1.0 for name in COLUMNS} | {"time": np.arange(ROWS) / 100}
-    named = pa.table(columns).rename_columns(["time", "q1", "q2", "tau1 [Nm]", "tau2 [Nm]"])
-    log = read_log(named.replace_schema_metadata({"tau.unit": "mNm"}))
-    assert log.tau[0, 0] == 1
-    assert sum(notice.code == "OTHER_UNIT" for notice in log.notices) == 2
 
 
 def test_metadata_that_are_no_units_are_left_alone() -> None:

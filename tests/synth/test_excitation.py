@@ -13,29 +13,7 @@ import pytest
 from algid.arm import Arm
 from algid.base.errors import SettingError
 from algid.synth.cases import case_names, load_case
-from algid.synth.excitation import Hold, SampledTorque, wide_multi_sine
-
-ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
-
-
-def test_the_wide_torque_scales_with_what_the_arm_asks_for() -> None:
-    torque = wide_multi_sine(ARM)
-    # weight outstretched, friction at 4 rad/s, inertia outstretched at 40 rad/s², each by Table 1
-    weight2, inertia2 = 1.0 * 9.81 * 0.15, 0.01 + 1.0 * 0.15**2
-    weight1 = 2.0 * 9.81 * 0.2 + 1.0 * 9.81 * 0.4
-    inertia1 = 0.03 + 2.0 * 0.2**2 + 1.0 * 0.4**2 + inertia2 + 2 * (1.0 * 0.4 * 0.15)
-    need = (weight1 + weight2 + 4 * 0.5 + 40 * inertia1, weight2 + 4 * 0.25 + 40 * inertia2)
-    for amplitude, all_of_it in zip(torque.amplitude, need, strict=True):
-        np.testing.assert_allclose(amplitude, 0.6 * all_of_it, rtol=1e-12)
-    for frequency in torque.frequency:
-        np.testing.assert_allclose([frequency[0], frequency[-1]], [0.3, 8.0])
-        np.testing.assert_allclose(np.diff(np.log(frequency)), np.log(8 / 0.3) / 5)
-    phases = np.array(torque.phase)
-    assert phases.shape == (2, 6)
-    assert np.unique(phases).size == 12
-    assert np.all((phases >= 0) & (phases < 2 * np.pi))
-    assert wide_multi_sine(ARM) == torque
-    assert wide_multi_sine(ARM, 1).phase != torque.phase
+from algid.synth.excitation import Hold, SampledTorque
 
 
 @pytest.mark.parametrize(

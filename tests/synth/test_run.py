@@ -15,9 +15,9 @@ from algid.arm import Arm, FloatArray, inverse_dynamics, with_payload
 from algid.base.errors import SettingError
 from algid.synth.cases import Case
 from algid.synth.excitation import MultiSine
-from algid.synth.follow import STIFFNESS, Reference, follow, read_plan
+from algid.synth.follow import Reference, read_plan
 from algid.synth.run import Acquisition, synthesise
-from algid.synth.simulator import Driven, simulate, steered
+from algid.synth.simulator import simulate
 
 ARM = Arm(2.0, 1.0, 0.2, 0.15, 0.4, 0.3, 0.03, 0.01, 0.5, 0.25)
 CASE = Case("mine", ARM, 0.5, None, {})
@@ -27,24 +27,6 @@ SHORT = Acquisition(rate=100.0, duration=0.6, initial=(-1.0, 0.3, 0.5, -0.2))
 
 def loaded_constants(mass: float) -> FloatArray:
     return with_payload(ARM.constants(), ARM.payload_constants(mass))
-
-
-def test_the_logs_of_a_case_are_the_simulators_motions() -> None:
-    unloaded, loaded = synthesise(CASE, WAVE, SHORT)
-    t = np.arange(61) / 100
-    for log, mass, role in ((unloaded, 0.0, "unloaded"), (loaded, 0.5, "loaded")):
-        motion = simulate(
-            loaded_constants(mass), WAVE, t, np.array([-1.0, 0.3]), np.array([0.5, -0.2])
-        )
-        np.testing.assert_allclose(log.theta, motion.theta, atol=1e-12)
-        np.testing.assert_allclose(log.tau, WAVE(t), atol=1e-12)
-        assert log.origin.path == f"mine-{role}"
-        assert log.origin.truth is not None
-        assert (log.origin.truth.payload, log.origin.truth.case, log.origin.truth.arm) == (
-            mass,
-            "mine",
-            ARM,
-        )
 
 
 def test_an_object_is_grasped_and_let_go_without_a_step() -> None:
@@ -105,26 +87,6 @@ def test_an_arm_that_is_as_believed_follows_its_plan() -> None:
         np.testing.assert_allclose(log.tau, torque, atol=1e-3)
     (alone,) = synthesise(replace(CASE, payload=0.0), plan, Acquisition(rate=50.0, duration=0.1))
     assert alone.origin.path == "mine-unloaded"
-
-
-def test_the_controller_is_a_critically_damped_second_order_at_its_bandwidth() -> None:
-    """Without gravity and Coriolis, M (θ̈ + 2 ω_c θ̇ + ω_c² θ) = 0: x₀ (1 + ω_c t) exp(−ω_c t)."""
-    k = np.array([0.0, 0.0, 0.05, 0.0, 0.2, 0.0, 0.0])
-    t = np.linspace(0, 0.1, 41)
-    still = np.zeros((2, 5))
-    plan = Reference(np.linspace(0, 1, 5), still, still, still, still)
-
-    def controller(_times: FloatArray) -> Driven:
-        def torque(theta: FloatArray, omega: FloatArray) -> FloatArray:
-            push = -(STIFFNESS**2) * theta - 2 * STIFFNESS * omega
-            return np.stack([0.25 * push[0] + 0.05 * push[1], 0.05 * push[0] + 0.05 * push[1]])
-
-        return torque
-
-    ours = steered(k, controller, t, np.array([0.1, -0.3]))
-    exact = np.array([[0.1], [-0.3]]) * (1 + STIFFNESS * t) * np.exp(-STIFFNESS * t)
-    np.testing.assert_allclose(ours.theta, exact, atol=1e-9)
-    np.testing.assert_allclose(follow(k, plan, t, k, False, None).theta, 0.0, atol=1e-12)
 
 
 HEAD = "t,theta1,theta2,omega1,omega2,tau1,tau2"
