@@ -74,7 +74,7 @@ def clean_files(folder: Path) -> list[Path]:
     for path in paths:
         write_log(path, clean_log(), truth=truth)
     # small chunks, so that damage to one leaves others
-    mcap.write(folder / "clean.mcap", clean_log(), truth=truth, chunk_size=8192)
+    mcap.write(folder / "clean.mcap", [clean_log()], truth=truth, chunk_size=8192)
     return paths
 
 

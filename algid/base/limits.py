@@ -81,7 +81,6 @@ class FileLimits:
     """Joints that are not read and are looked at."""
     topics: int = 256
     """Topics that may hold joint states, beyond which one must be named."""
-    stamp_seconds: float = 9.2e9
 
     # bags
     bag_metadata_bytes: int = 1 << 24

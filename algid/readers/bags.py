@@ -8,12 +8,11 @@ from __future__ import annotations
 import re
 import sqlite3
 import weakref
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,8 +21,8 @@ from algid.base.files import read_start
 from algid.base.limits import LIMITS
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.notices import Notice
-from algid.readers.mcap import open_mcap
-from algid.readers.messages.message_file import MessageBatch, MessageChannel, MessageFile, Messages
+from algid.readers.mcap import mcap_file
+from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages
 from algid.readers.messages.reader import MessageLog
 
 _BATCH_BYTES, _BATCH_ROWS = 1 << 21, 1 << 14
@@ -38,15 +37,18 @@ def open_bag(path: Path, kind: str) -> MessageLog:
     LogError
         If none of a folder's files is there, or its metadata cannot be read.
     """
-    if kind != "rosbag2":
-        opened = ros1_file if kind == "bag" else database_file
-        return MessageLog(str(path), "bag", [cache(partial(opened, path))])
-    paths, notices = _files_of_folder(path)
-    if paths[0].suffix == ".mcap":
-        return replace(open_mcap(paths), notices=notices)
-    return MessageLog(
-        str(path), "bag", [cache(partial(database_file, one)) for one in paths], notices
-    )
+    notices: tuple[Notice, ...] = ()
+    files: list[Callable[[], MessageFile]] = [
+        partial(ros1_file if kind == "bag" else database_file, path)
+    ]
+    if kind == "rosbag2":
+        paths, notices = _files_of_folder(path)
+        files = [
+            partial(mcap_file if one.suffix == ".mcap" else database_file, one) for one in paths
+        ]
+        kind = "mcap" if paths[0].suffix == ".mcap" else kind
+    form = "mcap" if kind == "mcap" else "bag"
+    return MessageLog(str(path), form, [cache(one) for one in files], notices)
 
 
 def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
@@ -84,8 +86,6 @@ def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
     there = [folder / name for name in names if (folder / name).is_file()]
     if not there:
         raise LogError(f"{folder}: none of the bag's files is there; expected {names[:3]}")
-    if len({path.suffix for path in there}) > 1:
-        raise LogError(f"{folder}: the bag mixes files of .db3 and .mcap; read one file of it")
     missing = [name for name in names if folder / name not in there]
     numbers = {"missing": len(missing), "files": len(names), "names": ", ".join(missing[:3])}
     notices = (Notice("DAMAGED", numbers={"case": "split"} | numbers),) if missing else ()
@@ -121,18 +121,17 @@ def ros1_file(path: Path) -> MessageFile:
     reader = Reader(path)
     with _as_log_error(path, f"rosbag reindex {path.name} may mend it, else copy it again"):
         reader.open()
-    channels, counts = {}, dict[int, int]()
+    channels, counts = {}, Counter[int]()
     for one in reader.connections:
         definition = one.msgdef.data.encode()
         kind = denormalize_msgtype(one.msgtype)
         channels[one.id] = MessageChannel(one.topic, kind, "ros1", "ros1msg", definition)
     for chunk in reader.chunk_infos:
-        for number, count in chunk.connection_counts.items():
-            counts[number] = counts.get(number, 0) + count
+        counts.update(chunk.connection_counts)
     # rosbags has the end behind the last message
-    span = (reader.start_time, reader.end_time - 1) if any(counts.values()) else None
+    span = (reader.start_time, reader.end_time - 1) if counts.total() else None
 
-    def rows(wanted: frozenset[int]) -> Iterator[tuple[Any, Any]]:
+    def rows(wanted: frozenset[int]) -> Iterator[tuple[int, bytes]]:
         chosen = [one for one in reader.connections if one.id in wanted]
         for _, stamp, data in reader.messages(chosen) if chosen else ():
             yield stamp, data
@@ -175,11 +174,12 @@ def database_file(path: Path) -> MessageFile:
     stray = Notice("MESSAGES_LEFT_OUT", numbers={"case": "topic", "count": strays})
     span = (first, last) if type(first) is type(last) is int else None
 
-    def rows(wanted: frozenset[int]) -> Iterator[tuple[Any, Any]]:
+    def rows(wanted: frozenset[int]) -> Iterator[tuple[int, bytes]]:
         numbers = ",".join(map(str, sorted(wanted)))
         with _connected(path) as base:
             yield from base.execute(
-                f"SELECT timestamp, data FROM messages WHERE topic_id IN ({numbers}) ORDER BY rowid"
+                f"SELECT timestamp, data FROM messages WHERE topic_id IN ({numbers}) "
+                "AND typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY rowid"
             )
 
     notices = (stray,) if strays else ()
@@ -209,31 +209,21 @@ def usual_definition(kind: str) -> tuple[str, bytes]:
 
 
 def _batches(
-    rows: Callable[[frozenset[int]], Iterator[tuple[Any, Any]]], channels: frozenset[int]
-) -> Iterator[MessageBatch]:
-    """Messages by their stamps and payloads up to the first break, which yields its reason."""
-    stamps: list[int] = []
-    payloads: list[bytes] = []
-    size = odd = 0
-    wrong, broken = "", ""
+    rows: Callable[[frozenset[int]], Iterator[tuple[int, bytes]]], channels: frozenset[int]
+) -> Iterator[Messages | str]:
+    """Messages by their stamps and payloads up to the first break, and why it breaks."""
+    stamps, payloads, size = list[int](), list[bytes](), 0
+    broken = ""
     try:
-        for stamp, data in rows(channels):
-            if type(stamp) is not int or type(data) is not bytes:
-                odd += 1
-                wrong = wrong or repr(data if type(stamp) is int else stamp)[:40]
-                continue
+        for stamp, payload in rows(channels):
             stamps.append(stamp)
-            payloads.append(data)
-            size += len(data)
+            payloads.append(payload)
+            size += len(payload)
             if size > _BATCH_BYTES or len(stamps) == _BATCH_ROWS:
-                yield MessageBatch(Messages.of(payloads, np.array(stamps, np.int64)), checked=True)
+                yield Messages.of(payloads, np.array(stamps, np.int64))
                 stamps, payloads, size = [], [], 0
     except Exception as error:  # rosbags raises what its parts do
-        broken = _reason(error)
-    if stamps:
-        yield MessageBatch(Messages.of(payloads, np.array(stamps, np.int64)), checked=True)
-    if odd:
-        text = f"{wrong} for a time or a message in the table 'messages'"
-        yield MessageBatch(None, checked=True, reason=text, rows=odd)
+        broken = f"{_reason(error)}; of what follows nothing is read"
+    yield Messages.of(payloads, np.array(stamps, np.int64))
     if broken:
-        yield MessageBatch(None, checked=True, reason=f"{broken}; of what follows nothing is read")
+        yield broken

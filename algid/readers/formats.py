@@ -95,7 +95,7 @@ def _csv(name: str, title: str, magic: bytes) -> FileFormat:
 
 FORMATS: tuple[FileFormat, ...] = (
     FileFormat(
-        "mcap", "MCAP", (".mcap",), MCAP, lambda path, _: _reader("mcap").open_mcap([path]), True
+        "mcap", "MCAP", (".mcap",), MCAP, lambda path, _: _reader("mcap").open_mcap(path), True
     ),
     _bag("rosbag2", "rosbag2 folder", (), b""),
     _bag("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00"),

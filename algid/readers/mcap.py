@@ -11,7 +11,7 @@ import math
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache, partial, reduce
 from operator import or_
@@ -33,7 +33,6 @@ from algid.base.words import counted
 from algid.log import KEY, IntArray, loads
 from algid.notices import Notice
 from algid.readers.messages.message_file import (
-    MessageBatch,
     MessageChannel,
     MessageFile,
     Messages,
@@ -64,19 +63,18 @@ _SUMMARY = (2, 3, 4, 8, 10, 11, 13, 14)
 """Codes of the records that may stand behind the end of the data."""
 _LOOSE_BYTES = 1 << 23
 """Of records outside of chunks that are read at once."""
+_SMALL_BYTES = 1 << 13
 _BUFFER_BYTES = 1 << 9
 """What is read of a chunk to know its head."""
-_SMALL_BYTES = 1 << 13
 Definitions = list[tuple[int, bytes]]
 """Code and content of each."""
 Listed = tuple[IntArray, Definitions, int]
 """Offsets of messages, definitions, and where the last whole record ends."""
 
 
-def open_mcap(paths: Sequence[Path]) -> MessageLog:
-    """An MCAP log, or the splits of one in their order."""
-    name = str(paths[0] if len(paths) == 1 else paths[0].parent)
-    return MessageLog(name, "mcap", [cache(partial(mcap_file, path)) for path in paths])
+def open_mcap(path: Path) -> MessageLog:
+    """An MCAP log."""
+    return MessageLog(str(path), "mcap", [cache(partial(mcap_file, path))])
 
 
 @dataclass
@@ -121,7 +119,7 @@ class _Contents:
         for part in self.parts:
             if part.loose == loose:
                 try:
-                    _, numbers, others, *_ = _records(stream, part)
+                    _, numbers, others = _records(stream, part)
                     self.define(others, part.start)
                     part.counts = Counter(numbers.tolist())
                 except Exception as error:  # what the libraries raise
@@ -229,23 +227,17 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         place = end
         if code == Opcode.FOOTER:
             break
-    broken, left = place < end, size - place
-    # what breaks off behind the data is its summary if the footer says so, or is gone too
-    summary = known and code in _SUMMARY
-    if size > 28 and (tail := _read(stream, size - 28, 28)).endswith(_MAGIC):
-        summary = struct.unpack("<Q20x", tail)[0] == data_end
-    why = "" if known or len(head) < _FRAME.size else "what stands there is no record"
-    if data_end and not broken:
-        why = "its end stands there, and more behind it"
-    if data_end and (left <= len(_MAGIC) or (summary and broken)):
-        return
-    if why:
-        numbers: dict[str, Any] = {"case": "bytes", "bytes": left, "first": place, "why": why}
-        found.notices.append(Notice("DAMAGED", numbers=numbers))
-    else:
+    left = size - place
+    if data_end and (left <= len(_MAGIC) or (place < end and known and code in _SUMMARY)):
+        return  # what breaks off behind the data is its summary
+    if (known or len(head) < _FRAME.size) and (place < end or not data_end):
         case = "chunk" if code == Opcode.CHUNK else "record"
-        numbers = {"case": case if left else "end", "bytes": left}
+        numbers: dict[str, Any] = {"case": case if left else "end", "bytes": left}
         found.notices.append(Notice("CUT_OFF", numbers=numbers))
+    else:
+        numbers = {"case": "bytes", "bytes": left, "first": place}
+        numbers["why"] = "what stands there is no record"
+        found.notices.append(Notice("DAMAGED", numbers=numbers))
     if left:
         found.damage.append(f"it breaks off at byte {place}")
         if known and code == Opcode.CHUNK:
@@ -260,29 +252,18 @@ def _summary(stream: IO[bytes], size: int) -> Definitions:
     ValueError
         If it is damaged.
     """
-    tail = _read(stream, max(0, size - _FOOTER_BYTES), min(_FOOTER_BYTES, size))
-    if not tail.endswith(_MAGIC) or len(tail) < _FOOTER_BYTES:
+    tail = _read(stream, size - _FOOTER_BYTES, _FOOTER_BYTES)
+    if not tail.endswith(_MAGIC):
         raise ValueError("the file has no end: it was cut off")
-    code, length, start, _, checksum = struct.unpack_from("<BQQQI", tail)
-    if (code, length) != (Opcode.FOOTER, 20):
-        raise ValueError("its end is none")
-    if not start:
-        return []
-    content = _read(stream, start, size - _FOOTER_BYTES - start)
+    start, checksum = struct.unpack_from("<Q8xI", tail, _FRAME.size)
+    content = _read(stream, start, size - _FOOTER_BYTES - start) if start else b""
     if checksum and zlib.crc32(tail[:25], zlib.crc32(content)) != checksum:
         raise ValueError("its checksum is wrong")
-    _, others, end = _one_by_one(content, 0, len(content))
-    if end != len(content):
-        raise ValueError("its records do not fill it")
-    return others
+    return _one_by_one(content, 0, len(content))[1]
 
 
-def _records(
-    stream: IO[bytes], part: _Part
-) -> tuple[Messages, NDArray[np.uint16], Definitions, bool, tuple[int, int] | None]:
-    """The messages of a part, the channel (M,) of each, and its definitions.
-
-    And whether it is checked, and of a torn chunk the bytes that are there and that should be.
+def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint16], Definitions]:
+    """The messages of a part, the channel (M,) of each, its definitions.
 
     Raises
     ------
@@ -295,25 +276,25 @@ def _records(
         chunk = _parsed(Chunk, content)
         content, size = _unpacked(chunk), chunk.uncompressed_size
         checked = chunk.uncompressed_crc != 0
-        if len(content) != size and not part.torn:
-            unpacked = "more" if len(content) > size else f"{len(content):,}"
-            raise ValueError(f"a chunk of {counted(size, 'byte')} unpacks to {unpacked}")
-        if len(content) == size and checked and zlib.crc32(content) != chunk.uncompressed_crc:
-            raise ValueError("a chunk's checksum is wrong")
+        whole = len(content) == size
+        if not (whole or part.torn) or (
+            whole and checked and zlib.crc32(content) != chunk.uncompressed_crc
+        ):
+            raise ValueError("a chunk's size or its checksum is wrong")
         index = _read(stream, part.start + part.length, part.index_length)
     octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
     # a small chunk is sooner walked than compared with its index
     listed = _by_index(octets, content, index) if size > _SMALL_BYTES else None
-    offsets, others, end = listed or _one_by_one(content, 0, len(content))
+    offsets, others, end = listed or _one_by_one(content, 0, octets.size)
     if end != len(content) and not part.torn:
         raise ValueError("its records do not fill it")
-    torn = (end, size) if part.torn and end != size else None
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
     sizes = heads["length"].astype(np.int64) - (_HEAD_BYTES - 9)
     log_ns = heads["log_ns"].astype(np.int64)
-    messages = Messages(octets[:end], offsets + _HEAD_BYTES, sizes, log_ns)
     # nothing vouches for what is there of a torn chunk, which CUT_OFF says
-    return messages, heads["channel"], others, checked or torn is not None, torn
+    checked |= part.torn
+    messages = Messages(octets[:end], offsets + _HEAD_BYTES, sizes, log_ns, checked)
+    return messages, heads["channel"], others
 
 
 def _unpacked(chunk: Chunk) -> bytes:
@@ -389,25 +370,24 @@ def _by_index(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Listed
     return (offsets, others, octets.size) if first == offsets[0] and not unlisted.size else None
 
 
-def _batches(path: Path, found: _Contents, channels: frozenset[int]) -> Iterator[MessageBatch]:
-    """The messages of `channels` in file order; a damaged part yields its reason."""
+def _batches(path: Path, found: _Contents, channels: frozenset[int]) -> Iterator[Messages | str]:
+    """The messages of `channels` in file order; or why a part of them is lost."""
 
-    def batches() -> Iterator[MessageBatch]:
+    def batches() -> Iterator[Messages | str]:
         with path.open("rb", buffering=_BUFFER_BYTES) as stream:
             for part in found.parts:
                 if part.counts is not None and not part.counts.keys() & channels:
                     continue
                 try:
-                    messages, numbers, others, checked, torn = _records(stream, part)
+                    messages, numbers, others = _records(stream, part)
                     found.define(others, part.start)
                     if part.start >= found.redefined:
                         raise ValueError("a channel or its schema is defined anew and differently")
-                    # numpy.isin takes longer than all else here
-                    ours = reduce(or_, [numbers == one for one in channels])
-                    batch = MessageBatch(messages.take(np.flatnonzero(ours)), checked, torn=torn)
                 except Exception as error:  # what the libraries raise of damaged bytes
-                    reason = f"{error or 'it breaks off'} (at byte {part.start})"
-                    batch = MessageBatch(None, checked=True, reason=reason)
-                yield batch
+                    yield f"{error or 'it breaks off'} (at byte {part.start})"
+                    continue
+                # numpy.isin takes longer than all else here
+                ours = reduce(or_, [numbers == one for one in channels])
+                yield messages.take(np.flatnonzero(ours))
 
     return ahead(batches())

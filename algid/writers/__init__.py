@@ -1,4 +1,4 @@
-"""Writers of logs: one file a format, each `write(path, log, truth=…)`, whole files only."""
+"""Writers of logs: one file a format, each `write(path, blocks, truth=…)`, whole files only."""
 
 from __future__ import annotations
 
@@ -53,4 +53,5 @@ def write_log(
     name = format or path.suffix.lstrip(".").lower()
     if name not in FORMATS:
         raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")
-    import_module(f"algid.writers.{name}").write(path, log, truth=truth, force=force)
+    blocks = [log] if isinstance(log, Log) else log
+    import_module(f"algid.writers.{name}").write(path, blocks, truth=truth, force=force)

@@ -6,9 +6,12 @@ index are laid out at once. Every other record is written by the mcap library.
 
 from __future__ import annotations
 
+import struct
 import zlib
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 import zstandard
@@ -46,127 +49,88 @@ _MESSAGE = [
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 
-def message_bytes(content: np.dtype[np.void]) -> int:
-    """The bytes of a message record of that content."""
-    return np.dtype([*_MESSAGE, ("content", content)]).itemsize
-
-
 @dataclass
 class ChunkedFile:
-    """An MCAP file in the making; `finish` ends it.
-
-    Parameters
-    ----------
-    stream : binary file, at its start
-    profile, library : str
-        As the header states them.
-    schema, channels : records of the mcap library
-    """
+    """An MCAP file of a ROS 2 recorder in the making, at the start of a binary `stream`."""
 
     stream: IO[bytes]
-    profile: str
-    library: str
     schema: Schema
-    channels: tuple[Channel, ...]
-    _messages: dict[int, int] = field(default_factory=dict)
-    _times: tuple[int, int] | None = None
+    _channels: dict[int, Channel] = field(default_factory=dict)
+    _messages: Counter[int] = field(default_factory=Counter)
     _chunks: list[ChunkIndex] = field(default_factory=list)
-    _metadata: list[MetadataIndex] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.stream.write(MCAP0_MAGIC)
-        self._write(Header(self.profile, self.library))
+        self.stream.write(MCAP0_MAGIC + _bytes_of(Header("ros2", "algid")))
 
-    def add(self, stamp_ns: IntArray, content: NDArray[np.void], place: int = 0) -> None:
-        """Write a chunk of messages on the channel at a `place`.
-
-        Their stamps (N,), none negative, and contents (N,).
-        """
-        channel = self.channels[place].id
-        sent = self._messages.get(channel, 0)
-        before = b"" if self._chunks else _bytes_of(self.schema, *self.channels)
+    def add(self, channel: Channel, stamp_ns: IntArray, content: NDArray[np.void]) -> None:
+        """Write a chunk of messages: their stamps (N,), none negative, and contents (N,)."""
+        before = b"" if channel.id in self._channels else _bytes_of(self.schema, channel)
         rows = np.zeros(len(content), np.dtype([*_MESSAGE, ("content", content.dtype)]))
         rows["code"], rows["length"] = Opcode.MESSAGE, rows.itemsize - _PREFIX
-        rows["channel"] = channel
-        rows["sequence"] = sent + np.arange(len(rows))
+        rows["channel"] = channel.id
+        rows["sequence"] = self._messages[channel.id] + np.arange(len(rows))
         rows["log_time"] = rows["publish_time"] = stamp_ns
         rows["content"] = content
-        data = before + rows.tobytes()
-        packed = zstandard.compress(data)
-        first, last = int(stamp_ns.min()), int(stamp_ns.max())
-        start, length = self._write(Chunk("zstd", packed, last, first, zlib.crc32(data), len(data)))
         index = np.zeros(len(rows), _INDEX)
         index["log_time"] = stamp_ns
         index["offset"] = len(before) + rows.itemsize * np.arange(len(rows))
-        entries = index.tobytes()
-        self.stream.write(_prefix(Opcode.MESSAGE_INDEX, 6 + len(entries)))
-        self.stream.write(channel.to_bytes(2, "little"))
-        self.stream.write(len(entries).to_bytes(4, "little") + entries)
+        data, entries = before + rows.tobytes(), index.tobytes()
+        head = struct.pack(
+            "<BQHI", Opcode.MESSAGE_INDEX, 6 + len(entries), channel.id, len(entries)
+        )
+        packed = zstandard.compress(data)
+        first, last = int(stamp_ns.min()), int(stamp_ns.max())
+        start = self.stream.tell()
+        chunk = _bytes_of(Chunk("zstd", packed, last, first, zlib.crc32(data), len(data)))
+        self.stream.write(chunk)
+        self.stream.write(head + entries)
         self._chunks.append(
             ChunkIndex(
-                chunk_length=length,
+                chunk_length=len(chunk),
                 chunk_start_offset=start,
                 compression="zstd",
                 compressed_size=len(packed),
                 message_end_time=last,
-                message_index_length=_PREFIX + 6 + len(entries),
-                message_index_offsets={channel: start + length},
+                message_index_length=len(head) + len(entries),
+                message_index_offsets={channel.id: start + len(chunk)},
                 message_start_time=first,
                 uncompressed_size=len(data),
             )
         )
-        self._messages[channel] = sent + len(rows)
-        known = self._times or (first, last)
-        self._times = min(first, known[0]), max(last, known[1])
+        self._channels[channel.id] = channel
+        self._messages[channel.id] += len(rows)
 
-    def add_metadata(self, name: str, content: dict[str, str]) -> None:
-        """Write a metadata record."""
-        start, length = self._write(Metadata(name, content))
-        self._metadata.append(MetadataIndex(start, length, name))
-
-    def finish(self) -> None:
-        """Write the summary and the footer."""
-        self._write(DataEnd(0))
-        start = self.stream.tell()
-        groups: tuple[tuple[Opcode, list[Any]], ...] = (
-            (Opcode.SCHEMA, [self.schema]),
-            (Opcode.CHANNEL, list(self.channels)),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.METADATA_INDEX, self._metadata),
+    def finish(self, metadata: Mapping[str, dict[str, str]]) -> None:
+        """Write the metadata records by name, the summary and the footer."""
+        listed = []
+        for name, content in metadata.items():
+            record = _bytes_of(Metadata(name, content))
+            listed.append(MetadataIndex(self.stream.tell(), len(record), name))
+            self.stream.write(record)
+        self.stream.write(_bytes_of(DataEnd(0)))
+        statistics = Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=dict(self._messages),
+            chunk_count=len(self._chunks),
+            message_count=self._messages.total(),
+            message_end_time=max((one.message_end_time for one in self._chunks), default=0),
+            message_start_time=min((one.message_start_time for one in self._chunks), default=0),
+            metadata_count=len(listed),
+            schema_count=1,
         )
-        summary, offsets = b"", []
-        for code, records in groups:
-            group = _bytes_of(*records)
-            offsets.append(SummaryOffset(code, start + len(summary), len(group)))
-            summary += group
+        start, summary, offsets = self.stream.tell(), b"", list[McapRecord]()
+        channels = list(self._channels.values())
+        for records in ([self.schema], channels, [statistics], self._chunks, listed):
+            if group := _bytes_of(*records):
+                offsets.append(SummaryOffset(Opcode(group[0]), start + len(summary), len(group)))
+                summary += group
         offsets_start = start + len(summary)
         summary += _bytes_of(*offsets)
         # the sum covers the footer up to itself
         covered = summary + _bytes_of(Footer(start, offsets_start, 0))[:-4]
-        self.stream.write(summary)
-        self._write(Footer(start, offsets_start, zlib.crc32(covered)))
-        self.stream.write(MCAP0_MAGIC)
-
-    def _statistics(self) -> Statistics:
-        first, last = self._times or (0, 0)
-        return Statistics(
-            attachment_count=0,
-            channel_count=len(self.channels),
-            channel_message_counts=self._messages,
-            chunk_count=len(self._chunks),
-            message_count=sum(self._messages.values()),
-            message_end_time=last,
-            message_start_time=first,
-            metadata_count=len(self._metadata),
-            schema_count=1,
-        )
-
-    def _write(self, record: McapRecord) -> tuple[int, int]:
-        """Where the record stands and how many bytes it has."""
-        start, content = self.stream.tell(), _bytes_of(record)
-        self.stream.write(content)
-        return start, len(content)
+        footer = _bytes_of(Footer(start, offsets_start, zlib.crc32(covered)))
+        self.stream.write(summary + footer + MCAP0_MAGIC)
 
 
 def _bytes_of(*records: McapRecord) -> bytes:
@@ -175,7 +139,3 @@ def _bytes_of(*records: McapRecord) -> bytes:
         record.write(builder)
     content: bytes = builder.end()  # type: ignore[no-untyped-call]
     return content
-
-
-def _prefix(code: Opcode, length: int) -> bytes:
-    return code.to_bytes(1, "little") + length.to_bytes(8, "little")

@@ -7,13 +7,16 @@ from pathlib import Path
 
 from algid.base.files import whole_file
 from algid.log import Companion, Log, Truth
-from algid.writers.blocks import as_blocks, columns, exact_in_seconds, summed
+from algid.writers.blocks import columns, summed
+
+_EXACT_SECONDS_NS = 1 << 53
+"""Stamps below 104 days survive as float64 seconds: half a unit in the last place is < 0.5 ns."""
 
 
 def write(
-    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, force: bool = True
+    path: Path, blocks: Iterable[Log], *, truth: Truth | None = None, force: bool = True
 ) -> None:
-    """Write a log, or the blocks of one: t in s, angles, torques, velocities where recorded.
+    """Write the blocks of a log: t in s, angles, torques, velocities where recorded.
 
     Stamps too far from zero for float64 seconds get a column ``stamp_ns`` as well. The sidecar is
     written only with a truth.
@@ -29,10 +32,11 @@ def write(
     with whole_file(path, force=force) as temporary:
         stamped = None
         with temporary.open("wb") as stream:
-            for block in as_blocks(log):
+            for block in blocks:
                 first = stamped is None
                 if stamped is None:
-                    stamped = not exact_in_seconds(block.stamp_ns)
+                    whole = block.stamp_ns[0] >= 0 and block.stamp_ns[-1] < _EXACT_SECONDS_NS
+                    stamped = not whole
                 by_name = columns(block)
                 if not stamped:
                     del by_name["stamp_ns"]

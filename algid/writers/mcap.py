@@ -8,8 +8,7 @@ and the numbers differ between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from itertools import chain
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +18,13 @@ from numpy.typing import NDArray
 from algid.base.files import whole_file
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION, check_stamps
 from algid.log import KEY, Companion, Log, Truth
-from algid.writers.blocks import as_blocks
 
 TOPIC = "/joint_states"
 REFERENCES = "/joint_references"
 JOINTS = ("joint1", "joint2")
 _CHUNK = 768 * 1024
+_HEAD_BYTES = 31
+"""Of a message record."""
 _QOS = """\
 - history: 1
   depth: 10
@@ -40,15 +40,15 @@ _QOS = """\
 
 def write(
     path: Path,
-    log: Log | Iterable[Log],
+    blocks: Iterable[Log],
     *,
     truth: Truth | None = None,
     chunk_size: int = _CHUNK,
     force: bool = True,
 ) -> None:
-    """Write a log, or the blocks of one; the truth goes into the metadata record "algid".
+    """Write the blocks of a log; the truth goes into the metadata record "algid".
 
-    A chunk holds `chunk_size` bytes of messages of one block at most.
+    A chunk holds about `chunk_size` bytes of messages of one block at most.
 
     Raises
     ------
@@ -58,98 +58,62 @@ def write(
     """
     from mcap.records import Channel, Schema
 
-    from algid.writers.chunks import ChunkedFile, message_bytes
+    from algid.writers.chunks import ChunkedFile
 
-    blocks = as_blocks(log)
-    topics: tuple[str, ...] = (TOPIC,)
-    first_block = next(blocks, None)
-    if first_block is not None:
-        blocks = chain([first_block], blocks)
-        if first_block.reference is not None:
-            topics = (TOPIC, REFERENCES)
+    schema = Schema(1, JOINT_STATE_DEFINITION.encode(), "ros2msg", JOINT_STATE)
+    states, followed = (
+        Channel(number, topic, "cdr", {"offered_qos_profiles": _QOS}, schema.id)
+        for number, topic in enumerate((TOPIC, REFERENCES), start=1)
+    )
     with whole_file(path, force=force) as temporary, temporary.open("wb") as stream:
-        file = ChunkedFile(
-            stream,
-            profile="ros2",
-            library="algid",
-            schema=Schema(1, JOINT_STATE_DEFINITION.encode(), "ros2msg", JOINT_STATE),
-            channels=tuple(
-                Channel(number, topic, "cdr", {"offered_qos_profiles": _QOS}, 1)
-                for number, topic in enumerate(topics, start=1)
-            ),
-        )
+        file = ChunkedFile(stream, schema)
         for block in blocks:
             check_stamps(path, block.stamp_ns)
-            rows = max(1, chunk_size // message_bytes(_layout(block.omega is not None)))
+            rows = max(1, chunk_size // (_HEAD_BYTES + messages(block.part(0, 1)).itemsize))
             for first in range(0, len(block), rows):
                 part = block.part(first, min(first + rows, len(block)))
-                file.add(part.stamp_ns, messages(part))
+                file.add(states, part.stamp_ns, messages(part))
                 if part.reference is not None:
-                    file.add(part.stamp_ns, references(part), 1)
-        if truth is not None:
-            file.add_metadata(KEY, {KEY: Companion(truth, {}).dumps()})
-        file.finish()
+                    file.add(followed, part.stamp_ns, _filled(part, position=part.reference))
+        file.finish({KEY: {KEY: Companion(truth, {}).dumps()}} if truth is not None else {})
 
 
 def messages(block: Log) -> NDArray[np.void]:
     """The samples of a block as JointState messages in CDR (N,); `check_stamps` must hold."""
-    signals = {"position": block.theta, "velocity": block.omega, "effort": block.tau}
-    return _filled(block, signals)
+    return _filled(block, position=block.theta, velocity=block.omega, effort=block.tau)
 
 
-def references(block: Log) -> NDArray[np.void]:
-    """The angles to follow of a block that has them, as messages of positions alone (N,)."""
-    return _filled(block, {"position": block.reference})
+def _filled(block: Log, **signals: NDArray[np.floating[Any]] | None) -> NDArray[np.void]:
+    """Messages with the signals that there are.
 
-
-def _filled(
-    block: Log, signals: Mapping[str, NDArray[np.floating[Any]] | None]
-) -> NDArray[np.void]:
-    known = {name: values for name, values in signals.items() if values is not None}
-    rows = np.zeros(len(block), _layout("velocity" in known, "effort" in known))
+    CDR counts a number's alignment from behind the four bytes of the encapsulation.
+    """
+    fields: list[Any] = [
+        ("encapsulation", "u1", 4),
+        ("sec", "<i4"),
+        ("nanosec", "<u4"),
+        ("frame_length", "<u4"),
+        ("frame", "V4"),
+        ("names", "<u4"),
+    ]
+    for joint in JOINTS:
+        fields += [(f"{joint}_length", "<u4"), (joint, "S8")]
+    for name in ("position", "velocity", "effort"):
+        fields.append((f"{name}_count", "<u4"))
+        if signals.get(name) is not None:
+            fields += [(f"{name}_padding", "V4")] * (np.dtype(fields).itemsize % 8 == 0)
+            fields.append((name, "<f8", 2))
+    rows = np.zeros(len(block), fields)
     rows["encapsulation"] = (0, 1, 0, 0)
     rows["sec"] = block.stamp_ns // 10**9
     rows["nanosec"] = block.stamp_ns % 10**9
     rows["frame_length"] = 1
-    rows["names"] = 2
-    for number, joint in enumerate(JOINTS, start=1):
-        rows[f"length{number}"] = len(joint) + 1
-        rows[f"joint{number}"] = joint.encode()
-    for name, values in known.items():
-        rows[f"{name}_count"] = 2
-        rows[name] = values.T
+    rows["names"] = len(JOINTS)
+    for joint in JOINTS:
+        rows[f"{joint}_length"] = len(joint) + 1
+        rows[joint] = joint.encode()
+    for name, values in signals.items():
+        if values is not None:
+            rows[f"{name}_count"] = 2
+            rows[name] = values.T
     return rows
-
-
-def _layout(velocity: bool, effort: bool = True) -> np.dtype[np.void]:
-    """The CDR layout: alignment counts from behind the four bytes of the encapsulation."""
-    fields: list[tuple[str, object, int]] = [
-        ("encapsulation", ("u1", 4), 4),
-        ("sec", "<i4", 4),
-        ("nanosec", "<u4", 4),
-        ("frame_length", "<u4", 4),
-        ("frame", "S1", 4),
-        ("names", "<u4", 4),
-        ("length1", "<u4", 4),
-        ("joint1", "S7", 8),
-        ("length2", "<u4", 4),
-        ("joint2", "S7", 8),
-    ]
-    for name in ("position", "velocity", "effort"):
-        full = {"position": True, "velocity": velocity, "effort": effort}[name]
-        fields.append((f"{name}_count", "<u4", 4))
-        if full:
-            place = sum(width for *_, width in fields) - 4
-            if place % 8:
-                fields.append((f"{name}_padding", "V4", 4))
-            fields.append((name, ("<f8", 2), 16))
-    names, kinds, widths = zip(*fields, strict=True)
-    ends = np.cumsum(widths)
-    return np.dtype(
-        {
-            "names": list(names),
-            "formats": list(kinds),
-            "offsets": (ends - widths).tolist(),
-            "itemsize": int(ends[-1]),
-        }
-    )

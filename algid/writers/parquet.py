@@ -9,13 +9,13 @@ from algid.base.arrow import table_of_columns
 from algid.base.errors import OutputError
 from algid.base.files import whole_file
 from algid.log import KEY, Companion, Log, Truth
-from algid.writers.blocks import as_blocks, columns, summed
+from algid.writers.blocks import columns, summed
 
 
 def write(
-    path: Path, log: Log | Iterable[Log], *, truth: Truth | None = None, force: bool = True
+    path: Path, blocks: Iterable[Log], *, truth: Truth | None = None, force: bool = True
 ) -> None:
-    """Write a log, or the blocks of one, a row group a block: t in s … stamp_ns last.
+    """Write the blocks of a log, a row group a block: t in s … stamp_ns last.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def write(
     writer = None
     with whole_file(path, force=force) as temporary:
         try:
-            for block in as_blocks(log):
+            for block in blocks:
                 by_name = columns(block)
                 summed(sums, by_name)
                 table = table_of_columns(by_name)

@@ -522,7 +522,7 @@ def _redefined_alike(folder: Path) -> Path:
 
 def _referenced(folder: Path) -> Path:
     path = folder / "log.mcap"
-    mcap.write(path, replace(log(), reference=VALUES[4:]), truth=TRUTH)
+    mcap.write(path, [replace(log(), reference=VALUES[4:])], truth=TRUTH)
     return path
 
 

@@ -127,14 +127,7 @@ def test_rows_without_a_time_are_counted(tmp_path: Path) -> None:
     assert len(found) == len(log) - 2
     (notice,) = found.notices
     assert (notice.code, notice.lossy) == ("DAMAGED", True)
-    assert "2 damaged rows left out; the first: b'" not in notice.text
-    assert "2 messages are missing" in notice.text
-    changed(file, "UPDATE messages SET timestamp = 'noon'")
-    with pytest.raises(
-        LogError,
-        match=r"the file is damaged \('noon' for a time or a message in the table 'messages'",
-    ):
-        read_log(file)
+    assert notice.text == "the file counts 200 messages and holds 198"
 
 
 def test_messages_of_no_topic_are_told(tmp_path: Path) -> None:

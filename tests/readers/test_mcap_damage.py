@@ -5,7 +5,6 @@ A summary is believed only where it agrees with the file, a chunk where it is so
 
 from __future__ import annotations
 
-import re
 import struct
 import zlib
 from collections.abc import Callable
@@ -253,13 +252,8 @@ def test_a_chunk_that_breaks_off_yields_its_whole_messages(
     # zstd and lz4 lose the block that breaks off, 128 and 64 KiB of about 3 MB
     assert 0.53 < len(found) / len(log) < 0.61
     assert same(found, log.part(0, len(found)))
-    told = lost(found)
-    assert told.keys() == {"CUT_OFF"}
-    assert f"{len(found):,} messages" in told["CUT_OFF"]
-    count = re.search(r"about ([\d,]+) are lost", told["CUT_OFF"])
-    assert count is not None
-    # all messages are of one size, the schema and the channel are the rest
-    assert abs(int(count[1].replace(",", "")) - (len(log) - len(found))) < 200
+    assert lost(found).keys() == {"CUT_OFF"}
+    assert "an unfinished chunk" in lost(found)["CUT_OFF"]
 
 
 @pytest.mark.parametrize("chunked", [True, False])
@@ -368,5 +362,4 @@ def test_a_chunk_that_holds_more_than_it_claims_is_lost_and_told(
     path.write_bytes(poked(path.read_bytes(), size_at, "<QI", claimed, 0))  # and no checksum
     found = read_log(path)
     assert 0 < len(found) < len(LOG)
-    (notice,) = [one for one in found.notices if one.lossy]
-    assert f"a chunk of {claimed} bytes unpacks to more" in notice.text
+    assert "a chunk's size or its checksum is wrong" in lost(found)["DAMAGED"]

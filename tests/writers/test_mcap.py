@@ -114,7 +114,7 @@ def test_the_file_holds_what_the_library_writes(tmp_path: Path, velocity: bool, 
 
 def test_a_log_without_samples_is_a_file_without_messages(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
-    mcap.write(path, log_of(0, velocity=False))
+    mcap.write(path, [log_of(0, velocity=False)])
     assert facts(path.read_bytes()) == []
 
 

@@ -56,36 +56,28 @@ def parse_msg(root: str, text: str, *, ros1: bool = False) -> Types:
     DefinitionError
         If a line cannot be read, or a nested type is missing.
     """
-    sections = re.split(r"^=+[ \t]*\r?$", text, flags=re.MULTILINE)
-    types: Types = {**(_TIMES_OF_ROS1 if ros1 else {}), root: _fields(root, sections[0])}
-    for section in sections[1:]:
+    types: Types = dict(_TIMES_OF_ROS1) if ros1 else {}
+    for place, section in enumerate(re.split(r"^=+[ \t]*\r?$", text, flags=re.MULTILINE)):
         head, _, body = section.strip().partition("\n")
         heading = re.match(r"^MSG:\s*(\S+)$", head.strip())
-        if heading is None:
+        if place and heading is None:
             raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
-        types[heading[1]] = _fields(heading[1], body)
-    resolved: Types = {}
-    for name, fields in types.items():
-        own = tuple(_resolved(field, name, types) for field in fields)
-        resolved[name] = own or (() if ros1 else (_NOTHING,))
-    return resolved
-
-
-def _fields(name: str, text: str) -> tuple[Field, ...]:
-    """The fields of a structure, a line each; comments and constants are passed over."""
-    fields = []
-    for line in text.splitlines():
-        plain = line.split("#", 1)[0].strip()
-        match = _FIELD.match(plain)
-        if match is None and plain:
-            raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
-        if match is None or match["rest"].startswith("="):
-            continue
-        count = None
-        if match["array"]:
-            count = int(match["size"]) if match["size"].isdigit() else SEQUENCE
-        fields.append(Field(match["name"], match["type"], count))
-    return tuple(fields)
+        name, body = (heading[1], body) if place and heading else (root, section)
+        fields = []
+        for line in body.splitlines():
+            plain = line.split("#", 1)[0].strip()
+            match = _FIELD.match(plain)
+            if match is None and plain:
+                raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
+            if match is None or match["rest"].startswith("="):  # a comment, a constant
+                continue
+            size = match["size"] or ""
+            many = int(size) if size.isdigit() else SEQUENCE
+            fields.append(Field(match["name"], match["type"], many if match["array"] else None))
+        types[name] = tuple(fields) or (() if ros1 else (_NOTHING,))
+    for name, own in types.items():
+        types[name] = tuple(_resolved(field, name, types) for field in own)
+    return types
 
 
 def _resolved(field: Field, owner: str, types: Types) -> Field:
@@ -93,15 +85,10 @@ def _resolved(field: Field, owner: str, types: Types) -> Field:
     if field.type in PRIMITIVES or field.type in TEXTS:
         return field
     wanted = field.type if "/" in field.type else f"{owner.split('/')[0]}/{field.type}"
-    package, _, rest = wanted.partition("/")
-    for name in (
-        wanted,
-        wanted.replace("/msg/", "/"),
-        f"{package}/msg/{rest}",
-        _SHORT.get(field.type, wanted),
-    ):
+    long, short = wanted.replace("/", "/msg/", 1), wanted.replace("/msg/", "/")
+    for name in (wanted, short, long, _SHORT.get(field.type)):
         if name in types:
-            return Field(field.name, name, field.count)
+            return Field(field.name, str(name), field.count)
     raise DefinitionError(f"{owner}: the type {field.type!r} of {field.name!r} is not defined")
 
 

@@ -3,37 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import islice
 
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.units import unit_of
 from algid.base.words import counted, repeated
-from algid.log import Reading
-from algid.notices import Notice, Remedy
+from algid.notices import Remedy
 from algid.profile import Profile
 from algid.readers.column_names import COMMANDED, CURRENTS, STEMS, choose, units_in_names
-from algid.readers.joints import along_the_arm, reading_of
+from algid.readers.joints import along_the_arm
 from algid.readers.messages.codec import codec_for
 from algid.readers.messages.layout import MessageLayout, MisfitError
-from algid.readers.messages.message_file import MessageFile, channels_by_topic, listed
+from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Topic
 from algid.readers.stated import in_json_schema, lines_of, units_in
-from algid.readers.table import REFERENCES, VELOCITIES
+from algid.readers.table import REFERENCES
 
 _SAMPLES = 64
-_TOPIC = Remedy({"topic": None})
-_JOINTS = Remedy({"joints": None})
+TOPIC = Remedy({"topic": None})
 _USUAL = "/joint_states"
 _TELLING = (b"effort", b"tau_est", b"tau_J")
 """Names of torques in definitions: of ROS, Unitree, libfranka."""
-_JOINT_STATE = ("sensor_msgs/msg/JointState", "sensor_msgs/JointState")
-_DYNAMIC_JOINT_STATE = ("control_msgs/msg/DynamicJointState", "control_msgs/DynamicJointState")
-_TRAJECTORY_STATE = (
-    "control_msgs/msg/JointTrajectoryControllerState",
-    "control_msgs/JointTrajectoryControllerState",
-)
 _JOINT_REFERENCES = "/joint_references"
 """The topic of joint states that algid writes what the joints are to follow to."""
 _REFERENCES = ("reference.positions", "desired.positions", "position")
@@ -43,32 +35,12 @@ _STAMPS = ("header.stamp", "stamp", "timestamp", "time", "header.timestamp")
 _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "nsecs"))
 
 
-class NothingFoundError(LogError):
-    """There is no such topic or message; damage to the file may be why.
-
-    `lacking` is the text without the file's name.
-    """
-
-    def __init__(self, path: str, lacking: str) -> None:
-        super().__init__(f"{path}: {lacking}")
-        self.lacking = lacking
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The topics to read, the main one first, where each channel comes from, and what was decided.
-
-    `others` has by joint the path of its position, of those that the main topic names and nobody
-    asked for. `said` is what definitions, schemas and metadata state in words.
-    """
-
-    topics: tuple[Topic, ...]
-    mapping: dict[str, str]
-    reading: Reading
-    notices: tuple[Notice, ...]
-    units: dict[str, str]
-    others: dict[str, str]
-    said: tuple[str, ...]
+def _nothing(file: MessageFile, lacking: str) -> str:
+    """That a file lacks what is looked for; damage to it may be why."""
+    if places := list(dict.fromkeys(file.damage)):
+        where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+        lacking = f"the file is damaged ({where}); copy it again; in what is left: {lacking}"
+    return f"{file.path}: {lacking}"
 
 
 @dataclass(frozen=True)
@@ -87,138 +59,69 @@ class JointTopic:
     beside: tuple[str, ...] = ()
 
 
-def plan(file: MessageFile, profile: Profile) -> Plan:
-    """What to read out of a file.
-
-    Raises
-    ------
-    LogError
-        If no topic holds the joints, several do, or a message cannot be read.
-    """
-    given: dict[str, tuple[str | None, str]] = {}
-    for channel in profile.channels:
-        topic, path = profile.place(channel)
-        if path:
-            given[channel] = (topic, path)
-    found = None
-    if not set(profile.needed) <= given.keys():
-        found = find_joint_topic(file, profile)
-    sources: dict[str, tuple[str, str]] = {}
-    units: dict[str, str] = {}
-    reading, notices = Reading(joints_told="profile"), list[Notice]()
-    if found is not None:
-        for channel, path in found.paths.items():
-            if channel in profile.channels:
-                sources[channel] = (found.topic, path)
-        reading, order = reading_of(found.joints, profile)
-        notices += order if found.named else ()
-        if found.beside:
-            numbers = {"topic": found.topic, "others": ", ".join(found.beside[:4])}
-            other = Remedy({"topic": found.beside[0]}, "for the other")
-            choice = {"case": "topic"} | numbers
-            notices.append(Notice("JOINT_ORDER", numbers=choice, remedies=(other,)))
-        if found.named and reading.joints and given.keys().isdisjoint(REFERENCES):
-            sources |= _references(file, reading.joints)
-        units = {name: unit for name, unit in found.units.items() if name not in given}
-    for channel, (own, path) in given.items():
-        place = own or (found.topic if found else None)
-        if place is None:
+def topic_of(
+    file: MessageFile,
+    name: str,
+    paths: dict[str, str],
+    layouts: Sequence[MessageLayout],
+    profile: Profile,
+) -> Topic:
+    """A topic to read, of whose first messages one has each of the `paths`."""
+    if not layouts:
+        each = Remedy({"tau1.topic": None}, "for one channel")
+        lacking = f"there is no message on topic {name!r}; found {file.listed()}; name another"
+        raise LogError(_nothing(file, f"{lacking}: {TOPIC}; {each}"))
+    for channel, path in paths.items():
+        if not any(layout.find(path) for layout in layouts):
+            known = next((list(one.numbers)[:12] for one in layouts if one.numbers), ["nothing"])
             raise LogError(
-                f"{file.path}: {channel} is taken from {path!r} without a topic: {_TOPIC}"
+                f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found "
+                f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
             )
-        sources[channel] = (place, path)
-    for pair in (VELOCITIES, REFERENCES):  # both joints', or none
-        if not sources.keys() >= set(pair) or (
-            pair == VELOCITIES and profile.velocity == "observer"
-        ):
-            for name in pair:
-                sources.pop(name, None)
-    homes = tuple(dict.fromkeys(topic for topic, _ in sources.values()))
-    topics = tuple(_topic(file, home, sources, profile) for home in homes)
-    mapping = {channel: f"{topic}: {path}" for channel, (topic, path) in sources.items()}
-    main, clock = topics[0], "log"
-    mapping["t"] = "log time"
-    if profile.clock != "log" and main.stamp is not None:
-        mapping["t"], clock = f"{main.name}: {main.stamp[0].rpartition('.')[0]}", "header"
-    said: list[str] = []
-    for one in topics:
-        stated, lines = _stated(file, one)
-        units = stated | units
-        said += lines
-    others = found.others if found is not None and found.topic == main.name else {}
-    reading = replace(reading, topics=homes, clock=clock)
-    return Plan(topics, mapping, reading, tuple(notices), units, others, tuple(said))
+    stamp = next(filter(None, map(_stamp_in, layouts)), None)
+    if profile.clock == "header" and stamp is None:
+        log_clock = Remedy({"clock": "log"})
+        raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
+    return Topic(name, paths, stamp, profile.clock)
 
 
-def _stated(file: MessageFile, topic: Topic) -> tuple[dict[str, str], list[str]]:
+def stated_of(
+    file: MessageFile, topic: str, paths: dict[str, str], layouts: Sequence[MessageLayout]
+) -> tuple[dict[str, str], list[str]]:
     """By channel the unit that a topic's schema or metadata state; what else is stated, as text."""
-    channel = file.channels[min(channels_by_topic(file)[topic.name])]
+    channel = file.channel(topic)
     text = channel.definition.decode("utf-8", errors="replace")
     metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
     if channel.encoding == "json":
         units, descriptions = in_json_schema(text)
         metadata |= units
         lines += descriptions
-        for layout in islice(_layouts(file, topic.name), 1):
-            lines += [f"{path}: {label}" for path, label in layout.labels.items() if "unit" in path]
+        labels = layouts[0].labels.items()
+        lines += [f"{path}: {label}" for path, label in labels if "unit" in path]
     elif channel.definition_encoding.startswith("ros"):
         lines += [line for line in text.splitlines() if "#" in line or "//" in line]
-    fields = {name: path.partition("[")[0] for name, path in topic.paths.items()}
+    fields = {name: path.partition("[")[0] for name, path in paths.items()}
     by_field = units_in(metadata, list(dict.fromkeys(fields.values())))
     named = {name: by_field[path] for name, path in fields.items() if path in by_field}
     return {name: unit_of(unit) or unit for name, unit in named.items()}, lines
 
 
-def _references(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[str, str]]:
+def references_of(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[str | None, str]]:
     """By reference channel topic and path of what joints follow, if one topic alone tells it."""
-    by_topic = {}
-    for topic, numbers in channels_by_topic(file).items():
-        kind = file.channels[min(numbers)].type
-        if kind not in _TRAJECTORY_STATE and (
-            topic != _JOINT_REFERENCES or kind not in _JOINT_STATE
-        ):
-            continue
-        try:
-            layout = next(_layouts(file, topic), MessageLayout())
-        except LogError:  # the log is read without it
-            continue
-        names = names_in(layout)
-        for positions in _REFERENCES if set(joints) <= set(names) else ():
-            paths = [f"{positions}[{names.index(joint)}]" for joint in joints]
-            if layout.has(paths):
-                by_topic[topic] = {
-                    name: (topic, path) for name, path in zip(REFERENCES, paths, strict=True)
-                }
-                break
-    return by_topic.popitem()[1] if len(by_topic) == 1 else {}
-
-
-def _topic(
-    file: MessageFile, name: str, sources: dict[str, tuple[str, str]], profile: Profile
-) -> Topic:
-    """A topic by its name, with its own `sources`."""
-    paths = {channel: path for channel, (home, path) in sources.items() if home == name}
-    missing, known, stamp = dict(paths), list[str](), None
-    for layout in _layouts(file, name):
-        missing = {channel: path for channel, path in missing.items() if not layout.find(path)}
-        known = known or list(layout.numbers)[:12] or ["nothing"]
-        stamp = stamp or _stamp_in(layout)
-    if not known:
-        each = Remedy({"tau1.topic": None}, "for one channel")
-        raise NothingFoundError(
-            file.path,
-            f"there is no message on topic {name!r}; found {listed(file)}; name another: {_TOPIC}; "
-            f"{each}",
-        )
-    for channel, path in missing.items():
-        raise LogError(
-            f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found "
-            f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
-        )
-    if profile.clock == "header" and stamp is None:
-        log_clock = Remedy({"clock": "log"})
-        raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
-    return Topic(name, paths, stamp, profile.clock)
+    found: list[list[tuple[str | None, str]]] = []
+    for topic in file.topics:
+        kind = file.channel(topic).type
+        if topic == _JOINT_REFERENCES or kind.endswith("/JointTrajectoryControllerState"):
+            layout = MessageLayout()
+            with suppress(LogError):  # the log is read without it
+                layout = next(layouts_of(file, topic), layout)
+            names = names_in(layout)
+            for positions in _REFERENCES:
+                paths = [f"{positions}[{names.index(one)}]" for one in joints if one in names]
+                if len(paths) == len(joints) and layout.has(paths):
+                    found.append([(topic, path) for path in paths])
+                    break
+    return dict(zip(REFERENCES, found[0], strict=True)) if len(found) == 1 else {}
 
 
 def find_joint_topic(file: MessageFile, profile: Profile) -> JointTopic | None:
@@ -227,55 +130,50 @@ def find_joint_topic(file: MessageFile, profile: Profile) -> JointTopic | None:
     Raises
     ------
     LogError
-        If several hold two joints, or one holds more and none was selected.
-    NothingFoundError
-        If none holds them.
+        If none holds two joints, several do, or one holds more and none was selected.
     """
     fitting: dict[str, JointTopic] = {}
-    lacking: dict[str, None] = {}
-    crowded, refused = list[LogError](), list[LogError]()
+    crowded, refused, lacking = list[str](), list[str](), list[str]()
     needed = [what for what in _QUANTITIES if f"{what}1" in profile.needed]
     words = [_QUANTITIES[what] for what in needed]
-    for name, numbers in channels_by_topic(file).items():
-        channel = file.channels[min(numbers)]
-        known = channel.type in _JOINT_STATE + _DYNAMIC_JOINT_STATE or channel.encoding == "json"
-        known = known or any(word in channel.definition for word in _TELLING)
+    for name in file.topics:
+        channel = file.channel(name)
+        known = channel.type.endswith(("/JointState", "/DynamicJointState"))
+        known |= channel.encoding == "json" or any(map(channel.definition.__contains__, _TELLING))
         if name != profile.topic and (profile.topic or not known):
             continue
-        there: dict[str, None] = {}
+        most, named = list[str](), MessageLayout()
         try:
-            for layout in _layouts(file, name):
-                names = names_in(layout)
+            for layout in layouts_of(file, name):
                 joints = _joints_in(layout, needed)
                 if found := _joint_topic_in(name, layout, joints, profile):
                     fitting[name] = found
                     break
-                if twice := repeated(names):
-                    text = f"messages on {name!r} name the joint {twice[0]!r} twice"
-                    by_place = Remedy(
-                        {"theta1.source": "position[0]"}, "name the fields by their places"
-                    )
-                    refused.append(LogError(f"{file.path}: {text}; {by_place} …"))
-                if len(joints) > 2 or (joints and profile.joints):
-                    there |= dict.fromkeys(joints)
-                elif len(joints) < 2 and names:
-                    empty = [word for word in words if not layout.find(f"{word}[{len(names) - 1}]")]
-                    stay = f", whose {' and '.join(empty)} stay empty" if empty else ""
-                    lacking[f"{name!r} with the joints {', '.join(names[:8])}{stay}"] = None
+                most = max(most, joints, key=len)
+                named = layout if names_in(layout) else named
         except LogError as error:  # another topic may still hold the joints
-            refused.append(error)
-        if there and name not in fitting:
-            text = f"{name!r} has {counted(len(there), 'joint')} ({', '.join(list(there)[:12])})"
-            crowded.append(LogError(f"{file.path}: {text}; choose: {_JOINTS}"))
-    if _USUAL in fitting:
-        found = fitting.pop(_USUAL)
+            refused.append(str(error))
+        names = names_in(named)
+        if name in fitting:
+            continue
+        if twice := repeated(names):
+            by_place = Remedy({"theta1.source": "position[0]"}, "name the fields by their places")
+            text = f"messages on {name!r} name the joint {twice[0]!r} twice; {by_place} …"
+            refused.append(f"{file.path}: {text}")
+        if len(most) > 2 or (most and profile.joints):
+            text = f"{name!r} has {counted(len(most), 'joint')} ({', '.join(most[:12])})"
+            crowded.append(f"{file.path}: {text}; choose: {Remedy({'joints': None})}")
+        elif names:
+            empty = [word for word in words if not named.find(f"{word}[{len(names) - 1}]")]
+            stay = f", whose {' and '.join(empty)} stay empty" if empty else ""
+            lacking.append(f"{name!r} with the joints {', '.join(names[:8])}{stay}")
+    if _USUAL in fitting or len(fitting) == 1:
+        found = fitting.pop(_USUAL, None) or fitting.popitem()[1]
         return replace(found, beside=tuple(fitting))
-    if len(fitting) == 1:
-        return fitting.popitem()[1]
     if fitting:
-        raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose: {_TOPIC}")
+        raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose: {TOPIC}")
     for refusal in crowded + refused:
-        raise refusal
+        raise LogError(refusal)
     if all(profile.channel(name).source for name in profile.needed):
         return None
     wanted = f"{' and '.join(f'{word}s' for word in words)} of two joints"
@@ -283,11 +181,9 @@ def find_joint_topic(file: MessageFile, profile: Profile) -> JointTopic | None:
         wanted = f"the joints {profile.joints}"
     both = Remedy({"topic": None, "joints": None})
     each = Remedy({"tau1.topic": None, "tau1.source": None}, "or channel by channel")
-    held = "; ".join(list(lacking)[:4]) or listed(file)
-    raise NothingFoundError(
-        file.path,
-        f"no topic holds {wanted}; found {held}; name topics and fields: {both}; {each}",
-    )
+    held = "; ".join(lacking[:4]) or file.listed()
+    text = f"no topic holds {wanted}; found {held}; name topics and fields: {both}; {each}"
+    raise LogError(_nothing(file, text))
 
 
 def _joint_topic_in(
@@ -297,14 +193,10 @@ def _joint_topic_in(
 
     None if one is missing, or if there are more than two and none was selected.
     """
-    chosen = None
-    if profile.joints is not None:
-        if set(profile.joints) <= set(joints):
-            chosen = profile.joints
-    elif len(joints) == 2:
+    names, chosen = names_in(layout), profile.joints
+    if chosen is None and len(joints) == 2:
         chosen, _ = along_the_arm(joints)
-    names = names_in(layout)
-    if chosen:
+    if chosen and set(chosen) <= set(joints):
         paths, others = {}, {}
         for quantity in _QUANTITIES:
             for number, joint in enumerate(chosen, start=1):
@@ -322,10 +214,8 @@ def _joint_topic_in(
         choice = choose(_paths(layout, ()), profile.joints, needed=profile.needed)
     except LookupError:
         return None
-    paths = {}
-    for name, path in choice.columns.items():
-        if name != "t" and layout.find(path):
-            paths[name] = path
+    columns = choice.columns.items()
+    paths = {name: path for name, path in columns if name != "t" and layout.find(path)}
     if not set(profile.needed) <= paths.keys():
         return None
     units = units_in_names(paths, {})
@@ -355,7 +245,7 @@ def _path(layout: MessageLayout, joint: str, quantity: str) -> str | None:
             there = stem in layout.numbers or f"{stem}[0]" in layout.numbers
             if there and stem not in COMMANDED | CURRENTS:
                 paths.append(f"{stem}[{joint}]")
-    return next((path for path in paths if layout.find(path) is not None), None)
+    return next(filter(layout.find, paths), None)
 
 
 def _stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
@@ -370,10 +260,9 @@ def _stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
 
 def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Joints in a channel's first message, and its numbers' paths as a profile writes them."""
-    try:
-        layout = next(_layouts(file, file.channels[number].topic), MessageLayout())
-    except LogError:
-        return (), ()
+    layout = MessageLayout()
+    with suppress(LogError):
+        layout = next(layouts_of(file, file.channels[number].topic), layout)
     joints = names_in(layout)
     return joints, tuple(_paths(layout, joints))
 
@@ -381,20 +270,17 @@ def fields_shown(file: MessageFile, number: int) -> tuple[tuple[str, ...], tuple
 def _paths(layout: MessageLayout, joints: Sequence[str]) -> Iterator[str]:
     """The paths of a message's numbers: of a field one, none, or one a place."""
     for name, numbers in layout.numbers.items():
-        count = numbers.count
-        if count == 0:
-            yield f"{name} (empty)"
-        elif count == 1:
+        if numbers.count == 1:
             yield name
-        elif count == len(joints):
-            for joint in joints:
-                yield f"{name}[{joint}]"
-        else:
-            for place in range(min(count, LIMITS.joint_cells)):
-                yield f"{name}[{place}]"
+            continue
+        if not numbers.count:
+            yield f"{name} (empty)"
+        places = range(min(numbers.count, LIMITS.joint_cells))
+        for place in joints if numbers.count == len(joints) else places:
+            yield f"{name}[{place}]"
 
 
-def _layouts(file: MessageFile, topic: str) -> Iterator[MessageLayout]:
+def layouts_of(file: MessageFile, topic: str) -> Iterator[MessageLayout]:
     """Layouts of the topic's first messages that fit their schema.
 
     Raises
@@ -402,27 +288,25 @@ def _layouts(file: MessageFile, topic: str) -> Iterator[MessageLayout]:
     LogError
         If none of them does.
     """
-    channels = channels_by_topic(file).get(topic)
-    if not channels:
+    if topic not in file.topics:
         return
-    codec = codec_for(file.path, file.channels[min(channels)])
-    for batch in file.batches(channels):
-        messages = batch.messages
-        if messages is None:
-            file.damage.append(batch.reason)
-        if messages is None or not len(messages):
+    codec = codec_for(file.path, file.channel(topic))
+    for messages in file.batches(file.topics[topic]):
+        if isinstance(messages, str):
+            file.damage.append(messages)
             continue
-        fitting, misfit = 0, None
         records = codec.records(messages.take(slice(_SAMPLES)))
+        misfits = []
         for start, size in zip(records.starts, records.sizes, strict=True):
             end = start + min(size, LIMITS.message_bytes)
             try:
                 layout = codec.parse(records.content[start:end].tobytes())
             except MisfitError as error:
-                misfit = error
+                misfits.append(error)
                 continue
-            fitting += 1
             yield layout
-        if misfit and not fitting:
-            raise LogError(f"{file.path}: topic {topic!r}: {misfit}; it cannot be read") from misfit
-        return
+        if misfits and len(misfits) == len(records):
+            why = f"{misfits[-1]}; it cannot be read"
+            raise LogError(f"{file.path}: topic {topic!r}: {why}") from misfits[-1]
+        if len(records):
+            return

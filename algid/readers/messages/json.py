@@ -11,6 +11,7 @@ from itertools import count
 from typing import Any
 
 from algid.base.limits import LIMITS
+from algid.base.words import repeated
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 from algid.readers.messages.message_file import Messages
 from algid.readers.stated import BAD, GOOD, GROUPS
@@ -94,11 +95,10 @@ class JsonRecords:
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object whose names stand there once: of two alike the parser takes the last."""
-    found: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in found:
-            raise MisfitError(f"a JSON message that names {name[:80]!r} twice")
-        found[name] = value
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        (name, *_) = repeated(name for name, _ in pairs)
+        raise MisfitError(f"a JSON message that names {name[:80]!r} twice")
     return found
 
 

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 from algid.base.errors import LogError
-from algid.log import Origin
-from algid.notices import Notice
+from algid.log import Origin, Reading
+from algid.notices import Notice, Remedy
 from algid.profile import Profile
 from algid.readers.clock import Series, aligned, in_order, whole_topic
-from algid.readers.joints import moving_joints
+from algid.readers.joints import moving_joints, reading_of
 from algid.readers.log_reader import TableReader, make_reader
-from algid.readers.messages.joint_topic import NothingFoundError, plan
+from algid.readers.messages.joint_topic import (
+    TOPIC,
+    find_joint_topic,
+    layouts_of,
+    references_of,
+    stated_of,
+    topic_of,
+)
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Topic
-from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable
+from algid.readers.table import BLOCK_ROWS, REFERENCES, VELOCITIES, SampleTable
 
 _LOOKED = 1 << 14
 """Messages whose other joints are looked at."""
@@ -40,51 +48,90 @@ def open_messages(log: MessageLog, profile: Profile) -> TableReader:
     Raises
     ------
     LogError
-        If a message is encoded in an unknown way, or the file cannot be read or is damaged and
-        holds no joints.
-    NothingFoundError
-        If no topic of a sound file holds the joints.
+        If no topic holds the joints, several do, or a message cannot be read.
     """
-    name, file = log.path, log.files[0]()
-    try:
-        wanted = plan(file, profile)
-    except NothingFoundError as error:
-        if not file.damage:
-            raise
-        places = list(dict.fromkeys(file.damage))
-        where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
-        text = f"the file is damaged ({where}); copy it again; in what is left: {error.lacking}"
-        raise LogError(f"{file.path}: {text}") from error
-    main = wanted.topics[0]
+    file = log.files[0]()
+    given: dict[str, tuple[str | None, str]] = {}
+    for name in profile.channels:
+        topic, path = profile.place(name)
+        if path:
+            given[name] = (topic, path)
+    # where each channel comes from: the topic with joint states, then what the profile names
+    sources: dict[str, tuple[str | None, str]] = {}
+    units: dict[str, str] = {}
+    reading, notices, found = Reading(joints_told="profile"), list[Notice](), None
+    if not set(profile.needed) <= given.keys() and (found := find_joint_topic(file, profile)):
+        for name, path in found.paths.items():
+            if name in profile.channels:
+                sources[name] = (found.topic, path)
+        units = {name: unit for name, unit in found.units.items() if name not in given}
+        reading, order = reading_of(found.joints, profile)
+        if found.named:
+            notices += order
+            if reading.joints and given.keys().isdisjoint(REFERENCES):
+                sources |= references_of(file, reading.joints)
+        if found.beside:
+            numbers = {"case": "topic", "topic": found.topic, "others": ", ".join(found.beside[:4])}
+            other = Remedy({"topic": found.beside[0]}, "for the other")
+            notices.append(Notice("JOINT_ORDER", numbers=numbers, remedies=(other,)))
+    sources |= given
+    for pair in (VELOCITIES, REFERENCES):  # both joints', or none
+        unwanted = pair == VELOCITIES and profile.velocity == "observer"
+        if unwanted or not sources.keys() >= set(pair):
+            sources = {name: place for name, place in sources.items() if name not in pair}
+    homes: dict[str, dict[str, str]] = {}  # paths by topic, the main one first
+    mapping = {}
+    for name, (own, path) in sources.items():
+        home = own or (found.topic if found else None)
+        if home is None:
+            raise LogError(f"{file.path}: {name} is taken from {path!r} without a topic: {TOPIC}")
+        homes.setdefault(home, {})[name] = path
+        mapping[name] = f"{home}: {path}"
+    topics, said = list[Topic](), list[str]()
+    for home, paths in homes.items():
+        layouts = list(layouts_of(file, home))
+        topics.append(topic_of(file, home, paths, layouts, profile))
+        stated, lines = stated_of(file, home, paths, layouts)
+        units = stated | units
+        said += lines
+    # the main topic has the clock, and the joints that are not read
+    main, clock = topics[0], "log"
+    mapping["t"] = "log time"
+    if profile.clock != "log" and main.stamp is not None:
+        mapping["t"], clock = f"{main.name}: {main.stamp[0].rpartition('.')[0]}", "header"
+    others = found.others if found is not None and found.topic == main.name else {}
+    reading = replace(reading, topics=tuple(homes), clock=clock)
     beside = moving_joints(
-        wanted.others, lambda paths: Topic(main.name, paths, None, "log").tables(file, _LOOKED)
+        others, lambda paths: Topic(main.name, paths, None, "log").tables(file, _LOOKED)
     )
-    origin = Origin(name, log.kind, wanted.mapping, file.truth, wanted.reading)
+    origin = Origin(log.path, log.kind, mapping, file.truth, reading)
+
+    told = (*log.notices, *notices, *beside)
+    tables = partial(_tables, log, topics)
+    return make_reader(origin, tables, profile, units, told, file.count(main.name), said)
+
+
+def _tables(log: MessageLog, topics: Sequence[Topic], rows: int) -> Iterator[SampleTable]:
+    """The samples of the first topic, each with what the others have at its time."""
 
     def read(topic: Topic, rows: int) -> Iterator[SampleTable]:
         for opened in log.files:
             yield from topic.tables(opened(), rows)
 
-    def tables(rows: int) -> Iterator[SampleTable]:
-        samples = read(main, rows)
-        if len(wanted.topics) == 1:
-            return samples
-        needed: list[Series] = []
-        followed: list[Series] = []
-        left_out: list[Notice] = []
-        for one in wanted.topics[1:]:
-            only_followed = set(one.paths) <= set(REFERENCES)
-            try:
-                series = whole_topic(name, one.name, one.paths, read(one, BLOCK_ROWS))
-                (followed if only_followed else needed).append(series)
-            except LogError as error:
-                if not only_followed:
-                    raise
-                why = str(error).removeprefix(f"{name}: ")
-                numbers = {"case": "reference", "topic": one.name, "why": why}
-                left_out.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
-        return aligned(in_order(name, samples), needed, followed, left_out)
-
-    notices = (*log.notices, *wanted.notices, *beside)
-    rows = main.count(file)
-    return make_reader(origin, tables, profile, wanted.units, notices, rows, wanted.said)
+    samples = read(topics[0], rows)
+    if len(topics) == 1:
+        return samples
+    needed, followed = list[Series](), list[Series]()
+    left_out = list[Notice]()
+    for one in topics[1:]:
+        only_followed = set(one.paths) <= set(REFERENCES)
+        try:
+            series = whole_topic(log.path, one.name, one.paths, read(one, BLOCK_ROWS))
+            (followed if only_followed else needed).append(series)
+        except LogError as error:
+            if not only_followed:
+                raise
+            why = str(error).removeprefix(f"{log.path}: ")
+            numbers = {"case": "reference", "topic": one.name, "why": why}
+            left_out.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
+    return aligned(in_order(log.path, samples), needed, followed, left_out)
