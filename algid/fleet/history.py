@@ -31,7 +31,6 @@ def _usual() -> Iterator[str]:
 
 PARAMETERS = tuple(_usual())
 """Those that most robots have: others would be tested on few logs."""
-MANY, FEW = 4, 2  # robots with so few logs each, which may be sessions of one
 FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others
 
 
@@ -123,22 +122,6 @@ class History:
             {"case": "alone", "count": alone, "least": FEWEST_PEERS},
         ]
         return [Notice("NOT_TESTED", numbers=one) for one in reasons if one["count"]]
-
-    @property
-    def scattered(self) -> Notice | None:
-        """That folders may have made many robots of one; None otherwise.
-
-        Most robots have a log or two, and no two were logged in the same time.
-        """
-        dated = self.roster.drop_nulls("first").sort("first")
-        few = int((self.roster["logs"] <= FEW).sum())
-        apart = (dated["first"].shift(-1) > dated["last"]).head(-1).all() if len(dated) else False
-        if self.robots < MANY or 2 * few <= self.robots or not (apart or not len(dated)):
-            return None
-        return Notice(
-            "NOT_TESTED",
-            numbers={"case": "sessions", "few": few, "robots": self.robots, "logs": FEW},
-        )
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""

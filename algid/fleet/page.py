@@ -96,8 +96,6 @@ def verdict(history: History) -> Verdict:
         names.append(f"{visible(row['job'])} ({row['parameter']}, {sigmas} σ)")
     if names:
         reasons.append(_named("log", names))
-    if history.scattered is not None:
-        reasons.append(history.scattered)
     fleet = f"{counted(history.robots, 'robot')}, {counted(history.logs, 'log')}"
     return graded(f"{fleet}: {_counts(found) or 'no findings'}", reasons + history.untested)
 

@@ -163,14 +163,7 @@ def test_neither_a_drift_nor_a_wild_log_is_a_change(tmp_path: Path) -> None:
     assert wild.findings.select("kind", "job").rows() == [("outlier", "j200")]
 
 
-def test_many_robots_of_a_log_each_may_be_one_in_many_folders(tmp_path: Path) -> None:
-    one = _jobs(1, 15, seed=24).with_columns(robot=pl.col("job"))
-    scattered = _history(one, tmp_path).scattered
-    assert scattered is not None
-    assert scattered.numbers == {"case": "sessions", "few": 15, "robots": 15, "logs": 2}
-    assert "name it in a manifest" in " ".join(
-        reason.text for reason in verdict(_history(one, tmp_path)).reasons
-    )
-    together = one.with_columns(time=pl.lit(START))  # robots of one moment are several
-    assert _history(together, tmp_path).scattered is None
-    assert _history(_jobs(3, 30, seed=24), tmp_path).scattered is None
+def test_robots_of_a_log_each_may_be_sessions_of_one(tmp_path: Path) -> None:
+    one = _history(_jobs(1, 15, seed=24).with_columns(robot=pl.col("job")), tmp_path)
+    (alone,) = [reason for reason in verdict(one).reasons if reason.key == "NOT_TESTED:alone"]
+    assert alone.numbers["count"] == 15
