@@ -92,13 +92,10 @@ def bound_table(design: Design) -> Table:
     )
     return Table(
         "Predicted standard deviations",
-        {
-            "Parameter": "name", "Believed": "number", "Predicted ±": "number", "Unit": "text",
-            "± %": "number", "Requested": "text", "Worst arm ± %": "number",
-        },
+        "Parameter | Believed | Predicted ± | Unit | ± % | Requested | Worst arm ± %",
         tuple(rows),
         note,
-    )  # fmt: skip
+    )
 
 
 def limit_table(design: Design) -> Table:
@@ -119,13 +116,10 @@ def limit_table(design: Design) -> Table:
     )
     return Table(
         "Active limits",
-        {
-            "Limit": "name", "Used": "number", "Allowed": "number", "%": "number",
-            "Active": "text", "Unit": "text", "Tightest": "text",
-        },
+        "Limit | Used | Allowed | % | Active | Unit | Tightest",
         tuple(rows),
         note,
-    )  # fmt: skip
+    )
 
 
 _WIDER = tuple(Remedy({name: None}, "widen") for name in ("range", "speed", "torque", "runs"))

@@ -129,13 +129,10 @@ def robot_table(history: History) -> Table:
         rows.append((*latest, found, _day(row["first"]), _day(row["last"])))
     return Table(
         "Robots",
-        {
-            "Latest log": "name", "Robot": "text", "Logs": "number", "Findings": "text",
-            "From": "text", "To": "text",
-        },
+        "Latest log | Robot | Logs | Findings | From | To",
         tuple(rows),
         _shown(history.robots, "robot"),
-    ).without_empty()  # fmt: skip
+    ).without_empty()
 
 
 def finding_table(history: History) -> Table:
@@ -162,13 +159,10 @@ def finding_table(history: History) -> Table:
     )
     return Table(
         "Findings",
-        {
-            "Log": "name", "Robot": "text", "Parameter": "text", "What": "text", "By": "text",
-            "When": "text",
-        },
+        "Log | Robot | Parameter | What | By | When",
         tuple(rows),
         f"{note} {_shown(history.findings.height, 'finding')}".rstrip(),
-    )  # fmt: skip
+    )
 
 
 def _shown(count: int, things: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from algid.base.text import ABSENT, file_name, significant, visible
 from algid.estimators.rollout import HORIZONS, RolloutScore
 from algid.identification.validate import Simulation
-from algid.report.document import Kind, Table
+from algid.report.document import Table
 from algid.report.tables import by_state
 from algid.results import TorquePrediction
 
@@ -141,9 +141,7 @@ class Validated:
 def _table(
     title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]], note: str = ""
 ) -> Table:
-    columns: dict[str, Kind] = dict.fromkeys(headings, "number")
-    columns[headings[0]] = "name"
-    return Table(title, columns, tuple(rows), note)
+    return Table(title, " | ".join(headings), tuple(rows), note)
 
 
 def _as_json(one: TorquePrediction | None) -> dict[str, Any] | None:

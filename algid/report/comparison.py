@@ -101,20 +101,17 @@ class Comparison:
         return (
             Table(
                 "Estimates side by side",
-                {
-                    "Parameter": "name", "Result": "text", "Estimate": "number", "Unit": "text",
-                    "Status": "status", "Δ/σ": "number", "Δ %": "number",
-                },
+                "Parameter | Result | Estimate | Unit | Status | Δ/σ | Δ %",
                 tuple(estimates),
                 note,
             ),
             Table(
                 "Settings that differ",
-                {"Setting": "name", "Result": "text", "Value": "text"},
+                "Setting | Result | Value",
                 tuple(settings),
                 "" if settings else same,
             ),
-        )  # fmt: skip
+        )
 
     def as_json(self) -> str:
         """Estimates, 95 % intervals and distances in σ as the text of a JSON file."""

@@ -6,6 +6,7 @@ each. Terminal, Markdown and page set it, each in one way for all of them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -16,6 +17,8 @@ from algid.report.arm import ArmDrawing
 from algid.report.plot import Plot
 
 Kind = Literal["name", "number", "text", "status"]
+_SIZE = r"\d[\d.,]*(?:e[+-]?\d+)?"
+NUMBER = re.compile(rf"[+\-−<]?{_SIZE}(?: ± (?:{_SIZE}|{ABSENT}))?")
 
 
 @dataclass(frozen=True)
@@ -25,13 +28,13 @@ class Table:
     Parameters
     ----------
     title, rows
-    columns : kind by heading; a terminal without room for all leaves out the last ones
+    columns : headings with " | " between; a terminal without room for all leaves out the last ones
     note : one line below it
     links : where the names of rows lead, which only a page shows
     """
 
     title: str
-    columns: Mapping[str, Kind]
+    columns: str
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     links: Mapping[str, str] | None = None
@@ -40,10 +43,20 @@ class Table:
         """The table less the columns that hold nothing."""
         if not self.rows:
             return self
-        pairs = zip(self.columns.items(), zip(*self.rows, strict=True), strict=True)
-        full = [(column, cells) for column, cells in pairs if set(cells) - {ABSENT, ""}]
-        columns, cells = zip(*full, strict=True)
-        return replace(self, columns=dict(columns), rows=tuple(zip(*cells, strict=True)))
+        pairs = zip(self.columns.split(" | "), zip(*self.rows, strict=True), strict=True)
+        full = [(heading, cells) for heading, cells in pairs if set(cells) - {ABSENT, ""}]
+        headings, cells = zip(*full, strict=True)
+        return replace(self, columns=" | ".join(headings), rows=tuple(zip(*cells, strict=True)))
+
+    @property
+    def heads(self) -> list[tuple[str, Kind]]:
+        """Headings and kinds: the row's name, a status, a number where all cells are, or text."""
+        heads = list[tuple[str, Kind]]()
+        for place, heading in enumerate(self.columns.split(" | ")):
+            cells = {row[place] for row in self.rows} - {ABSENT, ""}
+            kind: Kind = "number" if all(map(NUMBER.fullmatch, cells)) else "text"
+            heads.append((heading, "status" if heading == "Status" else kind if place else "name"))
+        return heads
 
 
 Content = Table | Plot | str | tuple[str, ...]

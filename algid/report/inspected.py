@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from algid.base.text import visible
 from algid.base.words import counted
 from algid.inspection.report import Inspection
-from algid.report.document import Kind, Table
+from algid.report.document import Table
 
 MOST_SHOWN = 100
 """Entries of a log that are listed."""
@@ -23,7 +23,7 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
     yield from _held(found)
     if found.mapping:
         rows = tuple((name, visible(source)) for name, source in sorted(found.mapping.items()))
-        yield Table("Taken as", {"algid": "name", "log": "text"}, rows)
+        yield Table("Taken as", "algid | log", rows)
     yield from _figures(found)
     for notices in (found.notices, found.findings):
         for one in notices:
@@ -37,9 +37,7 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
 
 def _held(found: Inspection) -> Iterator[Table | str]:
     """Columns or topics, then what the messages of each topic hold."""
-    columns: dict[str, Kind] = {
-        "Name": "name", "Type": "text", "Samples": "number", "Hz": "number",
-    }  # fmt: skip
+    columns = "Name | Type | Samples | Hz"
     rows, shown = [], found.entries[:MOST_SHOWN]
     for one in shown:
         count = "" if one.count is None else str(one.count)
@@ -67,10 +65,7 @@ def _figures(found: Inspection) -> Iterator[Table | str]:
             f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}{longest}"
         )
     if found.signals:
-        columns: dict[str, Kind] = {
-            "Channel": "name", "Low": "number", "High": "number", "Noise": "number",
-            "Step": "number", "Saturated, %": "number",
-        }  # fmt: skip
+        columns = "Channel | Low | High | Noise | Step | Saturated, %"
         rows = []
         for name, one in found.signals.items():
             values = (one.low, one.high, one.noise, one.step, 100 * one.saturated)

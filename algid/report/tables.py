@@ -49,13 +49,9 @@ def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Resul
         rows.append((one.name, one.value, one.half, one.unit, *known))
     return Table(
         title,
-        {
-            "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
-            "Status": "status", "±, %": "number", "Truth": "number", "Error, %": "number",
-            "Meaning": "text",
-        },
+        "Parameter | Estimate | ± 95 % | Unit | Status | ±, % | Truth | Error, % | Meaning",
         tuple(rows),
-    ).without_empty()  # fmt: skip
+    ).without_empty()
 
 
 def arm_tables(result: Result) -> tuple[Table, ...]:
@@ -94,15 +90,12 @@ def paper_tables(result: Result) -> tuple[Table, ...]:
         estimates_table("Loaded arm", result.loaded, result),
         Table(
             "Table 4",
-            {
-                "Parameter": "name", "Estimate": "number", "± 95 %": "number", "Unit": "text",
-                "Truth": "number", "Error, %": "number", "Paper, %": "number",
-            },
+            "Parameter | Estimate | ± 95 % | Unit | Truth | Error, % | Paper, %",
             tuple(rows),
             "Names and order of the paper's Table 4; Paper, % is the error it reports. The paper "
             "does not state its torque: that of the synthetic cases was sought for this table.",
         ).without_empty(),
-    )  # fmt: skip
+    )
 
 
 def prediction_table(fit: FitSummary) -> Table:
@@ -120,13 +113,10 @@ def prediction_table(fit: FitSummary) -> Table:
         notes += [f"Filter: {one.filter}.", *([f"RMSE of {where}: {states}."] if states else [])]
     return Table(
         "Torque prediction",
-        {
-            "Torque predicted": "name", "Joint": "text", "RMSE, N m": "number",
-            "RMSE / RMS, %": "number", "R²": "number",
-        },
+        "Torque predicted | Joint | RMSE, N m | RMSE / RMS, % | R²",
         tuple(rows),
         " ".join(dict.fromkeys(notes)),
-    )  # fmt: skip
+    )
 
 
 def by_state(found: TorquePrediction) -> str:
@@ -164,13 +154,10 @@ def terms_table(fit: FitSummary) -> Table:
         )
     return Table(
         "Terms tried",
-        {
-            "Term": "name", "Change of BIC": "number", "Held-out error, %": "number",
-            "Log odds": "number", "Kept": "text", "Why": "text",
-        },
+        "Term | Change of BIC | Held-out error, % | Log odds | Kept | Why",
         tuple(rows),
         note,
-    ).without_empty()  # fmt: skip
+    ).without_empty()
 
 
 def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
@@ -186,24 +173,21 @@ def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
     return (
         Table(
             "Noise of the logs",
-            {"Signal": "name", "Noise, std": "number", "Unit": "text"},
+            "Signal | Noise, std | Unit",
             tuple(noise),
         ),
         Table(
             "Whiteness of the residual",
-            {
-                "Residual": "name", "White": "text", "p-value": "number",
-                "Lag-one correlation": "number",
-            },
+            "Residual | White | p-value | Lag-one correlation",
             tuple(tests),
             f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}.",
         ),
         Table(
             "Physical bounds that are broken",
-            {"Bound": "name", "Value": "number", "Broken by, σ": "number"},
+            "Bound | Value | Broken by, σ",
             tuple(bounds),
         ),
-    )  # fmt: skip
+    )
 
 
 def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
@@ -223,20 +207,17 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
     return (
         Table(
             "Logs",
-            {
-                "Log": "name", "Arm": "text", "Format": "text", "Samples": "number",
-                "Duration, s": "number", "Rate, Hz": "number",
-            },
+            "Log | Arm | Format | Samples | Duration, s | Rate, Hz",
             tuple(rows),
         ),
-        Table("Channels", {"Signal": "name", "Taken from": "text", "Log": "text"}, tuple(channels)),
-    )  # fmt: skip
+        Table("Channels", "Signal | Taken from | Log", tuple(channels)),
+    )
 
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
     """Settings by dotted name."""
     rows = tuple(flat_settings(settings).items())
-    return Table("Settings", {"Setting": "name", "Value": "text"}, rows)
+    return Table("Settings", "Setting | Value", rows)
 
 
 def result_settings(result: Result) -> Table:
@@ -288,4 +269,4 @@ def provenance_table(rows: Sequence[tuple[str, str]], logs: Sequence[LogSummary]
     for log in logs:
         every.append((f"path of {file_name(log.path)}", log.path))
         every.append((f"sha256 of {file_name(log.path)}", log.sha256 or "unknown, fetched in part"))
-    return Table("Provenance", {"What": "name", "Value": "text"}, tuple(every))
+    return Table("Provenance", "What | Value", tuple(every))

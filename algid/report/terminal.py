@@ -63,7 +63,7 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
     styles = {"name": "bold", "number": "", "text": "", "status": "bold yellow"}
     rows = [[visible(cell, LONGEST) for cell in row] for row in table.rows]
     kinds, used = list[Kind](), 0
-    for place, (heading, kind) in enumerate(table.columns.items()):
+    for place, (heading, kind) in enumerate(table.heads):
         # rich itself breaks words and cuts digits before it lets a column go
         cells = [heading, *(row[place] for row in rows)]
         words = cells if kind == "number" else " ".join(cells).split()

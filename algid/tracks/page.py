@@ -116,13 +116,9 @@ def stretch_table(result: TrackResult) -> Table:
         rows.append((str(place), *span, *mass_and_half(one), "kg", status.value, *true))
     return Table(
         "Payload by stretch",
-        {
-            "Stretch": "name", "From, s": "number", "To, s": "number", "Payload": "number",
-            "± 95 %": "number", "Unit": "text", "Status": "status", "Truth": "number",
-            "Error": "number",
-        },
+        "Stretch | From, s | To, s | Payload | ± 95 % | Unit | Status | Truth | Error",
         tuple(rows),
-    ).without_empty()  # fmt: skip
+    ).without_empty()
 
 
 def change_table(result: TrackResult) -> Table:
@@ -138,13 +134,10 @@ def change_table(result: TrackResult) -> Table:
         rows.append((str(place + 1), f"{moment:.3f}", by, "kg", between, formatted(near, ".3f")))
     return Table(
         "Changes",
-        {
-            "Change": "name", "At, s": "number", "By": "number", "Unit": "text",
-            "Between, s": "number", "Truth at, s": "number",
-        },
+        "Change | At, s | By | Unit | Between, s | Truth at, s",
         tuple(rows),
         "Between: the change's 95 % interval.",
-    ).without_empty()  # fmt: skip
+    ).without_empty()
 
 
 def quality_tables(result: TrackResult) -> tuple[Table, ...]:
@@ -156,9 +149,9 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
     )
     holes = [(f"{start:.3f}", f"{end:.3f}") for start, end in result.track.holes.tolist()]
     return (
-        Table("Fit", {"What": "name", "Value": "number"}, fit),
+        Table("Fit", "What | Value", fit),
         *log_tables([result.log]),
-        Table("Times without samples", {"From, s": "name", "To, s": "number"}, tuple(holes)),
+        Table("Times without samples", "From, s | To, s", tuple(holes)),
     )
 
 

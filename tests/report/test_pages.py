@@ -169,10 +169,10 @@ def test_no_status_of_a_failed_result_is_good(folder: Path, result: Result) -> N
 def document(**more: object) -> Document:
     reasons = tuple(Notice("A", f"reason {place}", logs=("a.csv",)) for place in range(5))
     verdict = Verdict("reservations", "k1 is known", reasons, (Notice("B", "a note", note=True),))
-    table = Table("T & Co", {"A": "name", "N": "number"}, (("x|y", "1"),), "a note")
+    table = Table("T & Co", "A | N", (("x|y", "1"),), "a note")
     parts = (
         Section("one", "One", (table,)),
-        Section("none", "None", (Table("empty", {"A": "name"}, ()), ())),
+        Section("none", "None", (Table("empty", "A", ()), ())),
         Section("two", "Two", ("a sentence", ("first", "second"), table), folded=True),
     )
     return Document("Title", verdict, parts, "kicker", "name", "facts", "made", **more)  # type: ignore[arg-type]
