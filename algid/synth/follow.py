@@ -31,8 +31,6 @@ from algid.synth.simulator import Driven, SimulatedMotion, steered
 
 STIFFNESS = 2 * np.pi * 10.0
 _KNOTS = 200.0  # a second, at most: a plan is smooth
-COLUMNS = ("t", "theta1", "theta2", "omega1", "omega2", "tau1", "tau2")
-LOADED_COLUMN = "loaded_tau1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +62,9 @@ def read_plan(path: Path) -> Reference:
         names, *rows = csv.reader(read_text(file).splitlines())
         values = np.array([list(map(float, row)) for row in rows]).reshape(-1, len(names)).T
         column = dict(zip(names, values, strict=True))
+        loaded = "loaded_tau" if "loaded_tau1" in column else "tau"
         signals = []
-        for name in ("theta", "omega", "tau", "loaded_tau"):
-            if name == "loaded_tau" and LOADED_COLUMN not in column:
-                name = "tau"
+        for name in ("theta", "omega", "tau", loaded):
             signals.append(np.stack([column[f"{name}1"], column[f"{name}2"]]))
         t = column["t"] - column["t"][:1]
     except KeyError as error:

@@ -30,22 +30,13 @@ class Acquisition:
 
 
 def excitation(case: Case, name: str) -> Torque:
-    """The torque of that name: the case's own, `wide` (0.3 to 8 Hz) or `none`.
+    """The torque among `EXCITATIONS`: the case's own, `wide` (0.3 to 8 Hz) or `none`.
 
     A case file without a torque is driven by the wide one.
-
-    Raises
-    ------
-    ValueError
-        If there is no excitation of that name.
     """
-    if name == "none":
-        return no_torque
-    if name == "wide" or (name == "case" and case.torque is None):
-        return wide_multi_sine(case.arm)
-    if name == "case" and case.torque is not None:
-        return case.torque
-    raise ValueError(f"excitation must be one of {', '.join(EXCITATIONS)}, got {name}")
+    wide = wide_multi_sine(case.arm)
+    torques: dict[str, Torque] = {"case": case.torque or wide, "wide": wide, "none": no_torque}
+    return torques[name]
 
 
 def held(torque: Torque, rate: float, duration: float, hold: Hold) -> SampledTorque:
