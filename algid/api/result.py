@@ -94,6 +94,13 @@ class Result(results.Result):  # noqa: D101
         panels = intervals(self).figure
         return Figure({"data": panels.data, "layout": panels.layout})
 
+    def __str__(self) -> str:
+        from algid.report.brief import brief
+
+        return "\n".join([self.subject, *brief(self)])
+
+    __repr__ = __str__
+
     def _repr_html_(self) -> str:
         """For notebooks."""
         from algid.report.render import notebook

@@ -131,15 +131,12 @@ def grid_step(values: FloatArray) -> float:
     if levels.size <= 2:
         return 0.0
     steps = np.diff(levels)
-    smallest = float(
-        steps[steps > 1e-9 * max(1e-300, float(np.abs(levels).max()))].min(initial=np.inf)
-    )
-    if not np.isfinite(smallest):
-        return 0.0
+    steps = steps[steps > 1e-9 * np.abs(levels).max()]
+    smallest = steps.min(initial=np.inf)
     ratios = steps / smallest
-    if float(np.abs(ratios - np.rint(ratios)).max()) >= 0.05:
+    if not steps.size or np.abs(ratios - np.rint(ratios)).max() >= 0.05:
         return 0.0
-    return smallest
+    return float(smallest)
 
 
 def saturated_share(values: FloatArray) -> float:

@@ -21,12 +21,10 @@ from pydantic import BaseModel, ConfigDict, ValidationError, computed_field
 from algid.base.errors import ResultError
 from algid.base.files import first_misfit, read_text, whole_file
 from algid.base.significance import NORMAL
-from algid.base.text import visible
 from algid.base.verdict import Verdict
 from algid.log import Reading
 from algid.model import DELAYS
 from algid.notices import Notice, code_of_now, notes_of, warnings_of
-from algid.results.rows import row_of
 
 SCHEMA_VERSION: Literal[4] = 4
 
@@ -446,19 +444,6 @@ class Result(_Model):
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same, whatever else either can do."""
         return isinstance(other, Result) and dict(self) == dict(other)
-
-    def __str__(self) -> str:
-        judged = self.verdict
-        lines = [self.subject, visible(judged.sentence, 1000)]
-        mends = " or ".join(repr(one) for why in judged.reasons[:1] for one in why.remedies)
-        if mends:
-            lines.append(f"mend: {visible(mends, 1000)}")
-        for name, one in self.estimates.items():
-            row = row_of(name, one)
-            lines.append(f"{row.name:<8} {row.with_half:>22} {row.unit:<10} {row.status}")
-        return "\n".join(lines)
-
-    __repr__ = __str__
 
     @property
     def subject(self) -> str:
