@@ -12,7 +12,7 @@ that coloured residuals do not make every term look significant; the Bayesian cr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -315,30 +315,17 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     return float(ratio)
 
 
-@dataclass(frozen=True)
-class TermWorth:
-    """An optional term and the BIC with it less that without it: negative if it earns its place."""
+def term_worths(fit: Fit) -> Iterator[tuple[str, float]]:
+    """ΔBIC of each optional term: n log N − W, Schwarz 1978, W the Wald statistic of n values.
 
-    term: str
-    delta_bic: float
-
-    @property
-    def earned(self) -> bool:
-        """Whether the criterion favours the term."""
-        return self.delta_bic < 0
-
-
-def term_worths(fit: Fit) -> list[TermWorth]:
-    """ΔBIC of each optional term: n log N − W, Schwarz 1978, W the Wald statistic of n values."""
-    worths = []
+    It is the BIC with the term less that without it: negative if the term earns its place.
+    """
     for term in OPTIONAL:
         places = list(map(fit.names.index, within(term.names, fit.names)))
-        if not places:
-            continue
-        values = fit.values[places]
-        wald = float(values @ scaled_pinv(fit.covariance[np.ix_(places, places)]) @ values)
-        worths.append(TermWorth(term.name, len(places) * float(np.log(max(2, fit.freedom))) - wald))
-    return worths
+        if places:
+            values = fit.values[places]
+            wald = float(values @ scaled_pinv(fit.covariance[np.ix_(places, places)]) @ values)
+            yield term.name, len(places) * float(np.log(max(2, fit.freedom))) - wald
 
 
 def bent(fit: Fit) -> bool:
@@ -397,22 +384,11 @@ def _singular(covariance: FloatArray) -> bool:
     return bool(values[0] < _SINGULAR * values[-1])
 
 
-@dataclass(frozen=True, eq=False)
-class MassScatter:
-    """Payload mass (n,) in kg of each of n loaded logs by itself, and its standard deviation.
-
-    `ci95` is the interval of the standard deviation.
-    """
-
-    masses: FloatArray
-    std: float
-    ci95: tuple[float, float]
-
-
-def repeatability(fit: Fit) -> MassScatter | None:
+def repeatability(fit: Fit) -> tuple[FloatArray, float, tuple[float, float]] | None:
     """How far the payload differs from run to run.
 
-    None with fewer than two loaded logs, or if one does not determine it.
+    Payload mass (n,) in kg of each of n loaded logs by itself, and its standard deviation with the
+    95 % interval of that. None with fewer than two loaded logs, or if one does not determine it.
 
     Each loaded log is fitted for m_p, the arm and the lengths held as all logs have them. The
     interval is that of the standard deviation of normal numbers, by χ² of n − 1: wide where there
@@ -435,4 +411,4 @@ def repeatability(fit: Fit) -> MassScatter | None:
     std = float(np.std(masses, ddof=1))
     low = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.025)))
     high = std * float(np.sqrt(freedom / chi2_exceeded(freedom, 0.975)))
-    return MassScatter(np.array(masses), std, (low, high))
+    return np.array(masses), std, (low, high)

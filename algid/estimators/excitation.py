@@ -6,18 +6,18 @@ itself. What is alike in every run, a wrong torque constant say, shows in no num
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from algid.arm import FloatArray
 from algid.base.criteria import STILL
 from algid.estimators import weak
 from algid.estimators.combine import FEWEST_LOGS
 from algid.estimators.diagnostics import ratio_of_joints
 from algid.estimators.fit import Fit
 from algid.estimators.modulating_functions import MOTORLESS
-from algid.estimators.problem import Problem, Source, WeakSettings
+from algid.estimators.problem import Problem
 from algid.estimators.weak import Normal
 from algid.model import K1, K2, K3
 from algid.notices import Notice
@@ -38,20 +38,24 @@ def undriven(fit: Fit, problem: Problem) -> Notice | None:
     torque: constants near nothing solve that equation too, and least squares ends there where
     friction and cables pull as hard as the arm's own load.
     """
-    model = fit.shared.model
-    settings = problem.at(model, fit.delay).settings
-    for kind, sources in problem.kinds():
-        c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
-        normals = weak.normals_of(sources, settings, c)
-        if not normals:
-            continue
-        gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
+    for _, c, gram in _at_fit(fit, problem):
         power = gram[:, -1, -1]
         for joint in range(2):
             acting = float(np.diag(gram[joint])[:-1] @ c**2)
             if power[joint] == 0 and acting < LEAST_ACTING**2 * float(power[1 - joint]):
                 return Notice("HARDLY_DRIVEN", numbers={"case": "passive", "joint": joint + 1})
     return None
+
+
+def _at_fit(fit: Fit, problem: Problem) -> Iterator[tuple[bool, FloatArray, FloatArray]]:
+    """Whether logs are loaded, their coefficients (q,), and sums (2, q + 1, q + 1) of windows."""
+    model = fit.shared.model
+    settings = problem.at(model, fit.delay).settings
+    for kind, sources in problem.kinds():
+        c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
+        normals = weak.normals_of(sources, settings, c)
+        if normals:
+            yield kind, c, np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
 
 
 def contradicted(fit: Fit, problem: Problem) -> Notice | None:
@@ -78,7 +82,10 @@ def contradicted(fit: Fit, problem: Problem) -> Notice | None:
         if ratio is not None:
             return Notice("JOINTS_CONTRADICT", numbers={"ratio": ratio})
         hardly = _hardly_driven(normals)
-        if few and hardly and not _confirmed(fit, hardly, kind, sources, settings):
+        if not few or not hardly:
+            continue
+        of_kind = {own: (c, gram) for own, c, gram in _at_fit(fit, problem)}
+        if not _confirmed(fit.shared.model.names, hardly, *of_kind[kind]):
             return Notice(
                 "HARDLY_DRIVEN",
                 numbers={"case": "torque", "joint": hardly, "percent": 100 * MOTORLESS},
@@ -86,20 +93,14 @@ def contradicted(fit: Fit, problem: Problem) -> Notice | None:
     return None
 
 
-def _confirmed(
-    fit: Fit, joint: int, kind: bool, sources: Sequence[Source], settings: WeakSettings
-) -> bool:
+def _confirmed(names: Sequence[str], joint: int, c: FloatArray, gram: FloatArray) -> bool:
     """True if both joints confirm the constants of one that is hardly driven, 1 or 2.
 
     A light second link needs little torque. Its constants stand where they explain that torque,
     and their part of the other joint's torque is larger than what the fit leaves there. What
     bearings and cables make of a joint that no motor moves is confirmed by nothing.
     """
-    model = fit.shared.model
-    c = fit.shared.coefficients(fit.values, kind)[: len(model.names)]
-    normals = weak.normals_of(sources, replace(settings, model=model), c)
-    gram = np.sum([normal.gram.sum(axis=0) for normal in normals], axis=0)
-    of_link = np.append(np.where(np.isin(model.names, OF_LINK_2), c, 0.0), 0.0)
+    of_link = np.append(np.where(np.isin(names, OF_LINK_2), c, 0.0), 0.0)
     residual = np.append(-c, 1.0)
     left, part = (gram @ residual) @ residual, (gram @ of_link) @ of_link
     own, other = joint - 1, 2 - joint

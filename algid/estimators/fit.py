@@ -106,7 +106,6 @@ class Fit:
     shrinkage : the prior's part on the torque's terms; None where none is shrunk
     repeats : places of logs that repeat each other, where that was looked at
     misfit : whether the residual of the likelihood depends on the motion, where that was looked at
-    deviance : minus twice the likelihood's logarithm but for a constant, where there is one
     """
 
     estimator: str
@@ -131,7 +130,6 @@ class Fit:
     shrinkage: Prior | None = None
     repeats: Groups = ()
     misfit: Misfit | None = None
-    deviance: float | None = None
 
     def __post_init__(self) -> None:
         keep_arrays(self)

@@ -111,7 +111,6 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
             Notice("REFUTED", numbers={"case": "not converged", "kept": start.estimator})
         )
         return replace(failed, iterations=iterations)
-    deviance = sum(outcome.deviance for outcome in outcomes)
     whiteness = judge(reduce(add, [outcome.innovations for outcome in outcomes]))
     informations = [outcome.information for outcome in outcomes]
     samples = int(_count(outcomes))
@@ -138,7 +137,7 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
         if lacking.significant:
             numbers = {"kept": start.estimator, "p_value": lacking.p_value}
             refuted = start.noted(Notice("REFUTED", numbers={"case": "motion"} | numbers))
-            return replace(refuted, misfit=lacking, iterations=iterations, deviance=deviance)
+            return replace(refuted, misfit=lacking, iterations=iterations)
     # No surer than the weak estimate: a joint at rest trembles in noise, which is no motion.
     status = list(fitted.status)
     for place, before in enumerate(start.status):
@@ -153,7 +152,6 @@ def fit(problem: Problem, noise: NoiseLevels | None = None) -> Fit:
             whiteness=whiteness,
             residual=tuple(outcome.residual for outcome in outcomes),
             iterations=iterations,
-            deviance=deviance,
         )
     )
 

@@ -47,6 +47,7 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,8 +120,12 @@ def fit(problem: Problem) -> Fit:
     """
     robust = RobustProblem.of(problem)
     least = robust.least_squares()
-    fit = robust.with_window_scatter(robust.instruments_if_endogenous(least), least)
-    return robust.with_load_scatter(fit, least)
+    fit = robust.instruments_if_endogenous(least)
+    if fit.intervals != "jackknife":
+        fit = robust.with_scatter(fit, least, [{"window": window} for window in WINDOWS])
+    if attributes(least.shared.model, "by_load"):
+        fit = robust.with_scatter(fit, least, [{"by_torque": True}])
+    return fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,18 +296,22 @@ class RobustProblem:
             shrinkage=shrinkage,
         )
 
-    def with_window_scatter(self, fit: Fit, least: Fit) -> Fit:
-        """The fit with the scatter of windows of other lengths; as it is if logs are left out.
+    def with_scatter(self, fit: Fit, least: Fit, others: Sequence[Mapping[str, Any]]) -> Fit:
+        """The fit with the scatter of n `others` beside `least`, of other windows or convention.
 
-        W = V + Σ_w d dᵀ / n,   d = β_w − β,   β by least squares as `least`'s.
+            W = V + Σ d dᵀ / n,   d = β_other − β, by least squares
+
+        Gears rub in proportion to the torque that passes them: a joint's load L, or all other
+        torque, friction D of motor and bearings included, by their order along the drive. Between
+        both is e (|L + D| − |L|) tanh(ω / ω_s) ≈ e |D| sgn L, which looks like a gain common to
+        both joints: it moves all constants together, and no scatter from log to log or from window
+        to window shows it.
         """
-        if fit.intervals == "jackknife":
-            return fit
         determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
         moved = []
-        for window in WINDOWS:
+        for settings in others:
             try:
-                other = self.least_squares(window)
+                other = self.least_squares(**settings)
             except TooShortError:  # of the longer windows
                 continue
             moved.append(np.where(determined, other.values - least.values, 0.0))
@@ -310,24 +319,6 @@ class RobustProblem:
             return fit
         scatter = np.transpose(moved) @ np.array(moved) / len(moved)
         return replace(fit, covariance=fit.covariance + scatter)
-
-    def with_load_scatter(self, fit: Fit, least: Fit) -> Fit:
-        """The fit with what the convention of friction by load moves.
-
-        Gears rub in proportion to the torque that passes them: a joint's load L, or all other
-        torque, friction D of motor and bearings included, by their order along the drive. Between
-        both is e (|L + D| − |L|) tanh(ω / ω_s) ≈ e |D| sgn L, which looks like a gain common to
-        both joints: it moves all constants together, and no scatter from log to log or from window
-        to window shows it.
-
-            W = V + d dᵀ,   d = β_torque − β_load, by least squares
-        """
-        if not attributes(least.shared.model, "by_load"):
-            return fit
-        other = self.least_squares(by_torque=True)
-        determined = np.array([status != "NOT_IDENTIFIABLE" for status in least.status])
-        moved = np.where(determined, other.values - least.values, 0.0)
-        return replace(fit, covariance=fit.covariance + np.outer(moved, moved))
 
     def instruments_if_endogenous(self, least: Fit) -> Fit:
         """The fit by least squares, or by instruments where those differ and answer nothing.
@@ -582,29 +573,16 @@ def no_feedback(fit: Fit, problem: Problem) -> float:
     for kind, sources in problem.kinds():
         for source in sources:
             c = fit.shared.coefficients(fit.values, kind)[: len(settings.model.names)]
-            e, y = _residual(source, settings, c)
-            if e.shape[1] > 2 * _LAGS:
-                own, spread = _crossed(e, y)
+            every = [own for _, _, own in weak.residual_rows(source, settings, c)]
+            rows = np.concatenate([np.empty((4, 0)), *every], axis=1)
+            if rows.shape[1] > 2 * _LAGS:
+                rows -= rows.mean(axis=1, keepdims=True)
+                own, spread = _crossed(rows[:2], rows[2:])
                 products, variance = products + own, variance + spread
     if not np.all(variance > 0):
         return 1.0
     largest = float(np.max(np.abs(products) / np.sqrt(variance)))
     return chance(largest, products.size)
-
-
-def _residual(
-    source: Source, settings: WeakSettings, c: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Residuals and torques' moments (2, R) of a log's windows, less their means."""
-    rows = [np.empty((4, 0))]
-    for piece, windows, _ in weak.overlapping(source(), settings):
-        X = windows.equations(settings.model, piece, False, c)
-        residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
-        rows.append(np.concatenate([residual, X[:, -1]]))
-    every = np.concatenate(rows, axis=1)
-    if every.shape[1]:
-        every = every - every.mean(axis=1, keepdims=True)
-    return every[:2], every[2:]
 
 
 def _crossed(e: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -126,31 +126,20 @@ class Selection:
     hold_by: Literal["logs", "settings", "parameters"] = "settings"
     late: Lateness | None = None
 
-    def left_out(self, terms: Collection[str], reason: str) -> Selection:
-        """The same without `terms`, whose trials end in this `reason`."""
-        kept = outside(self.model.terms, terms)
+    def changed(self, terms: Collection[str], reason: str, *, kept: bool) -> Selection:
+        """The same with `terms`, or without them, whose trials end so for this `reason`."""
+        own, delay = without_delay(terms), not set(_DELAY).isdisjoint(terms)
+        ended = [
+            replace(trial, kept=kept, reason=reason) if trial.term in terms else trial
+            for trial in self.trials
+        ]
+        model = self.model.terms + own if kept else outside(self.model.terms, own)
         return replace(
             self,
-            model=replace(self.model, terms=kept),
-            delay=self.delay and set(_DELAY).isdisjoint(terms),
-            trials=self._ended(terms, kept=False, reason=reason),
+            model=replace(self.model, terms=model),
+            delay=kept if delay else self.delay,
+            trials=tuple(ended),
         )
-
-    def with_term(self, term: str, reason: str) -> Selection:
-        """The same with one more term, whose trial ends in its being kept for this `reason`."""
-        model = replace(self.model, terms=self.model.terms + without_delay((term,)))
-        delay = self.delay or EVERY_TERM[term].delays
-        trials = self._ended((term,), kept=True, reason=reason)
-        return replace(self, model=model, delay=delay, trials=trials)
-
-    def _ended(self, terms: Collection[str], *, kept: bool, reason: str) -> tuple[TermTrial, ...]:
-        """The trials, those of `terms` with another end."""
-        ended = []
-        for trial in self.trials:
-            if trial.term in terms:
-                trial = replace(trial, kept=kept, reason=reason)
-            ended.append(trial)
-        return tuple(ended)
 
     @property
     def undetermined(self) -> Lateness | None:

@@ -214,6 +214,16 @@ def speeds(sources: Sequence[Source], settings: WeakSettings) -> FloatArray:
     return np.sqrt(squares / max(count, 1))
 
 
+def residual_rows(
+    source: Source, settings: WeakSettings, c: FloatArray, window: float | None = None
+) -> Iterator[tuple[Segment, Windows, FloatArray]]:
+    """A log's pieces, their windows, and residuals at `c` (q,) above torques' moments (4, R)."""
+    for piece, windows, _ in overlapping(source(), settings, window):
+        X = windows.equations(settings.model, piece, False, c)
+        residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
+        yield piece, windows, np.concatenate([residual, X[:, -1]])
+
+
 def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> ResidualSums | None:
     """Sums over the windows' residual y − Xᵀc of one log at `c` (q,), with the torque's moments.
 
@@ -231,14 +241,12 @@ def residuals(source: Source, settings: WeakSettings, c: FloatArray) -> Residual
                 gathered.append(residual_sums(together, spacing, OVERLAP, LAGS * OVERLAP // 2))
             rows.clear()
 
-        for piece, windows, _ in overlapping(source(), settings, window):
+        for piece, windows, own in residual_rows(source, settings, c, window):
             longest = max(longest, _seconds(piece))
             if not piece.continues or _count(rows) >= PIECE_SAMPLES:
                 add_up()
             spacing = windows.step * windows.dt
-            X = windows.equations(settings.model, piece, False, c)
-            residual = X[:, -1] - np.einsum("q,aqr->ar", c, X[:, :-1])
-            rows.append(np.concatenate([residual, X[:, -1]]))
+            rows.append(own)
         add_up()
         return gathered, longest
 

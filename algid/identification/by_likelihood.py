@@ -141,7 +141,7 @@ def completed(
         added = _most_evident(better.misfit, richer)
         if added is None:
             break
-        richer = richer.with_term(added, _BY_LIKELIHOOD)
+        richer = richer.changed((added,), _BY_LIKELIHOOD, kept=True)
         better = refit(richer)
         if better.converged and not better.refuted:
             return better, richer
@@ -190,7 +190,7 @@ def _of_motorless(
     if picked.chosen_by == "logs":
         terms = within(terms, FIRST_TERMS)
     dropped = {trial.term for trial in picked.trials if trial.kept}.difference(terms)
-    plainer = replace(picked.left_out(dropped, _BY_NOTHING), delay=False, late=None)
+    plainer = replace(picked.changed(dropped, _BY_NOTHING, kept=False), delay=False, late=None)
     if plainer.hold_by == "logs":
         plainer = replace(plainer, hold="foh")
     better = robust.of_passive_joint(problem_of(survey, settings, plainer, prior))

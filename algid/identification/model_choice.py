@@ -105,7 +105,8 @@ def without_insignificant(chosen: Selection, fit: Fit, settings: Settings) -> Se
     if chosen.chosen_by != "logs" or chosen.shrunk:
         return chosen
     nothing = _insignificant(chosen, fit).difference(settings.terms)
-    return chosen.left_out(nothing, "left out: the fit finds it to be zero within its error")
+    why = "left out: the fit finds it to be zero within its error"
+    return chosen.changed(nothing, why, kept=False)
 
 
 def _insignificant(chosen: Selection, fit: Fit) -> set[str]:

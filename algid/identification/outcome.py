@@ -347,9 +347,8 @@ def _repeatability(fit: Fit) -> results.Repeatability | None:
     repeated = repeatability(fit)
     if repeated is None:
         return None
-    return results.Repeatability(
-        masses=repeated.masses.tolist(), std=repeated.std, ci95=repeated.ci95
-    )
+    masses, std, ci95 = repeated
+    return results.Repeatability(masses=masses.tolist(), std=std, ci95=ci95)
 
 
 def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
@@ -402,8 +401,8 @@ def _torque_hold(chosen: Selection) -> results.TorqueHold:
 def _terms(fit: Fit, chosen: Selection) -> Iterator[results.TermCriterion]:
     """Worth of each term that the logs chose from, or of those that were given."""
     if not chosen.trials:
-        for w in term_worths(fit):
-            yield results.TermCriterion(term=w.term, delta_bic=w.delta_bic, kept=w.earned)
+        for term, delta_bic in term_worths(fit):
+            yield results.TermCriterion(term=term, delta_bic=delta_bic, kept=delta_bic < 0)
     for trial in chosen.trials:
         yield results.TermCriterion(
             term=trial.term,

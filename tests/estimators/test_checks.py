@@ -90,11 +90,12 @@ def test_each_loaded_run_tells_its_payload_and_how_well_that_repeats(bench: Benc
     fit = weak.fit(Problem(bare, burdened, lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))
     found = repeatability(fit)
     assert found is not None
-    np.testing.assert_allclose(found.masses, masses, atol=6e-4)
-    assert found.std == pytest.approx(0.005, rel=0.15)
-    low, high = found.ci95  # χ² with two degrees of freedom: 0.0506 and 7.378
-    assert low / found.std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
-    assert high / found.std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
+    alone, std, (low, high) = found
+    np.testing.assert_allclose(alone, masses, atol=6e-4)
+    assert std == pytest.approx(0.005, rel=0.15)
+    # χ² with two degrees of freedom: 0.0506 and 7.378
+    assert low / std == pytest.approx(np.sqrt(2 / 7.378), rel=1e-3)
+    assert high / std == pytest.approx(np.sqrt(2 / 0.05064), rel=1e-3)
     assert (
         repeatability(
             weak.fit(Problem(bare, burdened[:1], lengths={"l1": bench.arm.l1, "l2": bench.arm.l2}))

@@ -18,7 +18,7 @@ from algid.estimators.combine import LogInformation, Prior
 from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
-from algid.estimators.robust import Expected, RobustProblem, _crossed, dispersion, shrink
+from algid.estimators.robust import WINDOWS, Expected, RobustProblem, _crossed, dispersion, shrink
 from algid.model import Model
 from algid.signals.segments import Segment
 from pipelines.disturbed import DT, NAMES, Scene, scene
@@ -223,7 +223,7 @@ def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) ->
     least = alone.least_squares()
     others: list[Source] = [partial(list, [run]) for place, run in enumerate(runs) if place != 6]
     rest = least_squares(others, WeakSettings())
-    found = alone.with_window_scatter(least, least)
+    found = alone.with_scatter(least, least, [{"window": window} for window in WINDOWS])
     places = [found.names.index(name) for name in NAMES]
     away = np.abs(found.values - rest.values)[places]
     assert np.max(away / np.hypot(least.std, rest.std)[places]) > 3
