@@ -51,9 +51,9 @@ def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader
     from algid.readers.table_cells import TableFile
 
     if isinstance(path, str | Path):
-        from algid.readers.formats import format_of
+        from algid.readers.formats import open_file
 
-        found = format_of(Path(path)).open(Path(path), profile)
+        found = open_file(Path(path), profile)
         if not isinstance(found, TableFile):
             from algid.readers.messages.reader import open_messages
 

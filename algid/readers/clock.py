@@ -34,8 +34,8 @@ _RUN = 8
 """Samples in a row that come late: fewer are jitter."""
 _SHORTEST = 64
 """Late samples at a table's end that wait for the next table, and least of a run before all."""
-_NO_HOLE = 0.75
-"""Of the usual rows in a time, between the half that one of two threads writes and all of them."""
+_HOLE = 1.5
+"""Periods: between the step of all rows and that of the half that one of two threads writes."""
 PAUSE = 20
 """Periods between a run and the next one: a gap that no window spans."""
 
@@ -160,22 +160,17 @@ def _restart(table: SampleTable) -> int | None:
     """
     late = np.flatnonzero(_late(table.stamp_ns))
     for rows in np.split(late, np.flatnonzero(np.diff(late) > 1) + 1):
-        if rows.size < _RUN:
+        if rows.size < _RUN or rows[0] < 2:
             continue
         before = table.part(max(0, rows[0] - 2 * HORIZON - rows.size), rows[0])
         order = np.argsort(before.stamp_ns, kind="stable")
         known, own = before.stamp_ns[order], table.stamp_ns[rows]
-        first, last = own.min(), own.max()
-        if first >= known[-1]:  # it stands still
-            continue
-        there = np.unique(known[(known >= first) & (known <= last)])
-        if there.size >= _RUN and there.size * _period(np.unique(known)) > _NO_HOLE * (
-            last - first
-        ):
-            after = np.minimum(np.searchsorted(known, own), known.size - 1)
-            same = (known[after] == own) & _alike(table, rows[0] - known.size + order[after], rows)
-            if np.count_nonzero(~same) > rows.size / 2:
-                return int(rows[0])
+        after = np.clip(np.searchsorted(known, own), 1, known.size - 1)
+        near = known[after] - known[after - 1] <= _HOLE * _period(np.unique(known))
+        inside = near & (known[0] <= own) & (own < known[-1])  # where it stands still none is
+        same = (known[after] == own) & _alike(table, rows[0] - known.size + order[after], rows)
+        if np.count_nonzero(inside & ~same) > rows.size / 2:
+            return int(rows[0])
         rising = np.count_nonzero(np.diff(own) > 0) > 0.75 * rows.size
         if rows.size >= _SHORTEST and rising and own[0] < before.stamp_ns[-HORIZON:].min():
             return int(rows[0])

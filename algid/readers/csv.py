@@ -69,12 +69,16 @@ def open_csv(path: Path, kind: str, names: Sequence[str] | None = None) -> Table
         if not source.endswith(b"\n"):  # its last number may lack digits
             source = source[: source.rfind(b"\n") + 1]
             notices = (Notice("CUT_OFF", numbers={"case": "cell"}),)
-    if dialect.padded and isinstance(source, bytes):  # runs of blanks become one tab
-        mark = dialect.separator.encode()
-        blank = b" " if mark == b"\t" else rb"[ \t]"
-        around = blank + b"*" + re.escape(mark) + blank + b"*" if mark else blank + b"+"
-        source = re.sub(around, mark or b"\t", source)
-        source = re.sub(rb"(?m)^%b+|%b+(?=\r?$)" % (blank, blank), b"", source)
+    if dialect.padded and isinstance(source, bytes):
+        mark = dialect.separator.encode() or b"\t"
+        if not dialect.separator:  # runs of blanks become one tab
+            source = source.replace(b" ", mark)
+        for blank in (b" ", b"\t"):
+            for edge in (mark, b"\r\n", b"\n"):
+                pairs = (blank + edge, edge + blank) if blank in source and edge in source else ()
+                for pair in pairs if blank.decode() != dialect.separator else ():
+                    while pair in source:
+                        source = source.replace(pair, edge)
 
     def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
         for frame in _frames(path, source, dialect, columns, most, quoted=quoted):

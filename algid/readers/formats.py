@@ -6,11 +6,10 @@ table: opening and inspecting a log, the logs of a folder, the guide.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from algid.base.errors import LogError
 from algid.base.files import read_start
@@ -43,7 +42,6 @@ class Entry:
 
 
 Entries = tuple[Entry, ...]
-Opener = Callable[[Path, "Profile"], "TableFile | MessageLog"]
 
 
 @dataclass(frozen=True)
@@ -60,9 +58,6 @@ class FileFormat:
         Ends of file names by which logs are looked for in a folder.
     magic : bytes
         What its files begin with; empty for folders, and for text.
-    open : callable
-        Opens a log of it, and imports what it needs; a profile may name columns that the file does
-        not.
     messages : bool
         Whether it holds messages on topics, not columns.
     """
@@ -71,83 +66,57 @@ class FileFormat:
     title: str
     suffixes: tuple[str, ...]
     magic: bytes
-    open: Opener
     messages: bool = False
 
 
-def _reader(module: str) -> Any:
-    return import_module(f"algid.readers.{module}")
-
-
-def _bag(name: str, title: str, suffixes: tuple[str, ...], magic: bytes) -> FileFormat:
-    return FileFormat(
-        name, title, suffixes, magic, lambda path, _: _reader("bags").open_bag(path, name), True
-    )
-
-
-def _csv(name: str, title: str, magic: bytes) -> FileFormat:
-    def opened(path: Path, profile: Profile) -> TableFile:
-        table: TableFile = _reader("csv").open_csv(path, name, profile.columns)
-        return table
-
-    return FileFormat(name, title, (f".{name}",), magic, opened)
-
-
 FORMATS: tuple[FileFormat, ...] = (
-    FileFormat(
-        "mcap", "MCAP", (".mcap",), MCAP, lambda path, _: _reader("mcap").open_mcap(path), True
-    ),
-    _bag("rosbag2", "rosbag2 folder", (), b""),
-    _bag("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00"),
-    _bag("bag", "ROS 1 bag", (".bag",), b"#ROSBAG V"),
-    FileFormat(
-        "parquet",
-        "Parquet",
-        (".parquet",),
-        b"PAR1",
-        lambda path, _: _reader("arrow_files").open_parquet(path),
-    ),
-    FileFormat(
-        "feather",
-        "Feather (Arrow)",
-        (".feather", ".arrow"),
-        b"ARROW1",
-        lambda path, _: _reader("arrow_files").open_feather(path),
-    ),
-    FileFormat(
-        "npz",
-        "NumPy archive",
-        (".npz",),
-        b"PK\x03\x04",
-        lambda path, _: _reader("arrays").open_arrays(path, "npz"),
-    ),
-    FileFormat(
-        "mat",
-        "MATLAB",
-        (".mat",),
-        b"MATLAB ",
-        lambda path, _: _reader("arrays").open_arrays(path, "mat"),
-    ),
-    FileFormat(
-        "hdf5",
-        "HDF5 (`algid[hdf5]`)",
-        (".h5", ".hdf5"),
-        b"\x89HDF\r\n\x1a\n",
-        lambda path, _: _reader("arrays").open_arrays(path, "hdf5"),
-    ),
-    _csv("csv.zst", "CSV packed with zstd", ZSTD),
-    _csv("csv.gz", "CSV packed with gzip", GZIP),
-    FileFormat(
-        "jsonl",
-        "JSON lines",
-        (".jsonl", ".ndjson"),
-        b"",
-        lambda path, _: _reader("arrays").open_json_lines(path),
-    ),
-    _csv("csv", "CSV", b""),
+    FileFormat("mcap", "MCAP", (".mcap",), MCAP, messages=True),
+    FileFormat("rosbag2", "rosbag2 folder", (), b"", messages=True),
+    FileFormat("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00", messages=True),
+    FileFormat("bag", "ROS 1 bag", (".bag",), b"#ROSBAG V", messages=True),
+    FileFormat("parquet", "Parquet", (".parquet",), b"PAR1"),
+    FileFormat("feather", "Feather (Arrow)", (".feather", ".arrow"), b"ARROW1"),
+    FileFormat("npz", "NumPy archive", (".npz",), b"PK\x03\x04"),
+    FileFormat("mat", "MATLAB", (".mat",), b"MATLAB "),
+    FileFormat("hdf5", "HDF5 (`algid[hdf5]`)", (".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n"),
+    FileFormat("csv.zst", "CSV packed with zstd", (".csv.zst",), ZSTD),
+    FileFormat("csv.gz", "CSV packed with gzip", (".csv.gz",), GZIP),
+    FileFormat("jsonl", "JSON lines", (".jsonl", ".ndjson"), b""),
+    FileFormat("csv", "CSV", (".csv",), b""),
 )
 SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes)
 _BY_NAME = {form.name: form for form in FORMATS}
+
+
+def open_file(path: Path, profile: Profile) -> TableFile | MessageLog:
+    """Open a log, whatever its format; a profile may name columns that the file does not.
+
+    Raises
+    ------
+    LogError
+        If it is of no format, or damaged.
+    """
+    kind = format_of(path).name
+    match kind:
+        case "mcap":
+            from algid.readers.mcap import open_mcap
+
+            return open_mcap(path)
+        case "rosbag2" | "db3" | "bag":
+            from algid.readers.bags import open_bag
+
+            return open_bag(path, kind)
+        case "parquet" | "feather":
+            from algid.readers.arrow_files import open_feather, open_parquet
+
+            return open_parquet(path) if kind == "parquet" else open_feather(path)
+        case "npz" | "mat" | "hdf5" | "jsonl":
+            from algid.readers.arrays import open_arrays, open_json_lines
+
+            return open_json_lines(path) if kind == "jsonl" else open_arrays(path, kind)
+    from algid.readers.csv import open_csv
+
+    return open_csv(path, kind, profile.columns)
 
 
 def format_of(path: Path) -> FileFormat:
@@ -179,7 +148,9 @@ def format_of(path: Path) -> FileFormat:
             return form
     text = head.rstrip(b"\0")  # of a log that breaks off
     if text and looks_like_text(text):
-        return _BY_NAME["jsonl" if _reader("arrays").is_json_lines(head) else "csv"]
+        from algid.readers.arrays import is_json_lines
+
+        return _BY_NAME["jsonl" if is_json_lines(head) else "csv"]
     if not head and path.is_dir():
         return _BY_NAME["rosbag2"]
     if not head:
@@ -272,9 +243,8 @@ def entries_at(path: Path) -> Entries:
     from algid.profile import Profile
     from algid.readers.dialect import NoHeaderError
 
-    form = format_of(path)
     try:
-        return entries_of(form.open(path, Profile()))
+        return entries_of(open_file(path, Profile()))
     except NoHeaderError as error:
         names = tuple(f"column {place + 1}" for place in range(error.columns))
-        return entries_of(form.open(path, Profile(columns=names)))
+        return entries_of(open_file(path, Profile(columns=names)))

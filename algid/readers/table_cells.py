@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.base.arrow import numbers_of
+from algid.base.arrow import column_of, numbers_of, whole_column
 from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.words import repeated
@@ -123,8 +123,19 @@ class Cell:
             if pa.types.is_struct(values.type):
                 values = pc.struct_field(values, [step])
             else:
-                one = pc.list_slice(values, step, step + 1, return_fixed_size_list=True)
-                values = pc.if_else(values.is_valid(), one.values, None)
+                numbers = values.flatten()
+                sizes = whole_column(pc.list_value_length(values).fill_null(0))
+                size = sizes[0] if len(sizes) else 0
+                if (
+                    size > step
+                    and np.all(sizes == size)
+                    and not numbers.null_count
+                    and _is_plain(numbers.type)
+                ):
+                    values = column_of(whole_column(numbers)[step::size])
+                else:
+                    one = pc.list_slice(values, step, step + 1, return_fixed_size_list=True)
+                    values = pc.if_else(values.is_valid(), one.values, None)
         if self.is_clock:
             values = values.view(pa.int32() if self.type.bit_width == 32 else pa.int64())
         elif not _is_plain(values.type):
