@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.arm import FloatArray, keep_arrays, read_only
 from algid.base.names import outside, places_outside
@@ -102,19 +101,6 @@ def without(prior: Prior | None, absent: tuple[str, ...]) -> Prior | None:
         return prior
     none = Prior(absent, np.zeros(len(absent)), np.diag([_NOTHING**-2] * len(absent)), absent)
     return joined(None if prior is None else prior.silent_on(absent), none)
-
-
-def scaled_pinvs(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
-    """`scaled_pinv` of many matrices S (n, Q, Q) at once."""
-    diagonal = np.einsum("nii->ni", S)
-    size = np.sqrt(np.maximum(diagonal, 0.0))
-    inverse = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
-    values, vectors = np.linalg.eigh(S * (inverse[:, :, None] * inverse[:, None, :]))
-    size = np.abs(values)
-    kept = size > tolerance * size.max(axis=1, initial=0.0)[:, None]
-    shares = np.divide(1.0, values, out=np.zeros_like(values), where=kept)
-    half = inverse[:, :, None] * vectors
-    return np.asarray((half * shares[:, None, :]) @ half.swapaxes(1, 2))
 
 
 def scaled_pinv(S: FloatArray, tolerance: float = RANK_TOLERANCE) -> FloatArray:
@@ -469,28 +455,17 @@ def long_run_variance(scores: FloatArray) -> tuple[FloatArray, int]:
     Newey & West 1987 with the bandwidth of Andrews 1991, eq. (6.2) and (6.4), from a first-order
     autoregression.
     """
-    total, lags = long_run_variances(scores[None])
-    return total, int(lags[0])
-
-
-def long_run_variances(scores: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Sum (q, q) of `long_run_variance` of each of n logs' scores (n, B, q), and the lags (n,)."""
-    _, count, q = scores.shape
-    power = np.sum(scores**2, axis=1)
+    count = len(scores)
+    power = np.sum(scores**2, axis=0)
     size = np.sqrt(power)
-    shares = np.divide(1.0, size, out=np.zeros_like(size), where=power > 0)
-    usable = scores * shares[:, None]
-    rho = np.clip(np.sum(usable[:, 1:] * usable[:, :-1], axis=1), -0.97, 0.97)
+    usable = scores * np.divide(1.0, size, out=np.zeros_like(size), where=power > 0)
+    rho = np.clip(np.sum(usable[1:] * usable[:-1], axis=0), -0.97, 0.97)
     # α(1) with unit weights: each score was scaled to unit power above.
-    numerator = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2), axis=1)
-    freedom = np.sum((power > 0) / (1 - rho) ** 4, axis=1)
-    persistence = numerator / np.maximum(freedom, 1e-300)
-    lags = np.minimum(1.1447 * (persistence * count) ** (1 / 3), count / 4).astype(np.int64)
-    flat = scores.reshape(-1, q)
-    total = flat.T @ flat
-    for lag in range(1, int(lags.max(initial=0)) + 1):
-        weights = np.maximum(1 - lag / (lags + 1), 0.0)
-        later = weights[:, None, None] * scores[:, lag:]
-        cross = later.reshape(-1, q).T @ scores[:, : count - lag].reshape(-1, q)
+    numerator = np.sum(4 * rho**2 / ((1 - rho) ** 6 * (1 + rho) ** 2))
+    persistence = numerator / max(float(np.sum((power > 0) / (1 - rho) ** 4)), 1e-300)
+    lags = int(min(1.1447 * (persistence * count) ** (1 / 3), count / 4))
+    total = scores.T @ scores
+    for lag in range(1, lags + 1):
+        cross = (1 - lag / (lags + 1)) * scores[lag:].T @ scores[: count - lag]
         total += cross + cross.T
     return total, lags

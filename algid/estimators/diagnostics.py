@@ -23,13 +23,13 @@ from algid.base.compiled import chi2_exceeded, chi2_tail, normal_exceeded
 from algid.base.names import within
 from algid.base.significance import sigmas
 from algid.estimators.combine import (
+    RANK_TOLERANCE,
     LogInformation,
     Prior,
     combine,
     likelihood,
     of_kind,
     scaled_pinv,
-    scaled_pinvs,
 )
 from algid.estimators.fit import Fit, Status, alone
 from algid.estimators.identifiability import sizes
@@ -304,9 +304,10 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     s, S = of_joint(1)
 
     ratios = np.concatenate([[1.0], _RATIOS, -_RATIOS])
-    apart = s - ratios[:, None] * f
-    inverses = scaled_pinvs(S + ratios[:, None, None] ** 2 * F)
-    chi2 = np.einsum("ri,rij,rj->r", apart, inverses, apart)
+    size = np.sqrt(np.maximum(np.diag(S) + np.diag(F), 1e-300))
+    apart = (s - ratios[:, None] * f) / size
+    V = (S + ratios[:, None, None] ** 2 * F) / np.outer(size, size)
+    chi2 = np.einsum("ri,rij,rj->r", apart, np.linalg.pinv(V, RANK_TOLERANCE, True), apart)
     best = int(np.argmin(chi2))
     ratio = ratios[best]
     differs = min(ratio, 1 / ratio) < 1 - unlike

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.model import K1, K2, K3, K4, K5, K6
-from algid.signals.differences import integral, nested_integral
+from algid.signals.differences import integral
 from algid.signals.segments import Segment, pieces_of
 
 
@@ -94,14 +94,19 @@ def columns(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) ->
         coupling1=_of_derivative(c2 * (2 * omega1 + omega2), t, dt),
         inertia2=_of_acceleration(moved[1], t, dt),
         viscous1=_of_derivative(moved[0], t, dt),
-        gravity1=nested_integral(t**2 * np.cos(theta[0]), dt, 2),
-        gravity12=nested_integral(t**2 * np.cos(theta[0] + theta[1]), dt, 2),
-        torque1=nested_integral(t**2 * tau[0], dt, 2),
+        gravity1=_twice(t**2 * np.cos(theta[0]), dt),
+        gravity12=_twice(t**2 * np.cos(theta[0] + theta[1]), dt),
+        torque1=_twice(t**2 * tau[0], dt),
         coupling2=_of_derivative(c2 * omega1, t, dt)
-        + nested_integral(t**2 * s2 * omega1 * (omega1 + omega2), dt, 2),
+        + _twice(t**2 * s2 * omega1 * (omega1 + omega2), dt),
         viscous2=_of_derivative(moved[1], t, dt),
-        torque2=nested_integral(t**2 * tau[1], dt, 2),
+        torque2=_twice(t**2 * tau[1], dt),
     )
+
+
+def _twice(signal: FloatArray, dt: float) -> FloatArray:
+    """∫^(2) of a signal, eq. (3) to (5)."""
+    return integral(integral(signal, dt), dt)
 
 
 def _of_acceleration(angle: FloatArray, t: FloatArray, dt: float) -> FloatArray:
@@ -208,26 +213,7 @@ STAGE1_NAMES = (f"{K5}+{K3}", K1, K3, K6, K4, K2)
 STAGE2_NAMES = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
 
 
-@dataclass(frozen=True, eq=False)
-class Stage1:
-    """Series of k1 … k7 (7, ..., n); condition numbers of the 6×6 system and of k7's equation."""
-
-    k: FloatArray
-    condition: FloatArray
-    k7_condition: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Stage2:
-    """Series of the loaded constants x_m (5, ..., n), l1 (m) and m_p (kg); the condition number."""
-
-    x: FloatArray
-    l1: FloatArray
-    m_p: FloatArray
-    condition: FloatArray
-
-
-def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> Stage1:
+def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
     """Constants without payload: P_r x_r = q_r of eq. (3) and five more integrals; k7 by eq. (4).
 
     Parameters
@@ -238,7 +224,7 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
 
     Returns
     -------
-    Stage1
+    `STAGE1_SERIES` (10, ..., n)
         NaN in the first ε of each window, and where a system is singular.
     """
     terms = columns(theta, omega, tau, dt)
@@ -246,11 +232,8 @@ def stage1(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> 
     k5_k3, k1, k3, k6, k4, k2 = solution.x
     known = k3 * (terms.inertia1 + terms.inertia2) + k1 * terms.coupling2 + k2 * terms.gravity12
     k7, k7_condition = _single_unknown(terms.viscous2, terms.torque2 - known)
-    return Stage1(
-        k=np.stack([k1, k2, k3, k4, k5_k3 - k3, k6, k7]),
-        condition=solution.condition,
-        k7_condition=k7_condition,
-    )
+    k = [k1, k2, k3, k4, k5_k3 - k3, k6, k7]
+    return np.stack([*k, k5_k3, solution.condition, k7_condition])
 
 
 def _solved_late(first: FloatArray, dt: float) -> Solutions:
@@ -275,7 +258,7 @@ def _single_unknown(coefficient: FloatArray, rhs: FloatArray) -> tuple[FloatArra
 
 def stage2(
     theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float, k: FloatArray, gravity: float
-) -> Stage2:
+) -> FloatArray:
     """Constants with payload, and the payload: P_m x_m = q_m of eq. (5) and four more integrals.
 
     Parameters
@@ -289,7 +272,7 @@ def stage2(
 
     Returns
     -------
-    Stage2
+    `STAGE2_SERIES` (8, ..., n)
         NaN in the first ε of each window, and where a system is singular.
     """
     terms = columns(theta, omega, tau, dt)
@@ -298,8 +281,7 @@ def stage2(
     )
     rest = terms.torque1 - k[5] * terms.viscous1
     solution = _solved_late(np.concatenate([unknown, rest[None]]), dt)
-    l1, m_p = payload(solution.x, k, gravity)
-    return Stage2(x=solution.x, l1=l1, m_p=m_p, condition=solution.condition)
+    return np.stack([*solution.x, *payload(solution.x, k, gravity), solution.condition])
 
 
 def payload(x: FloatArray, k: FloatArray, gravity: float) -> tuple[FloatArray, FloatArray]:
@@ -343,44 +325,16 @@ class PaperSeries:
     settled: int
 
 
-def stage1_series(source: Iterable[Segment], window: float) -> Iterator[PaperSeries]:
-    """`STAGE1_SERIES` of a log of the arm without payload.
+def series_of(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[PaperSeries]:
+    """Series of a stage over the windows of a log.
 
     Parameters
     ----------
     source : iterable of `Segment`, with velocities
     window : float, s
         What is left over at the end of a segment is a window too, down to eight samples.
+    stage : `stage1`, or `stage2` with what it knows
     """
-
-    def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
-        solved = stage1(theta, omega, tau, dt)
-        total = solved.k[4] + solved.k[2]
-        return np.concatenate([solved.k, [total, solved.condition, solved.k7_condition]])
-
-    return _windows(source, window, stage)
-
-
-def stage2_series(
-    source: Iterable[Segment], window: float, k: FloatArray, gravity: float
-) -> Iterator[PaperSeries]:
-    """`STAGE2_SERIES` of a log of the arm with payload.
-
-    Parameters
-    ----------
-    source, window : see `stage1_series`
-    k : (7,), in `algid.model.UNITS`, of the arm without payload
-    gravity : float, m/s²
-    """
-
-    def stage(theta: FloatArray, omega: FloatArray, tau: FloatArray, dt: float) -> FloatArray:
-        solved = stage2(theta, omega, tau, dt, k, gravity)
-        return np.concatenate([solved.x, [solved.l1, solved.m_p, solved.condition]])
-
-    return _windows(source, window, stage)
-
-
-def _windows(source: Iterable[Segment], window: float, stage: Stage) -> Iterator[PaperSeries]:
     for batch in _batches(pieces_of(source, window, least=8)):
         dt = batch[0].dt
         theta = np.stack([window.theta for window in batch], axis=1)

@@ -40,24 +40,12 @@ _SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12  # of fourth order (Fornberg
 _BEND = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12
 
 
-@dataclass(frozen=True)
-class PredictionFilter:
-    """Zero-phase Butterworth filters of `order`: of motion at `motion`, of torque at `cutoff` Hz.
-
-    `dropped` s are left out at each end.
-    """
-
-    order: int = 3
-    motion: float = 20.0
-    cutoff: float = 5.0
-    dropped: float = 0.3
-
-    def __str__(self) -> str:
-        return (
-            f"zero-phase Butterworth, order {self.order}: motion {self.motion:g} Hz, then torque "
-            f"{self.cutoff:g} Hz; "
-            f"{self.dropped:g} s dropped at each end"
-        )
+ORDER, MOTION, CUTOFF, DROPPED = 3, 20.0, 5.0, 0.3
+"""Of the zero-phase filters: order, cutoffs of motion and of torque in Hz, s left out at ends."""
+FILTER = (
+    f"zero-phase Butterworth, order {ORDER}: motion {MOTION:g} Hz, then torque {CUTOFF:g} Hz; "
+    f"{DROPPED:g} s dropped at each end"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +117,6 @@ class PredictionSums:
     model : Model
     shift : TorqueShift
         After how long a logged torque acts.
-    by : PredictionFilter
     at : (q,)
         The coefficients that are to be scored, and no others, where the model is not linear in
         them.
@@ -139,13 +126,11 @@ class PredictionSums:
         self,
         model: Model,
         shift: TorqueShift = AT_ONCE,
-        by: PredictionFilter | None = None,
         at: FloatArray | None = None,
     ) -> None:
         self._model = model
         self._at = at
         self._shift = shift
-        self._by = by or PredictionFilter()
         self._cutter: Cutter | None = None
         size = len(model.names) + 1
         self._standing = Standing()
@@ -178,7 +163,7 @@ class PredictionSums:
         shift = self._shift.at(piece.dt)
         if self._at is not None:
             shift -= self._model.lag(self._at)
-        _, X = _filtered(self._rows, piece, shift, self._by)
+        _, X = _filtered(self._rows, piece, shift)
         if not X.size:
             return
         if self._at is not None:
@@ -197,17 +182,17 @@ class PredictionSums:
 
 
 def _filtered(
-    rows: Callable[[Motion, float], FloatArray], piece: Segment, shift: float, by: PredictionFilter
+    rows: Callable[[Motion, float], FloatArray], piece: Segment, shift: float
 ) -> tuple[FloatArray, FloatArray]:
     """Times (n,) in s and X (2, q + 1, n) of a piece, from the `rows` (2, q, n) of its motion.
 
     Empty where the piece is too short. See the module's table.
     """
-    signals, dt, first = _decimated(piece, by)
-    edge = round(by.dropped / dt)
-    if signals.shape[1] <= max(2 * edge + 2, 6 * (by.order + 1)):
+    signals, dt, first = _decimated(piece)
+    edge = round(DROPPED / dt)
+    if signals.shape[1] <= max(2 * edge + 2, 6 * (ORDER + 1)):
         return np.zeros(0), np.zeros((2, 0, 0))
-    theta = butterworth(signals[:2], dt, min(by.motion, 0.45 / dt), by.order)
+    theta = butterworth(signals[:2], dt, min(MOTION, 0.45 / dt))
     Y = rows(motion_of(theta, dt), dt)
     if shift:
         place = np.arange(signals.shape[1]) + shift / dt
@@ -217,17 +202,17 @@ def _filtered(
     felt = np.asarray(X.any(axis=2))  # k4 is nothing to joint 2, k7 to joint 1
     alike = np.all(X[0] == X[1], axis=1)  # and k2, k3 to both the same
     felt[1] &= ~alike
-    X[felt] = butterworth(X[felt], dt, min(by.cutoff, 0.45 / dt), by.order)
+    X[felt] = butterworth(X[felt], dt, min(CUTOFF, 0.45 / dt))
     X[1, alike] = X[0, alike]
     kept = np.arange(edge, signals.shape[1] - edge)
     return first + dt * kept, X[:, :, edge : signals.shape[1] - edge]
 
 
-def _decimated(piece: Segment, by: PredictionFilter) -> tuple[FloatArray, float, float]:
+def _decimated(piece: Segment) -> tuple[FloatArray, float, float]:
     """Angles and torques (4, n) at the filter's rate, the period in s, and the first time in s."""
-    step = int(1 / (_PER_CUTOFF * by.motion * piece.dt))
+    step = int(1 / (_PER_CUTOFF * MOTION * piece.dt))
     signals = np.concatenate([piece.theta, piece.tau])
-    kernel = smoother(piece.dt, _SHARPER * by.motion)
+    kernel = smoother(piece.dt, _SHARPER * MOTION)
     if step < 2 or signals.shape[1] < kernel.size:
         return signals, piece.dt, piece.start
     first = piece.start + piece.dt * (kernel.size // 2)
@@ -248,20 +233,18 @@ def scored_torque(
     c: FloatArray,
     segments: Iterable[Segment],
     shift: TorqueShift = AT_ONCE,
-    by: PredictionFilter | None = None,
 ) -> Iterator[ScoredTorque]:
     """What `score` scores, piece by piece: both torques as the filters leave them.
 
     A piece that is too short to be scored is left out.
     """
-    by = by or PredictionFilter()
 
     def rows(motion: Motion, dt: float) -> FloatArray:
         return torque(model, c, flexed(model, c, motion, dt))[:, None]
 
     for piece in pieces_of(segments, _PIECE_SECONDS):
         lag = shift.at(piece.dt) - model.lag(c)
-        t, X = _filtered(rows, piece, lag, by)
+        t, X = _filtered(rows, piece, lag)
         if X.size:
             yield ScoredTorque(t, X[:, 1], X[:, 0])
 
@@ -288,10 +271,9 @@ def score(
     c: FloatArray,
     segments: Iterable[Segment],
     shift: TorqueShift = AT_ONCE,
-    by: PredictionFilter | None = None,
 ) -> PredictionScore:
     """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
-    sums = PredictionSums(model, shift, by, c)
+    sums = PredictionSums(model, shift, c)
     for segment in segments:
         sums.push(segment)
     sums.finish()

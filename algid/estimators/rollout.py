@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionFilter, motion_of
+from algid.estimators.prediction import DROPPED, MOTION, ORDER, motion_of
 from algid.model import Model, advanced, damping, inertia
 from algid.signals.filters import butterworth
 from algid.signals.segments import Segment, pieces_of
@@ -132,13 +132,13 @@ def _starts(
 
     Only starts with the first horizon ahead of them.
     """
-    by, dt, n = PredictionFilter(), piece.dt, len(piece)
+    dt, n = piece.dt, len(piece)
     halves = 2 * round(HORIZONS[-1] / step) + 1
-    edge, first = round(by.dropped / dt), round(HORIZONS[0] / dt)
+    edge, first = round(DROPPED / dt), round(HORIZONS[0] / dt)
     at = np.arange(edge, n - edge - first, max(1, round(spacing / dt)))
-    if n <= 6 * (by.order + 1) or not at.size:
+    if n <= 6 * (ORDER + 1) or not at.size:
         return np.zeros((4, 0)), np.zeros((halves, 2, 0)), np.zeros((len(HORIZONS), 2, 0))
-    motion = motion_of(butterworth(piece.theta, dt, min(by.motion, 0.45 / dt), by.order), dt)
+    motion = motion_of(butterworth(piece.theta, dt, min(MOTION, 0.45 / dt)), dt)
     late = shift.at(dt) - model.lag(c)
     when = at * dt + 0.5 * step * np.arange(halves)[:, None] - late
     t = np.arange(n) * dt

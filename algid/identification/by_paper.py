@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,9 @@ from algid.estimators.paper import (
     STAGE2_SERIES,
     PaperSeries,
     Summary,
-    stage1_series,
-    stage2_series,
+    series_of,
+    stage1,
+    stage2,
     wanders,
 )
 from algid.identification.outcome import Identified, distrusted
@@ -114,10 +116,10 @@ def _estimate(
     names: Sequence[str]
     if k is None:
         names, file = STAGE1_SERIES, STAGE1_FILE
-        series = stage1_series(moving, window)
+        series = series_of(moving, window, stage1)
     else:
         names, file = STAGE2_SERIES, STAGE2_FILE
-        series = stage2_series(moving, window, k, settings.gravity)
+        series = series_of(moving, window, partial(stage2, k=k, gravity=settings.gravity))
     summary = Summary(len(names))
 
     def watched() -> Iterator[PaperSeries]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from algid import results
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionFilter, PredictionScore
+from algid.estimators.prediction import CUTOFF, FILTER, PredictionScore
 from algid.table4 import finite
 
 
@@ -14,7 +14,6 @@ def prediction(score: PredictionScore) -> results.TorquePrediction | None:
     """As the result holds it; None where every log was too short to judge."""
     if score.count == 0:
         return None
-    by = PredictionFilter()
     moving = rest = held = None
     states = score.standing
     if np.any(states.moving + states.rest):
@@ -25,8 +24,8 @@ def prediction(score: PredictionScore) -> results.TorquePrediction | None:
         rmse=_pair(score.rmse),
         nrmse=_pair(score.nrmse),
         r2=_pair(score.r2),
-        filter=str(by),
-        bandwidth=by.cutoff,
+        filter=FILTER,
+        bandwidth=CUTOFF,
         of_load=_pair(score.of_load),
         rmse_moving=moving,
         rmse_rest=rest,

@@ -25,7 +25,7 @@ from algid.estimators.innovations import (
 )
 from algid.estimators.noise import first_guess
 from algid.estimators.paper import PaperSeries
-from algid.estimators.prediction import PredictionFilter, scored_torque
+from algid.estimators.prediction import CUTOFF, MOTION, scored_torque
 from algid.estimators.running import has_running, running
 from algid.identification.recordings import Recordings
 from algid.model import Model, Motion, inertia, torque
@@ -71,9 +71,7 @@ def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[
     bandwidth = _bandwidth(piece, model, c)
     # the model is not linear in the motion: what noise forbids to show is taken from its torque,
     # not from its motion
-    theta = smoothed(
-        piece.theta, piece.dt, max(bandwidth, min(PredictionFilter().motion, 0.1 / piece.dt))
-    )
+    theta = smoothed(piece.theta, piece.dt, max(bandwidth, min(MOTION, 0.1 / piece.dt)))
     omega = np.gradient(theta, piece.dt, axis=1)
     motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
     motion = flexed(model, c, motion, piece.dt)
@@ -126,13 +124,12 @@ def scored_blocks(
     shift: TorqueShift,
 ) -> Iterator[dict[str, FloatArray]]:
     """The torque that is scored and its prediction, of every log; arguments as `torque_blocks`."""
-    by = PredictionFilter()
     for number, log in enumerate(survey.logs):
-        for piece in scored_torque(model, coefficients[log.role], survey.segments(log), shift, by):
+        for piece in scored_torque(model, coefficients[log.role], survey.segments(log), shift):
             step = 1
             if piece.t.size > 1:
                 dt = float(piece.t[1] - piece.t[0])
-                step = max(1, int(1 / (SCORED_RATE * by.cutoff * dt)))
+                step = max(1, int(1 / (SCORED_RATE * CUTOFF * dt)))
             measured, predicted = piece.measured[:, ::step], piece.predicted[:, ::step]
             t = piece.t[::step]
             yield {

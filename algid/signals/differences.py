@@ -194,34 +194,3 @@ def integral(signal: FloatArray, dt: float) -> FloatArray:
     steps[..., 2:-1] += _INNER[0] * (signal[..., :-3] + signal[..., 3:])
     steps *= dt
     return np.cumsum(steps, axis=-1, out=steps)
-
-
-def nested_integral(signal: FloatArray, dt: float, order: int) -> FloatArray:
-    """Integrate a uniformly sampled signal `order` times from its first sample.
-
-    Parameters
-    ----------
-    signal : (..., N) float64, unit u
-        Samples at 0, dt, …, (N-1) dt.
-    dt : float, s
-    order : int, at least 1
-
-    Returns
-    -------
-    (..., N) float64, unit u s^order
-        Zero at the first sample. Error O(dt^4) for smooth signals.
-
-    Raises
-    ------
-    ValueError
-        If order < 1 or the signal has fewer than four samples.
-
-    Notes
-    -----
-    The integrals ∫^(n) of Páez-García et al. 2023, eq. (3) to (5).
-    """
-    if order < 1:
-        raise ValueError(f"order must be at least 1, got {order}")
-    for _ in range(order):
-        signal = integral(signal, dt)
-    return signal

@@ -20,9 +20,7 @@ from algid.base.compiled import lapack
 _KAISER_BETA = 7.0  # stop band at -70 dB
 _PERIODS = 2.5  # half length of a kernel in periods of its bandwidth
 _LEAST = 3  # half length that three odd moments ask for, however slowly a log was sampled
-_SETTLED = (
-    1.0  # periods of a Butterworth cutoff, times its order, after which it forgets to some 1e-4
-)
+_SETTLED = 3.0  # periods of a Butterworth filter's cutoff, after which it forgets to some 1e-4
 _ROWS = 32  # outputs a matrix product makes at once
 
 
@@ -103,52 +101,30 @@ def smoothed(x: FloatArray, dt: float, bandwidth: float) -> FloatArray:
     return correlate(reflected(x, reach), kernel / kernel.sum())
 
 
-def butterworth(x: FloatArray, dt: float, cutoff: float, order: int) -> FloatArray:
-    """Signals (m, N) after a zero-phase Butterworth filter: forwards, then backwards.
+def butterworth(x: FloatArray, dt: float, cutoff: float) -> FloatArray:
+    """Signals (m, N) after a zero-phase Butterworth filter of third order: forwards, then back.
 
-    `cutoff` is in Hz; `order` is that of one direction.
+    `cutoff` is in Hz.
 
-    The filter is the bilinear transform of the analogue one, in sections of second order, one of
-    third where the order is odd (Oppenheim & Schafer, Discrete-Time Signal Processing, sec. 6.3 and
-    7.1). Both ends continue by point reflection, over `_SETTLED` × `order` periods of the cutoff.
-    The sections start at rest around the first sample: constants are kept exactly. N must be above
-    1.
+    The filter is the bilinear transform of the analogue one (Oppenheim & Schafer, Discrete-Time
+    Signal Processing, sec. 6.3 and 7.1). Both ends continue by point reflection, over `_SETTLED`
+    periods of the cutoff. It starts at rest around the first sample: constants are kept exactly. N
+    must be above 1.
     """
-    reach = min(math.ceil(_SETTLED * order / (cutoff * dt)), x.shape[1] - 1)
+    warped = np.tan(np.pi * cutoff * dt)
+    scale = 1 + warped + warped**2
+    numerator = warped**3 / (1 + warped) / scale * np.array([1.0, 3.0, 3.0, 1.0])
+    denominator = np.convolve(
+        [1.0, (warped - 1) / (1 + warped)],
+        [1.0, 2 * (warped**2 - 1) / scale, (1 - warped + warped**2) / scale],
+    )
+    reach = min(math.ceil(_SETTLED / (cutoff * dt)), x.shape[1] - 1)
     y = reflected(x, reach)
     for _ in range(2):  # there, and back again
         start = y[:, :1].copy()
-        y -= start
-        for numerator, denominator in _sections(cutoff * dt, order):
-            y = _passed(numerator, denominator, y)
-        y += start
+        y = _passed(numerator, denominator, y - start) + start
         y = y[:, ::-1]
     return np.ascontiguousarray(y[:, reach : reach + x.shape[1]])
-
-
-def _sections(cutoff: float, order: int) -> list[tuple[FloatArray, FloatArray]]:
-    """Numerators and denominators of a Butterworth low pass; `cutoff` in periods a sample."""
-    warped = np.tan(np.pi * cutoff)
-    sections = []
-    for pair in range(order // 2):
-        damping = 2 * np.sin(np.pi * (2 * pair + 1) / (2 * order)) * warped
-        scale = 1 + damping + warped**2
-        numerator = warped**2 / scale * np.array([1.0, 2.0, 1.0])
-        denominator = np.array(
-            [1.0, 2 * (warped**2 - 1) / scale, (1 - damping + warped**2) / scale]
-        )
-        sections.append((numerator, denominator))
-    if order % 2:
-        numerator = warped / (1 + warped) * np.array([1.0, 1.0])
-        denominator = np.array([1.0, (warped - 1) / (1 + warped)])
-        if sections:  # each section is one more substitution
-            last = sections.pop()
-            numerator, denominator = (
-                np.convolve(numerator, last[0]),
-                np.convolve(denominator, last[1]),
-            )
-        sections.append((numerator, denominator))
-    return sections
 
 
 def _passed(numerator: FloatArray, denominator: FloatArray, x: FloatArray) -> FloatArray:

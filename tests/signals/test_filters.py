@@ -78,14 +78,13 @@ def test_every_so_many_values_of_a_correlation_are_numpys(step: int, length: int
     np.testing.assert_allclose(correlate(x, kernel, step), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 7])
 @pytest.mark.parametrize("cutoff", [0.5, 5.0, 100.0, 225.0])
-def test_butterworth_is_scipys_ends_included(order: int, cutoff: float) -> None:
+def test_butterworth_is_scipys_ends_included(cutoff: float) -> None:
     x = np.cumsum(np.random.default_rng(5).standard_normal((2, 4000)), axis=1)
-    sections = butter(order, cutoff, fs=500.0, output="sos")
-    reach = min(math.ceil(order * 500 / cutoff), x.shape[1] - 1)
+    sections = butter(3, cutoff, fs=500.0, output="sos")
+    reach = min(math.ceil(3 * 500 / cutoff), x.shape[1] - 1)
     expected = sosfiltfilt(sections, x, axis=-1, padtype="odd", padlen=reach)
     # the same arithmetic in another order: rounding, grown by sections that remember 1e3 samples
     np.testing.assert_allclose(
-        butterworth(x, 1 / 500, cutoff, order), expected, atol=1e-8 * np.abs(x).max()
+        butterworth(x, 1 / 500, cutoff), expected, atol=1e-8 * np.abs(x).max()
     )

@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from algid.signals.differences import integral, nested_integral
+from algid.signals.differences import integral
 
 
 def largest_error(dt: float, order: int) -> float:
     """Error of the integrals of cos(3 t) over two seconds, at any sample."""
     t = dt * np.arange(round(2.0 / dt) + 1)
     exact = {1: np.sin(3 * t) / 3, 2: (1 - np.cos(3 * t)) / 9, 3: t / 9 - np.sin(3 * t) / 27}[order]
-    return float(np.abs(nested_integral(np.cos(3 * t), dt, order) - exact).max())
+    found = np.cos(3 * t)
+    for _ in range(order):
+        found = integral(found, dt)
+    return float(np.abs(found - exact).max())
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -34,7 +37,5 @@ def test_leading_axes_are_kept() -> None:
 
 
 def test_wrong_calls_say_what_was_wrong() -> None:
-    with pytest.raises(ValueError, match="order must be at least 1, got 0"):
-        nested_integral(np.zeros(8), 0.1, 0)
     with pytest.raises(ValueError, match="at least 4 samples, got 3"):
         integral(np.zeros(3), 0.1)
