@@ -74,11 +74,12 @@ def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
                 "zstd chunks)"
             )
     else:
-        found = [*folder.glob("*.mcap"), *folder.glob("*.db3")]
-        by_stem = {one.name: _NAME_AND_NUMBER.match(one.stem) for one in found}
-        order = {name: (int(one[2] or 0), name) for name, one in by_stem.items() if one}
-        names = sorted(order, key=order.__getitem__)
-        if len({one[1] for one in by_stem.values() if one}) > 1:
+        parts = []
+        for one in [*folder.glob("*.mcap"), *folder.glob("*.db3")]:
+            if match := _NAME_AND_NUMBER.match(one.stem):
+                parts.append((int(match[2] or 0), one.name, match[1]))
+        names = [name for _, name, _ in sorted(parts)]
+        if len({stem for *_, stem in parts}) > 1:
             raise LogError(
                 f"{folder}: {', '.join(names[:3])}: not the numbered parts of one bag, and no "
                 "metadata.yaml lists them; read each for itself"

@@ -61,6 +61,8 @@ _KINDS: dict[int, tuple[Any, str]] = {
 """Records that define something, and what they are known by."""
 _SUMMARY = (2, 3, 4, 8, 10, 11, 13, 14)
 """Codes of the records that may stand behind the end of the data."""
+_LEAST = {Opcode.MESSAGE: _HEAD_BYTES - 9, Opcode.DATA_END: 4}
+"""Bytes of such a record's content."""
 _LOOSE_BYTES = 1 << 23
 """Of records outside of chunks that are read at once."""
 _SMALL_BYTES = 1 << 13
@@ -205,8 +207,7 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         code, length, channel, entries = _INDEX.unpack(head.ljust(_INDEX.size, b"\0"))
         end = place + _FRAME.size + length
         known = 0 < code <= Opcode.DATA_END or code >= 0x80
-        known &= length >= _HEAD_BYTES - 9 or code != Opcode.MESSAGE
-        known &= length == 4 or code != Opcode.DATA_END
+        known &= length >= _LEAST.get(code, 0)
         if not known or end > size:
             break
         last = found.parts[-1] if found.parts else _Part(0, 0)
@@ -216,7 +217,8 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         elif code == Opcode.MESSAGE_INDEX and follows and not last.loose:
             last.index_length += end - place
             if 0 < entries == length - 6:
-                last.counts = {**(last.counts or {}), channel: entries // 16}
+                last.counts = {} if last.counts is None else last.counts
+                last.counts[channel] = entries // 16
         elif code == Opcode.MESSAGE or (code in _KINDS and not data_end):
             if follows and last.loose and last.length < _LOOSE_BYTES:
                 last.length += end - place

@@ -37,8 +37,8 @@ _PARTS = (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos"), ("secs", "n
 
 def _nothing(file: MessageFile, lacking: str) -> str:
     """That a file lacks what is looked for; damage to it may be why."""
-    if places := list(dict.fromkeys(file.damage)):
-        where = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+    if file.damage:
+        where = "; ".join(list(dict.fromkeys(file.damage))[:3])
         lacking = f"the file is damaged ({where}); copy it again; in what is left: {lacking}"
     return f"{file.path}: {lacking}"
 
@@ -93,8 +93,8 @@ def stated_of(
     text = channel.definition.decode("utf-8", errors="replace")
     metadata, lines = dict(channel.metadata), list(lines_of(channel.metadata))
     if channel.encoding == "json":
-        units, descriptions = in_json_schema(text)
-        metadata |= units
+        own, descriptions = in_json_schema(text)
+        metadata |= own
         lines += descriptions
         labels = layouts[0].labels.items()
         lines += [f"{path}: {label}" for path, label in labels if "unit" in path]
@@ -102,8 +102,8 @@ def stated_of(
         lines += [line for line in text.splitlines() if "#" in line or "//" in line]
     fields = {name: path.partition("[")[0] for name, path in paths.items()}
     by_field = units_in(metadata, list(dict.fromkeys(fields.values())))
-    named = {name: by_field[path] for name, path in fields.items() if path in by_field}
-    return {name: unit_of(unit) or unit for name, unit in named.items()}, lines
+    units = {name: by_field.get(path) for name, path in fields.items()}
+    return {name: unit_of(unit) or unit for name, unit in units.items() if unit}, lines
 
 
 def references_of(file: MessageFile, joints: tuple[str, str]) -> dict[str, tuple[str | None, str]]:

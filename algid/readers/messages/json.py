@@ -25,8 +25,9 @@ class JsonRecords:
 
     def __init__(self) -> None:
         self._known: dict[object, int] = {}
-        self._layouts: dict[int, MessageLayout | MisfitError] = {}
+        self._layouts: dict[int, MessageLayout] = {}
         self._numbers = count()
+        self._misfit = ""
 
     def records(self, messages: Messages) -> Messages:
         """The messages as records, which `parse` reads until the next ones are made."""
@@ -39,8 +40,8 @@ class JsonRecords:
             try:
                 rows.append(self._record(messages.content[start:end].tobytes()))
             except MisfitError as error:
-                self._learn(str(error), error)
-                rows.append(struct.pack("<Q", self._known[str(error)]))
+                self._misfit = self._misfit or str(error)
+                rows.append(b"")
         return Messages.of(rows, messages.log_ns)
 
     def parse(self, record: bytes) -> MessageLayout:
@@ -51,16 +52,9 @@ class JsonRecords:
         MisfitError
             If its message was no JSON object.
         """
-        (number,) = struct.unpack_from("<Q", record)
-        layout = self._layouts[number]
-        if isinstance(layout, MisfitError):
-            raise layout
-        return layout
-
-    def _learn(self, structure: object, layout: MessageLayout | MisfitError) -> None:
-        if structure not in self._known:
-            self._known[structure] = next(self._numbers)
-            self._layouts[self._known[structure]] = layout
+        if not record:
+            raise MisfitError(self._misfit)
+        return self._layouts[struct.unpack_from("<Q", record)[0]]
 
     def _record(self, payload: bytes) -> bytes:
         try:
@@ -89,7 +83,8 @@ class JsonRecords:
                     layout.labels[path] = str(leaf)
                 elif path in GOOD | BAD and (path in GOOD) == (leaf in (0, False)):
                     layout.lacks += (path,)
-            self._learn(structure, layout)
+            self._known[structure] = next(self._numbers)
+            self._layouts[self._known[structure]] = layout
         return struct.pack(f"<Q{len(numbers)}d", self._known[structure], *numbers.values())
 
 

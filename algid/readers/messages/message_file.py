@@ -131,5 +131,4 @@ class MessageFile:
             f"{channel.topic!r} ({channel.type or 'no schema'}, {channel.encoding!r})"
             for channel in self.channels.values()
         ]
-        more = f" and {len(topics) - 12} more" if len(topics) > 12 else ""
-        return (", ".join(topics[:12]) or "no topic") + more
+        return ", ".join([*topics[:12], "…"][: len(topics)]) or "no topic"
