@@ -21,10 +21,10 @@ from algid.identification.identify import identify
 from algid.log import Log
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import simulate
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import random_arm, waves
 from pipelines.cramer_rao import Truth, information
 from pipelines.experiment import Seen, count, experiment, grid, judged, number, rms, share
-from pipelines.simulator import Controller, Plan, controlled
+from pipelines.simulator import Controller, Plan, controlled, inertias
 
 FIRST_ARM = 300  # seeds of arms that nothing was tuned on
 SIGMA_THETA, SIGMA_TAU = 1e-3, 1e-2
@@ -120,18 +120,16 @@ def _pd(row: Row, arm: Arm, t: FloatArray, held: bool, seed: int) -> Truth:
     fine = np.arange(2 * t.size - 1) / (2 * row.rate)
     alone = row.drive == "joint2"
     frequencies = np.array([0.5, 1.1, 1.9] if alone else [0.1, 0.2, 0.3, 0.5])
-    theta, omega = np.zeros((2, fine.size)), np.zeros((2, fine.size))
-    theta[0] = -np.pi / 2
-    for joint in (1,) if alone else (0, 1):
-        phase = rng.uniform(0, 2 * np.pi, frequencies.size)
-        size = 0.5 / np.sqrt(np.arange(1, frequencies.size + 1))
-        w = 2 * np.pi * frequencies[:, None]
-        theta[joint] += (size[:, None] * np.sin(w * fine + phase[:, None])).sum(axis=0)
-        omega[joint] += (size[:, None] * w * np.cos(w * fine + phase[:, None])).sum(axis=0)
+    joints = [1] if alone else [0, 1]
+    phase = rng.uniform(0, 2 * np.pi, (len(joints), frequencies.size))
+    size = 0.5 / np.sqrt(np.arange(1, frequencies.size + 1))
+    wanted = np.zeros((2, 2, fine.size))
+    wanted[0, 0] = -np.pi / 2
+    wanted[:, joints] += waves(fine, frequencies, size, phase)[:2]
     k = arm.constants()
-    inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])
+    inertia = inertias(k)
     law = Controller(inertia * STIFFNESS**2, 2 * 0.7 * inertia * STIFFNESS, digital=held)
-    plan = Plan(theta, omega, np.zeros_like(theta))
+    plan = Plan(wanted[0], wanted[1], np.zeros_like(wanted[0]))
     angles, torques, _ = controlled(k, plan, law, np.zeros(2), row.rate, rng)
     return Truth(t, angles, np.gradient(angles, t, axis=1), torques)
 

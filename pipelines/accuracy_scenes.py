@@ -61,6 +61,16 @@ def case_of(name: str) -> Case:
     return Case(name, arm, payload, None, {})
 
 
+def waves(
+    t: FloatArray | float, frequency: FloatArray, size: FloatArray, phase: FloatArray
+) -> FloatArray:
+    """Angles, velocities and accelerations (3, …, N) at times (N,) of sums of sines (…, n)."""
+    w, size = 2 * np.pi * frequency[..., None], size[..., None]
+    at = w * t + phase[..., None]
+    sines = size * np.sin(at), size * w * np.cos(at), -size * w**2 * np.sin(at)
+    return np.asarray(np.stack(np.broadcast_arrays(*sines)).sum(axis=-2))
+
+
 def logged(
     t: FloatArray,
     theta: FloatArray,

@@ -24,9 +24,9 @@ from algid.identification.identify import identify
 from algid.log import Log
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import HANGING
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import random_arm, waves
 from pipelines.experiment import Seen, count, experiment, grid, judged, number, rms, share, words
-from pipelines.simulator import Arms, swung
+from pipelines.simulator import Arms, inertias, swung
 
 DT, DURATION, LOGS = 2e-3, 10.0, 6
 SHARE, PERSISTENCE = 0.3, 0.1  # of the drive's RMS; s
@@ -101,11 +101,9 @@ def _controller(
     """Angles to follow (2, n, T) at half steps, and the torque (2, n) of a PD controller."""
     phase = rng.uniform(0, 2 * np.pi, (2, LOGS, _FREQUENCIES.size))
     size = rng.uniform(0.2, 0.5, phase.shape)
-    turn = 2 * np.pi * _FREQUENCIES
-    angle = phase[..., None] + turn[:, None] * half
-    wanted = np.sum(size[..., None] * np.sin(angle), axis=2) + HANGING[:, None, None]
-    rate = np.sum((size * turn)[..., None] * np.cos(angle), axis=2)
-    inertia = np.array([k[4] + k[2] + 2 * k[0], k[2]])[:, None]
+    wanted, rate, _ = waves(half, _FREQUENCIES, size, phase)
+    wanted += HANGING[:, None, None]
+    inertia = inertias(k)[:, None]
 
     def control(place: int, x: FloatArray) -> FloatArray:
         error, slower = wanted[:, :, place] - x[:2], rate[:, :, place] - x[2:4]

@@ -25,7 +25,7 @@ from algid.model import RIGID
 from pipelines.accuracy_scenes import logged, random_arm
 from pipelines.experiment import Seen, count, experiment, judged, number, share
 from pipelines.race_scenes import DURATION, RATE, SIGMA_TAU, SIGMA_THETA, followed, sines
-from pipelines.simulator import Arms
+from pipelines.simulator import Arms, inertias
 
 SUBSTEPS = 6
 SPEEDS = (30.0, 55.0, 80.0)  # rad/s, of a link against its locked motor
@@ -46,7 +46,7 @@ def scenes(
     """
     keys = list(product(seeds, range(runs)))
     k = np.stack([random_arm(100 + seed)[0].constants() for seed, _ in keys], axis=-1)
-    links, inertia = np.stack([k[4] + k[2], k[2]]), np.stack([k[4] + k[2] + 2 * k[0], k[2]])
+    links, inertia = np.stack([k[4] + k[2], k[2]]), inertias(k)
     shares = [np.random.default_rng([7, seed]).uniform(*ROTOR, 2) for seed, _ in keys]
     rotor = np.transpose(shares) * links
     fine = np.arange(2 * SUBSTEPS * round(DURATION * RATE) + 1) / (2 * SUBSTEPS * RATE)

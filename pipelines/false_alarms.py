@@ -34,7 +34,7 @@ from algid.log import Log, Origin
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.sensors import Sensors, sample_times
 from algid.synth.simulator import SimulatedMotion, simulate
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import random_arm, waves
 from pipelines.experiment import Seen, count, experiment, grid, judged, share, words
 
 FIRST_ARM = 1000  # seeds of arms that nothing was tuned on
@@ -88,11 +88,9 @@ def motion_of(kind: str, arm: Arm, rng: np.random.Generator, *, even: bool) -> S
 
 def _followed(k: FloatArray, t: FloatArray, rng: np.random.Generator) -> SimulatedMotion:
     """Sines about the horizontal and the stretched arm, and the torque that they take."""
-    f = rng.uniform(0.03, 0.3, (2, 4, 1))
-    phase, size = rng.uniform(0, 2 * np.pi, (2, 4, 1)), rng.uniform(0.2, 0.6, (2, 4, 1))
-    w, at = 2 * np.pi * f, 2 * np.pi * f * t + phase
-    theta = np.sum(size * np.sin(at), axis=1)
-    omega, alpha = np.sum(size * w * np.cos(at), axis=1), np.sum(-size * w**2 * np.sin(at), axis=1)
+    f = rng.uniform(0.03, 0.3, (2, 4))
+    phase, size = rng.uniform(0, 2 * np.pi, (2, 4)), rng.uniform(0.2, 0.6, (2, 4))
+    theta, omega, alpha = waves(t, f, size, phase)
     return SimulatedMotion(t, theta, omega, inverse_dynamics(k, theta, omega, alpha))
 
 

@@ -6,16 +6,14 @@ import random
 from collections.abc import Iterable
 from heapq import merge
 from itertools import repeat
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from mcap.writer import Writer
 
-from algid.arm import Arm
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
-from algid.log import Log, Origin, Truth
-from algid.writers import FORMATS, mcap, write_log
+from algid.log import Log, Origin
+from algid.writers import mcap
 
 _NUMBERS = (0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 40, (1 << 63) - 1)
 _WORDS = (
@@ -65,17 +63,6 @@ def clean_log(rows: int = 400) -> Log:
         Origin("", "", {}),
         omega,
     )
-
-
-def clean_files(folder: Path) -> list[Path]:
-    """The clean log in every format, with a truth."""
-    truth = Truth(Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3), 0.5, "case1")
-    paths = [folder / f"clean.{kind}" for kind in FORMATS]
-    for path in paths:
-        write_log(path, clean_log(), truth=truth)
-    # small chunks, so that damage to one leaves others
-    mcap.write(folder / "clean.mcap", [clean_log()], truth=truth, chunk_size=8192)
-    return paths
 
 
 Topic = tuple[str, str, str, str, bytes, Iterable[tuple[int, bytes]]]

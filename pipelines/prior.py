@@ -26,7 +26,7 @@ from algid.results import Result
 from algid.settings import Settings
 from algid.synth.excitation import SampledTorque, wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, simulate, steered
-from pipelines.accuracy_scenes import logged, random_arm
+from pipelines.accuracy_scenes import logged, random_arm, waves
 from pipelines.experiment import Seen, count, experiment, grid, judged, number, share
 
 RATE, DURATION = 200.0, 4.0
@@ -66,14 +66,10 @@ def log_of(arm: Arm, motion: str, seed: int) -> Log:
 def _locked(arm: Arm, t: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Angles and torques (2, N) of an arm whose second joint is held."""
     phase, size = rng.uniform(0, 6, 3), np.array([0.5, 0.3, 0.2])
-    pulse = 2 * np.pi * np.array([0.4, 0.9, 1.7])
-    angle = np.zeros((3, 2, t.size))
-    angle[0, 1] = rng.uniform(-1, 1)
-    for p, a, w in zip(phase, size, pulse, strict=True):
-        angle[0, 0] += a * np.sin(w * t + p)
-        angle[1, 0] += a * w * np.cos(w * t + p)
-        angle[2, 0] -= a * w**2 * np.sin(w * t + p)
-    return angle[0], inverse_dynamics(arm.constants(), *angle)
+    motion = np.zeros((3, 2, t.size))
+    motion[:, 0] = waves(t, np.array([0.4, 0.9, 1.7]), size, phase)
+    motion[0, 1] = rng.uniform(-1, 1)
+    return motion[0], inverse_dynamics(arm.constants(), *motion)
 
 
 def _pulled(

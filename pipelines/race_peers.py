@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+import algid
 from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.log import Log
 from algid.signals.segments import Segment
@@ -58,37 +59,32 @@ def even(log: Log) -> Segment:
     return Segment(0.0, STEP, theta, tau)
 
 
-def algid_by(estimator: str) -> Contender:
-    """algid without any other flag, or with one estimator."""
+def algid_by(**flags: str) -> Contender:
+    """algid without any flag, or with some."""
 
     def answer(logs: Sequence[Log], _l1: float) -> Answer:
-        import algid
-
-        settings = (
-            algid.Settings() if estimator == "default" else algid.Settings(estimator=estimator)
+        result = algid.identify(list(logs), report=False, **flags)  # type: ignore[arg-type]
+        found = {name: row for name, row in result.parameters.items() if row.estimate is not None}
+        none = (np.nan,) * 4  # estimate, deviation and both ends of the interval
+        rows = [
+            (found[name].estimate, found[name].std, *(found[name].ci95 or none[:2]))
+            if name in found
+            else none
+            for name in CONSTANT_NAMES
+        ]
+        numbers = np.array(rows, dtype=np.float64)
+        model = result.fit.model if result.fit else None
+        return Answer(
+            numbers[:, 0],
+            None if np.all(np.isnan(numbers[:, 1])) else numbers[:, 1],
+            None if np.all(np.isnan(numbers[:, 2:])) else numbers[:, 2:],
+            {
+                name: row.estimate or 0.0
+                for name, row in found.items()
+                if name not in CONSTANT_NAMES
+            },
+            float((model and model.coulomb_speed) or regressions.WIDTH),
         )
-        result = algid.identify(list(logs), settings=settings, report=False)
-        found = [result.parameters.get(name) for name in CONSTANT_NAMES]
-        # of each estimate, deviation and both ends of the interval
-        numbers = np.array(
-            [
-                (np.nan,) * 4
-                if row is None
-                else (row.estimate, row.std, *(row.ci95 or (None, None)))
-                for row in found
-            ],
-            dtype=np.float64,
-        )
-        terms = {
-            name: row.estimate
-            for name, row in result.parameters.items()
-            if name not in CONSTANT_NAMES and row.estimate is not None
-        }
-        width = result.fit.model.coulomb_speed if result.fit and result.fit.model else None
-        width = float(width or regressions.WIDTH)
-        if estimator == "paper":
-            return Answer(numbers[:, 0], terms=terms, width=width)
-        return Answer(numbers[:, 0], numbers[:, 1], numbers[:, 2:], terms, width)
 
     return answer
 
@@ -104,35 +100,41 @@ def _terms(p: FloatArray, choice: Choice) -> dict[str, float]:
     return {NAMES[place]: float(p[n]) for n, place in enumerate(choice.columns) if place >= 7}
 
 
-def regression(
-    solve: Callable[[Sequence[Segment], Choice], tuple[FloatArray, FloatArray]],
-    every_term: bool = False,
-) -> Contender:
-    """A regression behind the filters that predict best."""
+Fitted = Callable[[list[Segment], Choice, float], Answer]
 
-    def answer(logs: Sequence[Log], _l1: float) -> Answer:
+
+def prepared(fit: Fitted, every_term: bool = False) -> Contender:
+    """A contender that takes even logs, behind the filters that predict best, and their terms."""
+
+    def answer(logs: Sequence[Log], l1: float) -> Answer:
         segments = [even(log) for log in logs]
-        choice = chosen(segments, every_term)
-        p, covariance = solve(segments, choice)
-        return _by_covariance(p[:7], covariance[:7, :7], _terms(p, choice))
+        return fit(segments, chosen(segments, every_term), l1)
 
     return answer
 
 
-def output_error(every_term: bool = False) -> Contender:
+def least_squares(segments: list[Segment], choice: Choice, _l1: float) -> Answer:
+    """Least squares on the filtered regressor."""
+    return _of_regression(*regressions.least_squares(segments, choice), choice)
+
+
+def instruments(segments: list[Segment], choice: Choice, _l1: float) -> Answer:
+    """IDIM-IV."""
+    return _of_regression(*regressions.instruments(segments, choice), choice)
+
+
+def _of_regression(p: FloatArray, covariance: FloatArray, choice: Choice) -> Answer:
+    return _by_covariance(p[:7], covariance[:7, :7], _terms(p, choice))
+
+
+def output_error(segments: list[Segment], choice: Choice, _l1: float) -> Answer:
     """Simulated against measured angles, from least squares on."""
-
-    def answer(logs: Sequence[Log], _l1: float) -> Answer:
-        segments = [even(log) for log in logs]
-        choice = chosen(segments, every_term)
-        first, _ = regressions.least_squares(segments, choice)
-        p = simulation.fit(segments, first, choice)
-        return Answer(p[:7], terms=_terms(p, choice))
-
-    return answer
+    first, _ = regressions.least_squares(segments, choice)
+    p = simulation.fit(segments, first, choice)
+    return Answer(p[:7], terms=_terms(p, choice))
 
 
-def pinocchio(logs: Sequence[Log], l1: float) -> Answer:
+def pinocchio(segments: list[Segment], choice: Choice, l1: float) -> Answer:
     """FIGAROH's way: pinocchio's torque regressor and columns of friction, filtered and thinned,
     least squares with each joint weighed by its misfit.
     """
@@ -145,8 +147,6 @@ def pinocchio(logs: Sequence[Log], l1: float) -> Answer:
         first, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array([l1, 0.0, 0.0])), "joint2"
     )
     data = model.createData()
-    segments = [even(log) for log in logs]
-    choice = chosen(segments)
     # of mass, first moments and inertias of both links those that move in the plane
     links = [0, 1, 9, 10, 11, 19, *([2, 12] if "bent" in choice.terms else [])]
     more = [place for place in choice.columns if 5 <= place < 12]
@@ -180,14 +180,12 @@ def pinocchio(logs: Sequence[Log], l1: float) -> Answer:
     return _by_covariance(to_constants @ found, to_constants @ covariance @ to_constants.T, terms)
 
 
-def pysindy(logs: Sequence[Log], _l1: float) -> Answer:
+def pysindy(segments: list[Segment], choice: Choice, _l1: float) -> Answer:
     """PySINDy's weak form over windows of 0.4 s, then least squares."""
     from pysindy import WeakPDELibrary
     from pysindy.feature_library import PolynomialLibrary
 
     window = 0.4
-    segments = [even(log) for log in logs]
-    choice = chosen(segments)
     moments = []
     for log in segments:
         Y = columns(smoothed(log, CUTOFF))[:, choice.columns]
@@ -234,7 +232,7 @@ _MORE = {"coulomb": ("f1", "f2"), "rotor": ("j2",), "bent": ("y1", "y2")}
 _G = 9.81
 
 
-def mujoco_sysid(logs: Sequence[Log], l1: float) -> Answer:
+def mujoco_sysid(segments: list[Segment], choice: Choice, l1: float) -> Answer:
     """MuJoCo's sysid: simulated against measured angles in stretches of 0.5 s, with its own
     covariance.
 
@@ -248,8 +246,6 @@ def mujoco_sysid(logs: Sequence[Log], l1: float) -> Answer:
 
     mujoco: Any = package  # neither is annotated in full
     sysid: Any = identification
-    segments = [even(log) for log in logs]
-    choice = chosen(segments)
     first, _ = regressions.least_squares(segments, choice)
     start = _physical(dict(zip(CONSTANT_NAMES, first, strict=False)) | _terms(first, choice), l1)
     names = [*_RIGID, *(name for term in choice.terms for name in _MORE.get(term, ()))]
@@ -396,18 +392,18 @@ def _constants(arm: dict[str, float], l1: float) -> FloatArray:
 Contender = Callable[[Sequence[Log], float], Answer]
 """Takes logs, and the length of link 1 in m where it asks for one."""
 PEERS: dict[str, tuple[Contender, int]] = {
-    "algid": (algid_by("default"), 0),
-    "algid weak": (algid_by("weak"), 1),
-    "least squares": (regression(regressions.least_squares), 4),
-    "least squares, every term": (regression(regressions.least_squares, every_term=True), 5),
-    "IDIM-IV": (regression(regressions.instruments), 5),
-    "IDIM-IV, every term": (regression(regressions.instruments, every_term=True), 6),
-    "output error": (output_error(), 5),
-    "output error, every term": (output_error(every_term=True), 6),
-    "pinocchio regressors": (pinocchio, 4),
-    "PySINDy weak form": (pysindy, 5),
-    "MuJoCo sysid": (mujoco_sysid, 8),
-    "the paper's method": (algid_by("paper"), 2),
+    "algid": (algid_by(), 0),
+    "algid weak": (algid_by(estimator="weak"), 1),
+    "least squares": (prepared(least_squares), 4),
+    "least squares, every term": (prepared(least_squares, every_term=True), 5),
+    "IDIM-IV": (prepared(instruments), 5),
+    "IDIM-IV, every term": (prepared(instruments, every_term=True), 6),
+    "output error": (prepared(output_error), 5),
+    "output error, every term": (prepared(output_error, every_term=True), 6),
+    "pinocchio regressors": (prepared(pinocchio), 4),
+    "PySINDy weak form": (prepared(pysindy), 5),
+    "MuJoCo sysid": (prepared(mujoco_sysid), 8),
+    "the paper's method": (algid_by(estimator="paper"), 2),
 }
 """Each contender, and the number of its user's choices, such as cut-offs, orders or windows."""
 SIMULATED_ALONE = ("MuJoCo sysid", "the paper's method")

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from algid.arm import Arm, FloatArray
 from algid.log import Log
-from pipelines.accuracy_scenes import random_arm
+from pipelines.accuracy_scenes import random_arm, waves
 from pipelines.cramer_rao import Truth, information
-from pipelines.simulator import Arms, swung
+from pipelines.simulator import Arms, inertias, swung
 
 RATE, DURATION = 500.0, 10.0
 SUBSTEPS = 4
@@ -98,15 +98,14 @@ def followed(
         instead, its torque held between samples.
     drawn : generators of the sines, one a motion
     """
-    frequency = np.stack([rng.uniform(0.2, 1.5, (2, 4)) for rng in drawn], axis=-1)
-    phase = np.stack([rng.uniform(0, 2 * np.pi, (2, 4)) for rng in drawn], axis=-1)
-    amplitude, now = 0.35 / np.sqrt(frequency), np.zeros((2, held.size))
+    frequency = np.stack([rng.uniform(0.2, 1.5, (2, 4)) for rng in drawn], axis=1)
+    phase = np.stack([rng.uniform(0, 2 * np.pi, (2, 4)) for rng in drawn], axis=1)
+    now = np.zeros((2, held.size))
 
     def sampled(half: int, x: FloatArray) -> None:
-        angle = 2 * np.pi * frequency * (half / (2 * substeps * RATE)) + phase
-        wanted = (amplitude * np.sin(angle)).sum(axis=1)
+        t = np.array([half / (2 * substeps * RATE)])
+        wanted, speed, _ = waves(t, frequency, 0.35 / np.sqrt(frequency), phase)[..., 0]
         wanted[0] -= np.pi / 2
-        speed = (amplitude * 2 * np.pi * frequency * np.cos(angle)).sum(axis=1)
         now[:] = gains[0] * (wanted - x[:2]) + gains[1] * (speed - x[2:4])
 
     def torque(half: int, _: FloatArray) -> FloatArray:
@@ -139,7 +138,7 @@ def _moved(keys: Sequence[tuple[str, int, int]]) -> list[Truth]:
     coulomb = rubs * FRICTION * np.sqrt(np.mean(np.square(size), axis=2)).T
     held = np.array([kind == "position-controlled" for kind, _, _ in keys])
     drawn = [np.random.default_rng(seed + 50 * run) for _, seed, run in keys]
-    stiffness = np.stack([k[4] + k[2] + 2 * k[0], k[2]]) * 20.0**2
+    stiffness = inertias(k) * 20.0**2
     arms = Arms(k, K.imag, coulomb, width=WIDTH)
     gains = stiffness, stiffness / 10.0
     states, torques = followed(arms, np.stack(drives, axis=-1), held, gains, drawn, SUBSTEPS)

@@ -128,6 +128,11 @@ class Arms:
         return alpha, (force - np.sum(pull * alpha, axis=0)) / self.mass
 
 
+def inertias(k: FloatArray) -> FloatArray:
+    """Of constants (7, …) the stretched arm's inertia about joint 1, link 2's about joint 2."""
+    return np.stack([k[4] + k[2] + 2 * k[0], k[2]])
+
+
 def swung(
     rate: Acting,
     torque: Acting,
