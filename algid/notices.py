@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
-from typing import Any
+from typing import Any, Literal
 
 from algid.base.text import joined
 from algid.base.words import counted
@@ -46,15 +46,13 @@ class Remedy:
         """As words of a command line."""
         words: list[str] = []
         for name, value in self.settings.items():
-            shown = _shown(name, value)
+            shown = VALUES.get(name.rpartition(".")[2], "VALUE") if value is None else value
             typed, behind, _ = flag(name).partition(SET)
-            if behind:
-                plain = value is None or (isinstance(value, str) and value.isalpha())
-                words += [SET.strip(), f"{name}={shown if plain else _toml(name, value)}"]
+            if behind and value is not None and not (isinstance(value, str) and value.isalpha()):
+                shown = json.dumps(value, ensure_ascii=False)
             elif isinstance(shown, list | tuple):
-                words += [typed, ",".join(map(str, shown))]
-            else:
-                words += [typed, str(shown)]
+                shown = ",".join(map(str, shown))
+            words += [SET.strip(), f"{name}={shown}"] if behind else [typed, str(shown)]
         return tuple(words)
 
     @property
@@ -90,22 +88,6 @@ def _quoted(word: str) -> str:
 
 
 _IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
-
-
-def _shown(name: str, value: Any) -> Any:
-    """A value, or what stands for one that only the user knows."""
-    if value is not None:
-        return value
-    return VALUES.get(name.rpartition(".")[2], "VALUE")
-
-
-def _toml(name: str, value: Any) -> str:
-    if value is not None:
-        return json.dumps(value, ensure_ascii=False)
-    shown = _shown(name, value)
-    if isinstance(shown, tuple) or name.endswith(("source", "topic", "time", "file")):
-        return json.dumps(shown)
-    return str(shown)
 
 
 class _Words(string.Formatter):
@@ -155,19 +137,10 @@ class Message:
     do: str = ""
     text: str | Mapping[str, str] = ""
 
-    def is_note(self, case: str) -> bool:
-        """Whether it says how things were done, in this case."""
-        return _holds(self.note, case)
-
-    def is_lossy(self, case: str) -> bool:
-        """Whether samples are missing, in this case."""
-        return _holds(self.lossy, case)
-
-
-def _holds(cases: bool | tuple[str, ...], case: str) -> bool:
-    if isinstance(cases, bool):
-        return cases
-    return case in cases
+    def holds(self, kind: Literal["note", "lossy"], case: str) -> bool:
+        """Whether it says how things were done, or that samples are missing, in this case."""
+        cases: bool | tuple[str, ...] = getattr(self, kind)
+        return cases if isinstance(cases, bool) else case in cases
 
 
 @cache
@@ -250,8 +223,8 @@ class Notice:
             return
         try:
             entry = message(self.code)
-            object.__setattr__(self, "note", self.note or entry.is_note(self.case))
-            object.__setattr__(self, "lossy", self.lossy or entry.is_lossy(self.case))
+            object.__setattr__(self, "note", self.note or entry.holds("note", self.case))
+            object.__setattr__(self, "lossy", self.lossy or entry.holds("lossy", self.case))
             object.__setattr__(self, "text", _text(self.code, self.numbers))
         except (LookupError, TypeError, ValueError) as error:
             raise ValueError(

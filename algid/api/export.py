@@ -152,24 +152,22 @@ def _flange(given: Sequence[float] | str, to: str) -> Any:
     return numbers("flange", given, (1e3, 1e3, 360.0), "metres and degrees like 0.12,0,-90")
 
 
-def file_of(result: Path, to: str, draws: int | None = None) -> Path:
+def file_of(result: Path, to: str, draws: int | None = None) -> str:
     """The default file of a result's export: the result's name with the format's suffix.
 
     Of draws it is a folder.
     """
     from algid.exports.formats import FORMATS
 
-    folder = result
-    if result.name == "result.json":
-        folder = result.resolve().parent
+    folder = result.resolve().parent if result.name == "result.json" else result
     stem = folder.stem or "arm"
-    if draws is not None or to in ("csv", "parquet"):
-        return Path(f"{stem}-draws")
+    if draws is not None:
+        return f"{stem}-draws"
+    if to == "payload":
+        return f"{stem}-payload.yaml"
     if to == "python":
         stem = re.sub(r"\W", "_", stem)
-    if to == "payload":
-        return Path(f"{stem}-payload.yaml")
-    return Path(f"{stem}{FORMATS[to].suffix}")
+    return f"{stem}{FORMATS[to].suffix}"
 
 
 def answer(made: Exported, _given: Mapping[str, Any]) -> Answer:

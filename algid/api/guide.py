@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from algid.api.answer import Answer, Manual
-from algid.api.signature import fields_of
+from algid.api.signature import options_of
 from algid.base.errors import SettingError
 from algid.notices import code_of_now, message, messages
 from algid.options import Option
@@ -109,9 +109,9 @@ def _registry(mark: str) -> Any:
     if mark == "profile":
         from algid.profile import Profile
 
-        return fields_of(Profile)
+        return options_of(Profile)
     if mark == "settings":
         from algid.settings import Settings
 
-        return fields_of(Settings)
+        return options_of(Settings)
     return messages()

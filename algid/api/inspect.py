@@ -104,10 +104,7 @@ def answer(found: Inspection, given: Mapping[str, Any]) -> Answer:
     def shown() -> Iterator[Table | str]:
         width = shutil.get_terminal_size().columns
         for part in inspection_content(found):
-            if isinstance(part, str):
-                yield from lines_of(part, width, rest="    ")
-            else:
-                yield part
+            yield from lines_of(part, width, rest="    ") if isinstance(part, str) else [part]
 
     ended = exit_of(failed=found.contradicted, lost=found.lossy)
     if found.refused:

@@ -35,53 +35,45 @@ class _Names(dict[str, Any]):
 
 
 @cache
-def options_of(verb: Callable[..., Any]) -> Mapping[str, Option]:
-    """What a verb takes that a command line has, by name, without ``**options``."""
-    module = vars(sys.modules[verb.__module__])
-    helps, found = _described(verb), {}
-    for name, one in inspect.signature(verb).parameters.items():
-        if name not in CALLERS and one.kind is not one.VAR_KEYWORD:
-            hint = eval(one.annotation, module, _Names(module))  # our own source
-            option = _option(name, hint, helps, EVERYDAY)
-            argument = one.kind is not one.KEYWORD_ONLY and not option.flag
-            default = option.default if one.default is None else one.default
-            typed = option.flag or flag(name, off=one.default is True)
-            found[name] = replace(option, default=default, flag=typed, argument=argument)
-    return found
+def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
+    """What a verb, `Settings` or `Profile` takes that a command line has, by name.
 
-
-@cache
-def fields_of(model: Any, of: str = "") -> Mapping[str, Option]:
-    """The fields of `Settings` or `Profile`, and `of` a channel, by name."""
-    helps, found = _described(model), dict[str, Option]()
-    for name, one in inspect.signature(model).parameters.items():
-        if hasattr(one.annotation, "model_fields"):
-            found |= fields_of(one.annotation, f"{name}.")
+    Of ``**options`` nothing is said; `of` is a channel, whose fields are the profile's.
+    """
+    module, is_model = vars(sys.modules[taker.__module__]), hasattr(taker, "model_fields")
+    helps, found = _described(taker), dict[str, Option]()
+    for own, one in inspect.signature(taker).parameters.items():
+        if own in CALLERS or one.kind is one.VAR_KEYWORD:
             continue
-        panel = EVERYDAY if name in EVERYDAY_FIELDS else ADVANCED
-        option = _option(of + name, one.annotation, helps, panel)
-        default = False if option.kind is bool else None  # one that is not typed is not said
-        found[of + name] = replace(option, default=default, flag=flag(of + name))
+        hint, name = one.annotation, of + own
+        if isinstance(hint, str):
+            hint = eval(hint, module, _Names(module))  # our own source
+        if hasattr(hint, "model_fields"):
+            found |= options_of(hint, f"{name}.")
+            continue
+        parts, words = _parts(hint), _words(hint)
+        stated = next((part for part in parts if isinstance(part, Option)), Option())
+        kinds, kind = [part for part in parts if not isinstance(part, Option)], stated.kind
+        if kind is None:  # text where Python takes several forms
+            kind = kinds[0] if len(kinds) == 1 and get_origin(kinds[0]) is None else str
+            kind = Path if Path in kinds else kind
+        panel, default = EVERYDAY, stated.default if one.default is None else one.default
+        if is_model:  # a field that is not typed is not said
+            panel = EVERYDAY if name in EVERYDAY_FIELDS else ADVANCED
+            default = False if kind is bool else None
+        found[name] = replace(
+            stated,
+            name=name,
+            kind=kind,
+            default=default,
+            panel=stated.panel or panel,
+            flag=stated.flag or flag(name, off=default is True),
+            help=helps.get(own) or f"{', '.join(words)}.",
+            words=words,
+            argument=one.kind is not one.KEYWORD_ONLY and not stated.flag,
+            or_file=Path in kinds,
+        )
     return found
-
-
-def _option(name: str, hint: Any, helps: Mapping[str, str], panel: str) -> Option:
-    """What an annotation and a docstring say."""
-    parts, words = _parts(hint), _words(hint)
-    stated = next((part for part in parts if isinstance(part, Option)), Option())
-    kinds, kind = [part for part in parts if not isinstance(part, Option)], stated.kind
-    if kind is None:  # text where Python takes several forms
-        kind = kinds[0] if len(kinds) == 1 and get_origin(kinds[0]) is None else str
-        kind = Path if Path in kinds else kind
-    return replace(
-        stated,
-        name=name,
-        kind=kind,
-        panel=stated.panel or panel,
-        help=helps.get(name) or f"{', '.join(words)}.",
-        words=words,
-        or_file=Path in kinds,
-    )
 
 
 def verb(function: Verb) -> Verb:

@@ -20,7 +20,7 @@ from typing import Any, get_args, get_origin
 import click
 from click.shell_completion import CompletionItem
 
-from algid.api.signature import EMPTY, fields_of, head, options_of, refuse_unknown
+from algid.api.signature import EMPTY, head, options_of, refuse_unknown
 from algid.base.exits import epilog
 from algid.base.text import lines_of
 from algid.cli.output import complain, shown
@@ -58,12 +58,9 @@ class Command(click.Command):
         """Write arguments and options."""
         rows: dict[str, list[tuple[str, str]]] = {ARGUMENTS: [], EVERYDAY: [], ADVANCED: []}
         for one in self.get_params(ctx):
-            known = self.taken.get(one.name or "")
-            if isinstance(one, click.Argument) and known is not None:
-                rows[ARGUMENTS].append((str(one.metavar), known.help))
-            else:
-                panel = ADVANCED if known is None else known.panel  # help is none of ours
-                rows[panel].append(one.get_help_record(ctx) or ("", ""))
+            known = self.taken.get(one.name or "", Option(panel=ADVANCED))  # help is none of ours
+            record = one.get_help_record(ctx) or (str(one.metavar), known.help)
+            rows[ARGUMENTS if known.argument else known.panel].append(record)
         for panel, entries in rows.items():
             if entries:
                 with formatter.section(panel):
@@ -101,40 +98,34 @@ def command(name: str) -> Command:
     settable = [one.name.partition(".")[0] for one in (*of_logs.values(), *by_set)]
 
     def run(**typed: Any) -> None:
-        click.get_current_context().exit(_run(module, verb, typed, settable))
+        """Call the verb with what is typed, print its answer, and end with its exit code."""
+        from algid.base.runtime import keep_freed
+        from algid.report.progress import progress
+
+        keep_freed()
+        quiet, verbose = typed.pop("quiet"), typed.pop("verbose", False)
+        as_json = name in PRINTED and typed.pop("format") == "json"
+        given = {key: value for key, value in typed.items() if value not in (None, ())}
+        for line in given.pop("set", ()):
+            take(given, line, settable)
+        given = getattr(module, "typed", dict)(given)
+        parameters = inspect.signature(verb).parameters
+        arguments = [one.name for one in taken if one.argument]
+        callers = {"command": shlex.join(["algid", *sys.argv[1:]]), "complain": complain}
+        with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
+            callers["progress"] = bar
+            called = {key: value for key, value in callers.items() if key in parameters}
+            called |= {key: value for key, value in given.items() if key not in arguments}
+            value = verb(*map(given.get, arguments), **called)
+        made = module.answer(value, given | {"verbose": verbose})
+        answers = made if isinstance(made, list) else [made]
+        for one in answers:
+            shown(one, as_json, quiet)
+        click.get_current_context().exit(max(one.exit for one in answers))
 
     *above, example = head(verb)
     text = "\n\n".join((*above, "\b\n" + "\n".join(lines_of(example, 76, rest="  "))))
     return Command(name, taken, help=text, epilog=epilog(name), callback=run)
-
-
-def _run(
-    module: Any, verb: Callable[..., Any], typed: dict[str, Any], settable: Collection[str]
-) -> int:
-    """Call a verb with what is typed, print its answer, and return the exit code."""
-    from algid.base.runtime import keep_freed
-    from algid.report.progress import progress
-
-    keep_freed()
-    quiet, verbose = typed.pop("quiet"), typed.pop("verbose", False)
-    as_json = typed.pop("format") == "json" if module.__name__.endswith(PRINTED) else False
-    given = {key: value for key, value in typed.items() if value not in (None, ())}
-    for line in given.pop("set", ()):
-        take(given, line, settable)
-    given = getattr(module, "typed", dict)(given)
-    parameters = inspect.signature(verb).parameters
-    arguments = [name for name, one in options_of(verb).items() if one.argument]
-    callers = {"command": shlex.join(["algid", *sys.argv[1:]]), "complain": complain}
-    with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
-        callers["progress"] = bar
-        called = {key: value for key, value in callers.items() if key in parameters}
-        called |= {key: value for key, value in given.items() if key not in arguments}
-        value = verb(*map(given.get, arguments), **called)
-    made = module.answer(value, given | {"verbose": verbose})
-    answers = made if isinstance(made, list) else [made]
-    for one in answers:
-        shown(one, as_json, quiet)
-    return max(one.exit for one in answers)
 
 
 def take(given: dict[str, Any], line: str, settable: Collection[str]) -> None:
@@ -202,9 +193,9 @@ def _of_logs(verb: Callable[..., Any]) -> dict[str, Option]:
     from algid.profile import Profile
     from algid.settings import OF_PRIOR, Settings
 
-    found = dict(fields_of(Profile))
+    found = dict(options_of(Profile))
     if "Unpack[Options]" in str(last.annotation):
-        return {**found, **fields_of(Settings)}
+        return {**found, **options_of(Settings)}
     for name in OF_PRIOR:  # what an arm is said to be is no log's
         del found[name]
     return found
