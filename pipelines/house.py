@@ -44,8 +44,7 @@ IDEAS = {
     r"|saturation\._solved|evidence\.\w*(sandwich|dispersion)\w*)$",
     "tests of the model": r"^(refined\.\w*refuted\w*|log_likelihood\.refuted|identifiability\.judge"
     r"|misfit\.misfit|by_likelihood\._refuted_alone|\w+\.score_test)$",
-    "choosers of terms": r"^(terms\.select|by_likelihood\.completed"
-    r"|model_choice\.without_insignificant|shrunk\.shrunk)$",
+    "choosers of terms": r"^(terms\.select|model_choice\.revised|shrunk\.shrunk)$",
 }
 """By idea, a pattern of `module.function` or of the source of each function of the core that holds
 it: one each is enough."""

@@ -52,34 +52,24 @@ def likeliest_width(profile: Profile, start: float) -> Width:
     first = float(np.clip(np.log(start), low, high))
     seen: dict[int, tuple[float, FloatArray]] = {}  # by half octaves from the first width
 
-    def log_width(place: int) -> float:
-        return first + place * _HALF_OCTAVE
-
-    def allowed(place: int) -> bool:
-        return bool(low <= log_width(place) <= high)
-
     def deviance(place: int) -> float:
+        x = first + place * _HALF_OCTAVE
+        if not low <= x <= high:
+            return np.inf
         if place not in seen:
-            seen[place] = profile(float(np.exp(log_width(place))))
-        return seen[place][0]
+            seen[place] = profile(float(np.exp(x)))
+        return seen[place][0] if np.isfinite(seen[place][0]) else np.inf
 
     place = 0
     for step in (2, 1):
-        while True:
-            best = min(filter(allowed, (place - step, place + step)), key=deviance)
-            if not deviance(best) < deviance(place):  # so a deviance that is no number ends it too
-                break
+        while deviance(best := min(place - step, place + step, key=deviance)) < deviance(place):
             place = best
-    before, after = place - 1, place + 1
-    inside = low <= log_width(before) < log_width(after) <= high
-    if not (inside and np.isfinite(deviance(before)) and np.isfinite(deviance(after))):
-        unmoved = np.zeros((seen[place][1].size,) * 2)
-        return Width(float(np.exp(log_width(place))), unmoved)
-    h = _HALF_OCTAVE
-    slope = (deviance(after) - deviance(before)) / (2 * h)
-    curvature = (deviance(before) - 2 * deviance(place) + deviance(after)) / h**2
-    curvature = max(curvature, 1e-300)
-    bottom = log_width(place) + float(np.clip(-slope / curvature, -h, h))
-    change = (seen[after][1] - seen[before][1]) / (2 * h)
+    x, h = first + place * _HALF_OCTAVE, _HALF_OCTAVE
+    below, here, above = (deviance(place + side) for side in (-1, 0, 1))
+    if not np.isfinite([below, above]).all():
+        return Width(float(np.exp(x)), np.zeros((seen[place][1].size,) * 2))
+    slope, curvature = (above - below) / (2 * h), max((below - 2 * here + above) / h**2, 1e-300)
+    change = (seen[place + 1][1] - seen[place - 1][1]) / (2 * h)
     variance = min(2.0 / curvature, (high - low) ** 2 / 12)
+    bottom = x + float(np.clip(-slope / curvature, -h, h))
     return Width(float(np.exp(bottom)), variance * np.outer(change, change))

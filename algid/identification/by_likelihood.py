@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -10,16 +10,16 @@ import numpy as np
 
 from algid.base.names import outside, within
 from algid.base.runtime import Worker
-from algid.base.significance import level
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
-from algid.estimators.fit import Fit, Misfit
+from algid.estimators.fit import Fit
 from algid.estimators.prediction import PredictionSums
 from algid.estimators.problem import Source
-from algid.estimators.terms import Selection, TermTrial, has_need, plausible
+from algid.estimators.terms import Selection, TermTrial
+from algid.identification.model_choice import revised
 from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recording, Recordings
 from algid.methods import estimator_of
@@ -98,8 +98,12 @@ def run_fit(
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
             fit = estimate(problem_of(survey, settings, chosen, prior, watched))
-            if fit.misfit is not None and settings.chooses:
-                fit, chosen = completed(fit, chosen, fitted)
+            fit, chosen = revised(
+                fit,
+                chosen,
+                settings,
+                lambda one: estimate(problem_of(survey, settings, one, prior)),
+            )
             if fit.refuted and settings.chooses:
                 notes = fit.notes
         picked = chosen
@@ -121,47 +125,6 @@ def finished(fit: Fit, settings: Settings) -> Fit:
     if settings.constrain:
         fit = constrained(fit)
     return fit
-
-
-OVERLOOKED = 2
-"""Terms at most that the likelihood adds."""
-_BY_LIKELIHOOD = "kept: what the likelihood leaves of the torque depends on it"
-
-
-def completed(
-    fit: Fit, chosen: Selection, refit: Callable[[Selection], Fit], most: int = OVERLOOKED
-) -> tuple[Fit, Selection]:
-    """The fit with `most` more terms at most, where the likelihood holds with them.
-
-    They are those that the weak form's noise hid. Unchanged where it does not: what the arm has is
-    no term then, or several.
-    """
-    richer, better = chosen, fit
-    for _ in range(most):
-        added = _most_evident(better.misfit, richer)
-        if added is None:
-            break
-        richer = richer.changed((added,), _BY_LIKELIHOOD, kept=True)
-        better = refit(richer)
-        if better.converged and not better.refuted:
-            return better, richer
-    return fit, chosen
-
-
-def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
-    """The left-out term that the likelihood's residual shows most, if its value is plausible."""
-    if misfit is None:
-        return None
-    left = {trial.term for trial in chosen.trials if not trial.kept}
-    least = level("REFUTED") / max(1, len(misfit.overlooked))
-    seen = []
-    for one in misfit.overlooked:
-        possible = one.term in left and has_need(one.term, chosen.model.terms)
-        if possible and one.p_value < least and plausible(one.values):
-            seen.append((one.p_value, one.term))
-    if not seen:
-        return None
-    return min(seen)[1]
 
 
 _BY_NOTHING = "left out: it was judged beside constants near nothing"
@@ -196,7 +159,11 @@ def _of_motorless(
     better = robust.of_passive_joint(problem_of(survey, settings, plainer, prior))
     if better is None:
         return fit, chosen
-    return better, plainer
+
+    def refit(one: Selection) -> Fit:
+        return robust.of_passive_joint(problem_of(survey, settings, one, prior)) or better
+
+    return revised(better, plainer, settings, refit)
 
 
 _SHRUNK = "kept and shrunk: where the likelihood is refuted no term is chosen"

@@ -320,10 +320,10 @@ def _zero_is_stated(log: Recording, stated: dict[str, Any]) -> bool:
 
 
 def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> Fitted:
-    """The fit with the terms that the logs choose, without those that it finds to be nothing."""
+    """The fit with the terms that the logs choose."""
     from algid.identification.by_likelihood import run_fit
     from algid.identification.known import prior_of
-    from algid.identification.model_choice import choose_model, without_insignificant
+    from algid.identification.model_choice import choose_model
 
     survey.begin("choosing terms")
     if earlier is None:
@@ -334,9 +334,6 @@ def _fitted(survey: Recordings, settings: Settings, earlier: Earlier | None) -> 
     survey.begin("fitting")
     settings = settings.but(torque_hold=chosen.hold)
     found = run_fit(survey, settings, chosen, prior)
-    better = without_insignificant(found.chosen, found.fit, settings)
-    if (better.model, better.delay) != (found.chosen.model, found.chosen.delay):
-        found = run_fit(survey, settings, better, prior)
     return replace(found, settings=settings.but(torque_hold=found.chosen.hold))
 
 

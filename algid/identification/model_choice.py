@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from algid.base.names import within
-from algid.estimators.fit import Fit
+from algid.base.significance import level
+from algid.estimators.fit import Fit, Misfit
 from algid.estimators.hold import Hold
-from algid.estimators.terms import CHOICE, Selection, TermTrial, needs_shape, price, select
+from algid.estimators.terms import (
+    CHOICE,
+    Selection,
+    TermTrial,
+    has_need,
+    needs_shape,
+    plausible,
+    price,
+    select,
+)
 from algid.identification.known import model_of
 from algid.identification.passes import long_enough, problem_of
 from algid.identification.recordings import Recordings
@@ -97,16 +107,57 @@ def _given(model: Model, terms: Sequence[str]) -> Selection:
     return Selection(replace(model, terms=own), len(own) < len(terms))
 
 
-def without_insignificant(chosen: Selection, fit: Fit, settings: Settings) -> Selection:
-    """The selection without the terms that the logs chose and the fit finds not worth their price.
+OVERLOOKED = 2
+"""Terms at most that the likelihood adds."""
+_BY_LIKELIHOOD = "kept: what the likelihood leaves of the torque depends on it"
+_ZERO = "left out: the fit finds it to be zero within its error"
 
-    The first pass weighs by noise levels that the fit improves, and linearises elsewhere.
+
+def revised(
+    fit: Fit, chosen: Selection, settings: Settings, refit: Callable[[Selection], Fit]
+) -> tuple[Fit, Selection]:
+    """The fit with the terms that it shows itself, where the logs chose them.
+
+    The first pass weighs by noise levels that the fit improves, and linearises elsewhere. Where the
+    likelihood is refuted, terms that its residual shows are added, if it stands with them: else
+    what the arm has is no term, or several. Of one that stands those are left out that are not
+    worth their price.
     """
-    if chosen.chosen_by != "logs" or chosen.shrunk:
-        return chosen
+    if chosen.chosen_by != "logs":
+        return fit, chosen
+    richer, better = chosen, fit
+    for _ in range(OVERLOOKED):
+        added = _most_evident(better.misfit, richer)
+        if added is None:
+            break
+        richer = richer.changed((added,), _BY_LIKELIHOOD, kept=True)
+        better = refit(richer)
+        if better.converged and not better.refuted:
+            fit, chosen = better, richer
+            break
     nothing = _insignificant(chosen, fit).difference(settings.terms)
-    why = "left out: the fit finds it to be zero within its error"
-    return chosen.changed(nothing, why, kept=False)
+    if nothing and not fit.refuted:
+        poorer = chosen.changed(nothing, _ZERO, kept=False)
+        other = refit(poorer)
+        if not other.refuted:
+            return other, poorer
+    return fit, chosen
+
+
+def _most_evident(misfit: Misfit | None, chosen: Selection) -> str | None:
+    """The left-out term that the likelihood's residual shows most, if its value is plausible."""
+    if misfit is None:
+        return None
+    left = {trial.term for trial in chosen.trials if not trial.kept}
+    least = level("REFUTED") / max(1, len(misfit.overlooked))
+    seen = []
+    for one in misfit.overlooked:
+        possible = one.term in left and has_need(one.term, chosen.model.terms)
+        if possible and one.p_value < least and plausible(one.values):
+            seen.append((one.p_value, one.term))
+    if not seen:
+        return None
+    return min(seen)[1]
 
 
 def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
