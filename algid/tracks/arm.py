@@ -101,12 +101,11 @@ class IdentifiedArm:
         """
         stencil = Stencil(piece.dt, self.shift, lag=self.model.lag(self.k))
         theta = smoothed(piece.theta, piece.dt, min(SMOOTHING, 0.1 / piece.dt))
-        linear = linearise(self.model, c, theta, piece, stencil, self.noise)
         if settle:
-            multiplier = linear.solve_transposed(linear.columns[-1:])[0]
-            theta = trajectory(piece, linear, multiplier, self.noise)
-            linear = linearise(self.model, c, theta, piece, stencil, self.noise)
-        return linear
+            first = linearise(self.model, c, theta, piece, stencil, self.noise, residual_only=True)
+            multiplier = first.solve_transposed(first.columns)[0]
+            theta = trajectory(piece, first, multiplier, self.noise)
+        return linearise(self.model, c, theta, piece, stencil, self.noise)
 
 
 def arm_of(
@@ -159,7 +158,15 @@ def arm_of(
             lengths["l1"], slopes = constants
             T[kept.index("l1")] = vector(names, slopes, otherwise=0.0)
     for name, given in lengths.items():
-        value[name] = _length(result, name, given)
+        # the one given, else the one the result was made with, else its estimate
+        estimate = result.payload[name].estimate if name in result.payload else None
+        stated = [one for one in (given, result.settings.get(name), estimate) if one is not None]
+        if not stated:
+            raise ResultError(
+                f"{result.log.path}: its result has no {name}; give the link's length with "
+                f"{flag(name)}"
+            )
+        value[name] = float(stated[0])
     arm = IdentifiedArm(
         shared,
         vector(names, value, otherwise=0.0),
@@ -167,14 +174,3 @@ def arm_of(
         shift_of(result).at(first.dt),
     )
     return arm, T @ covariance_of(result, names, uncertain) @ T.T
-
-
-def _length(result: Result, name: str, given: float | None) -> float:
-    """A link's length: the one given, else the one the result was made with, else its estimate."""
-    estimate = result.payload[name].estimate if name in result.payload else None
-    for length in (given, result.settings.get(name), estimate):
-        if length is not None:
-            return float(length)
-    raise ResultError(
-        f"{result.log.path}: its result has no {name}; give the link's length with {flag(name)}"
-    )

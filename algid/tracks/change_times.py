@@ -27,6 +27,7 @@ from algid.estimators.whitening import Linearised, modelled
 from algid.signals.differences import POINTS, Stencil
 from algid.signals.segments import Segment, append
 from algid.tracks.arm import IdentifiedArm
+from algid.tracks.change_points import PENALTY
 from algid.tracks.drift import Drift
 
 STEP = 5e-3  # s, between candidates
@@ -171,7 +172,6 @@ class Confirmation:
     arm : IdentifiedArm
     drift : Drift
     ends : s, of the log
-    penalty : what a change has to explain, in squares of the rows' noise
     variance : of the rows, one at least
     """
 
@@ -179,7 +179,6 @@ class Confirmation:
     arm: IdentifiedArm
     drift: Drift
     ends: tuple[float, float]
-    penalty: float
     variance: float
 
     def of(self, changes: Sequence[ChangeTime], weighed: Sequence[float]) -> list[ChangeTime]:
@@ -188,7 +187,7 @@ class Confirmation:
         `weighed` are the masses in kg between them, one more.
         """
         places, masses = list(changes), list(weighed)
-        count = None
+        penalty, count = PENALTY * self.variance, None
         while places and len(places) != count:
             count = len(places)
             places = self._placed(places, masses)
@@ -200,7 +199,7 @@ class Confirmation:
                 one = self._place(rows, times[first] - MARGIN, times[last] + MARGIN)
                 if one is not None:
                     both = explained(rows, times[[first, last]])
-                    if both - explained(rows, np.array([one.time])) < self.penalty:
+                    if both - explained(rows, np.array([one.time])) < penalty:
                         single[first] = one
             following = len(places)
             for first, one in sorted(single.items(), reverse=True):
@@ -212,7 +211,7 @@ class Confirmation:
             gains = [np.inf] + [one.gain for one in places] + [np.inf]
             for at in reversed(range(len(places))):
                 before, own, after = gains[at : at + 3]
-                if own < self.penalty and own <= min(before, after):
+                if own < penalty and own <= min(before, after):
                     del places[at], masses[at + 1]
         return places
 

@@ -157,8 +157,9 @@ def quality_tables(result: TrackResult) -> tuple[Table, ...]:
 
 def mass_and_half(stretch: Stretch) -> tuple[str, str]:
     """A stretch's mass and half its 95 % interval in kg; a mass that may be nothing is 0."""
-    mass = "0" if stretch.empty else resolved(stretch.m_p, stretch.std)
-    return mass, significant(NORMAL * stretch.std, 2)
+    half = NORMAL * stretch.std
+    mass = "0" if abs(stretch.m_p) <= half else resolved(stretch.m_p, stretch.std)
+    return mass, significant(half, 2)
 
 
 def verdict(result: TrackResult) -> Verdict:

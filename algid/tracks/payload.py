@@ -26,7 +26,6 @@ from algid.tracks.cells import CELL, Cells, cells_of, joined
 from algid.tracks.change_points import (
     AHEAD,
     BEHIND,
-    PENALTY,
     SHORTEST,
     excess,
     first_segmentation,
@@ -59,12 +58,6 @@ class Stretch:
     def ci95(self) -> tuple[float, float]:
         """The 95 % interval, kg."""
         return self.m_p - NORMAL * self.std, self.m_p + NORMAL * self.std
-
-    @property
-    def empty(self) -> bool:
-        """True if the 95 % interval contains zero."""
-        low, high = self.ci95
-        return low <= 0 <= high
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +118,7 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
         shown.append(ChangeTime(time, safe, safe, np.inf))
     masses = [drift.freed(part).mass for part in _cut(cells, places)]
     ends = float(cells.start[0]), float(cells.end[-1])
-    evidence = Confirmation(source, arm, drift, ends, PENALTY * spread, spread)
+    evidence = Confirmation(source, arm, drift, ends, spread)
     changes = evidence.of(shown, masses)
     # whitening remembers: what a stretch is weighed by starts behind the jolt at its beginning
     settled = _settled(source, arm, _inner_parts(cells, changes), drift)

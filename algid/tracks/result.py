@@ -62,7 +62,15 @@ class TrackResult:
     @property
     def statuses(self) -> list[StretchStatus]:
         """Of each stretch."""
-        return [_status(stretch, self.track.tip_equivalent) for stretch in self.track.stretches]
+        found = []
+        for one in self.track.stretches:
+            if not one.std < UNDETERMINED * max(abs(one.m_p), self.track.tip_equivalent):
+                found.append(StretchStatus.WEAK_EXCITATION)
+            elif one.m_p + SURE * one.std < 0:
+                found.append(StretchStatus.NEGATIVE_MASS)
+            else:
+                found.append(StretchStatus.OK)
+        return found
 
     @property
     def complete(self) -> bool:
@@ -80,14 +88,6 @@ class TrackResult:
             reached = [mass for time, mass in self.schedule if time <= middle]
             masses.append(reached[-1] if reached else 0.0)
         return tuple(masses)
-
-
-def _status(stretch: Stretch, tip_equivalent: float) -> StretchStatus:
-    if not stretch.std < UNDETERMINED * max(abs(stretch.m_p), tip_equivalent):
-        return StretchStatus.WEAK_EXCITATION
-    if stretch.m_p + SURE * stretch.std < 0:
-        return StretchStatus.NEGATIVE_MASS
-    return StretchStatus.OK
 
 
 def track_json(result: TrackResult) -> str:

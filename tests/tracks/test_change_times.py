@@ -32,7 +32,7 @@ def rough(*moments: float) -> tuple[ChangeTime, ...]:
 
 
 def kept(log: Log, moments: tuple[float, ...], masses: tuple[float, ...]) -> list[ChangeTime]:
-    evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 4.5), 60.0, 1.0)
+    evidence = Confirmation(lambda: segments([log]), ARM, STEADY, (0.0, 4.5), 1.0)
     return evidence.of(rough(*moments), masses)
 
 
