@@ -169,55 +169,46 @@ def verdict(result: TrackResult) -> Verdict:
         (StretchStatus.WEAK_EXCITATION, "weak"),
         (StretchStatus.NEGATIVE_MASS, "negative"),
     ):
-        numbers = [str(place) for place, own in enumerate(statuses, start=1) if own is status]
-        if numbers:
-            reasons.append(Notice("STRETCHES", numbers={"case": case, "numbers": numbers}))
+        own = [str(place) for place, one in enumerate(statuses, start=1) if one is status]
+        if own:
+            reasons.append(Notice("STRETCHES", numbers={"case": case, "numbers": own}))
     if track.explained < LEAST_R2:
-        share = {"case": "track", "percent": max(100 * track.explained, 0.0)}
-        reasons.append(Notice("LITTLE_EXPLAINED", numbers=share))
+        numbers = {"case": "track", "percent": max(100 * track.explained, 0.0)}
+        reasons.append(Notice("LITTLE_EXPLAINED", numbers=numbers))
+    times = significant(float(track.colour) ** 0.5, 2)
     if track.colour > COLOURED:
-        times = {"case": "errors", "times": significant(float(track.colour) ** 0.5, 2)}
-        reasons.append(Notice("LITTLE_EXPLAINED", numbers=times))
+        reasons.append(Notice("LITTLE_EXPLAINED", numbers={"case": "errors", "times": times}))
     if result.data_lost and not lossy(result.notices):
         reasons.append(Notice("DATA_LOST"))
     reasons += warnings_of(result.notices)
-    notes = notes_of(result.notices)
-    return graded(_headline(result), reasons, notes, failure=_failure(result), things="masses")
-
-
-def _headline(result: TrackResult) -> str:
-    stretches, changes = result.track.stretches, result.track.changes[:, 0].tolist()
-    masses = [mass_and_half(one)[0] for one in stretches]
-    half = mass_and_half(max(stretches, key=lambda stretch: stretch.std))[1]
-    if not changes:
-        return f"the payload does not change: {masses[0]} ± {half} kg throughout"
-    what = f", in {len(stretches)} stretches"
-    if len(changes) <= MOST_NAMED:
-        times = joined([f"{time:.2f}" for time in changes])
-        what = f" at {times} s, weighing {joined(masses)} kg"
-    times = counted(len(changes), "time")
-    return f"the payload changes {times}{what}, the least certain to ± {half} kg (95 %)"
-
-
-def _failure(result: TrackResult) -> str | None:
-    """Why the masses must not be used; None where they may be."""
-    track, statuses = result.track, result.statuses
-    asked = "is it this arm, in these units?"
+    # why the masses must not be used
+    failure, asked = None, "is it this arm, in these units?"
     negative = statuses.count(StretchStatus.NEGATIVE_MASS)
     if has_code(result.notices, "LENGTH_CONTRADICTED"):
-        return "a link length contradicts the arm's result"
-    if track.explained < WORST_R2:
+        failure = "a link length contradicts the arm's result"
+    elif track.explained < WORST_R2:
         share = max(100 * track.explained, 0)
-        return f"arm and payload explain only {share:.0f} % of the torque: {asked}"
-    if track.colour > STRANGE and track.explained < ALL_BUT:
-        times = significant(float(track.colour) ** 0.5, 2)
-        return f"arm and payload miss the torque by {times} times its sensors' noise: {asked}"
-    if 2 * negative >= len(statuses):
+        failure = f"arm and payload explain only {share:.0f} % of the torque: {asked}"
+    elif track.colour > STRANGE and track.explained < ALL_BUT:
+        failure = f"arm and payload miss the torque by {times} times its sensors' noise: {asked}"
+    elif 2 * negative >= len(statuses):
         of_all = f"{negative} of {counted(len(statuses), 'stretch', 'stretches')}"
-        return f"{of_all} with a negative mass: the arm's constants do not fit this log"
-    if set(statuses) == {StretchStatus.WEAK_EXCITATION}:
-        return "the arm moves too little to weigh anything"
-    return None
+        failure = f"{of_all} with a negative mass: the arm's constants do not fit this log"
+    elif set(statuses) == {StretchStatus.WEAK_EXCITATION}:
+        failure = "the arm moves too little to weigh anything"
+    changes = track.changes[:, 0].tolist()
+    masses = [mass_and_half(one)[0] for one in track.stretches]
+    half = mass_and_half(max(track.stretches, key=lambda stretch: stretch.std))[1]
+    headline = f"the payload does not change: {masses[0]} ± {half} kg throughout"
+    if changes:
+        what = f", in {len(masses)} stretches"
+        if len(changes) <= MOST_NAMED:
+            moments = joined([f"{time:.2f}" for time in changes])
+            what = f" at {moments} s, weighing {joined(masses)} kg"
+        what = f"{counted(len(changes), 'time')}{what}"
+        headline = f"the payload changes {what}, the least certain to ± {half} kg (95 %)"
+    notes = notes_of(result.notices)
+    return graded(headline, reasons, notes, failure=failure, things="masses")
 
 
 def payload_figure(result: TrackResult) -> Plot:

@@ -58,7 +58,12 @@ def track_log(
     ResultError
         If the result cannot be read, or leaves a constant or a link length open.
     """
-    result, content, called = _arm(parameters)
+    if isinstance(parameters, Result):
+        result, content, called = parameters, result_json(parameters).encode(), parameters.log.path
+    else:
+        file, called = Path(parameters), str(parameters)
+        result = read_result(file)
+        content = read_whole(file / "result.json" if file.is_dir() else file)
     source = open_source(
         log, "loaded", reused(profile, result), result.settings.get("gravity", 9.81), changing=True
     )
@@ -98,14 +103,3 @@ def track_log(
         notices=tuple(notices),
         data_lost=lossy(of_log),
     )
-
-
-def _arm(parameters: Result | str | Path) -> tuple[Result, bytes, str]:
-    """The arm's result, its file's content, and what it is called."""
-    if isinstance(parameters, Result):
-        return parameters, result_json(parameters).encode(), parameters.log.path
-    file = Path(parameters)
-    result = read_result(file)
-    if file.is_dir():
-        file = file / "result.json"
-    return result, read_whole(file), str(parameters)
