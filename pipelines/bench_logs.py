@@ -16,6 +16,7 @@ from algid.log import Log, Origin
 from algid.synth.cases import load_case
 from algid.writers import write_log
 from pipelines.mutations import Topic, joint_states, write_topics
+from tests.readers.mcaps import protobuf_schema
 
 RATE = 1000
 PERIOD = 10.0  # s
@@ -124,25 +125,7 @@ def imu_payloads(rows: int) -> Iterator[bytes]:
 
 def protobuf_states(path: Path, rows: int) -> None:
     """Joint states as protobuf messages with a Timestamp."""
-    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
-
-    file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
-    file.dependency.append("google/protobuf/timestamp.proto")
-    message = file.message_type.add(name="State")
-    message.field.add(
-        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
-    )
-    for number, (name, kind) in enumerate(
-        (("name", 9), ("position", 1), ("velocity", 1), ("effort", 1)), 2
-    ):
-        message.field.add(name=name, number=number, type=kind, label=3)
-    stamp = descriptor_pb2.FileDescriptorProto()
-    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(stamp)
-    pool.Add(file)
-    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
-    data = descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString()
+    data, state = protobuf_schema()
     log = arm_log(rows)
     omega = log.omega
     assert omega is not None

@@ -24,6 +24,7 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.signals.segments import Segment
 from pipelines.race_regressions import NAMES, Choice, acceleration, smoothed
+from pipelines.simulator import swung
 
 WINDOW = 0.5  # s
 _DROPPED = 0.3  # s at each end, where the filter of the first states rings
@@ -92,19 +93,12 @@ def _simulated(p: FloatArray, x: FloatArray, tau: FloatArray, h: float) -> Float
     Runge-Kutta method.
     """
     p, x = p.T[:, :, None], np.moveaxis(x, 0, 1)
+    last = len(tau) - 1
 
-    def rate(x: FloatArray, torque: FloatArray) -> FloatArray:
+    def rate(half: int, x: FloatArray) -> FloatArray:
+        torque = 0.5 * (tau[min(half // 2, last)] + tau[min((half + 1) // 2, last)])
+        x = np.clip(x, -1e3, 1e3)
         return np.concatenate([x[2:], acceleration(p, x[:2], x[2:], torque[:, None])])
 
-    found = np.empty((x.shape[1], *tau.shape))
-    found[:, 0] = np.moveaxis(x[:2], 0, 1)
-    for step in range(len(tau) - 1):
-        first, last = tau[step], tau[step + 1]
-        middle = 0.5 * (first + last)
-        a = rate(x, first)
-        b = rate(x + 0.5 * h * a, middle)
-        c = rate(x + 0.5 * h * b, middle)
-        d = rate(x + h * c, last)
-        x = np.clip(x + h / 6 * (a + 2 * b + 2 * c + d), -1e3, 1e3)
-        found[:, step + 1] = np.moveaxis(x[:2], 0, 1)
-    return found
+    states, _ = swung(rate, lambda *_: x[:0], x, len(tau), h)
+    return np.moveaxis(states[:, :2], 2, 0)

@@ -214,7 +214,7 @@ def _reading(folder: str, draw: random.Random) -> tuple[str, ...]:
         f"validate {folder} {UNLOADED} --loaded {LOADED} --simulate",
         *(
             f"export {folder} --to {to} -o out/arm.x"
-            for to in ["urdf", "mjcf", "sdf", "python", "c", "yaml"]
+            for to in ["urdf", "mjcf", "sdf", "python", "c", "payload"]
         ),
         f"identify {LOADED} --parameters {folder} -o out {QUICK}",
         f"track {LOADED} --parameters {folder} -o out {LENGTHS}",
