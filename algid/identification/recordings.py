@@ -233,14 +233,15 @@ class Recordings:
 
         The first is examined, and refuses a log only where that is all of it.
         """
-        from algid.inspection.clipping import Counted
+        from algid.inspection.clipping import beyond, clipped
 
         if log.digest is not None and log._hash is None and not 0 < log.promised <= SHORT:
             log._hash = Beside(log.digest)
         first_pass = log.rows is None
         rows, first_ns, last_ns = 0, 0, 0
         notices = list(log.notices)
-        counted: Counted | None = None
+        limits: tuple[Limit, ...] = ()
+        counts: list[int] = []
         self._report(log, 0)
         blocks = _with_end(log)
         if log._begin is not None:
@@ -251,9 +252,10 @@ class Recordings:
                 if log._findings is None:
                     log._findings = self._examined(log, block, whole=alone)
                 notices += log._findings
-                counted = Counted(self._limits.get(log.role, ()))
-            if counted is not None:
-                counted.add(block)
+                limits = self._limits.get(log.role, ())
+                counts = [0] * len(limits)
+            more = beyond(block, limits)
+            counts = [count + own for count, own in zip(counts, more, strict=True)]
             if len(block):
                 last_ns = int(block.stamp_ns[-1])
             rows += len(block)
@@ -261,8 +263,7 @@ class Recordings:
             yield block
             self._report(log, rows)
         if first_pass:
-            if counted is not None:
-                notices += counted.notices(log.origin)
+            notices += clipped(log.origin, limits, counts, rows)
             log.notices = tuple(notices)
             log.rows, log.first_ns, log.last_ns = rows, first_ns, last_ns
 

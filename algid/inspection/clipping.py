@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -39,47 +38,26 @@ def saturation(*logs: Log, gravity: float = 9.81, effort: str | None = None) -> 
     return saturation_of(pieces, gravity) if pieces else UNSEEN
 
 
-@dataclass
-class Counted:
-    """Counts the samples of a log that lie beyond its limits."""
-
-    limits: tuple[Limit, ...]
-
-    def __post_init__(self) -> None:
-        self._beyond = [0] * len(self.limits)
-        self._rows = 0
-
-    def add(self, block: Log) -> None:
-        """Count those of a block."""
-        self._rows += len(block)
-        for place, limit in enumerate(self.limits):
-            self._beyond[place] += int(np.count_nonzero(limit.beyond(block.tau)))
-
-    def notices(self, origin: Origin) -> list[Notice]:
-        """What there is to say of each limit that lies within the samples counted."""
-        notices = []
-        for limit, beyond in zip(self.limits, self._beyond, strict=True):
-            if beyond:
-                notices.append(_notice(origin, limit, beyond, self._rows))
-        return notices
+def beyond(log: Log, limits: Sequence[Limit]) -> list[int]:
+    """How many samples of a log, or of a block of it, lie beyond each of its limits."""
+    return [int(np.count_nonzero(limit.beyond(log.tau))) for limit in limits]
 
 
-def clipped(log: Log, limits: Sequence[Limit]) -> list[Notice]:
-    """What there is to say of a log's limits."""
-    counted = Counted(tuple(limits))
-    counted.add(log)
-    return counted.notices(log.origin)
-
-
-def _notice(origin: Origin, limit: Limit, beyond: int, rows: int) -> Notice:
-    name = f"tau{limit.joint + 1}"
-    source = origin.mapping.get(name, name)
-    finite = [abs(side) for side in (limit.low, limit.high) if np.isfinite(side)]
-    numbers = {
-        "channel": name if source == name else f"{name} ({source})",
-        "level": max(finite),
-        "count": beyond,
-        "percent": 100 * beyond / rows,
-    }
-    keep = Remedy({"accept": CODE}, "to use them nevertheless")
-    return Notice(CODE, numbers=numbers, lossy=True, remedies=(keep,))
+def clipped(
+    origin: Origin, limits: Sequence[Limit], counts: Sequence[int], rows: int
+) -> list[Notice]:
+    """What there is to say of each limit beyond which `counts` samples of `rows` lie."""
+    notices = []
+    for limit, count in zip(limits, counts, strict=True):
+        name = f"tau{limit.joint + 1}"
+        source = origin.mapping.get(name, name)
+        numbers = {
+            "channel": name if source == name else f"{name} ({source})",
+            "level": max(abs(side) for side in (limit.low, limit.high) if np.isfinite(side)),
+            "count": count,
+            "percent": 100 * count / rows,
+        }
+        if count:
+            keep = Remedy({"accept": CODE}, "to use them nevertheless")
+            notices.append(Notice(CODE, numbers=numbers, lossy=True, remedies=(keep,)))
+    return notices

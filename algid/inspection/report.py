@@ -19,7 +19,7 @@ from pydantic import TypeAdapter
 from algid.base.errors import LogError
 from algid.base.faults import during
 from algid.inspection.checks import CONTRADICTIONS, examine
-from algid.inspection.clipping import clipped, saturation
+from algid.inspection.clipping import beyond, clipped, saturation
 from algid.inspection.conventions import judged
 from algid.inspection.figures import (
     ClockFigures,
@@ -147,7 +147,8 @@ def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
     known = saturation(content, gravity=gravity, effort=effort)
     tried = cache(partial(judged, content, gravity=gravity > 0))
     findings = examine(content, gravity=gravity, effort=effort, known=known, tried=tried)
-    findings += tuple(clipped(content, known.limits))
+    counts = beyond(content, known.limits)
+    findings += tuple(clipped(content.origin, known.limits, counts, len(content)))
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
     signals = {}
     for name, pair in (("theta", content.theta), ("tau", content.tau), ("omega", content.omega)):

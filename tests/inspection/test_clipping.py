@@ -9,7 +9,7 @@ import pytest
 
 from algid.identification.open_logs import open_sources
 from algid.identification.recordings import Recordings
-from algid.inspection.clipping import clipped, saturation
+from algid.inspection.clipping import beyond, clipped, saturation
 from algid.inspection.report import inspect_log
 from algid.log import Log
 from tests.inspection.test_checks import moving_log
@@ -48,7 +48,8 @@ def test_samples_beyond_a_sensor_s_range_are_left_out_and_counted() -> None:
 def test_they_are_lost_data_and_used_where_that_is_accepted() -> None:
     log = cut_off()
     known = saturation(log)
-    (notice,) = clipped(log, known.limits)
+    counts = beyond(log, known.limits)
+    (notice,) = clipped(log.origin, known.limits, counts, len(log))
     assert notice.lossy
     assert "--accept CLIPPED_TORQUE" in notice.advice
     reading = replace(log.origin.reading, accepted=("CLIPPED_TORQUE",))
