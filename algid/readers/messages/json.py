@@ -16,9 +16,6 @@ from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 from algid.readers.messages.message_file import Messages
 from algid.readers.stated import BAD, GOOD, GROUPS
 
-_TELLING = GROUPS | GOOD | BAD
-"""Names of the values that say whose a message is, or that it is no measurement."""
-
 
 class JsonRecords:
     """The structures of a topic's messages: what they name, and the order of their numbers."""
@@ -66,23 +63,25 @@ class JsonRecords:
         leaves: dict[str, Any] = {}
         _gather(content, "", leaves, 0)
         numbers = {path: leaf for path, leaf in leaves.items() if type(leaf) is float}
-        telling = [
-            (path, leaf)
+        # what changes with every message is no structure: of very many groups a few are enough
+        groups = GROUPS if len(self._known) < LIMITS.layouts else ()
+        told = {
+            path: leaf
             for path, leaf in leaves.items()
-            if type(leaf) is tuple or path.rpartition(".")[2] in _TELLING
-        ]
-        structure = tuple(numbers), tuple(telling)
+            if type(leaf) is tuple or path.rpartition(".")[2] in groups
+        }
+        flags = [one for one in GOOD | BAD if one in leaves]
+        lacks = tuple(one for one in flags if (one in GOOD) == (leaves[one] in (0, False)))
+        structure = tuple(numbers), tuple(told.items()), lacks
         if structure not in self._known:
-            layout = MessageLayout(fixed=[(0, 8)])
+            layout = MessageLayout(fixed=[(0, 8)], lacks=lacks)
             for place, path in enumerate(numbers, start=1):
                 layout.numbers[path] = Numbers(8 * place, "<f8")
             for path, leaf in leaves.items():
                 if type(leaf) is tuple:
                     layout.texts[path] = leaf
-                elif type(leaf) is str or path.rpartition(".")[2] in GROUPS:
+                elif type(leaf) is str or path in told:
                     layout.labels[path] = str(leaf)
-                elif path in GOOD | BAD and (path in GOOD) == (leaf in (0, False)):
-                    layout.lacks += (path,)
             self._known[structure] = next(self._numbers)
             self._layouts[self._known[structure]] = layout
         return struct.pack(f"<Q{len(numbers)}d", self._known[structure], *numbers.values())

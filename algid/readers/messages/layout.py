@@ -141,11 +141,12 @@ class _Pattern:
     places: Mapping[str, Numbers] | None
     left_out: Mapping[str, str]
 
-    def matches(self, table: NDArray[np.uint64]) -> NDArray[np.bool_]:
-        """True for those messages (N, words) that have this layout."""
-        fits = np.ones(len(table), np.bool_)
+    def matches(self, table: NDArray[np.uint64], rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """True for those of the rows (R,) of messages (N, words) that have this layout."""
+        fits = np.ones(rows.size, np.bool_)
+        whole = rows.size == len(table)
         for word, mask, value in zip(self.words, self.masks, self.values, strict=True):
-            fits &= (table[:, word] & mask) == value
+            fits &= ((table[:, word] if whole else table[rows, word]) & mask) == value
             if not fits.any():
                 break
         return fits
@@ -235,9 +236,9 @@ class Decoder:
         left, tried = np.arange(len(messages)), 0
         while left.size:
             if tried == len(known):
-                pattern = self._new(table[0].tobytes(), lead)
+                pattern = self._new(table[left[0]].tobytes(), lead)
                 if pattern is None:
-                    left, table = left[1:], table[1:]
+                    left = left[1:]
                     continue
                 if tried == LIMITS.layouts:  # what is remembered must not grow with the file
                     known.clear()
@@ -245,14 +246,15 @@ class Decoder:
                 known.append(pattern)
             pattern = known[tried]
             tried += 1
-            fits = pattern.matches(table)
+            fits = pattern.matches(table, left)
             if not fits.any():
                 continue
             if pattern.places is None:
                 self.leave(count=int(np.count_nonzero(fits)), **pattern.left_out)
             else:
-                yield left[fits], pattern.read(table if fits.all() else table[fits], lead)
-            left, table = left[~fits], table[~fits]
+                own = left[fits]
+                yield own, pattern.read(table if own.size == len(table) else table[own], lead)
+            left = left[~fits]
 
     def _new(self, row: bytes, lead: int) -> _Pattern | None:
         """The pattern of a message's layout, None where it does not fit its schema."""
