@@ -26,8 +26,7 @@ from algid.estimators.combine import left_out
 from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
-from algid.estimators.standing import Standing, standing
-from algid.model import Model, Motion, regressor, torque
+from algid.model import F1, F2, Model, Motion, regressor, torque
 from algid.signals.filters import butterworth, correlate, smoother
 from algid.signals.segments import Cutter, Segment, pieces_of
 from algid.signals.shift import AT_ONCE, TorqueShift
@@ -48,34 +47,27 @@ FILTER = (
 )
 
 
+FRICTIONS = (F1, F2)
+
+
 @dataclass(frozen=True, eq=False)
 class PredictionScore:
-    """Sums by joint (2,): samples, torque, and squares of residual, torque and the model's parts.
+    """Samples, and sums (9, 2) over them by joint.
 
-    `standing` are those of moving and of standing joints, where one set of coefficients is scored.
+    Of the torque; of squares of torque, of the model's parts and of the residual; and where one set
+    of coefficients is scored those of `at_rest`.
     """
 
     count: float = 0.0
-    residual: FloatArray = field(default_factory=lambda: np.zeros(2))
-    torque: FloatArray = field(default_factory=lambda: np.zeros(2))
-    square: FloatArray = field(default_factory=lambda: np.zeros(2))
-    parts: FloatArray = field(default_factory=lambda: np.zeros(2))
-    standing: Standing = field(default_factory=Standing)
+    sums: FloatArray = field(default_factory=lambda: np.zeros((9, 2)))
 
     def __add__(self, other: PredictionScore) -> PredictionScore:
-        return PredictionScore(
-            self.count + other.count,
-            self.residual + other.residual,
-            self.torque + other.torque,
-            self.square + other.square,
-            self.parts + other.parts,
-            self.standing + other.standing,
-        )
+        return PredictionScore(self.count + other.count, self.sums + other.sums)
 
     @property
     def rmse(self) -> FloatArray:
         """Root mean square of the residual (2,) in N m."""
-        return np.sqrt(self.residual / max(self.count, 1.0))
+        return np.sqrt(self.sums[3] / max(self.count, 1.0))
 
     @property
     def nrmse(self) -> FloatArray:
@@ -83,7 +75,7 @@ class PredictionScore:
 
         Of a joint without torque over the other joint's.
         """
-        return np.sqrt(self.residual / np.maximum(self._of_drive(self.square), 1e-300))
+        return np.sqrt(self.sums[3] / np.maximum(self._of_drive(self.sums[1]), 1e-300))
 
     @property
     def of_load(self) -> FloatArray:
@@ -92,8 +84,8 @@ class PredictionScore:
         A joint that is hardly driven has little torque, since inertia, weight and friction make up
         for one another there.
         """
-        acts = np.maximum(self._of_drive(self.square), self.parts)
-        return np.sqrt(self.residual / np.maximum(acts, 1e-300))
+        acts = np.maximum(self._of_drive(self.sums[1]), self.sums[2])
+        return np.sqrt(self.sums[3] / np.maximum(acts, 1e-300))
 
     @property
     def r2(self) -> FloatArray:
@@ -101,12 +93,23 @@ class PredictionScore:
 
         Of a joint without torque, of the other joint's.
         """
-        spread = self.square - self.torque**2 / max(self.count, 1.0)
-        return 1 - self.residual / np.maximum(self._of_drive(spread), 1e-300)
+        spread = self.sums[1] - self.sums[0] ** 2 / max(self.count, 1.0)
+        return 1 - self.sums[3] / np.maximum(self._of_drive(spread), 1e-300)
+
+    @property
+    def by_state(self) -> FloatArray:
+        """RMSE (3, 2) in N m of joints that move, of ones that stand, and of these past friction.
+
+        NaN where it never does.
+        """
+        count = self.sums[[4, 6, 6]]
+        return np.sqrt(
+            np.divide(self.sums[[5, 7, 8]], count, out=np.full((3, 2), np.nan), where=count > 0)
+        )
 
     def _of_drive(self, power: FloatArray) -> FloatArray:
         """`power` (2,), of a joint without a motor that of the one that drives the arm."""
-        return np.where(self.square > 0, power, power[::-1])
+        return np.where(self.sums[1] > 0, power, power[::-1])
 
 
 class PredictionSums:
@@ -133,8 +136,8 @@ class PredictionSums:
         self._shift = shift
         self._cutter: Cutter | None = None
         size = len(model.names) + 1
-        self._standing = Standing()
         self._count, self._torque, self._gram = 0, np.zeros(2), np.zeros((2, size, size))
+        self._at_rest = np.zeros((5, 2))
 
     def push(self, segment: Segment) -> None:
         """Take in the next segment of the log."""
@@ -154,10 +157,8 @@ class PredictionSums:
         v = np.append(-c, 1.0)
         residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
         parts = np.einsum("x,axx->a", c**2, self._gram[:, :-1, :-1])
-        square = self._gram[:, -1, -1].copy()
-        return PredictionScore(
-            float(self._count), residual, self._torque.copy(), square, parts, self._standing
-        )
+        squares = [self._torque, self._gram[:, -1, -1], parts, residual]
+        return PredictionScore(float(self._count), np.stack([*squares, *self._at_rest]))
 
     def _add(self, piece: Segment) -> None:
         shift = self._shift.at(piece.dt)
@@ -168,7 +169,7 @@ class PredictionSums:
             return
         if self._at is not None:
             X, omega = np.delete(X, -2, axis=1), X[:, -2]
-            self._standing += standing(self._model, self._at, X, omega)
+            self._at_rest += at_rest(self._model, self._at, X, omega)
         self._count += X.shape[2]
         self._torque = self._torque + X[:, -1].sum(axis=1)
         self._gram += X @ X.swapaxes(1, 2)
@@ -179,6 +180,35 @@ class PredictionSums:
             return regressor(self._model, motion)
         Y = regressor(self._model, flexed(self._model, self._at, motion, dt), self._at)
         return np.concatenate([Y, motion.omega[:, None]], axis=1)
+
+
+def at_rest(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> FloatArray:
+    """Samples and squared residuals of joints that move, the same of those at rest, and d² (5, 2).
+
+    Where a joint stands, dry friction is any torque up to ± f: no model predicts which. Of a joint
+    slower than friction's step ω_s is therefore stated, beside the residual r, how far the torque
+    lies from all that friction f may be there,
+
+        d = |r + f tanh(ω / ω_s)| − f, where that is positive; else 0
+
+    Parameters
+    ----------
+    model : Model
+    c : (q,)
+    X : (2, q + 1, n)
+        Regressor of each joint, its torque last.
+    omega : (2, n), rad/s
+    """
+    r = X[:, -1] - np.einsum("q,aqn->an", c, X[:, :-1])
+    still = np.abs(omega) < model.coulomb_speed
+    held = np.abs(r)
+    for joint, name in enumerate(FRICTIONS):
+        if name in model.names:
+            place = model.names.index(name)
+            f = max(float(c[place]), 0.0)
+            held[joint] = np.maximum(np.abs(r[joint] + f * X[joint, place]) - f, 0.0)
+    rows = [~still, ~still * r**2, still, still * r**2, still * held**2]
+    return np.array([row.sum(axis=1) for row in rows])
 
 
 def _filtered(

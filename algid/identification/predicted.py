@@ -15,11 +15,8 @@ def prediction(score: PredictionScore) -> results.TorquePrediction | None:
     if score.count == 0:
         return None
     moving = rest = held = None
-    states = score.standing
-    if np.any(states.moving + states.rest):
-        moving = _where_known(states.rmse_moving)
-        rest = _where_known(states.rmse_rest)
-        held = _where_known(states.rmse_held)
+    if not np.isnan(score.by_state).all():
+        moving, rest, held = map(_where_known, score.by_state)
     return results.TorquePrediction(
         rmse=_pair(score.rmse),
         nrmse=_pair(score.nrmse),

@@ -187,9 +187,8 @@ def test_the_torques_gain_is_the_known_mass_over_the_found_one(known: float) -> 
 
 def test_a_prediction_without_samples_is_none_and_others_hold_their_sums() -> None:
     assert prediction(PredictionScore()) is None
-    sums = PredictionScore(
-        100.0, np.array([4.0, 9.0]), np.array([0.0, 50.0]), np.array([400.0, 125.0])
-    )
+    rows = np.array([[0.0, 50.0], [400.0, 125.0], [0.0, 0.0], [4.0, 9.0]])
+    sums = PredictionScore(100.0, np.concatenate([rows, np.zeros((5, 2))]))
     found = prediction(sums)
     assert found is not None
     assert found.rmse == pytest.approx((0.2, 0.3))
