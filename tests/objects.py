@@ -5,23 +5,16 @@ joints.
 from __future__ import annotations
 
 import socket
-import struct
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 import pytest
-from mcap.writer import CompressionType, Writer
 
-from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.base.stores import connect
-from algid.log import Log
-from algid.writers.mcap import messages
 
 DENIED = (
     b"<?xml version='1.0'?><Error><Code>AccessDenied</Code><Message>Access Denied</Message></Error>"
@@ -100,38 +93,3 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
         yield served
     finally:
         running.stop()
-
-
-def with_cameras(path: Path, log: Log, images: int, size: int = 1 << 20, every: int = 250) -> None:
-    """Joint states in chunks of their own between chunks of `images` images that do not
-    compress.
-    """
-    noise = np.random.default_rng(3)
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)
-        close_chunk = getattr(writer, "_Writer__finalize_chunk")  # noqa: B009
-        writer.start(profile="ros2", library="test")
-        joints = _channel(writer, "/joint_states", JOINT_STATE, JOINT_STATE_DEFINITION)
-        camera = _channel(writer, "/camera", "sensor_msgs/msg/CompressedImage", "uint8[] data\n")
-        writer.add_metadata("calibration", {"camera": "none"})
-        shots = images * every // len(log)
-        for row, (stamp, payload) in enumerate(
-            zip(log.stamp_ns.tolist(), messages(log), strict=True)
-        ):
-            if row % every == 0:
-                for _ in range(shots):
-                    close_chunk()
-                    writer.add_message(
-                        camera,
-                        stamp,
-                        struct.pack("<BBBBI", 0, 1, 0, 0, size) + noise.bytes(size),
-                        stamp,
-                    )
-                close_chunk()
-            writer.add_message(joints, stamp, payload.tobytes(), stamp, row)
-        writer.finish()  # type: ignore[no-untyped-call]
-
-
-def _channel(writer: Writer, topic: str, name: str, definition: str) -> int:
-    schema = writer.register_schema(name=name, encoding="ros2msg", data=definition.encode())
-    return writer.register_channel(topic=topic, message_encoding="cdr", schema_id=schema)

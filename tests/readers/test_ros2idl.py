@@ -16,43 +16,6 @@ from tests.readers.mcaps import Cdr, write_mcap
 
 LINE = "=" * 80 + "\n"
 STORE = get_typestore(Stores.ROS2_HUMBLE)
-# written as rosidl_adapter writes it
-JOINT_STATE = """\
-// generated from rosidl_adapter/resource/msg.idl.em
-// with input from sensor_msgs/msg/JointState.msg
-
-#include "std_msgs/msg/Header.idl"
-
-module sensor_msgs {
-  module msg {
-    @verbatim (language="comment", text=
-      "This is a message that holds data to describe the state of a set of joints; (rad, Nm)." "\\n"
-      "@ is no annotation here, // no comment, } no end")
-    struct JointState {
-      std_msgs::msg::Header header;
-
-      @verbatim (language="comment", text="names")
-      sequence<string> name;
-
-      @unit (value="rad")
-      sequence<double> position;
-
-      sequence<double> velocity;
-
-      sequence<double> effort;
-    };
-  };
-};
-"""
-HEADER = """\
-#include "builtin_interfaces/msg/Time.idl"
-module std_msgs { module msg {
-struct Header { builtin_interfaces::msg::Time stamp; string frame_id; }; }; };
-"""
-TIME = """\
-module builtin_interfaces { module msg { /* seconds
-and the rest */ struct Time { int32 sec; uint32 nanosec; }; }; };
-"""
 IDL_NAMES = {
     "bool": "boolean",
     "byte": "octet",
