@@ -84,7 +84,7 @@ def _of_npz(path: Path) -> Read:
 
 
 def _of_mat(path: Path) -> Read:
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     arrays: Arrays = {}
 
@@ -99,6 +99,9 @@ def _of_mat(path: Path) -> Read:
         take(loadmat(path, simplify_cells=True), "")
     except NotImplementedError:  # version 7.3 is HDF5
         return _of_hdf5(path)
+    for name, _, kind in whosmat(path):
+        if kind == "logical" and name in arrays:  # which SciPy reads as whole numbers
+            arrays[name] = arrays[name].astype(np.bool_)
     return arrays, {}, {}
 
 
@@ -113,20 +116,20 @@ def _of_hdf5(path: Path) -> Read:
     attributes: dict[str, dict[str, str]] = {}
 
     def take(name: str, one: Any) -> None:
-        if not isinstance(one, h5py.Dataset) or one.is_virtual or one.external:
+        if not isinstance(one, h5py.Dataset) or one.is_virtual or one.external or one.ndim > 2:
             return
-        kinds = [one.dtype[each] for each in one.dtype.names or ()] or [one.dtype]
-        if name.startswith("#") or one.ndim > 2 or any(kind.kind not in "iufbSO" for kind in kinds):
+        kinds = {kind.kind for kind, *_ in (one.dtype.fields or {"": (one.dtype,)}).values()}
+        if name.startswith("#") or not kinds <= set("iufbSO"):
             return
         if one.nbytes > LIMITS.whole_bytes:
             raise LogError(f"{path}: the array {name!r} is of more than 1 GiB; save it as Parquet")
-        # HDF5 fills up with zeros what was never written
+        # HDF5 fills up with zeros what was never written; texts lie apart
         stored, expected, unit = one.id.get_storage_size(), one.nbytes, "bytes"
         if one.chunks is not None:
-            counts = -(-np.array(one.shape) // np.array(one.chunks))
             stored, unit = one.id.get_num_chunks(), "chunks"
+            counts = -(-np.array(one.shape) // np.array(one.chunks))
             expected = int(np.prod(counts)) if one.size else stored
-        if stored != expected and not any(kind.kind == "O" for kind in kinds):  # texts lie apart
+        if stored != expected and "O" not in kinds:
             raise LogError(
                 f"{path}: the array {name!r} has {stored} of {expected} {unit}; the file was cut "
                 "off or damaged, save it again"

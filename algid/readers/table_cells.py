@@ -83,7 +83,8 @@ class Cell:
     """A number of each row: a column's, or one within its lists and structures.
 
     `steps` are the places in these; `label` is the column with the joints' names, if the number of
-    `joint` stands beside its name; `fills` are values that stand for a missing one.
+    `joint` stands beside its name; `fills` are values that stand for a missing one; `unit` is what
+    the column's own attributes state.
     """
 
     column: str
@@ -94,6 +95,7 @@ class Cell:
     fills: tuple[float, ...] = ()
     scale: float = 1.0
     offset: float = 0.0
+    unit: str = ""
 
     @property
     def is_number(self) -> bool:
@@ -234,7 +236,11 @@ def cells_of(table: TableFile) -> TableCells:
                 raise LogError(
                     f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
                 )
-    flags = [name for name in cells if name.lower() in GOOD | BAD and _is_flag(cells[name].type)]
+    flags = []
+    for name, cell in cells.items():
+        is_flag = pa.types.is_boolean(cell.type) or _is_plain(cell.type) or is_text(cell.type)
+        if is_flag and name.lower() in GOOD | BAD:
+            flags.append(name)
     return TableCells(table, cells, tuple(flags))
 
 
@@ -295,9 +301,11 @@ def _names(text: str) -> list[str]:
 
 
 def _marked(path: str, cell: Cell, said: Mapping[str, str]) -> Cell:
-    """The cell with the scale, the offset and the marks of missing values that a file states."""
+    """The cell with unit, scale, offset and marks of missing values that a file states of it."""
     import pyarrow as pa
 
+    unit = said.get("units", said.get("unit", "")).strip()
+    cell = replace(cell, unit="" if unit.lower() in _NO_UNIT else unit[: LIMITS.unit_letters])
     numbers = {}
     for key in ("scale_factor", "add_offset", *_FILLS):
         if key in said and _is_plain(cell.type):
@@ -326,15 +334,7 @@ def units_of(cells: TableCells) -> dict[str, str]:
         if one.name.lower().endswith(("_unit", "_units")) and is_text(one.type):
             metadata[one.name] = next(_values(cells.table, one.name), "")
     units = units_in(metadata, list(cells.by_name))
-    stated = {}
-    for one in schema:
-        for key, value in decoded(one.metadata).items():
-            if key.lower() in ("unit", "units") and value.strip().lower() not in _NO_UNIT:
-                stated[one.name] = value.strip()[: LIMITS.unit_letters]
-    for name, cell in cells.by_name.items():
-        if cell.column in stated:
-            units[name] = stated[cell.column]
-    return units
+    return units | {name: cell.unit for name, cell in cells.by_name.items() if cell.unit}
 
 
 def groups_in(table: TableFile) -> Iterator[Notice]:
@@ -380,12 +380,6 @@ def _is_plain(kind: pa.DataType) -> bool:
     import pyarrow as pa
 
     return pa.types.is_integer(kind) or pa.types.is_floating(kind)
-
-
-def _is_flag(kind: pa.DataType) -> bool:
-    import pyarrow as pa
-
-    return pa.types.is_boolean(kind) or _is_plain(kind) or is_text(kind)
 
 
 def _flag(values: pa.Array) -> Any:

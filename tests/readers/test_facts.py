@@ -26,7 +26,6 @@ _LABEL = 64
 UNTOLD = {
     "sentinel -9999": "a number like another: the guide lists it",
     "sentinel 0 in torque alone": "a torque like another: the guide lists it",
-    "torque is boolean": "MATLAB's files hold it as whole numbers",
     "torque at a quarter of the rate: held": "identify and inspect name it: HELD_EFFORT",
 }
 """Facts that reading alone cannot tell."""
