@@ -11,7 +11,7 @@ from algid.arm import Arm, FloatArray, regressor, with_payload
 from algid.log import Log, Origin, Reading
 from algid.signals.segments import Segment
 from algid.synth.cases import Case, load_case
-from algid.synth.excitation import Torque, wide_multi_sine
+from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import simulate
 from pipelines.cramer_rao import Truth
 
@@ -25,7 +25,6 @@ CUTOFFS = (3.0, 5.0, 8.0, 12.0, 18.0, 27.0, 40.0)
 class Scene:
     """An arm with its payload, and its true motion without and with it."""
 
-    name: str
     arm: Arm
     payload: float
     bare: Truth
@@ -96,34 +95,19 @@ def scene(name: str) -> Scene:
 
     Arms of odd seed get a torque that turns joint 1 round.
     """
-    if name.startswith("case"):
-        case = load_case(name)
-        arm, payload, bias = case.arm, case.payload, 0.0
-    else:
-        arm, payload = random_arm(int(name.removeprefix("arm")))
-        k = arm.constants()
-        bias = float(k[3] + k[1] + 2 * k[5]) if int(name.removeprefix("arm")) % 2 else 0.0
+    case, seed = case_of(name), sum(name.encode())
+    arm, t = case.arm, np.arange(round(DURATION * RATE) + 1) / RATE
     k = arm.constants()
-    loaded = with_payload(k, arm.payload_constants(payload))
-    seed = sum(name.encode())
-    return Scene(
-        name,
-        arm,
-        payload,
-        _moved(k, _torque(arm, seed, bias)),
-        _moved(loaded, _torque(arm, seed + 1, bias)),
-    )
+    odd = name.startswith("arm") and int(name.removeprefix("arm")) % 2
+    bias = np.array([[odd * float(k[3] + k[1] + 2 * k[5])], [0.0]])
 
+    def moved(constants: FloatArray, number: int) -> Truth:
+        wide = wide_multi_sine(arm, number)
+        motion = simulate(constants, lambda times: wide(times) + bias, t)
+        return Truth(t, motion.theta, motion.omega, motion.tau)
 
-def _torque(arm: Arm, seed: int, bias: float) -> Torque:
-    wide = wide_multi_sine(arm, seed)
-    return lambda t: wide(t) + np.array([[bias], [0.0]])
-
-
-def _moved(k: FloatArray, torque: Torque) -> Truth:
-    t = np.arange(round(DURATION * RATE) + 1) / RATE
-    motion = simulate(k, torque, t)
-    return Truth(t, motion.theta, motion.omega, motion.tau)
+    loaded = with_payload(k, arm.payload_constants(case.payload))
+    return Scene(arm, case.payload, moved(k, seed), moved(loaded, seed + 1))
 
 
 def noisy(

@@ -33,13 +33,14 @@ from algid.arm import CONSTANT_NAMES, FloatArray
 from algid.base.errors import AlgidError
 from algid.base.exits import Exit
 from algid.cli.app import called
+from algid.model import RIGID
 from algid.results import Result, read_result
 from algid.results.verdict import CAUSES, again
 from algid.synth.excitation import Torque, wide_multi_sine
 from algid.synth.simulator import HANGING, Driven, steered
 from pipelines import conventions
 from pipelines.accuracy_scenes import case_of
-from pipelines.experiment import Seen, count, experiment, grid, words
+from pipelines.experiment import Seen, count, experiment, grid, judged, words
 
 ARMS = ("case1", "arm21", "arm22")
 RATE, DURATION = 250.0, 8.0
@@ -167,24 +168,16 @@ def advices(words: list[str], outcome: Outcome) -> dict[str, list[str]]:
     return found
 
 
-def furthest(result: Result | None, k: FloatArray, names: tuple[str, ...]) -> float:
+def furthest(result: Result | None, truth: dict[str, float]) -> float:
     """Largest error in standard deviations of what is identified; infinite without a result."""
-    if result is None:
-        return np.inf
-    true = dict(zip(CONSTANT_NAMES, k.tolist(), strict=True))
-    errors = []
-    for name in names:
-        one = result.parameters[name]
-        if one.estimate is not None and one.std:
-            errors.append(abs(one.estimate - true[name]) / one.std)
-    return max(errors, default=np.inf)
+    return max(judged(result, truth)["z"], default=np.inf) if result else np.inf
 
 
 def draw(kind: str, title: str, arm: str, _: int) -> Seen:
     """One spoiled arm: its advices and what they lead to."""
-    k = case_of(arm).arm.constants()
     # what real joints rub is no viscous friction, and no constant of the arm
-    names = CONSTANT_NAMES[:5] if kind == "real friction" else CONSTANT_NAMES
+    names = RIGID if kind == "real friction" else CONSTANT_NAMES
+    truth = dict(zip(names, case_of(arm).arm.constants().tolist(), strict=False))
     limit, logs = WITHIN, 2 if kind == "a joint each" else 1
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -194,7 +187,7 @@ def draw(kind: str, title: str, arm: str, _: int) -> Seen:
             call += ["--set", f"passive={1 if kind == 'acrobot' else 2}"]
         if kind == "real friction":
             written(folder, kind, arm, title, "nothing", logs)
-            limit = max(WITHIN, ALIKE * furthest(run(call, folder).result, k, names))
+            limit = max(WITHIN, ALIKE * furthest(run(call, folder).result, truth))
             call.append("--force")
         written(folder, kind, arm, title, title, logs)
         first = run(call, folder)
@@ -205,11 +198,11 @@ def draw(kind: str, title: str, arm: str, _: int) -> Seen:
                 right.append(then.code != Exit.USAGE)
                 told.append(f"inspect → exit {then.code}")
                 continue
-            far = furthest(then.result, k, names)
+            far = furthest(then.result, truth)
             again = command in advices(command, then).values()
             right.append(then.code in (Exit.OK, Exit.DATA_LOST) and far <= limit and not again)
             told.append(f"{advice} → exit {then.code}, {far:.2g} σ{', again' if again else ''}")
-    far = furthest(first.result, k, names)
+    far = furthest(first.result, truth)
     silent = not right and far > limit and first.code == 0
     wrong = [f"({arm}: exit {first.code}, {far:.2g} σ; {'; '.join(told)})"]
     return {"right": right, "silent": [silent], "not": [] if all(right) and not silent else wrong}

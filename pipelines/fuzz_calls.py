@@ -46,17 +46,17 @@ def outcome(call: Call, outer: Path) -> tuple[str, str]:
     before, own = _listing(outer), {path.name for path in Path().iterdir()}
     with warnings.catch_warnings():
         warnings.simplefilter("always")
-        code, out, err = called(*call.arguments)
+        code, out, err = called(*call)
     kind, why = judged(call, code, out, err)
     new = {path.name for path in Path().iterdir()} - own - {"out"}
     outside = _listing(outer) ^ before
-    if ".." in call.arguments:  # where the call itself asks to write
+    if ".." in call:  # where the call itself asks to write
         outside = {path for path in outside if Path(path).name.startswith(".")}
     if kind in FINE and (outside or any(name.startswith(".") for name in new)):
         kind, why = "left", f"{sorted(new)} {sorted(outside)}"
     for name in new:
         shutil.rmtree(name, ignore_errors=True) if Path(name).is_dir() else Path(name).unlink()
-    return kind, f"{' '.join(call.arguments)[:500]!r} | {call.note!r} | {why}"
+    return kind, f"{' '.join(call)[:500]!r} | {why}"
 
 
 def _listing(outer: Path) -> set[str]:
@@ -90,11 +90,11 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
         return "escape", repr((out + err)[-600:])
     told = bool(last) and last[-1].startswith(("algid: ", "╰"))
     # which prints why, among the rest
-    if code == 2 and not told and "inspect" not in call.arguments:
+    if code == 2 and not told and "inspect" not in call:
         return "lines", err[-600:]
     if code == 2 and "a library cannot take it" in err:
         return "library", ""
-    if "json" in call.arguments and code != 2:
+    if "json" in call and code != 2:
         try:
             json.loads(out, parse_constant=_no_number)
         except ValueError as error:

@@ -8,8 +8,6 @@ from __future__ import annotations
 import json
 import random
 import shutil
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -52,13 +50,8 @@ SLOW = {("identify", "--estimator"), ("identify", "--model"), ("identify", "--cr
 """Flags that choose honest work of more than a second."""
 
 
-@dataclass(frozen=True)
-class Call:
-    """A kind, the arguments, and what was changed, for the report."""
-
-    kind: str
-    arguments: tuple[str, ...]
-    note: str = ""
+Call = tuple[str, ...]
+"""The arguments of a command."""
 
 
 def draw_call(seed: int, place: Path) -> Call:
@@ -87,7 +80,7 @@ def flags(draw: random.Random, _place: Path) -> Call:
         given[draw.randrange(len(sound))] = values.text(draw)
     # no argument of a process holds a NUL, nor half a character
     words = [word.replace("\0", "").replace("\ud800", "\udcff") for word in given]
-    return Call("flags", (name, *words))
+    return name, *words
 
 
 def _given(option: Any, draw: random.Random) -> list[str]:
@@ -158,7 +151,7 @@ def toml(draw: random.Random, place: Path) -> Call:
     if draw.random() < 0.2:
         written = damage(written or b" ", draw)
     (place / file).write_bytes(written)
-    return Call("toml", tuple(arguments.split()), written.decode(errors="replace")[:600])
+    return tuple(arguments.split())
 
 
 def result(draw: random.Random, place: Path) -> Call:
@@ -175,27 +168,7 @@ def result(draw: random.Random, place: Path) -> Call:
     if draw.random() < 0.15:
         written = damage(written, draw)
     (place / folder / name).write_bytes(written)
-    return Call("result", _reading(folder, draw), f"{source}, {_differing(content, written)}")
-
-
-def _differing(content: Any, written: bytes) -> str:
-    """The first values that differ, for the report."""
-    try:
-        found = json.loads(written)
-    except (ValueError, RecursionError):
-        return "damaged"
-
-    def walk(one: Any, other: Any, at: str) -> Iterator[str]:
-        if isinstance(one, dict) and isinstance(other, dict):
-            for key in {**one, **other}:
-                yield from walk(one.get(key), other.get(key), f"{at}.{key}"[:200])
-        elif isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-            for place, pair in enumerate(zip(one, other, strict=True)):
-                yield from walk(*pair, f"{at}.{place}"[:200])
-        elif one != other:
-            yield f"{at}: {str(one)[:60]} -> {str(other)[:80]}"
-
-    return "; ".join(list(walk(content, found, ""))[:4])[:600]
+    return _reading(folder, draw)
 
 
 def _reading(folder: str, draw: random.Random) -> tuple[str, ...]:
@@ -246,8 +219,8 @@ def series(draw: random.Random, place: Path) -> Call:
         _copied(place / base, place / folder)
         file = draw.choice(sorted((place / folder).glob("*.parquet")))
         arguments = f"report {folder}{draw.choice(('', ' --export mcap'))}"
-    note = _spoil(file, draw)
-    return Call(f"series {kind}", tuple(arguments.split()), f"{file.name}: {note}")
+    _spoil(file, draw)
+    return tuple(arguments.split())
 
 
 TYPES: tuple[Any, ...] = (
@@ -275,49 +248,35 @@ TYPES: tuple[Any, ...] = (
 )
 
 
-def _spoil(file: Path, draw: random.Random) -> str:
+def _spoil(file: Path, draw: random.Random) -> None:
     if file.suffix != ".parquet" or draw.random() < 0.3:
         if draw.random() < 0.1:
             file.unlink()
-            return "removed"
-        file.write_bytes(damage(file.read_bytes(), draw))
-        return "damaged"
+        else:
+            file.write_bytes(damage(file.read_bytes(), draw))
+        return
     frame = pl.read_parquet(file)
-    notes = []
     for _ in range(draw.choice((1, 1, 2))):
-        if not frame.width:
-            break
-        column = draw.choice(frame.columns)
-        frame, note = _spoilt_column(frame, column, draw)
-        notes.append(f"{column}: {note}")
+        if frame.width:
+            frame = _spoilt_column(frame, draw.choice(frame.columns), draw)
     frame.write_parquet(file)
-    return "; ".join(notes)
 
 
-def _spoilt_column(
-    frame: pl.DataFrame, column: str, draw: random.Random
-) -> tuple[pl.DataFrame, str]:
-    kind = draw.randrange(8)
+def _spoilt_column(frame: pl.DataFrame, column: str, draw: random.Random) -> pl.DataFrame:
+    kind, to = draw.randrange(6), draw.choice(TYPES)
     if kind == 0:
-        return frame.drop(column), "dropped"
+        return frame.drop(column)
     if kind == 1:
-        return frame.with_columns(pl.lit(None).alias(column)), "null"
+        return frame.rename({column: column + values.text(draw)[:50].replace("\ud800", "x")})
     if kind == 2:
-        return frame.rename(
-            {column: column + values.text(draw)[:50].replace("\ud800", "x")}
-        ), "renamed"
+        return frame.head(draw.choice((0, 1, 2)))
     if kind == 3:
-        return frame.head(draw.choice((0, 1, 2))), "cut"
+        return pl.concat([frame] * draw.choice((2, 9)))
     if kind == 4:
-        return pl.concat([frame] * draw.choice((2, 9))), "repeated"
-    if kind == 5:
-        value = values.number(draw)
-        return frame.with_columns(pl.lit(value).alias(column)), f"{value}"
-    if kind == 6:
         word = values.text(draw).replace("\ud800", "x")
-        return frame.with_columns(pl.lit(word).alias(column)), "text"
-    to = draw.choice(TYPES)
+        value = draw.choice((None, values.number(draw), word))
+        return frame.with_columns(pl.lit(value).alias(column))
     try:
-        return frame.with_columns(pl.col(column).cast(to, strict=False)), f"as {to}"
+        return frame.with_columns(pl.col(column).cast(to, strict=False))
     except pl.exceptions.PolarsError:
-        return frame.with_columns(pl.lit(None, dtype=to).alias(column)), f"null as {to}"
+        return frame.with_columns(pl.lit(None, dtype=to).alias(column))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from pipelines.fuzz_calls import judged
-from pipelines.hostile.calls import Call
 
 
 @pytest.mark.parametrize(
@@ -31,9 +30,9 @@ from pipelines.hostile.calls import Call
     ],
 )
 def test_the_judge_sees_every_bad_end(code: int, out: str, err: str, kind: str) -> None:
-    assert judged(Call("flags", ("report", "x")), code, out, err)[0] == kind
+    assert judged(("report", "x"), code, out, err)[0] == kind
 
 
 @pytest.mark.parametrize("text", ["{", '{"a": NaN}'])
 def test_the_judge_reads_what_is_printed_as_json(text: str) -> None:
-    assert judged(Call("flags", ("compare", "--format", "json")), 0, text, "")[0] == "json"
+    assert judged(("compare", "--format", "json"), 0, text, "")[0] == "json"
