@@ -330,11 +330,12 @@ class RobustProblem:
         corrected = self.by_instruments(least, least.values, following)
         if corrected is None:
             return least
-        if compared(corrected, least).moved > _NEAR:
+        if compared(corrected, least)[1] > _NEAR:
             corrected = self.by_instruments(least, corrected.values, following) or corrected
-        tests = compared(corrected, least)
-        fit = replace(least, endogeneity=tests.distance)
-        if not tests.endogenous:
+        distance, moved, same = compared(corrected, least)
+        fit = replace(least, endogeneity=distance)
+        # least squares is off by more than its error bars take in
+        if not (same < level("INSTRUMENTS") and moved > MOVES):
             return fit
         case = "reference"
         if following is None:
@@ -342,10 +343,8 @@ class RobustProblem:
             silent = no_feedback(corrected, self.problem)
             if silent < ANSWERS:
                 return fit.noted(feedback(silent))
-        note = Notice(
-            "INSTRUMENTS", numbers={"case": case, "distance": tests.moved, "p_value": tests.same}
-        )
-        return replace(corrected, endogeneity=tests.distance).noted(note)
+        note = Notice("INSTRUMENTS", numbers={"case": case, "distance": moved, "p_value": same})
+        return replace(corrected, endogeneity=distance).noted(note)
 
     def by_instruments(
         self, least: Fit, at: FloatArray, following: Following | None = None
@@ -507,32 +506,14 @@ def _share(squares: FloatArray, usual: float) -> float:
     return min(1.0, float(np.sqrt((np.sum(squares) + usual**2) / (squares.size + 1))))
 
 
-@dataclass(frozen=True)
-class Exogeneity:
-    """How estimates by instruments differ from those by least squares.
+def compared(better: Fit, least: Fit) -> tuple[float, float, float]:
+    """How far instruments move a constant at most, in their deviations and in least squares' own.
 
-    Parameters
-    ----------
-    distance : how far a constant moves, in standard deviations of the instruments, at most
-    moved : the same in standard deviations of least squares
-    same : chance of such a difference where the torque is exogenous
+    With that the chance of such differences where the torque is exogenous.
     """
-
-    distance: float
-    moved: float
-    same: float
-
-    @property
-    def endogenous(self) -> bool:
-        """Whether least squares is off by more than its error bars take in."""
-        return self.same < level("INSTRUMENTS") and self.moved > MOVES
-
-
-def compared(better: Fit, least: Fit) -> Exogeneity:
-    """The test on estimates by instruments and by least squares."""
     places = np.flatnonzero(np.isin(least.names, RIGID) & np.isfinite(better.std + least.std))
     if not places.size:
-        return Exogeneity(0.0, 0.0, 1.0)
+        return 0.0, 0.0, 1.0
     away = (better.values - least.values)[places]
     V = np.zeros_like(better.covariance)
     for one, other in zip(_influences(better), _influences(least), strict=True):
@@ -541,7 +522,7 @@ def compared(better: Fit, least: Fit) -> Exogeneity:
         V = V + variance
     h = float(away @ scaled_pinv(V[np.ix_(places, places)]) @ away)
     distance, moved = (float(np.max(np.abs(away) / fit.std[places])) for fit in (better, least))
-    return Exogeneity(distance, moved, float(chi2_tail(places.size, max(h, 0.0))))
+    return distance, moved, float(chi2_tail(places.size, max(h, 0.0)))
 
 
 def _of(fit: Fit, problem: Problem) -> Problem:

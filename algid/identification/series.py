@@ -63,40 +63,27 @@ def torque_blocks(
             }
 
 
+_MOTION = ("theta1", "theta2", "omega1", "omega2")
+_TORQUES = ("tau1", "tau2", "tau1_predicted", "tau2_predicted")
+
+
 def _torques(piece: Segment, model: Model, c: FloatArray, shift: float) -> dict[str, FloatArray]:
-    if len(piece) < 16:
-        return _prediction_columns(
-            piece, np.full_like(piece.theta, np.nan), np.full_like(piece.theta, np.nan)
-        )
-    bandwidth = _bandwidth(piece, model, c)
-    # the model is not linear in the motion: what noise forbids to show is taken from its torque,
-    # not from its motion
-    theta = smoothed(piece.theta, piece.dt, max(bandwidth, min(MOTION, 0.1 / piece.dt)))
-    omega = np.gradient(theta, piece.dt, axis=1)
-    motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
-    motion = flexed(model, c, motion, piece.dt)
-    predicted = smoothed(torque(model, c, motion), piece.dt, bandwidth)
-    shift -= model.lag(c)  # a torque that lags shows at its stamp what acted before
-    predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
-    reach = min(half_length(piece.dt, bandwidth), len(piece) // 2)
-    predicted[:, :reach] = predicted[:, len(piece) - reach :] = np.nan
-    return _prediction_columns(piece, omega, predicted)
-
-
-def _prediction_columns(
-    piece: Segment, omega: FloatArray, predicted: FloatArray
-) -> dict[str, FloatArray]:
-    return {
-        "t": piece.t,
-        "theta1": piece.theta[0],
-        "theta2": piece.theta[1],
-        "omega1": omega[0],
-        "omega2": omega[1],
-        "tau1": piece.tau[0],
-        "tau2": piece.tau[1],
-        "tau1_predicted": predicted[0],
-        "tau2_predicted": predicted[1],
-    }
+    omega = predicted = np.full_like(piece.theta, np.nan)
+    if len(piece) >= 16:
+        bandwidth = _bandwidth(piece, model, c)
+        # the model is not linear in the motion: what noise forbids to show is taken from its
+        # torque, not from its motion
+        theta = smoothed(piece.theta, piece.dt, max(bandwidth, min(MOTION, 0.1 / piece.dt)))
+        omega = np.gradient(theta, piece.dt, axis=1)
+        motion = Motion(theta, omega, np.gradient(omega, piece.dt, axis=1))
+        motion = flexed(model, c, motion, piece.dt)
+        predicted = smoothed(torque(model, c, motion), piece.dt, bandwidth)
+        shift -= model.lag(c)  # a torque that lags shows at its stamp what acted before
+        predicted = np.stack([np.interp(piece.t + shift, piece.t, row) for row in predicted])
+        reach = min(half_length(piece.dt, bandwidth), len(piece) // 2)
+        predicted[:, :reach] = predicted[:, len(piece) - reach :] = np.nan
+    rows = np.concatenate([piece.theta, omega, piece.tau, predicted])
+    return {"t": piece.t} | dict(zip(_MOTION + _TORQUES, rows, strict=True))
 
 
 def _bandwidth(piece: Segment, model: Model, c: FloatArray) -> float:
@@ -130,15 +117,11 @@ def scored_blocks(
             if piece.t.size > 1:
                 dt = float(piece.t[1] - piece.t[0])
                 step = max(1, int(1 / (SCORED_RATE * CUTOFF * dt)))
-            measured, predicted = piece.measured[:, ::step], piece.predicted[:, ::step]
-            t = piece.t[::step]
+            t, rows = piece.t[::step], np.concatenate([piece.measured, piece.predicted])[:, ::step]
             yield {
                 "log": np.full(t.size, number, dtype=np.int32),
                 "t": t,
-                "tau1": measured[0],
-                "tau2": measured[1],
-                "tau1_predicted": predicted[0],
-                "tau2_predicted": predicted[1],
+                **dict(zip(_TORQUES, rows, strict=True)),
             }
 
 
@@ -232,20 +215,17 @@ def innovation_rows(sums: ResidualSums, *, whitened: bool) -> Iterator[dict[str,
     in shares of white noise; that of windows is in (N m)²/Hz and stands beside the torque's own
     through the same windows.
     """
-    kinds: list[tuple[str, FloatArray, FloatArray, FloatArray, FloatArray]] = []
-    if whitened:
-        spectrum = whiteness_of(sums)
-        low = np.broadcast_to(spectrum.low, spectrum.density.shape)
-        high = np.broadcast_to(spectrum.high, spectrum.density.shape)
-        kinds.append((WHITE_SPECTRUM, spectrum.frequency, spectrum.density, low, high))
-    else:
-        spectrum = spectra(sums)
-        nowhere = np.full((2, spectrum.frequency.size), np.nan)
-        residual, of_torque = spectrum.density[:2], spectrum.density[2:]
-        kinds.append((SPECTRUM, spectrum.frequency, residual, nowhere, nowhere))
-        kinds.append((TORQUE_SPECTRUM, spectrum.frequency, of_torque, nowhere, nowhere))
     r = autocorrelation(sums)
-    kinds.append((AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half))
+    kinds = [(AUTOCORRELATION, r.lag, r.correlation, -r.half, r.half)]
+    if whitened:
+        white = whiteness_of(sums)
+        band = white.low * np.ones((2, 1)), white.high * np.ones((2, 1))
+        kinds.insert(0, (WHITE_SPECTRUM, white.frequency, white.density, *band))
+    else:
+        plain = spectra(sums)
+        band = (np.full((2, plain.frequency.size), np.nan),) * 2
+        kinds.insert(0, (TORQUE_SPECTRUM, plain.frequency, plain.density[2:], *band))
+        kinds.insert(0, (SPECTRUM, plain.frequency, plain.density[:2], *band))
     for kind, x, values, low, high in kinds:
         for joint in range(2):
             yield {
