@@ -117,8 +117,9 @@ class TableReader:
                 rows = max(used, min(most, self.rows, LIMITS.reserved_rows))
                 room = np.empty((1 + 2 * len(recorded), rows), np.int64)
             elif used > room.shape[1]:
-                full, room = room, np.empty((len(room), max(used, 2 * room.shape[1])), np.int64)
-                room[:, :first] = full[:, :first]
+                larger = np.empty((len(room), max(used, 2 * room.shape[1])), np.int64)
+                larger[:, :first] = room[:, :first]
+                room = larger  # the smaller one goes at once
             stamps, signals = parts(first)
             stamps[:] = table.stamp_ns
             convert(table, signals, origin.reading, self.laws)
