@@ -367,7 +367,7 @@ class _Trials:
             lawful = [one.score for one in found if not one.broken]
             if lawful and bound > min(lawful) + self.apart:
                 break
-            found += self._of_family(family, free=place < _SHIFTED)
+            found += self._of_family(family, bound if place < _SHIFTED else np.inf)
         return found
 
     def scaled(self) -> Iterator[Candidate]:
@@ -377,11 +377,14 @@ class _Trials:
             if family is not None:
                 yield from self._of_family(family)
 
-    def _of_family(self, family: Convention, *, free: bool = True) -> list[Candidate]:
-        """A family with zeros by quarter and half turns, and those that fit best if by far."""
+    def _of_family(self, family: Convention, bound: float = -np.inf) -> list[Candidate]:
+        """A family with zeros by quarter and half turns, and those that fit best if by far.
+
+        No zeros have a score below the `bound`.
+        """
         turned = self.under(family, *self._turns)
-        least = min(one.score for one in turned)
-        if free and (best := self.zeroed(family)).score < least - self.apart:
+        far = min(one.score for one in turned) - self.apart
+        if bound < far and (best := self.zeroed(family)).score < far:
             turned.append(best)
         return turned
 
