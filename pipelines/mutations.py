@@ -34,18 +34,20 @@ def damage(content: bytes, draw: random.Random) -> bytes:
         width = draw.choice((2, 4, 8))
         number = draw.choice((*_NUMBERS, (1 << 64) - 1)) & ((1 << 8 * width) - 1)
         some = content[place : place + draw.choice((1, 9, 64, 512, 5000))]
-        old, new = draw.choice(
-            (
-                (content[place : place + 1], bytes([draw.randrange(256)])),  # another byte
-                (content[place : place + 1], bytes([content[place] ^ 1 << draw.randrange(8)])),
-                (content[place : place + width], number.to_bytes(width, "little")),
-                (content[place:], b""),  # cut off
-                (some, b""),
-                (some, some + some),
-                (some, bytes(len(some))),
-                (b"", draw.choice(_WORDS)),
-            )
+        byte = content[place : place + 1]
+        small = (  # the commonest
+            (byte, bytes([draw.randrange(256)])),
+            (byte, bytes([content[place] ^ 1 << draw.randrange(8)])),
+            (content[place : place + width], number.to_bytes(width, "little")),
         )
+        large = (
+            (content[place:], b""),  # cut off
+            (some, b""),
+            (some, some + some),
+            (some, bytes(len(some))),
+            (b"", draw.choice(_WORDS)),
+        )
+        old, new = draw.choice((*small, *small, *large))
         content = (content[:place] + new + content[place + len(old) :]) or b"\0"
     return content
 
