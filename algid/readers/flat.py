@@ -311,7 +311,8 @@ def samples(
         channels = {name: whole_column(whole.column(name)) for name in sources}
         for name, values in channels.items():
             if name != "t" or not np.issubdtype(values.dtype, np.integer):
-                channels[name] = values.astype(np.float64, copy=False)
+                with np.errstate(invalid="ignore"):  # damaged bytes may be a NaN that signals
+                    channels[name] = values.astype(np.float64, copy=False)
         for name in left:
             left[name] = add(left[name], -word_sum(channels[name]))
         times, notices = channels.pop("t"), list[Notice]()
