@@ -51,13 +51,12 @@ def opened(path):
     table = open_columns(pl.read_csv(path, skip_rows=1))
     return replace(table, path=str(path), kind="toy")
 '''
-FORMAT = """    FileFormat(
-        "toy",
-        "Toy log",
-        (".toy",),
-        b"TOYLOG",
-        lambda path, _: import_module("algid.readers.toy").opened(path),
-    ),
+FORMAT = """    FileFormat("toy", "Toy log", (".toy",), b"TOYLOG"),
+"""
+OPENED = """        case "toy":
+            from algid.readers.toy import opened
+
+            return opened(path)
 """
 CHECK = '''"""A check that always finds something."""
 
@@ -264,7 +263,8 @@ def add_toys(package: Path) -> None:
     )
     (package / "readers" / "toy.py").write_text(READER)
     formats = package / "readers" / "formats.py"
-    inserted(formats, '    _bag("rosbag2"', FORMAT)
+    inserted(formats, '    FileFormat("rosbag2"', FORMAT)
+    inserted(formats, '        case "rosbag2" | "db3" | "bag":', OPENED)
     (package / "inspection" / "toy.py").write_text(CHECK)
     checks = package / "inspection" / "checks.py"
     inserted(checks, "    every += rests(log, whole)\n", "    every += toys(log)\n")
