@@ -302,12 +302,12 @@ def samples(
     for arrays in rows.batches(list(sources.values()), most):
         import pyarrow as pa
 
-        batch = pa.RecordBatch.from_arrays(arrays, names=list(sources))
-        whole = batch.drop_null()
+        whole = batch = pa.RecordBatch.from_arrays(arrays, names=list(sources))
+        cut_off = any(len(values) and not values[-1].is_valid for values in arrays)
+        if any(values.null_count for values in arrays):  # it imports what plain rows do without
+            whole = batch.drop_null()
         count += batch.num_rows
         lost += batch.num_rows - whole.num_rows
-        last = batch.slice(max(0, batch.num_rows - 1))
-        cut_off = last.num_rows > last.drop_null().num_rows
         channels = {name: whole_column(whole.column(name)) for name in sources}
         for name, values in channels.items():
             if name != "t" or not np.issubdtype(values.dtype, np.integer):

@@ -116,11 +116,13 @@ class Cell:
     def of(self, batch: pa.RecordBatch) -> pa.Array:
         """The numbers of a batch: integers, floats, or for a clock ticks of its type."""
         import pyarrow as pa
-        import pyarrow.compute as pc
 
         values = batch.column(self.column)
         if self.label:
             values = self._beside_its_name(values, batch.column(self.label))
+        changed = bool(self.fills) or (self.scale, self.offset) != (1.0, 0.0)
+        if self.steps or changed:
+            import pyarrow.compute as pc  # plain numbers need not wait for it
         for step in self.steps:
             if pa.types.is_struct(values.type):
                 values = pc.struct_field(values, [step])
@@ -148,7 +150,7 @@ class Cell:
 
                 values = pl.Series(pl.from_arrow(values)).cast(pl.Float64).to_arrow()
             values = values.cast(pa.float64())
-        if not self.fills and (self.scale, self.offset) == (1.0, 0.0):
+        if not changed:
             return values
         values = values.cast(pa.float64())
         for fill in self.fills:
@@ -249,19 +251,21 @@ def _within(
 ) -> Iterator[tuple[str, tuple[int, ...], pa.DataType]]:
     """Names, steps and types of the cells of a column, of which some `values` are given."""
     import pyarrow as pa
-    import pyarrow.compute as pc
+
+    if not (pa.types.is_struct(kind) or is_list(kind)):
+        yield name, steps, kind
+        return
+    import pyarrow.compute as pc  # a plain table need not wait for it
 
     if pa.types.is_struct(kind):
         for place, one in enumerate(kind):
             inner = values and pc.struct_field(values, [place])
             yield from _within(f"{name}.{one.name}", one.type, inner, (*steps, place))
-    elif is_list(kind):
+    else:
         size = values and pc.max(pc.list_value_length(values)).as_py()
         for place in range(min(size or 0, LIMITS.list_cells)):
             inner = values and values.flatten()
             yield from _within(f"{name}[{place}]", kind.value_type, inner, (*steps, place))
-    else:
-        yield name, steps, kind
 
 
 _PLACE = re.compile(r"(.+)\[(\d+)\]")
