@@ -34,7 +34,7 @@ _RUN = 8
 """Samples in a row that come late: fewer are jitter."""
 _SHORTEST = 64
 """Late samples at a table's end that wait for the next table, and least of a run before all."""
-_HOLE = 1.5
+_APART = 1.5
 """Periods: between the step of all rows and that of the half that one of two threads writes."""
 PAUSE = 20
 """Periods between a run and the next one: a gap that no window spans."""
@@ -166,7 +166,7 @@ def _restart(table: SampleTable) -> int | None:
         order = np.argsort(before.stamp_ns, kind="stable")
         known, own = before.stamp_ns[order], table.stamp_ns[rows]
         after = np.clip(np.searchsorted(known, own), 1, known.size - 1)
-        near = known[after] - known[after - 1] <= _HOLE * _period(np.unique(known))
+        near = known[after] - known[after - 1] <= _APART * _period(np.unique(known))
         inside = near & (known[0] <= own) & (own < known[-1])  # where it stands still none is
         same = (known[after] == own) & _alike(table, rows[0] - known.size + order[after], rows)
         if np.count_nonzero(inside & ~same) > rows.size / 2:

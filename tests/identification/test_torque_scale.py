@@ -68,7 +68,7 @@ def test_without_a_payload_there_is_no_gain_to_tell() -> None:
     )
     assert bare.fit is not None
     assert bare.fit.torque_gain is None
-    with pytest.raises(SettingError, match="--payload-mass: expected a number from"):
+    with pytest.raises(SettingError, match="--payload-mass: expected greater than or equal to"):
         Settings(payload_mass=0.0)
 
 
