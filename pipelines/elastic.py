@@ -33,6 +33,9 @@ DRIVES = ("open loop", "digital PD")
 ROTOR = (0.05, 0.2)  # of the links' inertia
 COULOMB = 0.05  # of the drive's RMS
 TRACKED = 12.0  # rad/s, of the controller
+PRECISE = 0.01
+"""Noise of every second stiff arm's angles, of that of the others: a torque's own noise, which a
+load read from it would carry into its column, then is most of what is left."""
 ARMS, STIFF = 10, 100  # of each stiffness and drive
 
 
@@ -63,7 +66,8 @@ def scenes(
     for place, (seed, run) in enumerate(keys):
         rng = np.random.default_rng([seed, run, DRIVES.index(drive), int(speed or 1000)])
         signals = states[:, :2, place].T, torques[..., place].T
-        logs.append(logged(t, *signals, rng, (SIGMA_THETA, SIGMA_TAU), accepted=()))
+        precise = PRECISE if seed % 2 and not speed else 1.0
+        logs.append(logged(t, *signals, rng, (precise * SIGMA_THETA, SIGMA_TAU), accepted=()))
     truth = k[:5] + np.outer([0, 0, 0, 0, 1], rotor[0])
     return [
         (truth[:, first], speed**2 * links[:, first], logs[first : first + runs])

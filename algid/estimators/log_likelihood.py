@@ -129,7 +129,7 @@ class LogEvidence:
         known: NoiseLevels | None,
     ) -> None:
         self.loaded = loaded
-        self.sure = self.smooth = False
+        self.sure = self.smooth = self.by_motion = False
         self._source = source
         self._shared = shared
         self._shift = shift
@@ -309,6 +309,7 @@ class LogEvidence:
             shared.delay,
             residual_only=residual_only,
             smooth=smooth,
+            by_motion=self.by_motion,
         )
 
     def _stencil(self, shared: Shared, dt: float, c: FloatArray) -> Stencil:

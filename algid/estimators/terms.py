@@ -542,8 +542,7 @@ def _selected(
     every = replace(shapes, terms=tuple(name for name, term in TERMS.items() if not term.lags))
     shared = Shared(every, delay=True)
     some = replace(problem, unloaded=kinds[0].sources, loaded=kinds[1].sources)
-    every_log = opened(some, shared)
-    logs = [log for log in every_log if log.loaded in start]
+    logs = [log for log in opened(some, shared) if log.loaded in start]
     driven = [
         any(np.any(piece.tau[joint]) for log in logs for piece in log.kept) for joint in (0, 1)
     ]
@@ -557,7 +556,19 @@ def _selected(
     fixed = tuple(kept)
     everything = tuple(dict.fromkeys(tuple(candidates) + fixed))
     base = settings.shift.delay
+    # Read from the torque, the load of joints would carry the torque's noise into its column, and
+    # where angles are precise every joint would look elastic: the motion tells whether one is.
+    for log in logs:
+        log.by_motion = not elastic
     first = FirstPass(logs, shared, at, base)
+    soft = [term for term in candidates if term in ELASTIC and not elastic]
+    if soft:
+        scale = first.mean_square(first.columns(everything))
+        search = _Search(first, everything, fixed, absent, scale)
+        if search.evidence(soft[0], outside(everything, soft)) > 0:
+            for log in logs:
+                log.by_motion = False
+            first = FirstPass(logs, shared, at, base)
     before: list[str] | None = None
     for left in reversed(range(_ROUNDS)):
         offered = first.columns(everything)

@@ -136,6 +136,7 @@ def linearise(
     *,
     residual_only: bool = False,
     smooth: FloatArray | None = None,
+    by_motion: bool = False,
 ) -> Linearised:
     """Linearise a piece of log at a trajectory and at coefficients, and whiten it.
 
@@ -157,6 +158,8 @@ def linearise(
     smooth : (2, N), rad
         A trajectory at which the derivatives by c are taken in place of `theta0`, without the
         noise that is left in that one's accelerations.
+    by_motion : bool
+        Whether the motion, and not the torque, tells what bends elastic joints.
 
     Raises
     ------
@@ -169,12 +172,13 @@ def linearise(
     if torques.stop <= torques.start:
         raise np.linalg.LinAlgError(f"no torque acts within the angles, {stencil.shift} s later")
     measured = stencil.moving(piece.tau)[:, torques]
-    motion = flexed(model, c, Motion(*stencil.differences(theta0)), stencil.dt, measured)
+    acting = None if by_motion else measured
+    motion = flexed(model, c, Motion(*stencil.differences(theta0)), stencil.dt, acting)
     J, torques_of_model = modelled(model, c, motion, stencil.dt)
     G = along_stencil(partials(model, c, motion), stencil.weights)
     rising = torques_of_model
     if smooth is not None:
-        motion = flexed(model, c, Motion(*stencil.differences(smooth)), stencil.dt, measured)
+        motion = flexed(model, c, Motion(*stencil.differences(smooth)), stencil.dt, acting)
         J, rising = modelled(model, c, motion, stencil.dt)
     error = measured - torques_of_model - forward(G, piece.theta - theta0, first)
     parts = []

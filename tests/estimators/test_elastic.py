@@ -14,6 +14,7 @@ from algid.model import Model, Motion, link_motion, load, sensitivity, torque
 from algid.results import Result
 from algid.signals.segments import Segment
 from pipelines import conventions
+from pipelines.bench_logs import blocks
 from tests.estimators.conftest import DT, Bench
 from tests.estimators.test_terms import term_log, term_values
 
@@ -105,3 +106,12 @@ def test_a_lag_that_the_last_round_would_find_leaves_the_choice_whole() -> None:
     result = identify(swapped, report=False)
     assert result.verdict.failed
     assert "WRONG_CONVENTION" in {one.code for one in result.notices}
+
+
+def test_precise_angles_make_no_joint_elastic() -> None:
+    """A load that is read from the torque carries the torque's noise into its column."""
+    result = identify(next(iter(blocks(10_000))), report=False)
+    assert result.fit is not None
+    assert result.fit.intervals == "likelihood"
+    assert not result.fit.stiffness
+    assert result.verdict.grade == "good"
