@@ -281,6 +281,9 @@ def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
         if best is None:
             best = candidate
             continue
+        if best.balanced and candidate.convention == best.other_side:
+            # of two sides that explain the same, but for rounding, the log's own
+            best = min(best, candidate, key=lambda one: abs(one.zero[1]))
         if candidate.convention in (best.convention, best.other_side if best.balanced else None):
             continue
         alone = best.convincing and candidate.score - best.score > apart
