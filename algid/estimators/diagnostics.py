@@ -293,11 +293,9 @@ def ratio_of_joints(normals: Sequence[Normal], model: Model, unlike: float) -> f
     def of_joint(joint: int) -> tuple[FloatArray, FloatArray]:
         """What one joint's equation gives for the constants of both, and their covariance."""
         nothing = np.zeros(len(model.names))
-        logs = []
-        for normal in normals:
-            gram = normal.gram[:, joint]
-            logs.append(LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1]))
-        own = alone(shared, logs)
+        # as one log: how runs differ does not tell what is alike in all of them
+        gram = np.concatenate([normal.gram[:, joint] for normal in normals])
+        own = alone(shared, [LogInformation(False, nothing, gram[:, :-1, :-1], gram[:, :-1, -1])])
         return own.values[both], own.covariance[np.ix_(both, both)]
 
     f, F = of_joint(0)
