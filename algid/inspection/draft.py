@@ -94,7 +94,8 @@ def draft_profile(path: Path) -> str:
     joints = ", ".join(map(_quoted, reading.joints or ()))
     text = _filled(text, "topic", _quoted(own))
     text = _filled(text, "joints", joints and f"[{joints}]")
-    text = _filled(text, "time", _quoted(mapping.get("t", "")))
+    if kind not in _ON_TOPICS:
+        text = _filled(text, "time", _quoted(mapping.get("t", "")))
     text = _filled(text, "time_unit", _quoted(reading.time_unit or ""))
     for name in CHANNELS:
         topic, source = own, mapping.get(name, "")

@@ -242,7 +242,12 @@ def settings_unused(
             useless |= set(pair)
             if pair is VELOCITIES and profile.velocity == "measured":
                 useless.add("velocity")
-    given = {name for name in profile.model_fields_set if getattr(profile, name) is not None}
+    given = set()
+    for name in profile.model_fields_set:
+        one = getattr(profile, name)
+        # a channel's table that is empty, as a drafted profile has it, says nothing
+        if one is not None and getattr(one, "model_fields_set", True):
+            given.add(name)
     names = [name for name in useless if name.partition(".")[0] in given]
     if names:
         yield Notice(

@@ -272,6 +272,7 @@ def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_pat
     (tmp_path / "algid.toml").write_text(text, encoding="utf-8")
     found = read_log(tmp_path / "arm.mcap", load_profile(tmp_path / "algid.toml"))
     assert found.origin.mapping["theta1"] == f"/{name}: position[{name}]"
+    assert "STATED_UNUSED" not in {notice.code for notice in found.notices}
 
 
 def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
