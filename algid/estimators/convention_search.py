@@ -231,23 +231,21 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
 
 
 def tried_together(
-    logs: Sequence[Recorded], convention: Convention, *, gravity: bool = True
-) -> Candidate | None:
-    """Candidate of one convention from the logs of one arm; None if the logs are too short."""
-    log = _trials(logs, gravity)
-    if log is None:
-        return None
-    return log.under(replace(convention, zero=AS_READ.zero), convention.zero)[0]
+    logs: Sequence[Recorded], *conventions: Convention, gravity: bool = True
+) -> list[Candidate]:
+    """Candidates of conventions from the logs of one arm; none if the logs are too short."""
+    trials = _trials(logs, gravity)
+    if trials is None:
+        return []
+    return [trials.under(replace(one, zero=AS_READ.zero), one.zero)[0] for one in conventions]
 
 
 def zeroed_together(
-    logs: Sequence[Recorded], family: Convention, *, gravity: bool = True
-) -> Candidate | None:
-    """The same under the zeros that fit best, whatever those of `family`."""
-    log = _trials(logs, gravity)
-    if log is None:
-        return None
-    return log.zeroed(family)
+    logs: Sequence[Recorded], *families: Convention, gravity: bool = True
+) -> list[Candidate]:
+    """The same under the zeros that fit best, whatever those of the `families`."""
+    trials = _trials(logs, gravity)
+    return [] if trials is None else list(map(trials.zeroed, families))
 
 
 def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
@@ -280,14 +278,12 @@ def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
             continue
         if best is None:
             best = candidate
-            continue
-        if best.balanced and candidate.convention == best.other_side:
+        elif best.balanced and candidate.convention == best.other_side:
             # of two sides that explain the same, but for rounding, the log's own
             best = min(best, candidate, key=lambda one: abs(one.zero[1]))
-        if candidate.convention in (best.convention, best.other_side if best.balanced else None):
-            continue
-        alone = best.convincing and candidate.score - best.score > apart
-        return Judgement(as_read, best, alone)
+        elif candidate.convention != best.convention:  # the log as read is among them twice
+            alone = best.convincing and candidate.score - best.score > apart
+            return Judgement(as_read, best, alone)
     if best is None:
         return Judgement(as_read, as_read, alone=False)
     return Judgement(as_read, best, best.convincing)
@@ -320,11 +316,10 @@ class _Trials:
     """Logs, mapped and fitted under any convention."""
 
     def __init__(self, logs: Sequence[Recorded], gravity: bool) -> None:
+        each = [(rate, seconds_of_each(len(logs), longest)) for rate, longest in (_FINE, _COARSE)]
         self._fine, self._coarse = (
             moving([thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs])
-            for rate, longest in (
-                (rate, seconds_of_each(len(logs), longest)) for rate, longest in (_FINE, _COARSE)
-            )
+            for rate, longest in each
         )
         self._passive = logs[0].passive
         self._names = ZEROED

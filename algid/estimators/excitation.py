@@ -84,8 +84,8 @@ def contradicted(fit: Fit, problem: Problem) -> Notice | None:
         hardly = _hardly_driven(normals)
         if not few or not hardly:
             continue
-        of_kind = {own: (c, gram) for own, c, gram in _at_fit(fit, problem)}
-        if not _confirmed(fit.shared.model.names, hardly, *of_kind[kind]):
+        c, gram = next((c, gram) for own, c, gram in _at_fit(fit, problem) if own == kind)
+        if not _confirmed(fit.shared.model.names, hardly, c, gram):
             return Notice(
                 "HARDLY_DRIVEN",
                 numbers={"case": "torque", "joint": hardly, "percent": 100 * MOTORLESS},

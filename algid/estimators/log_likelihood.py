@@ -33,10 +33,15 @@ from algid.estimators.noise import (
 )
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, TooShortError
-from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
+from algid.estimators.whitening import (
+    Linearised,
+    NoiseLevels,
+    first_trajectory,
+    linearise,
+    trajectory,
+)
 from algid.model import Model, Motion
 from algid.signals.differences import POINTS, Stencil
-from algid.signals.filters import smoothed
 from algid.signals.segments import Segment, pieces, spread_pieces
 from algid.signals.shift import TorqueShift
 
@@ -47,7 +52,6 @@ PIECE_SAMPLES = 16384
 _TRAINED = 4  # whole pieces of a log in the training set, up to twice as many
 SHORTEST = 8 * POINTS  # samples: shorter pieces do not inform
 _STRETCH = 64  # samples over which scores are summed
-_SMOOTHING = 40.0  # Hz: of the trajectory at which a piece is first linearised
 _FINEST = 1e-10  # relative noise that no sensor undercuts, and floating point can still weigh
 _EXCESS = 10.0  # torque error beyond the sensor's noise and jumps that means unmodelled dynamics
 SURE = 0.9
@@ -117,7 +121,8 @@ class LogEvidence:
         Noise levels that are not to be estimated.
 
     `kept` is empty where the log has no piece long enough; `sure` says that its noise levels stay,
-    `smooth` that derivatives by coefficients are taken at smoothed trajectories.
+    `smooth` that derivatives by coefficients are taken at smoothed trajectories, `by_motion` that
+    the motion, not the torque, tells what bends elastic joints.
     """
 
     def __init__(
@@ -138,7 +143,7 @@ class LogEvidence:
         self.kept = [replace(piece, omega=None) for piece in kept]
         if not self.kept:
             return
-        self._trajectories = [_smoothed(piece.theta, piece.dt) for piece in self.kept]
+        self._trajectories = [first_trajectory(piece.theta, piece.dt) for piece in self.kept]
         floor = _digitisation(self.kept)
         guesses = [first_guess(piece.theta, piece.tau) for piece in self.kept]
         theta = medians(np.transpose([level.theta for level in guesses]))
@@ -247,7 +252,7 @@ class LogEvidence:
         """Pass over the whole log at the coefficients `c`; each piece has its own trajectory."""
         gathered = _Gathered()
         for piece in self._pieces():
-            start = _smoothed(piece.theta, piece.dt)
+            start = first_trajectory(piece.theta, piece.dt)
             first = self._linearise(c, start, piece, residual_only=True)
             multiplier = first.solve_transposed(first.columns[-1:])[0]
             theta = trajectory(piece, first, multiplier, self.noise)
@@ -298,7 +303,7 @@ class LogEvidence:
         shared = self._shared if shared is None else shared
         smooth = None
         if self.smooth and not residual_only:
-            smooth = _smoothed(theta, piece.dt)
+            smooth = first_trajectory(theta, piece.dt)
         return linearise(
             shared.model,
             c[: len(shared.model.names)],
@@ -341,11 +346,6 @@ def opened(problem: Problem, shared: Shared, noise: NoiseLevels | None = None) -
             )
         logs += kept
     return logs
-
-
-def _smoothed(theta: FloatArray, dt: float) -> FloatArray:
-    """Angles (2, N), sampled every `dt` s, without what is faster than a motion."""
-    return smoothed(theta, dt, min(_SMOOTHING, 0.1 / dt))
 
 
 def _digitisation(kept: Sequence[Segment]) -> NoiseLevels:

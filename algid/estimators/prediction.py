@@ -47,9 +47,6 @@ FILTER = (
 )
 
 
-FRICTIONS = (F1, F2)
-
-
 @dataclass(frozen=True, eq=False)
 class PredictionScore:
     """Samples, and sums (9, 2) over them by joint.
@@ -202,7 +199,7 @@ def at_rest(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> Fl
     r = X[:, -1] - np.einsum("q,aqn->an", c, X[:, :-1])
     still = np.abs(omega) < model.coulomb_speed
     held = np.abs(r)
-    for joint, name in enumerate(FRICTIONS):
+    for joint, name in enumerate((F1, F2)):
         if name in model.names:
             place = model.names.index(name)
             f = max(float(c[place]), 0.0)

@@ -78,10 +78,9 @@ from algid.estimators.problem import OF_A_WINDOW, Problem, Source, TooShortError
 from algid.estimators.references import Following, followed
 from algid.estimators.repeats import Groups, grouped, merged, shared_out
 from algid.estimators.weak import Normal
-from algid.model import EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes
+from algid.model import DELAYS, EVERY_TERM, K3, K5, RIGID, SINES, TERMS, attributes
 from algid.notices import Notice, Remedy
 
-_DELAYS = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _ROUNDS = 3  # linearisations: the third moves nothing by a hundredth of a standard deviation
 _SOFT_ROUNDS = 5  # of them where joints are elastic
 _MOST_KEPT = 1 << 20  # samples of all logs whose moments stay in memory, some 40 bytes each
@@ -414,13 +413,13 @@ def expectation(
     names, terms, means, spreads, usual = [], [], [], [], []
     offered_terms = shared.model.terms
     if shared.delay:
-        offered_terms += _DELAYS
+        offered_terms += DELAYS
     for term in offered_terms:
         spread = EVERY_TERM[term].spread
         if spread is None:
             continue
         mean = 0.0
-        if term in _DELAYS and not settings.shift.held:
+        if term in DELAYS and not settings.shift.held:
             mean = 0.5 * normals[0].dt  # of a torque that a digital controller holds
         for name in EVERY_TERM[term].names:
             if name in held or name not in shared.names:

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
-from algid.base.names import evenly_spread, outside, vector
+from algid.base.names import evenly_spread, outside, vector, within
 from algid.estimators import weak
 from algid.estimators.combine import scaled_pinv
 from algid.estimators.hold import SURE, Hold, Lateness
@@ -63,7 +63,6 @@ from algid.signals.segments import Segment, pieces, spread_pieces
 
 CHOICE = tuple(name for name, term in EVERY_TERM.items() if name in CHOICES and not term.lags)
 """Terms that the logs choose from; one column serves lag and delay, equal to first order."""
-_DELAY = tuple(name for name, term in EVERY_TERM.items() if term.delays)
 _LAG = tuple(name for name, term in EVERY_TERM.items() if term.lags)
 # Where a joint has no motor, its gain is nothing and makes its equation vanish.
 _OF_BOTH_TORQUES = tuple(name for name in CHOICE if EVERY_TERM[name].gains)
@@ -128,7 +127,7 @@ class Selection:
 
     def changed(self, terms: Collection[str], reason: str, *, kept: bool) -> Selection:
         """The same with `terms`, or without them, whose trials end so for this `reason`."""
-        own, delay = without_delay(terms), not set(_DELAY).isdisjoint(terms)
+        own, delay = without_delay(terms), not set(DELAYS).isdisjoint(terms)
         ended = [
             replace(trial, kept=kept, reason=reason) if trial.term in terms else trial
             for trial in self.trials
@@ -561,8 +560,8 @@ def _selected(
     for log in logs:
         log.by_motion = not elastic
     first = FirstPass(logs, shared, at, base)
-    soft = [term for term in candidates if term in ELASTIC and not elastic]
-    if soft:
+    soft = within(candidates, ELASTIC)
+    if soft and not elastic:
         scale = first.mean_square(first.columns(everything))
         search = _Search(first, everything, fixed, absent, scale)
         if search.evidence(soft[0], outside(everything, soft)) > 0:
@@ -579,7 +578,7 @@ def _selected(
         after = first.coefficients(first.solve(first.columns(terms))[0])
         # a delay of samples that explains most is far from linear in its column
         late = (after[False][-1] - at[logs[0].loaded][-1]) / first.dt
-        far = abs(late) > 1 and terms[len(fixed) : len(fixed) + 1] == [*_DELAY]
+        far = abs(late) > 1 and terms[len(fixed) : len(fixed) + 1] == [*DELAYS]
         linear = all(EVERY_TERM[term].linear and not EVERY_TERM[term].timing for term in terms)
         # joints that give much are far from linear in what they give
         far |= not set(ELASTIC).isdisjoint(terms)
@@ -587,9 +586,9 @@ def _selected(
             break
         at, before = after, terms
         first = FirstPass(logs, shared, at, base)
-        if left and abs(late) > 1 and far and late < 0 and _LAG:  # what is found has another round
+        if left and far and late < -1:  # what is found has another round
             other = _lagging(logs, shared, at, base)
-            others = [term for term in terms if term not in _DELAY]
+            others = outside(terms, DELAYS)
             plain, column = first.columns(terms), other.columns([*others, *_LAG])
             scale = other.mean_square(column)
             less = (first.solve(plain)[1] - other.solve(column)[1]) / scale
@@ -597,7 +596,7 @@ def _selected(
             if less + first.determinant - other.determinant > 2 * SURE:
                 first, shared = other, other.shared
                 at = first.coefficients(first.solve(column)[0])
-                candidates = [term for term in candidates if term not in _DELAY] + [*_LAG]
+                candidates = outside(candidates, DELAYS) + _LAG
                 everything = tuple(dict.fromkeys((*candidates, *fixed)))
     lateness = first.lateness(terms)
     if refuted:  # of what a model that does not hold leaves, no part is the delay's

@@ -35,9 +35,10 @@ from algid.base.compiled import lapack
 from algid.estimators.elastic import flexed, with_bends
 from algid.model import Model, Motion, partials, regressor, sensitivity, torque
 from algid.signals.differences import POINTS, Stencil, weighted
-from algid.signals.filters import recursion
+from algid.signals.filters import recursion, smoothed
 from algid.signals.segments import Segment
 
+_SMOOTHING = 40.0  # Hz: arms move slower; of the trajectory at which a piece is first linearised
 _ROUNDING = 8 * np.finfo(np.float64).eps
 """A pivot's least share of its diagonal: below it, every digit of the pivot is lost."""
 
@@ -355,6 +356,11 @@ def factored(band: FloatArray) -> FloatArray:
             f"the covariance of the torque residual is not positive definite (row {info})"
         )
     return factor
+
+
+def first_trajectory(theta: FloatArray, dt: float) -> FloatArray:
+    """Angles (2, N), sampled every `dt` s, without what is faster than a motion."""
+    return smoothed(theta, dt, min(_SMOOTHING, 0.1 / dt))
 
 
 def trajectory(

@@ -98,12 +98,7 @@ def run_fit(
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
             fit = estimate(problem_of(survey, settings, chosen, prior, watched))
-            fit, chosen = revised(
-                fit,
-                chosen,
-                settings,
-                lambda one: estimate(problem_of(survey, settings, one, prior)),
-            )
+            fit, chosen = revised(fit, chosen, settings, fitted)
             if fit.refuted and settings.chooses:
                 notes = fit.notes
         picked = chosen

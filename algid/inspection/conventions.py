@@ -154,15 +154,15 @@ def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
     k = dict(zip(as_read.names, as_read.k.tolist(), strict=True))
     left, pull = float(as_read.left.max()), math.hypot(k[K2], k[K4])
     if left < EXPLAINED and pull < _LEAST_PULL * abs(k[K3] + k[K5]):
-        weightless = tried_together(parts, AS_READ, gravity=False)
-        if weightless and weightless.convincing and weightless.left.max() < left + _OF_WEIGHT:
+        (weightless,) = tried_together(parts, AS_READ, gravity=False)
+        if weightless.convincing and weightless.left.max() < left + _OF_WEIGHT:
             driver = Remedy({"effort": "gravity-compensated"}, "for such a driver")
             remedies = driver, Remedy({"gravity": 0}, "for a horizontal plane")
             return Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}, remedies=remedies)
-    guesses = [tried_together(parts, guess) for guess in GUESSES]
-    turned = [zeroed_together(parts, family) for family in (AS_READ, _OTHER_WAY)]
-    turned = [one for one in turned if one and abs(one.zero[0]) > _SMALL]
-    every = [one for one in (*guesses, *turned) if one and one.plausible and _weighs(one)]
+    guesses = tried_together(parts, *GUESSES)
+    turned = zeroed_together(parts, AS_READ, _OTHER_WAY)
+    turned = [one for one in turned if abs(one.zero[0]) > _SMALL]
+    every = [one for one in (*guesses, *turned) if one.plausible and _weighs(one)]
     seconds = sum(part.theta.shape[1] * part.dt for part in parts)
     apart = max(APART, 2 * EVIDENCE * WINDOW / seconds)
     best = min((one.score for one in every), default=math.inf)

@@ -11,7 +11,13 @@ from algid.base.errors import ResultError
 from algid.base.names import outside, vector, within
 from algid.estimators.noise import first_guess
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
-from algid.estimators.whitening import Linearised, NoiseLevels, linearise, trajectory
+from algid.estimators.whitening import (
+    Linearised,
+    NoiseLevels,
+    first_trajectory,
+    linearise,
+    trajectory,
+)
 from algid.identification.known import (
     by_constants,
     covariance_of,
@@ -27,10 +33,8 @@ from algid.model import K3, K6, K7, SINES, TERMS, Model
 from algid.options import flag
 from algid.results import Result
 from algid.signals.differences import Stencil
-from algid.signals.filters import smoothed
 from algid.signals.segments import Segment
 
-SMOOTHING = 40.0  # Hz: arms move slower; of the trajectory at which a piece is first linearised
 COULOMB = TERMS["coulomb"]
 FRICTION = (K6, K7) + COULOMB.names
 
@@ -100,7 +104,7 @@ class IdentifiedArm:
         trajectory of the fit before, which has less noise in its accelerations.
         """
         stencil = Stencil(piece.dt, self.shift, lag=self.model.lag(self.k))
-        theta = smoothed(piece.theta, piece.dt, min(SMOOTHING, 0.1 / piece.dt))
+        theta = first_trajectory(piece.theta, piece.dt)
         if settle:
             first = linearise(self.model, c, theta, piece, stencil, self.noise, residual_only=True)
             multiplier = first.solve_transposed(first.columns)[0]

@@ -117,7 +117,7 @@ def cells_of(
 
     `settle` is that of `IdentifiedArm.linearised`.
     """
-    cells = []
+    cells, U = [], arm.columns
     for piece in pieces(segments, _PIECE_SAMPLES, 3 * POINTS):
         columns = arm.linearised(piece, c, settle=settle).columns
         step = max(1, round(CELL / piece.dt))
@@ -126,7 +126,7 @@ def cells_of(
         e = Y[:, -1] + (c - arm.k) @ Y[:, :-1]
         Y = Y[:, :-1]
         torque = e + arm.k @ Y
-        z = arm.columns @ Y
+        z = U @ Y
         given = Stencil(piece.dt, arm.shift).torques(len(piece))
         start = piece.start + piece.dt * (given.start + step * np.arange(count))
         cells.append(
@@ -138,7 +138,7 @@ def cells_of(
                 np.sum(e * e, axis=1),
                 np.sum(torque * torque, axis=1),
                 np.full(count, 2.0 * step),
-                arm.columns,
+                U,
             )
         )
     return cells

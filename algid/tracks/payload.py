@@ -92,10 +92,10 @@ def track(source: Pass, arm: IdentifiedArm, covariance: FloatArray) -> Track:
     Parameters
     ----------
     source : callable
-        Gives a fresh iterable of the log's `Segment`; called four times.
-    arm : Arm
-    covariance : (q + 2, q + 2) float64
-        Of the arm's coefficients and link lengths.
+        Gives a fresh iterable of the log's `Segment`; called several times.
+    arm : IdentifiedArm
+    covariance : (p, p) float64
+        Of coefficients, link lengths and the payload's body.
 
     Raises
     ------
