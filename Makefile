@@ -12,7 +12,7 @@ help:
 	@echo "make test-pythons  the quick tests with Python 3.12 and 3.13 where they are found"
 	@echo "make test-slow  statistics of intervals, kills of batches, pages in a browser: some minutes"
 	@echo "make check      format, lint, types, tests: what every commit passes"
-	@echo "make pipelines  case 1 through every format, and case 2, failing when a reported error grows"
+	@echo "make pipelines  case 1 through three formats, and case 2, failing when a reported error grows"
 
 setup: $(READY)
 

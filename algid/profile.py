@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 
 from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
-from algid.base.limits import PHYSICAL, PRIOR_ERROR
+from algid.base.limits import PHYSICAL, PRIOR_ERROR, Range
 from algid.base.units import names_of, unit_of
 from algid.options import Option, flag
 
@@ -67,7 +67,7 @@ OF_ONE_LOG = ("torque_file", "segment")
 """Settings that no other log shares."""
 
 
-def field(default: Any, bounds: tuple[float | None, float | None]) -> Any:
+def field(default: Any, bounds: Range) -> Any:
     """A field with its least and largest value."""
     low, high = bounds
     return Field(default, ge=low, le=high)

@@ -1,4 +1,4 @@
-# Case 1 through every format, and case 2: synth -> identify -> check. A reported error that grows fails the run.
+# Case 1 through three formats, and case 2: synth -> identify -> check. A reported error that grows fails the run.
 .PHONY: demo pipelines
 
 DEMO := build/demo

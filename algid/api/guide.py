@@ -45,7 +45,10 @@ def guide(topic: Annotated[str, Option(suggested=lambda: [*TOPICS])] | None = No
     $ algid guide start
     """
     if topic is None:
-        titles = {name: text_of(name).partition("\n")[0][2:] for name in TOPICS}
+        titles = dict[str, str]()
+        for name in TOPICS:
+            with (FOLDER / f"{name}.md").open(encoding="utf-8") as lines:
+                titles[name] = next(lines)[2:].rstrip()
         return str(_tables().contents(titles))
     if topic in TOPICS:
         return text_of(topic)

@@ -28,7 +28,7 @@ class FileLimits:
     joint_cells: int = 64
     """Joints that are taken of messages whose lists have no names."""
     whole_bytes: int = 1 << 30
-    """Of a file that is read as a whole: NumPy, MATLAB, Feather."""
+    """Of a file that is read as a whole: NumPy, MATLAB, HDF5, JSON lines."""
     reserved_rows: int = 1 << 26
     """Rows to reserve memory for on a file's word alone."""
     largest_value: float = 1e30
@@ -79,8 +79,6 @@ class FileLimits:
     """Names of joints in one message."""
     other_joints: int = 32
     """Joints that are not read and are looked at."""
-    topics: int = 256
-    """Topics that may hold joint states, beyond which one must be named."""
 
     # bags
     bag_metadata_bytes: int = 1 << 24

@@ -28,13 +28,12 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 from scipy.special import gammaincc, stdtr, stdtrit
 
+from algid.arm import FloatArray
 from algid.base.progress import Progress
 from algid.base.significance import CERTAIN, LEVEL, sigmas
 
-FloatArray = NDArray[np.float64]
 Change = tuple[int, FloatArray, FloatArray]
 """Between the logs before this place and from it on: the step of each parameter, and its error."""
 

@@ -252,9 +252,7 @@ def of_arrow(path: str, kind: str, table: pa.Table, **more: Any) -> TableFile:
 def is_json_lines(head: bytes) -> bool:
     """Whether the first line of a text is a JSON object, with another behind it."""
     first, _, rest = head.lstrip(b"\xef\xbb\xbf \t\r\n").partition(b"\n")
-    if not (first.startswith(b"{") and rest.lstrip().startswith(b"{")):
-        return False
-    return bool(first.strip()) and _is_object(first)
+    return first.startswith(b"{") and rest.lstrip().startswith(b"{") and _is_object(first)
 
 
 def _is_object(line: bytes) -> bool:

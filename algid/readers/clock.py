@@ -77,26 +77,30 @@ def in_order(
             raise LogError(f"{path}: time starts again, and its runs span over 292 years")
         return SampleTable(table.stamp_ns + shift_ns, table.columns, table.notices)
 
+    def in_time(table: SampleTable) -> SampleTable:
+        """The table in the order of time; what that mends is counted."""
+        nonlocal counts
+        ordered, added = _sorted(path, table)
+        counts += added
+        return ordered
+
     for rows in tables:
         if not len(rows):
             yield rows
             continue
         rising = bool(np.all(rows.stamp_ns[1:] > rows.stamp_ns[:-1]))
         if held is not None and rising and np.all(held.stamp_ns < rows.stamp_ns[0]):
-            ordered, added = _sorted(path, held)
-            counts += added
-            yield moved(ordered)
+            yield moved(in_time(held))
         elif held is not None:
             rows, rising = stack([held, rows]), False
         if rising:
             held = rows
             continue
         while (start := _restart(rows)) is not None:
-            ordered, added = _sorted(path, rows.part(0, start))
+            ordered = in_time(rows.part(0, start))
             last_ns, first_ns = int(ordered.stamp_ns[-1]), int(rows.stamp_ns[start])
             if not runs:
                 raise LogError(_backwards(path, last_ns, first_ns))
-            counts += added
             yield moved(ordered)
             pause = max(1, round(PAUSE * _period(ordered.stamp_ns[-HORIZON:])))
             shift_ns += last_ns + pause - first_ns
@@ -105,8 +109,7 @@ def in_order(
         certain = int(np.flatnonzero(~_late(rows.stamp_ns))[-1]) + 1
         if len(rows) - certain >= _SHORTEST:
             certain = len(rows)
-        ordered, added = _sorted(path, rows.part(0, certain))
-        counts += added
+        ordered = in_time(rows.part(0, certain))
         settled = max(0, len(ordered) - HORIZON)
         if settled:
             yield moved(ordered.part(0, settled))
@@ -115,9 +118,7 @@ def in_order(
         last_one, known = Remedy({"segment": run}, "the last one"), counted(run, "run")
         raise LogError(f"{path}: there is no segment {segment}: its time makes {known}; {last_one}")
     if held is not None:
-        ordered, added = _sorted(path, held)
-        counts += added
-        yield moved(ordered)
+        yield moved(in_time(held))
     late, repeated, lost = counts.tolist()
     notices = []
     if run > 1:
@@ -325,8 +326,8 @@ def aligned(
         covered = np.ones(len(table), np.bool_)
         for other in others:
             covered &= other.covers(table.stamp_ns)
-        lost += len(table) - int(np.count_nonzero(covered))
-        kept = table if covered.all() else table.take(covered)
+        kept = table.only(covered)
+        lost += len(table) - len(kept)
         columns = dict(kept.columns)
         for other in others:
             columns |= other.at(kept.stamp_ns)

@@ -36,7 +36,7 @@ from algid.readers.column_names import (
 from algid.readers.joints import moving_joints, reading_of
 from algid.readers.log_reader import TableReader, make_reader
 from algid.readers.stated import lines_of
-from algid.readers.table import JOINT_CHANNELS, REFERENCES, VELOCITIES, SampleTable
+from algid.readers.table import JOINT_CHANNELS, REFERENCES, SampleTable, in_pairs
 from algid.readers.table_cells import TableCells, TableFile, cells_of, decoded, groups_in, units_of
 
 if TYPE_CHECKING:
@@ -184,10 +184,7 @@ def _columns(
         if torque.q_des and "tau1" in profile.channels:
             # what the controller follows makes the torque
             sources.setdefault(reference, torque.q_des)
-    for pair in (REFERENCES, VELOCITIES):
-        unused = pair is VELOCITIES and profile.velocity == "observer"
-        if unused or not sources.keys() >= set(pair):
-            sources = {name: column for name, column in sources.items() if name not in pair}
+    sources = in_pairs(sources, profile.velocity)
     sources = {name: one for name, one in sources.items() if name in ("t", *profile.channels)}
     needed = profile.needed if profile.rate is not None else ("t", *profile.needed)
     missing = [name for name in needed if name not in sources]

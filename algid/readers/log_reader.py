@@ -162,8 +162,9 @@ class TableReader:
             if (start, end) != (0.0, math.inf):
                 since = table.stamp_ns - begin_ns
                 inside = (since >= 1e9 * start) & (since <= 1e9 * end)
-                outside += len(table) - int(np.count_nonzero(inside))
-                table = table.take(inside)
+                rows = len(table)
+                table = table.only(inside)
+                outside += rows - len(table)
             good = np.ones(len(table), np.bool_)
             for name, values in table.columns.items():
                 # a small sum of squares, which needs no array of its own, has no large term
@@ -180,8 +181,9 @@ class TableReader:
                         f"{LIMITS.largest_value:g} in size, found {values[row]}; {out}; {accept}"
                     )
             done += len(table)
-            dropped += len(table) - int(np.count_nonzero(good))
-            yield table if good.all() else table.take(good)
+            kept = table.only(good)
+            dropped += len(table) - len(kept)
+            yield kept
         if not (reading.start is None and reading.end is None):
             until = "the end" if reading.end is None else f"{end:g} s"
             yield remark(Notice("CUT", numbers={"count": outside, "start": start, "end": until}))
@@ -206,7 +208,7 @@ class TableReader:
 def make_reader(
     origin: Origin,
     tables: Callable[[int], Iterator[SampleTable]],
-    profile: Profile | None,
+    profile: Profile,
     stated: Mapping[str, str],
     notices: tuple[Notice, ...] = (),
     rows: int = 0,
@@ -220,7 +222,7 @@ def make_reader(
         Its reading holds what the format's reader has decided: joints, topics, clock, unit of time.
     tables : callable
         Gives tables of at most so many rows.
-    profile : Profile, optional
+    profile : Profile
     stated : mapping
         By canonical channel the unit that the file's own names state.
     notices, rows : as of `TableReader`
@@ -233,10 +235,6 @@ def make_reader(
         If a torque is in amperes without a torque constant, or an angle in counts without counts a
         turn.
     """
-    if profile is None:
-        from algid.profile import Profile
-
-        profile = Profile()
     channels, of_units = channel_readings(origin.path, origin.mapping, profile, stated)
     reading = replace(
         origin.reading,

@@ -39,8 +39,8 @@ from algid.readers.messages.message_file import (
     gather,
 )
 from algid.readers.messages.reader import MessageLog
+from algid.readers.text import MCAP
 
-_MAGIC = b"\x89MCAP0\r\n"
 _FRAME = struct.Struct("<BQ")
 _INDEX = struct.Struct("<BQHI")
 """Head of a message index: code, length, channel, bytes of its entries (16 each)."""
@@ -201,7 +201,7 @@ def _read(stream: IO[bytes], start: int, length: int) -> bytes:
 
 def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
     """Find the parts of a file up to its end, or to its first break."""
-    place, data_end = len(_MAGIC), 0
+    place, data_end = len(MCAP), 0
     while True:
         head = _read(stream, place, min(_INDEX.size, size - place))
         code, length, channel, entries = _INDEX.unpack(head.ljust(_INDEX.size, b"\0"))
@@ -230,7 +230,7 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         if code == Opcode.FOOTER:
             break
     left = size - place
-    if data_end and (left <= len(_MAGIC) or (place < end and known and code in _SUMMARY)):
+    if data_end and (left <= len(MCAP) or (place < end and known and code in _SUMMARY)):
         return  # what breaks off behind the data is its summary
     if (known or len(head) < _FRAME.size) and (place < end or not data_end):
         case = "chunk" if code == Opcode.CHUNK else "record"
@@ -255,7 +255,7 @@ def _summary(stream: IO[bytes], size: int) -> Definitions:
         If it is damaged.
     """
     tail = _read(stream, size - _FOOTER_BYTES, _FOOTER_BYTES)
-    if not tail.endswith(_MAGIC):
+    if not tail.endswith(MCAP):
         raise ValueError("the file has no end: it was cut off")
     start, checksum = struct.unpack_from("<Q8xI", tail, _FRAME.size)
     content = _read(stream, start, size - _FOOTER_BYTES - start) if start else b""

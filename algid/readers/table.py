@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.blocks import concatenated, rows_of
@@ -16,6 +18,7 @@ JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
 REFERENCES = ("q_des1", "q_des2")
 CHANNELS = JOINT_CHANNELS + VELOCITIES + REFERENCES
+Source = TypeVar("Source")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,15 +37,17 @@ class SampleTable:
         columns = rows_of(self.columns, slice(first, last))
         return SampleTable(self.stamp_ns[first:last], columns, self.notices if first == 0 else ())
 
-    def take(self, rows: IntArray | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> SampleTable:
+    def take(self, rows: IntArray | NDArray[np.bool_]) -> SampleTable:
         """The rows of an index or mask, with all notices."""
         return SampleTable(self.stamp_ns[rows], rows_of(self.columns, rows), self.notices)
 
+    def only(self, mask: NDArray[np.bool_]) -> SampleTable:
+        """The rows of a mask, with all notices: the table itself where that is all of them."""
+        return self if mask.all() else self.take(mask)
+
     def noting(self, *notices: Notice) -> SampleTable:
         """The table with more notices."""
-        return (
-            SampleTable(self.stamp_ns, self.columns, (*self.notices, *notices)) if notices else self
-        )
+        return replace(self, notices=(*self.notices, *notices))
 
 
 def remark(*notices: Notice) -> SampleTable:
@@ -65,6 +70,15 @@ def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:
     for table in tables:
         for first in range(0, max(1, len(table)), rows):
             yield table.part(first, min(first + rows, len(table)))
+
+
+def in_pairs(sources: Mapping[str, Source], velocity: str | None) -> dict[str, Source]:
+    """Sources by channel; velocities and references of both joints where they are read, or none."""
+    gone = set[str]()
+    for pair in (VELOCITIES, REFERENCES):
+        if not sources.keys() >= set(pair) or (pair is VELOCITIES and velocity == "observer"):
+            gone |= set(pair)
+    return {name: one for name, one in sources.items() if name not in gone}
 
 
 BLOCK_ROWS = 1 << 18

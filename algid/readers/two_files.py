@@ -10,8 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from algid.base.errors import LogError
 from algid.log import Origin
 from algid.notices import Notice, Remedy
@@ -76,7 +74,8 @@ def _beside(log: Any, name: str) -> Path:
 
 def _torques(other: Path, profile: Profile, angles: Origin, open_one: Opener) -> TableReader:
     """The file of the torques; its joints follow the order of the angles' if both have names."""
-    names = {entry.name for entry in entries_at(other)}
+    stated = profile.time or profile.topic  # else nobody asks what the file has
+    names = {entry.name for entry in entries_at(other)} if stated else set[str]()
     of_angles = {"columns": None}
     for key in ("time", "topic"):
         if getattr(profile, key) not in names:
@@ -114,8 +113,9 @@ def _overlap(main: Iterator[SampleTable], other: Series) -> Iterator[SampleTable
     outside = 0
     for table in main:
         within = (table.stamp_ns >= first) & (table.stamp_ns <= last)
-        outside += len(table) - int(np.count_nonzero(within))
-        yield table if within.all() else table.take(within)
+        kept = table.only(within)
+        outside += len(table) - len(kept)
+        yield kept
     if outside:
         yield remark(
             Notice("ALIGNED", numbers={"case": "file", "file": other.topic, "count": outside})

@@ -46,6 +46,8 @@ _MESSAGE = [
     ("log_time", "<u8"),
     ("publish_time", "<u8"),
 ]
+HEAD_BYTES = np.dtype(_MESSAGE).itemsize
+"""Of a message record before its content."""
 _INDEX = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 
 

@@ -23,8 +23,6 @@ TOPIC = "/joint_states"
 REFERENCES = "/joint_references"
 JOINTS = ("joint1", "joint2")
 _CHUNK = 768 * 1024
-_HEAD_BYTES = 31
-"""Of a message record."""
 _QOS = """\
 - history: 1
   depth: 10
@@ -58,7 +56,7 @@ def write(
     """
     from mcap.records import Channel, Schema
 
-    from algid.writers.chunks import ChunkedFile
+    from algid.writers.chunks import HEAD_BYTES, ChunkedFile
 
     schema = Schema(1, JOINT_STATE_DEFINITION.encode(), "ros2msg", JOINT_STATE)
     states, followed = (
@@ -69,7 +67,7 @@ def write(
         file = ChunkedFile(stream, schema)
         for block in blocks:
             check_stamps(path, block.stamp_ns)
-            rows = max(1, chunk_size // (_HEAD_BYTES + messages(block.part(0, 1)).itemsize))
+            rows = max(1, chunk_size // (HEAD_BYTES + messages(block.part(0, 1)).itemsize))
             for first in range(0, len(block), rows):
                 part = block.part(first, min(first + rows, len(block)))
                 file.add(states, part.stamp_ns, messages(part))

@@ -78,7 +78,7 @@ def topic_of(
                 f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found "
                 f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
             )
-    stamp = next(filter(None, map(_stamp_in, layouts)), None)
+    stamp = next(filter(None, map(stamp_in, layouts)), None)
     if profile.clock == "header" and stamp is None:
         log_clock = Remedy({"clock": "log"})
         raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
@@ -248,7 +248,7 @@ def _path(layout: MessageLayout, joint: str, quantity: str) -> str | None:
     return next(filter(layout.find, paths), None)
 
 
-def _stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
+def stamp_in(layout: MessageLayout) -> tuple[str, str] | None:
     """Where messages of this layout carry their own stamp: its seconds and nanoseconds."""
     for base in _STAMPS:
         for seconds, nanoseconds in _PARTS:

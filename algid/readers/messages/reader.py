@@ -18,12 +18,14 @@ from algid.readers.messages.joint_topic import (
     find_joint_topic,
     layouts_of,
     references_of,
+    stamp_in,
     stated_of,
     topic_of,
 )
+from algid.readers.messages.layout import MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Topic
-from algid.readers.table import BLOCK_ROWS, REFERENCES, VELOCITIES, SampleTable
+from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, in_pairs
 
 _LOOKED = 1 << 14
 """Messages whose other joints are looked at."""
@@ -75,10 +77,7 @@ def open_messages(log: MessageLog, profile: Profile) -> TableReader:
             other = Remedy({"topic": found.beside[0]}, "for the other")
             notices.append(Notice("JOINT_ORDER", numbers=numbers, remedies=(other,)))
     sources |= given
-    for pair in (VELOCITIES, REFERENCES):  # both joints', or none
-        unwanted = pair == VELOCITIES and profile.velocity == "observer"
-        if unwanted or not sources.keys() >= set(pair):
-            sources = {name: place for name, place in sources.items() if name not in pair}
+    sources = in_pairs(sources, profile.velocity)
     homes: dict[str, dict[str, str]] = {}  # paths by topic, the main one first
     mapping = {}
     for name, (own, path) in sources.items():
@@ -89,7 +88,11 @@ def open_messages(log: MessageLog, profile: Profile) -> TableReader:
         mapping[name] = f"{home}: {path}"
     topics, said = list[Topic](), list[str]()
     for home, paths in homes.items():
-        layouts = list(layouts_of(file, home))
+        layouts = list[MessageLayout]()
+        for layout in layouts_of(file, home):
+            layouts.append(layout)
+            if layout.has(paths.values()) and stamp_in(layout):
+                break  # later messages tell nothing more
         topics.append(topic_of(file, home, paths, layouts, profile))
         stated, lines = stated_of(file, home, paths, layouts)
         units = stated | units
