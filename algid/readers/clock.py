@@ -22,7 +22,7 @@ from algid.base.quantiles import median
 from algid.base.words import counted
 from algid.log import IntArray
 from algid.notices import Notice, Remedy
-from algid.readers.table import SampleTable, remark, stack
+from algid.readers.table import SampleTable, stack
 
 HORIZON = 1024
 """Rows a sample may come late: a network reorders neighbours, it does not mix two recordings."""
@@ -41,9 +41,14 @@ PAUSE = 20
 
 
 def in_order(
-    path: str, tables: Iterator[SampleTable], segment: int | None = None, *, runs: bool = False
+    path: str,
+    tables: Iterator[SampleTable],
+    told: list[Notice],
+    segment: int | None = None,
+    *,
+    runs: bool = False,
 ) -> Iterator[SampleTable]:
-    """Tables with strictly increasing stamps, within and across; the last tells what was mended.
+    """Tables with strictly increasing stamps, within and across, none of them empty.
 
     Parameters
     ----------
@@ -51,6 +56,8 @@ def in_order(
         Of the log, for messages.
     tables : iterator of SampleTable
         As they stand in the file.
+    told : list of Notice
+        At the end it has what was mended, too.
     segment : int, optional
         The run that is read alone, from 1.
     runs : bool
@@ -67,15 +74,13 @@ def in_order(
     held: SampleTable | None = None  # this run's last rows: late ones may belong among them
     counts = np.zeros(3, np.int64)
 
-    def moved(table: SampleTable) -> SampleTable:
+    def moved(table: SampleTable) -> Iterator[SampleTable]:
         """A part of this run behind the run before; nothing of it where another is read alone."""
         if segment not in (None, run):
-            return remark(*table.notices)
-        if not shift_ns:
-            return table
+            return
         if int(table.stamp_ns[-1]) + shift_ns > LIMITS.largest_time_ns:
             raise LogError(f"{path}: time starts again, and its runs span over 292 years")
-        return SampleTable(table.stamp_ns + shift_ns, table.columns, table.notices)
+        yield SampleTable(table.stamp_ns + shift_ns, table.columns) if shift_ns else table
 
     def in_time(table: SampleTable) -> SampleTable:
         """The table in the order of time; what that mends is counted."""
@@ -86,11 +91,10 @@ def in_order(
 
     for rows in tables:
         if not len(rows):
-            yield rows
             continue
         rising = bool(np.all(rows.stamp_ns[1:] > rows.stamp_ns[:-1]))
         if held is not None and rising and np.all(held.stamp_ns < rows.stamp_ns[0]):
-            yield moved(in_time(held))
+            yield from moved(in_time(held))
         elif held is not None:
             rows, rising = stack([held, rows]), False
         if rising:
@@ -101,7 +105,7 @@ def in_order(
             last_ns, first_ns = int(ordered.stamp_ns[-1]), int(rows.stamp_ns[start])
             if not runs:
                 raise LogError(_backwards(path, last_ns, first_ns))
-            yield moved(ordered)
+            yield from moved(ordered)
             pause = max(1, round(PAUSE * _period(ordered.stamp_ns[-HORIZON:])))
             shift_ns += last_ns + pause - first_ns
             rows, run = rows.part(start, len(rows)), run + 1
@@ -112,15 +116,14 @@ def in_order(
         ordered = in_time(rows.part(0, certain))
         settled = max(0, len(ordered) - HORIZON)
         if settled:
-            yield moved(ordered.part(0, settled))
+            yield from moved(ordered.part(0, settled))
         held = stack([ordered.part(settled, len(ordered)), rows.part(certain, len(rows))])
     if segment is not None and segment > run:
         last_one, known = Remedy({"segment": run}, "the last one"), counted(run, "run")
         raise LogError(f"{path}: there is no segment {segment}: its time makes {known}; {last_one}")
     if held is not None:
-        yield moved(in_time(held))
+        yield from moved(in_time(held))
     late, repeated, lost = counts.tolist()
-    notices = []
     if run > 1:
         said = "one is read behind another, and no window spans two"
         remedies: tuple[Remedy, ...] = (Remedy({"segment": 1}, "for one of them"),)
@@ -128,17 +131,15 @@ def in_order(
             said, remedies = f"number {segment} is read alone", ()
         joined = run - 1 if segment is None else 0
         numbers = {"count": run - 1, "runs": run, "said": said, "joined": joined}
-        notices.append(Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=remedies))
+        told.append(Notice("GAPS", numbers={"case": "restarts"} | numbers, remedies=remedies))
     if late:
-        notices.append(Notice("UNEVEN_STAMPS", numbers={"case": "late", "count": late}))
+        told.append(Notice("UNEVEN_STAMPS", numbers={"case": "late", "count": late}))
     if repeated:
         others = ""
         if lost:
             others = f"; {counted(lost, 'with other values is', 'with other values are')} lost"
         numbers = {"case": "repeated", "count": repeated, "others": others}
-        notices.append(Notice("UNEVEN_STAMPS", numbers=numbers, lossy=lost > 0))
-    if notices:
-        yield remark(*notices)
+        told.append(Notice("UNEVEN_STAMPS", numbers=numbers, lossy=lost > 0))
 
 
 def _period(stamps: IntArray) -> float:
@@ -288,7 +289,11 @@ class Series:
 
 
 def whole_topic(
-    path: str, topic: str, channels: Collection[str], tables: Iterator[SampleTable]
+    path: str,
+    topic: str,
+    channels: Collection[str],
+    tables: Iterator[SampleTable],
+    told: list[Notice],
 ) -> Series:
     """A topic of a file as a whole, in time order; its tables hold the `channels`.
 
@@ -297,32 +302,29 @@ def whole_topic(
     LogError
         As `in_order`, and if there is no sample.
     """
-    whole = stack(list(in_order(path, tables)) or [remark()])
-    if not len(whole):
+    parts = list(in_order(path, tables, told))
+    if not parts:
         channel = next(iter(channels))
         other = Remedy({f"{channel}.topic": None, f"{channel}.source": None}, "name another")
         raise LogError(f"{path}: topic {topic!r} holds no sample of {channel}; {other}")
-    return Series(topic, whole)
+    return Series(topic, stack(parts))
 
 
 def aligned(
     main: Iterator[SampleTable],
     others: Sequence[Series],
+    told: list[Notice],
     beside: Sequence[Series] = (),
-    notices: Sequence[Notice] = (),
 ) -> Iterator[SampleTable]:
     """The main topic's tables with the other topics' channels, where all `others` cover it.
 
     Where those `beside` do not, their channels are NaN.
 
-    The last table tells how many were dropped and what the interpolation costs, in the log's own
-    units, and has the `notices`.
+    At the end `told` has how many were dropped and what the interpolation costs, in the log's own
+    units.
     """
     lost, between = 0, set[str]()
     for table in main:
-        if not len(table):
-            yield table
-            continue
         covered = np.ones(len(table), np.bool_)
         for other in others:
             covered &= other.covers(table.stamp_ns)
@@ -339,15 +341,11 @@ def aligned(
             known = other.covers(kept.stamp_ns)
             for name, values in other.at(kept.stamp_ns).items():
                 columns[name] = np.where(known, values, np.nan)
-        yield SampleTable(kept.stamp_ns, columns, kept.notices)
-    said = list(notices)
+        yield SampleTable(kept.stamp_ns, columns)
     for other in others:
         if other.topic in between:
             rate = 1e9 / other.period if other.period else 0.0
             numbers = {"topic": other.topic, "rate": rate, "error": other.error()}
-            said.append(Notice("ALIGNED", numbers={"case": "interpolated"} | numbers))
+            told.append(Notice("ALIGNED", numbers={"case": "interpolated"} | numbers))
     if lost:
-        said.append(Notice("ALIGNED", numbers={"case": "not covered", "count": lost}))
-    for other in others:
-        said += other.table.notices
-    yield remark(*said)
+        told.append(Notice("ALIGNED", numbers={"case": "not covered", "count": lost}))

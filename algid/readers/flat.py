@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -126,7 +127,7 @@ def open_table(table: TableFile, profile: Profile) -> TableReader:
     reading = replace(reading, clock="column", time_unit=clock.unit)
 
     def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
-        return samples(rows, {"t": sources["t"], **others}, clock, {}, _LOOKED)
+        return samples(rows, {"t": sources["t"], **others}, clock, {}, [], _LOOKED)
 
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
     others = other_joints(cells, angles)
@@ -136,7 +137,7 @@ def open_table(table: TableFile, profile: Profile) -> TableReader:
     notices += moving_joints(others, look, angle) if angle else ()
     return make_reader(
         Origin(path, table.kind, mapping, table.companion.truth, reading),
-        lambda _: samples(rows, sources, clock, sums),
+        partial(samples, rows, sources, clock, sums),
         profile,
         units,
         tuple(notices),
@@ -270,9 +271,10 @@ def samples(
     sources: Mapping[str, str],
     clock: Clock,
     sums: Mapping[str, int],
+    told: list[Notice],
     most: int | None = None,
 ) -> Iterator[SampleTable]:
-    """The rows that have every value, with their stamps; the last table tells of the others.
+    """The rows that have every value, with their stamps.
 
     Parameters
     ----------
@@ -282,6 +284,8 @@ def samples(
     clock : Clock
     sums : mapping
         Of the words of each column, as they were written.
+    told : list of Notice
+        At the end it has what is to be said of the other rows, too.
     most : int, optional
         Rows to read.
 
@@ -295,7 +299,6 @@ def samples(
     left = {name: sums[source] for name, source in sources.items() if source in sums}
     count = lost = done = 0
     cut_off = False
-    held: SampleTable | None = None
     for arrays in rows.batches(list(sources.values()), most):
         import pyarrow as pa
 
@@ -312,13 +315,12 @@ def samples(
                     channels[name] = values.astype(np.float64, copy=False)
         for name in left:
             left[name] = add(left[name], -word_sum(channels[name]))
-        times, notices = channels.pop("t"), list[Notice]()
+        times = channels.pop("t")
         try:
             if unit is None and times.size:
                 unit = time_unit(times)
                 if unit != "s":
-                    told = {"case": "time", "unit": unit}
-                    notices.append(Notice("OTHER_UNIT", numbers=told))
+                    told.append(Notice("OTHER_UNIT", numbers={"case": "time", "unit": unit}))
             if clock.rate is None:
                 stamps = to_nanoseconds(times, getattr(time, "unit", unit or "s"))
             else:
@@ -331,20 +333,16 @@ def samples(
             likely = _unit_of_step(step / NANOSECONDS[unit or "s"])
             numbers = {"case": "slow time", "column": column, "unit": unit, "rate": 1e9 / step}
             other = Remedy({"time_unit": likely}, f"if they are in {likely}")
-            notices.append(Notice("OTHER_UNIT", numbers=numbers, remedies=(other,)))
+            told.append(Notice("OTHER_UNIT", numbers=numbers, remedies=(other,)))
         done += times.size
-        if held is not None:
-            yield held
-        held = SampleTable(stamps, channels, tuple(notices))
-    if held is None:
-        return
-    if lost == count and not (lost == 1 and cut_off):
+        yield SampleTable(stamps, channels)
+    if lost and lost == count and not (lost == 1 and cut_off):
         raise LogError(
             f"{path}: no row has a value in every column that is needed; put the signals on "
             "common stamps"
         )
     if lost == 1 and cut_off:
-        held = held.noting(Notice("CUT_OFF", numbers={"case": "row", "row": count}))
+        told.append(Notice("CUT_OFF", numbers={"case": "row", "row": count}))
     elif lost and clock.rate is not None:
         raise LogError(
             f"{path}: rows lack a value, and without a time the rows behind them have none; "
@@ -352,8 +350,7 @@ def samples(
         )
     elif lost:
         numbers = {"case": "empty", "count": lost, "rows": count}
-        held = held.noting(Notice("NOT_FINITE", numbers=numbers))
-    yield held
+        told.append(Notice("NOT_FINITE", numbers=numbers))
     wrong = [name for name, rest in left.items() if rest]
     if wrong:
         raise LogError(

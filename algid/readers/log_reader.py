@@ -20,14 +20,12 @@ from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order
 from algid.readers.convert import Law, channel_readings, convert, laws_of
 from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
-from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, cut, remark
+from algid.readers.table import BLOCK_ROWS, REFERENCES, ROWS, SampleTable, cut
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
 QUANTITIES = ("theta", "tau", "omega", "q_des")
-ROWS = 1 << 16
-"""Rows a table: few enough to stay in a core's cache between decoding and copying."""
 PASSIVE_TORQUE = 0.01
 """Of the other joint's: more than what a torque's noise makes of a joint without a motor."""
 
@@ -38,13 +36,13 @@ class TableReader:
 
     What it is stands in `origin` at once; its samples come in blocks, in time order.
 
-    `tables` gives a fresh pass in tables of at most so many rows. Stamps strictly increase within
-    and across blocks; a block's notices are those found while reading it. Memory is bounded by the
-    block's size wherever the format allows it.
+    `tables` gives a fresh pass, and adds to a list what it finds to be said. Stamps strictly
+    increase within and across blocks; a block's notices are those found while reading it. Memory
+    is bounded by the block's size wherever the format allows it.
     """
 
     origin: Origin
-    tables: Callable[[int], Iterator[SampleTable]]
+    tables: Callable[[list[Notice]], Iterator[SampleTable]]
     notices: tuple[Notice, ...] = ()
     rows: int = 0
     """Samples to expect, 0 where the file does not tell."""
@@ -86,7 +84,7 @@ class TableReader:
         origin, last = self.origin, [math.nan, math.nan]
         # stamps and signals of one log in one piece, which costs nothing until it is written
         room, recorded = np.empty((0, 0), np.int64), list[str]()
-        notices, total, used = self.notices, 0, 0
+        told, total, used = list(self.notices), 0, 0
 
         def parts(first: int = 0) -> tuple[IntArray, dict[str, FloatArray]]:
             part = room[:, first:used]
@@ -96,21 +94,20 @@ class TableReader:
         def log() -> Log:
             stamps, one = parts()
             omega, reference = one.get("omega"), one.get("q_des")
-            return Log(stamps, one["theta"], one["tau"], origin, omega, notices, reference)
+            return Log(stamps, one["theta"], one["tau"], origin, omega, tuple(told), reference)
 
-        ordered = in_order(origin.path, self.tables(ROWS), origin.reading.segment, runs=True)
-        for table in cut(self._usable(ordered), min(ROWS, most)):
-            if not len(table):
-                notices += table.notices
-                continue
+        segment = origin.reading.segment
+        ordered = in_order(origin.path, self.tables(told), told, segment, runs=True)
+        for table in cut(self._usable(ordered, told), min(ROWS, most)):
             first = used
             if used and used + len(table) > most:
                 yield log()
-                first, notices = 0, ()
+                first = 0
+                told.clear()
             if total < 2 <= len(table):
-                notices += other_rate(self.stated_rate, table.stamp_ns)
+                told += other_rate(self.stated_rate, table.stamp_ns)
             if not total:
-                notices += self._of_passive(table)
+                told += self._of_passive(table)
             used = first + len(table)
             if not first:
                 recorded = [name for name in QUANTITIES if f"{name}1" in table.columns]
@@ -128,17 +125,16 @@ class TableReader:
                 if "q_des" in signals:  # follows within half a turn
                     away = signals["theta"][joint] - signals["q_des"][joint]
                     signals["q_des"][joint] += _TURN * np.rint(away / _TURN)
-            notices += table.notices
             total += len(table)
         if total < 2:
-            worst = min(notices, key=lambda notice: not notice.lossy, default=None)
+            worst = min(told, key=lambda notice: not notice.lossy, default=None)
             why = "" if worst is None else f" ({worst.text})"
             raise LogError(
                 f"{origin.path}: {counted(total, 'sample')}; a log needs two at least{why}"
             )
         yield log()
 
-    def _usable(self, tables: Iterator[SampleTable]) -> Iterator[SampleTable]:
+    def _usable(self, tables: Iterator[SampleTable], told: list[Notice]) -> Iterator[SampleTable]:
         """The rows from `start` to `end` of the reading, whose numbers are finite.
 
         Where a user accepts others, their rows are left out and counted.
@@ -155,9 +151,6 @@ class TableReader:
         begin_ns: int | None = None
         outside = dropped = done = 0
         for table in tables:
-            if not len(table):
-                yield table
-                continue
             begin_ns = int(table.stamp_ns[0]) if begin_ns is None else begin_ns
             if (start, end) != (0.0, math.inf):
                 since = table.stamp_ns - begin_ns
@@ -186,9 +179,9 @@ class TableReader:
             yield kept
         if not (reading.start is None and reading.end is None):
             until = "the end" if reading.end is None else f"{end:g} s"
-            yield remark(Notice("CUT", numbers={"count": outside, "start": start, "end": until}))
+            told.append(Notice("CUT", numbers={"count": outside, "start": start, "end": until}))
         if dropped:
-            yield remark(Notice("NOT_FINITE", numbers={"case": "number", "count": dropped}))
+            told.append(Notice("NOT_FINITE", numbers={"case": "number", "count": dropped}))
 
     def _of_passive(self, begin: SampleTable) -> tuple[Notice, ...]:
         """What to say of a torque in the column of a joint that is called passive."""
@@ -207,7 +200,7 @@ class TableReader:
 
 def make_reader(
     origin: Origin,
-    tables: Callable[[int], Iterator[SampleTable]],
+    tables: Callable[[list[Notice]], Iterator[SampleTable]],
     profile: Profile,
     stated: Mapping[str, str],
     notices: tuple[Notice, ...] = (),
@@ -221,7 +214,7 @@ def make_reader(
     origin : Origin
         Its reading holds what the format's reader has decided: joints, topics, clock, unit of time.
     tables : callable
-        Gives tables of at most so many rows.
+        As of `TableReader`.
     profile : Profile
     stated : mapping
         By canonical channel the unit that the file's own names state.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from algid.arm import FloatArray
 from algid.base.blocks import concatenated, rows_of
 from algid.log import IntArray
-from algid.notices import Notice
 
 JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
@@ -27,48 +26,35 @@ class SampleTable:
 
     stamp_ns: IntArray
     columns: Mapping[str, FloatArray]
-    notices: tuple[Notice, ...] = ()
 
     def __len__(self) -> int:
         return int(self.stamp_ns.size)
 
     def part(self, first: int, last: int) -> SampleTable:
-        """Rows `first` to `last` - 1 as views; the notices stay with the first part."""
-        columns = rows_of(self.columns, slice(first, last))
-        return SampleTable(self.stamp_ns[first:last], columns, self.notices if first == 0 else ())
+        """Rows `first` to `last` - 1 as views."""
+        return self.take(slice(first, last))
 
-    def take(self, rows: IntArray | NDArray[np.bool_]) -> SampleTable:
-        """The rows of an index or mask, with all notices."""
-        return SampleTable(self.stamp_ns[rows], rows_of(self.columns, rows), self.notices)
+    def take(self, rows: slice | IntArray | NDArray[np.bool_]) -> SampleTable:
+        """The rows of a slice, an index or a mask."""
+        return SampleTable(self.stamp_ns[rows], rows_of(self.columns, rows))
 
     def only(self, mask: NDArray[np.bool_]) -> SampleTable:
-        """The rows of a mask, with all notices: the table itself where that is all of them."""
+        """The rows of a mask: the table itself where that is all of them."""
         return self if mask.all() else self.take(mask)
-
-    def noting(self, *notices: Notice) -> SampleTable:
-        """The table with more notices."""
-        return replace(self, notices=(*self.notices, *notices))
-
-
-def remark(*notices: Notice) -> SampleTable:
-    """A table of no samples, that only tells something: a pass ends with what it has counted."""
-    return SampleTable(np.empty(0, np.int64), {}, notices)
 
 
 def stack(tables: Sequence[SampleTable]) -> SampleTable:
     """One table out of several with the same channels, in their order."""
-    notices = tuple(notice for table in tables for notice in table.notices)
-    filled = [table for table in tables if len(table)] or list(tables[:1])
-    if len(filled) == 1:
-        return SampleTable(filled[0].stamp_ns, filled[0].columns, notices)
-    stamps = np.concatenate([table.stamp_ns for table in filled])
-    return SampleTable(stamps, concatenated([table.columns for table in filled]), notices)
+    if len(tables) == 1:
+        return tables[0]
+    stamps = np.concatenate([table.stamp_ns for table in tables])
+    return SampleTable(stamps, concatenated([table.columns for table in tables]))
 
 
 def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:
-    """The same samples in tables of at most `rows` rows."""
+    """The same samples in tables of at most `rows` rows, none of which is empty."""
     for table in tables:
-        for first in range(0, max(1, len(table)), rows):
+        for first in range(0, len(table), rows):
             yield table.part(first, min(first + rows, len(table)))
 
 
@@ -82,3 +68,5 @@ def in_pairs(sources: Mapping[str, Source], velocity: str | None) -> dict[str, S
 
 
 BLOCK_ROWS = 1 << 18
+ROWS = 1 << 16
+"""Rows a table: few enough to stay in a core's cache between decoding and copying."""

@@ -16,7 +16,7 @@ from algid.notices import Notice, Remedy
 from algid.readers.clock import Series, aligned, in_order, whole_topic
 from algid.readers.formats import entries_at
 from algid.readers.log_reader import TableReader
-from algid.readers.table import BLOCK_ROWS, SampleTable, remark
+from algid.readers.table import SampleTable
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -46,12 +46,12 @@ def open_with_torque_file(log: Any, profile: Profile, open_one: Opener) -> Table
     torques = _torques(other, profile, angles.origin, open_one)
     path = angles.origin.path
 
-    def tables(rows: int) -> Iterator[SampleTable]:
+    def tables(told: list[Notice]) -> Iterator[SampleTable]:
         torque_series = whole_topic(
-            str(other), other.name, torques.origin.mapping, torques.tables(BLOCK_ROWS)
+            str(other), other.name, torques.origin.mapping, torques.tables(told), told
         )
-        main = in_order(path, angles.tables(rows))
-        return aligned(_overlap(main, torque_series), [torque_series])
+        main = in_order(path, angles.tables(told), told)
+        return aligned(_overlap(main, torque_series, told), [torque_series], told)
 
     origin = _joined(angles.origin, torques.origin, other, profile)
     notices = angles.notices + torques.notices
@@ -107,8 +107,10 @@ def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> O
     return replace(angles, mapping=angles.mapping | sources, reading=reading)
 
 
-def _overlap(main: Iterator[SampleTable], other: Series) -> Iterator[SampleTable]:
-    """The rows of `main` within the other file's time; the last table counts those outside."""
+def _overlap(
+    main: Iterator[SampleTable], other: Series, told: list[Notice]
+) -> Iterator[SampleTable]:
+    """The rows of `main` within the other file's time; those outside are counted at the end."""
     first, last = other.table.stamp_ns[[0, -1]]
     outside = 0
     for table in main:
@@ -117,6 +119,5 @@ def _overlap(main: Iterator[SampleTable], other: Series) -> Iterator[SampleTable
         outside += len(table) - len(kept)
         yield kept
     if outside:
-        yield remark(
-            Notice("ALIGNED", numbers={"case": "file", "file": other.topic, "count": outside})
-        )
+        numbers = {"case": "file", "file": other.topic, "count": outside}
+        told.append(Notice("ALIGNED", numbers=numbers))

@@ -23,15 +23,16 @@ MS = 1_000_000
 MAPPING = {name: f"column {name}" for name in CHANNELS[:4]}
 
 
-def tables(*sizes: int, **channels: FloatArray) -> Iterator[SampleTable]:
+def tables(
+    told: list[Notice], sizes: tuple[int, ...], channels: dict[str, FloatArray]
+) -> Iterator[SampleTable]:
     """Tables of so many rows, 1 kHz; each channel counts the samples unless it is given."""
     first = 0
     for number, size in enumerate(sizes):
         rows = np.arange(first, first + size)
         columns = {name: channels.get(name, np.arange(sum(sizes)) * 1.0)[rows] for name in MAPPING}
-        yield SampleTable(
-            rows * MS, columns, (Notice(f"TABLE{number}", f"table {number}", lossy=number == 1),)
-        )
+        told.append(Notice(f"TABLE{number}", f"table {number}", lossy=number == 1))
+        yield SampleTable(rows * MS, columns)
         first += size
 
 
@@ -41,7 +42,7 @@ def reader(
     profile = Profile.model_validate(settings or {})
     origin = Origin("log.csv", "csv", MAPPING)
     return make_reader(
-        origin, lambda _rows: tables(*sizes, **channels), profile, {}, (Notice("FIRST", "first"),)
+        origin, lambda told: tables(told, sizes, channels), profile, {}, (Notice("FIRST", "first"),)
     )
 
 

@@ -24,13 +24,13 @@ from algid.readers.table import SampleTable, stack
 MS = 1_000_000
 
 
-def table(stamps: IntArray, values: FloatArray, *said: Notice) -> SampleTable:
-    return SampleTable(stamps, {"theta1": values}, said)
+def table(stamps: IntArray, values: FloatArray) -> SampleTable:
+    return SampleTable(stamps, {"theta1": values})
 
 
 def read(parts: list[SampleTable], only: int | None = None) -> SampleTable:
     """What comes of the tables, in time order."""
-    return stack(list(in_order("log", iter(parts), only, runs=True)))
+    return stack(list(in_order("log", iter(parts), [], only, runs=True)))
 
 
 @settings(max_examples=60, deadline=None)
@@ -80,15 +80,6 @@ def test_late_blocks_start_no_run() -> None:
         assert read(parts).columns["theta1"].tolist() == list(range(6000))
 
 
-def test_what_is_said_of_other_runs_is_kept() -> None:
-    first, last = Notice("ONE", "of the first"), Notice("TWO", "of the last", lossy=True)
-    stamps = np.arange(2000) * MS
-    parts = [table(stamps, stamps * 1.0, first), table(stamps, -stamps * 1.0, last)]
-    found = read(parts, 1)
-    assert [one.code for one in found.notices] == ["ONE", "TWO", "GAPS"]
-    assert found.notices[-1].text == ("time starts again 1 time: of 2 runs number 1 is read alone")
-
-
 def two_runs(folder: Path) -> tuple[FloatArray, FloatArray, Path]:
     t = np.arange(4000) / 500
     rows = {name: np.sin((1 + place) * t) for place, name in enumerate(("theta1", "theta2"))}
@@ -106,6 +97,8 @@ def test_a_file_of_two_runs_and_each_alone(tmp_path: Path) -> None:
         alone = read_log(path, Profile(segment=number))
         assert np.array_equal(alone.theta[0], theta1[own])
         assert alone.origin.reading.segment == number
+        (said,) = alone.notices
+        assert said.text == f"time starts again 1 time: of 2 runs number {number} is read alone"
         assert len(inspect(path, segment=number).notices) == 1
     with pytest.raises(
         LogError, match=r"no segment 3: its time makes 2 runs; the last one: --set segment=2"
@@ -131,6 +124,7 @@ def test_the_pause_between_runs_is_no_gap(lost: int, tmp_path: Path) -> None:
 def test_a_clock_set_back_by_more_than_a_short_log_so_far_starts_a_run() -> None:
     first, second = np.arange(500, 800) * MS, np.arange(0, 2000) * MS
     stamps = np.concatenate([first, second])
-    found = read([table(stamps, np.arange(stamps.size) * 1.0)])
+    told = list[Notice]()
+    found = stack(list(in_order("log", iter([table(stamps, 1.0 * stamps)]), told, runs=True)))
     assert len(found) == stamps.size
-    assert [one.code for one in found.notices] == ["GAPS"]
+    assert [one.code for one in told] == ["GAPS"]

@@ -25,7 +25,7 @@ from algid.readers.messages.joint_topic import (
 from algid.readers.messages.layout import MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Topic
-from algid.readers.table import BLOCK_ROWS, REFERENCES, SampleTable, in_pairs
+from algid.readers.table import REFERENCES, ROWS, SampleTable, in_pairs
 
 _LOOKED = 1 << 14
 """Messages whose other joints are looked at."""
@@ -105,7 +105,7 @@ def open_messages(log: MessageLog, profile: Profile) -> TableReader:
     others = found.others if found is not None and found.topic == main.name else {}
     reading = replace(reading, topics=tuple(homes), clock=clock)
     beside = moving_joints(
-        others, lambda paths: Topic(main.name, paths, None, "log").tables(file, _LOOKED)
+        others, lambda paths: Topic(main.name, paths, None, "log").tables(file, [], _LOOKED)
     )
     origin = Origin(log.path, log.kind, mapping, file.truth, reading)
 
@@ -114,27 +114,27 @@ def open_messages(log: MessageLog, profile: Profile) -> TableReader:
     return make_reader(origin, tables, profile, units, told, file.count(main.name), said)
 
 
-def _tables(log: MessageLog, topics: Sequence[Topic], rows: int) -> Iterator[SampleTable]:
+def _tables(log: MessageLog, topics: Sequence[Topic], told: list[Notice]) -> Iterator[SampleTable]:
     """The samples of the first topic, each with what the others have at its time."""
 
-    def read(topic: Topic, rows: int) -> Iterator[SampleTable]:
+    def read(topic: Topic, told: list[Notice]) -> Iterator[SampleTable]:
         for opened in log.files:
-            yield from topic.tables(opened(), rows)
+            yield from topic.tables(opened(), told, ROWS)
 
-    samples = read(topics[0], rows)
+    samples = read(topics[0], told)
     if len(topics) == 1:
         return samples
     needed, followed = list[Series](), list[Series]()
-    left_out = list[Notice]()
     for one in topics[1:]:
         only_followed = set(one.paths) <= set(REFERENCES)
+        own = list[Notice]() if only_followed else told  # it may be missing
         try:
-            series = whole_topic(log.path, one.name, one.paths, read(one, BLOCK_ROWS))
+            series = whole_topic(log.path, one.name, one.paths, read(one, own), own)
             (followed if only_followed else needed).append(series)
         except LogError as error:
             if not only_followed:
                 raise
             why = str(error).removeprefix(f"{log.path}: ")
             numbers = {"case": "reference", "topic": one.name, "why": why}
-            left_out.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
-    return aligned(in_order(log.path, samples), needed, followed, left_out)
+            told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
+    return aligned(in_order(log.path, samples, told), needed, told, followed)

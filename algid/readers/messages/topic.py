@@ -18,7 +18,7 @@ from algid.readers.messages.codec import codec_for
 from algid.readers.messages.layout import Decoder
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.stated import several
-from algid.readers.table import SampleTable, remark, stack
+from algid.readers.table import SampleTable, stack
 
 _STAMP = ("sec", "nanosec")
 
@@ -45,8 +45,8 @@ class Topic:
     _header: bool | None = None
     """Whether the samples have the header's stamps, once that is known."""
 
-    def tables(self, file: MessageFile, rows: int) -> Iterator[SampleTable]:
-        """The topic's samples in tables of about `rows` rows.
+    def tables(self, file: MessageFile, told: list[Notice], rows: int) -> Iterator[SampleTable]:
+        """The topic's samples in tables of about `rows` rows; what is lost is told at the end.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class Topic:
         channels = file.topics.get(self.name)
         if not channels:
             absent = {"case": "file", "file": file.path, "topic": self.name}
-            yield remark(Notice("MESSAGES_LEFT_OUT", numbers=absent))
+            told.append(Notice("MESSAGES_LEFT_OUT", numbers=absent))
             return
         place = f"{file.path}: topic {self.name!r}"
         wanted = dict(self.paths)
@@ -79,34 +79,34 @@ class Topic:
                 parts.append(SampleTable(messages.log_ns[held], columns))  # type: ignore[arg-type]
                 size += len(parts[-1])
             if size >= rows:
-                yield self._clocked(place, stack(parts))
+                yield self._clocked(place, stack(parts), told)
                 parts, size = [], 0
         if parts:
-            yield self._clocked(place, stack(parts))
+            yield self._clocked(place, stack(parts), told)
         others = Counter[str]()
         for number, channel in file.channels.items():
             if channel.topic == self.name and number not in channels and file.counts.get(number):
                 others[channel.type or "no schema"] += file.counts[number]
         if others:
             decoder.leave("type", others.total(), types=", ".join(sorted(others)[:4]))
-        said, promised = [*file.notices], file.count(self.name)
+        told += file.notices
+        promised = file.count(self.name)
         numbers: dict[str, Any] = {"case": "count", "promised": promised, "found": found}
         if lost:
             numbers = {"case": "chunk", "count": len(lost), "why": lost[0]}
             numbers["missing"] = promised - found
         if lost or promised != found:
-            said.append(Notice("DAMAGED", numbers=numbers))
+            told.append(Notice("DAMAGED", numbers=numbers))
         if unchecked:
-            said.append(Notice("NO_CHECKSUM", numbers={"case": "file"}))
+            told.append(Notice("NO_CHECKSUM", numbers={"case": "file"}))
         for case, left_out in decoder.left_out.items():
             own = {"case": case, "topic": self.name} | left_out
-            said.append(Notice("MESSAGES_LEFT_OUT", numbers=own))
-        said += [several(path, texts) for path, texts in decoder.labels.items() if len(texts) > 1]
-        yield remark(*said)
+            told.append(Notice("MESSAGES_LEFT_OUT", numbers=own))
+        told += [several(path, texts) for path, texts in decoder.labels.items() if len(texts) > 1]
 
-    def _clocked(self, place: str, table: SampleTable) -> SampleTable:
+    def _clocked(self, place: str, table: SampleTable, told: list[Notice]) -> SampleTable:
         """The samples with the stamps of the chosen clock and float64 columns."""
-        columns, stamps, notices = dict(table.columns), table.stamp_ns, table.notices
+        columns, stamps = dict(table.columns), table.stamp_ns
         if _STAMP[0] in columns:
             header = _nanoseconds(place, columns.pop(_STAMP[0]), columns.pop(_STAMP[1]))
             if self._header is None and len(table):
@@ -114,7 +114,7 @@ class Topic:
                 self._header = self.clock == "header" or not still
                 if not self._header:
                     numbers = {"case": "still", "topic": self.name, "stamp": int(header[0])}
-                    notices = (*notices, Notice("UNEVEN_STAMPS", numbers=numbers))
+                    told.append(Notice("UNEVEN_STAMPS", numbers=numbers))
             stamps = header if self._header else stamps
         if not self._header and len(table) and stamps.min() < 0:
             header_clock = Remedy({"clock": "header"}, "take the header's stamps")
@@ -122,7 +122,7 @@ class Topic:
                 f"{place}: a log time of 2^63 ns or more; expected ns since 1970; {header_clock}"
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
-        return SampleTable(stamps, floats, notices)
+        return SampleTable(stamps, floats)
 
 
 def _nanoseconds(place: str, seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
