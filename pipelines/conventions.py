@@ -142,7 +142,7 @@ def draw(title: str, arm: str, number: int) -> Seen:
         return exchanged(arm, number)
     k, motion = motion_of(arm)
     log = log_of(motion, SPOILS[title], number)
-    named = mend(log, conventions_of(log))
+    named = mend(log.origin, conventions_of(log))
     right = title == "nothing" or title in INVISIBLE
     try:
         result = identify(log, report=False)

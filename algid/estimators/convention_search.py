@@ -118,6 +118,11 @@ class Candidate:
         return replace(self.family, zero=self.zero)
 
     @property
+    def constants(self) -> dict[str, float]:
+        """What is found, by name."""
+        return dict(zip(self.names, self.k.tolist(), strict=True))
+
+    @property
     def other_side(self) -> Convention:
         """The convention with θ2 half a turn off, which turns the signs of k1 and k2."""
         return replace(self.family, zero=(self.zero[0], (self.zero[1] + pi) % (2 * pi)))
@@ -125,8 +130,7 @@ class Candidate:
     @cached_property
     def demands(self) -> dict[str, float]:
         """What physics demands, and how many standard deviations the log is on the right side."""
-        k = dict(zip(self.names, self.k.tolist(), strict=True))
-        demands = _demands(k, self.covariance, self.speed)
+        demands = _demands(self.constants, self.covariance, self.speed)
         if self.balanced:
             demands = {name: far for name, far in demands.items() if name not in _OF_SIDE}
         return demands
@@ -139,7 +143,7 @@ class Candidate:
         without gravity m2 ≤ k5 / l1². Of a link much lighter than the first that bound says
         little: it has to be a long pendulum too, k3 / k1 in lengths l1.
         """
-        k = dict(zip(self.names, self.k.tolist(), strict=True))
+        k = self.constants
         along = abs(k[K1] * k.get(K2, k[K1]))
         own = k[K3] * k.get(K4, k[K5])
         return along < _NEXT_TO_AXIS * own and _LONG * abs(k[K1]) < k[K3]
@@ -170,12 +174,13 @@ class Judgement:
     """The log as it was read, the best convention, and whether it is `alone`.
 
     It is where the log shows a real arm under it, and no other convention that physics allows
-    comes near.
+    comes near. `trials` fit the same log under any other.
     """
 
     as_read: Candidate
     best: Candidate
     alone: bool
+    trials: Trials
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,17 +216,24 @@ def judge(
 def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgement | None:
     """Try every convention on logs of one arm that were read alike, on the stretches that move.
 
-    None where they do not move for six windows, or the torque of a motor is zero throughout. None
-    other than as it was read stands where a bent arm explains as much: zeros turn three moments by
-    two angles, centres of mass off the links' lines, or a payload, turn each by its own.
+    None where they do not move for six windows, differ in their passive joint, or the torque of a
+    motor is zero throughout. None other than as it was read stands where a bent arm explains as
+    much: zeros turn three moments by two angles, centres of mass off the links' lines, or a
+    payload, turn each by its own.
     """
-    trials = _trials(logs, gravity)
-    if trials is None:
+    usable = evenly_spread([log for log in logs if log.usable], MOST_LOGS)
+    passives = {log.passive for log in usable}
+    # no motor's torque is asked for at a passive joint
+    idle = {joint for joint in (1, 2) if not any(log.tau[joint - 1].any() for log in usable)}
+    if len(passives) != 1 or idle - passives:
+        return None
+    trials = Trials(usable, gravity)
+    if trials.seconds < _SHORTEST:
         return None
     candidates = trials.unscaled()
-    judged = _judged(candidates, trials.apart)
+    judged = _judged(candidates, trials)
     if not judged.alone:
-        judged = _judged(candidates + list(trials.scaled()), trials.apart)
+        judged = _judged(candidates + list(trials.scaled()), trials)
     best = judged.best
     if judged.alone and (best.family != AS_READ or max(map(abs, best.zero)) > LARGEST_PHASE):
         bent = trials.bent()
@@ -230,47 +242,7 @@ def judge_together(logs: Sequence[Recorded], *, gravity: bool = True) -> Judgeme
     return judged
 
 
-def tried_together(
-    logs: Sequence[Recorded], *conventions: Convention, gravity: bool = True
-) -> list[Candidate]:
-    """Candidates of conventions from the logs of one arm; none if the logs are too short."""
-    trials = _trials(logs, gravity)
-    if trials is None:
-        return []
-    return [trials.under(replace(one, zero=AS_READ.zero), one.zero)[0] for one in conventions]
-
-
-def zeroed_together(
-    logs: Sequence[Recorded], *families: Convention, gravity: bool = True
-) -> list[Candidate]:
-    """The same under the zeros that fit best, whatever those of the `families`."""
-    trials = _trials(logs, gravity)
-    return [] if trials is None else list(map(trials.zeroed, families))
-
-
-def _trials(logs: Sequence[Recorded], gravity: bool) -> _Trials | None:
-    """Fits under any convention of those of the logs that are usable, and of one arm."""
-    usable: Sequence[Recorded] = [log for log in logs if log.usable]
-    if not usable:
-        return None
-    usable = evenly_spread(usable, MOST_LOGS)
-    passive = usable[0].passive
-    driven = np.zeros(2, dtype=bool)
-    if passive is not None:
-        driven[passive - 1] = True  # no motor's torque is asked for there
-    for log in usable:
-        if log.passive != passive:
-            return None
-        driven |= np.any(log.tau, axis=1)
-    if not driven.all():
-        return None
-    trials = _Trials(usable, gravity)
-    if trials.seconds < _SHORTEST:
-        return None
-    return trials
-
-
-def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
+def _judged(candidates: Sequence[Candidate], trials: Trials) -> Judgement:
     as_read = next(one for one in candidates if one.convention == AS_READ)
     best = None
     for candidate in sorted(candidates, key=lambda one: one.score):
@@ -282,11 +254,11 @@ def _judged(candidates: Sequence[Candidate], apart: float) -> Judgement:
             # of two sides that explain the same, but for rounding, the log's own
             best = min(best, candidate, key=lambda one: abs(one.zero[1]))
         elif candidate.convention != best.convention:  # the log as read is among them twice
-            alone = best.convincing and candidate.score - best.score > apart
-            return Judgement(as_read, best, alone)
+            alone = best.convincing and candidate.score - best.score > trials.apart
+            return Judgement(as_read, best, alone, trials)
     if best is None:
-        return Judgement(as_read, as_read, alone=False)
-    return Judgement(as_read, best, best.convincing)
+        return Judgement(as_read, as_read, False, trials)
+    return Judgement(as_read, best, best.convincing, trials)
 
 
 def seconds_of_each(count: int, longest: float = _FINE[1]) -> float:
@@ -312,10 +284,11 @@ def _least(scores: Callable[[FloatArray], FloatArray], start: FloatArray) -> Flo
     return best
 
 
-class _Trials:
+class Trials:
     """Logs, mapped and fitted under any convention."""
 
     def __init__(self, logs: Sequence[Recorded], gravity: bool) -> None:
+        self._logs = logs
         each = [(rate, seconds_of_each(len(logs), longest)) for rate, longest in (_FINE, _COARSE)]
         self._fine, self._coarse = (
             moving([thinned(log.theta, log.tau, log.dt, rate, longest) for log in logs])
@@ -345,6 +318,10 @@ class _Trials:
             Candidate(family, zero, self._names, k, V, share, score, sums.speed)
             for zero, k, V, share, score in every
         ]
+
+    def weightless(self) -> Candidate:
+        """The logs as they were read, of an arm on which gravity does not act."""
+        return Trials(self._logs, gravity=False).under(AS_READ, AS_READ.zero)[0]
 
     def zeroed(self, family: Convention) -> Candidate:
         """The candidate of a family with the zeros that fit best."""

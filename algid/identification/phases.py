@@ -72,7 +72,7 @@ def turn_note(fit: Fit, log: Recording) -> Notice | None:
         return None
     anyway = Remedy({"accept": "WRONG_ZERO"}, "where the arm is mounted so")
     numbers = {"turn": float(np.degrees(turn))}
-    return Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log, turn, half), anyway))
+    return Notice("WRONG_ZERO", numbers=numbers, remedies=(zeroed(log.origin, turn, half), anyway))
 
 
 def _certainty(fit: Fit, name: str) -> float:

@@ -221,12 +221,12 @@ class Recordings:
         """What is wrong with the conventions of each of several logs."""
         from algid.inspection.conventions import mends
 
-        known = [(log, self._recorded.pop(log)) for log in logs if log in self._recorded]
+        known = [log for log in logs if log in self._recorded]
         if not known:
             return {}
-        mended = mends(known, gravity=known[0][0].weight > 0)
-        pairs = zip(known, mended, strict=True)
-        return {log: notice for (log, _), notice in pairs if notice is not None}
+        parts = [(log.origin, self._recorded.pop(log)) for log in known]
+        mended = zip(known, mends(parts, gravity=known[0].weight > 0), strict=True)
+        return {log: notice for log, notice in mended if notice is not None}
 
     def _blocks(self, log: Recording) -> Iterator[Log]:
         """The log's blocks, each counted.

@@ -81,10 +81,10 @@ def examine(
     notices = [yielding(notice, log.origin.reading.accepted) for notice in every]
     if external or not alone or any(notice.refuse for notice in notices):
         return tuple(notices)
-    mended = mend(log, tried())
+    mended = mend(log.origin, tried())
     if mended is not None:
         return *notices, mended
-    doubt = doubted(log, tried()) if gravity > 0 else None
+    doubt = doubted(log.origin, tried()) if gravity > 0 else None
     return (*notices, doubt) if doubt else tuple(notices)
 
 

@@ -7,27 +7,21 @@ that change the reading.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import degrees, isclose, pi, remainder
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from algid.estimators.convention_search import (
-    APART,
-    EVIDENCE,
     EXPLAINED,
     MET,
     MOST_LOGS,
-    Candidate,
     Judgement,
     Recorded,
     judge_together,
-    tried_together,
-    zeroed_together,
 )
-from algid.estimators.convention_sums import WINDOW
 from algid.estimators.conventions import AS_READ, Convention
 from algid.log import ZEROS, Log, Origin, Reading
 from algid.model import K2, K3, K4, K5
@@ -36,29 +30,30 @@ from algid.signals.segments import stretches
 
 # rad: a zero this close, or a centre of mass off its link, is a phase and no other convention
 _SMALL = np.pi / 4
-_MENTIONED = 0.01  # rad: a zero that is off by less is not mentioned
 _SAME = 1e-3  # of a scale or rad: as good as equal
-_DEGREES, _TURNS = 180 / pi, 1 / (2 * pi)  # scales of angles that are no motor's
+_UNITS = {180 / pi: "deg", 1 / (2 * pi): "rev"}
+"""Of angles, by the scales that are no motor's."""
+_WRONG = {
+    "joints": "the joints are swapped",
+    "theta.source": "the angles of the joints are swapped",
+    "tau.source": "the torques of the joints are swapped",
+    "signs": "the signs of the joints are {value}",
+    "theta.sign": "the sign of θ{joint} is wrong",
+    "tau.sign": "the sign of τ{joint} is wrong",
+    "theta.unit": "θ{joint} is in {value}",
+    "theta.gear_ratio": "θ{joint} is the motor's angle, {value:.4g} times the joint's",
+    "second_angle": "θ2 counts from the horizontal or the vertical, not from link 1",
+    "drive": "the second motor stands at the base",
+    "zero": "θ1 is zero where link 1 is {value}",
+    "offsets": "the angles have to be offset by {value} rad",
+}
+"""What is wrong with a log, by the setting that mends it."""
 # weight in N m to inertia in kg m^2: a fifth of g/l for links of 1.5 m
 _LEAST_PULL = 1.3
 _OF_WEIGHT = 0.01  # of a torque: what weight must explain to be there
-_OTHER_WAY = Convention(torque_signs=(-1, -1))
-_BEHIND = Convention(signs=(-1, -1), torque_signs=(-1, -1))
-GUESSES = (
-    _OTHER_WAY,
-    _BEHIND,
-    *(replace(one, zero=(off, 0.0)) for one in (AS_READ, _OTHER_WAY) for off in (-pi / 2, pi / 2)),
-)
-"""Under which gravity pulls down where it pulls up, or to a side, as the log was read."""
-
-
-class Read(Protocol):
-    """A log, or what stands for one: how it was read."""
-
-    @property
-    def origin(self) -> Origin:
-        """Where its samples come from."""
-        ...
+_TORQUES = Convention(torque_signs=(-1, -1))
+_ALL = Convention(signs=(-1, -1), torque_signs=(-1, -1))
+_SIDEWAYS = ((-pi / 2, 0.0), (pi / 2, 0.0))  # θ1 from the vertical
 
 
 def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
@@ -76,10 +71,11 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
 
 def recorded(log: Log, seconds: float = math.inf) -> list[Recorded]:
     """The stretches of a log without a gap, the longest first, `seconds` of them in all."""
-    passive, parts = log.origin.reading.passive, []
+    parts = []
     for stretch in sorted(stretches([log]), key=len, reverse=True)[:MOST_LOGS]:
         part = stretch.part(0, int(min(len(stretch), seconds / stretch.dt)))
         seconds -= len(part) * part.dt
+        passive = log.origin.reading.passive
         parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive))
     return parts
 
@@ -96,7 +92,7 @@ def is_to_scale(judgement: Judgement | None) -> bool:
     return judgement.as_read.convincing and judgement.best.convention.scale == AS_READ.scale
 
 
-def mend(log: Read, judgement: Judgement | None) -> Notice | None:
+def mend(origin: Origin, judgement: Judgement | None) -> Notice | None:
     """What sets a log right that physics contradicts as it was read.
 
     None where it is right but for zeros that may be centres of mass off their links, or the log
@@ -104,220 +100,153 @@ def mend(log: Read, judgement: Judgement | None) -> Notice | None:
 
     Parameters
     ----------
-    log : Log, as it was read
+    origin : how the log was read
     judgement : of `judged`
     """
-    if judgement is None or not judgement.alone or judgement.best.convention == AS_READ:
+    if judgement is None or not judgement.alone:
         return None
-    convention = judgement.best.convention
-    only_zeros = replace(convention, zero=(0.0, 0.0)) == AS_READ
-    if only_zeros and max(abs(angle) for angle in convention.zero) < _SMALL:
+    as_read, convention = judgement.as_read, judgement.best.convention
+    off_by = max(map(abs, convention.zero))
+    if off_by < _SMALL and replace(convention, zero=AS_READ.zero) == AS_READ:
         return None
-    mirrored = convention.mirrored()
-    if mirrored == _BEHIND or len(list(_clauses(mirrored))) < len(list(_clauses(convention))):
-        convention = mirrored
-    settings = _settings(convention, log)
+    # of an arm and the same seen from behind what needs no number, then what needs fewer settings
+    settings = min(
+        (_settings(one, origin) for one in (convention, convention.mirrored())),
+        key=lambda one: ("offsets" in one, len(one)),
+    )
     if not settings:  # it is how the log was read
         return None
-    broken, left = judgement.as_read.broken, 100 * float(judgement.as_read.left.max())
-    then = 100 * float(judgement.best.left.max())
+    wrong = []
+    for name, value in settings.items():
+        channel, dot, key = name.partition(".")
+        form = _WRONG[channel.rstrip("12") + dot + key]
+        wrong.append(form.format(joint=channel[-1], value=value))
+    left, then = (100 * float(one.left.max()) for one in (as_read, judgement.best))
     contradiction = f"{left:.3g} % of a torque stays unexplained, {then:.2g} % otherwise"
-    if broken:
-        name = min(broken, key=lambda name: broken[name])
-        contradiction = f"{name} is broken by {round(-broken[name]):,} σ"
-    numbers = {"wrong": " and ".join(_clauses(convention)), "contradiction": contradiction}
+    if as_read.broken:
+        name, far = min(as_read.broken.items(), key=lambda one: one[1])
+        contradiction = f"{name} is broken by {round(-far):,} σ"
+    numbers = {"wrong": " and ".join(dict.fromkeys(wrong)), "contradiction": contradiction}
     return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(Remedy(settings),))
 
 
 def mends(
-    logs: Sequence[tuple[Read, list[Recorded]]], *, gravity: bool = True
+    logs: Sequence[tuple[Origin, list[Recorded]]], *, gravity: bool = True
 ) -> list[Notice | None]:
     """What sets each of several logs of one arm right: see `mend`.
 
     They are judged together. Where that leaves it open, each is judged alone.
     """
-    judgement = judge_together([part for _, parts in logs for part in parts], gravity=gravity)
-    if judgement is not None and judgement.alone:
-        return [mend(log, judgement) for log, _ in logs]
-    return [mend(log, judge_together(parts, gravity=gravity)) for log, parts in logs]
+    every = judge_together([part for _, parts in logs for part in parts], gravity=gravity)
+    if every is not None and every.alone:
+        return [mend(origin, every) for origin, _ in logs]
+    return [mend(origin, judge_together(parts, gravity=gravity)) for origin, parts in logs]
 
 
-def doubted(log: Log, judgement: Judgement | None) -> Notice | None:
+def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     """What gravity says against a log as it was read, of which no one convention is sure.
 
-    None where the log is right, or shows a real arm no better under any of `GUESSES` or another
-    zero.
+    None where the log is right, or shows a real arm no better with other signs or another zero.
     """
     if judgement is None or is_right(judgement):
         return None
-    as_read, parts = judgement.as_read, recorded(log)
-    k = dict(zip(as_read.names, as_read.k.tolist(), strict=True))
-    left, pull = float(as_read.left.max()), math.hypot(k[K2], k[K4])
-    if left < EXPLAINED and pull < _LEAST_PULL * abs(k[K3] + k[K5]):
-        (weightless,) = tried_together(parts, AS_READ, gravity=False)
+    as_read, trials = judgement.as_read, judgement.trials
+    k, left = as_read.constants, float(as_read.left.max())
+    if left < EXPLAINED and math.hypot(k[K2], k[K4]) < _LEAST_PULL * abs(k[K3] + k[K5]):
+        weightless = trials.weightless()
         if weightless.convincing and weightless.left.max() < left + _OF_WEIGHT:
             driver = Remedy({"effort": "gravity-compensated"}, "for such a driver")
             remedies = driver, Remedy({"gravity": 0}, "for a horizontal plane")
             return Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}, remedies=remedies)
-    guesses = tried_together(parts, *GUESSES)
-    turned = zeroed_together(parts, AS_READ, _OTHER_WAY)
-    turned = [one for one in turned if abs(one.zero[0]) > _SMALL]
-    every = [one for one in (*guesses, *turned) if one.plausible and _weighs(one)]
-    seconds = sum(part.theta.shape[1] * part.dt for part in parts)
-    apart = max(APART, 2 * EVIDENCE * WINDOW / seconds)
-    best = min((one.score for one in every), default=math.inf)
-    if as_read.plausible and as_read.score < best + apart:
+    named = trials.under(_TORQUES, AS_READ.zero) + trials.under(_ALL, AS_READ.zero)
+    named += trials.under(AS_READ, *_SIDEWAYS) + trials.under(_TORQUES, *_SIDEWAYS)
+    likely = []
+    for one in (*named, trials.zeroed(AS_READ), trials.zeroed(_TORQUES)):
+        pull = max(one.demands.get("k2 > 0", 0.0), one.demands.get("k4 > 0", 0.0))
+        is_other = one.family != AS_READ or abs(one.zero[0]) > _SMALL
+        if is_other and one.plausible and pull > MET:  # gravity pulls down, beyond doubt
+            likely.append(one)
+    least = min((one.score for one in likely), default=-math.inf) + trials.apart
+    near = [one for one in likely if one.score < least]
+    if not near or (as_read.plausible and as_read.score < least):
         return None
-    near = [one for one in every if one.score < best + apart]
     # a named zero or sign before the zeros that fit best
-    named = [one for one in near if one in guesses] or near
-    if not named:
-        return None
-    offered = tuple(Remedy(_settings(one.convention, log)) for one in named)
-    if named[0].zero[0]:
-        turn = {"turn": -degrees(named[0].zero[0])}
-        return Notice("WRONG_ZERO", numbers=turn, remedies=offered)
+    near = [one for one in near if one in named] or near
+    offered = tuple(Remedy(_settings(one.convention, origin)) for one in near)
+    turn = near[0].zero[0]
+    if turn:
+        return Notice("WRONG_ZERO", numbers={"turn": -degrees(turn)}, remedies=offered)
     return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
 
 
-def _weighs(one: Candidate) -> bool:
-    """True if gravity pulls down under a convention, beyond doubt."""
-    return max(one.demands.get("k2 > 0", 0.0), one.demands.get("k4 > 0", 0.0)) > MET
-
-
-def _clauses(convention: Convention) -> Iterator[str]:
-    """What is wrong with a log that has to be read by `convention`."""
-    if convention == _BEHIND:
-        yield (
-            "both joints count the other way round, or θ1 counts from the other horizontal (the "
-            "same arm seen from behind)"
-        )
-        return
-    if convention.swapped and convention.torques_swapped:
-        yield "the joints are swapped"
-    elif convention.swapped:
-        yield "the angles of the joints are swapped"
-    elif convention.torques_swapped:
-        yield "the torques of the joints are swapped"
-    for joint in (0, 1):
-        angle, torque = convention.signs[joint] < 0, convention.torque_signs[joint] < 0
-        if angle and torque:
-            yield f"joint {joint + 1} counts the other way round"
-        elif angle:
-            yield f"the sign of θ{joint + 1} is wrong"
-        elif torque:
-            yield f"the sign of τ{joint + 1} is wrong"
-    if convention.absolute:
-        yield "θ2 counts from the horizontal or the vertical, not from link 1"
-    if convention.base:
-        yield "the second motor stands at the base"
-    for what, scale in zip(("θ1", "θ2"), convention.scale, strict=True):
-        if isclose(scale, _DEGREES):
-            yield f"{what} is in degrees"
-        elif isclose(scale, _TURNS):
-            yield f"{what} is in turns"
-        elif scale != 1:
-            yield f"{what} is the motor's angle, {scale:.4g} times the joint's"
-    for what, off in zip(("θ1", "θ2"), convention.zero, strict=True):
-        if what == "θ1" and abs(off + pi / 2) < _SAME:
-            yield "θ1 is zero hanging straight down"
-        elif what == "θ1" and abs(off - pi / 2) < _SAME:
-            yield "θ1 is zero upright"
-        elif abs(off) > _MENTIONED:
-            yield f"the zero of {what} is off by {degrees(off):.4g}°"
-
-
-def _settings(convention: Convention, log: Read, off: float = _SAME) -> dict[str, Any]:
-    """The settings, by dotted names, that read the log by `convention`.
-
-    A named zero stands for one that is `off` by as many rad.
-    """
-    reading = log.origin.reading
-    mending: dict[str, Any] = dict(_sources(convention, log))
-    for joint in (0, 1):
-        theta, tau = f"theta{joint + 1}", f"tau{joint + 1}"
-        # A channel that is swapped keeps what the profile says of its joint: names and units go
-        # with the joint.
-        if convention.signs[joint] < 0 and convention.torque_signs[joint] < 0:
-            signs = list(mending.get("signs", reading.signs))
-            signs[joint] = -signs[joint]
-            mending["signs"] = signs
-        elif convention.signs[joint] < 0:
-            mending[f"{theta}.sign"] = -_own_sign(reading, theta)
-        elif convention.torque_signs[joint] < 0:
-            mending[f"{tau}.sign"] = -_own_sign(reading, tau)
-        scale = convention.scale[joint]
-        if isclose(scale, _DEGREES):
-            mending[f"{theta}.unit"] = "deg"
-        elif isclose(scale, _TURNS):
-            mending[f"{theta}.unit"] = "rev"
-        elif scale != 1:
-            mending[f"{theta}.gear_ratio"] = float(f"{scale:.6g}")
-    if convention.absolute:
-        mending["second_angle"] = "absolute"
-    if convention.base:
-        mending["drive"] = "base"
-    return mending | _zeros(convention, reading, off)
-
-
-def zeroed(log: Read, turn: float, half: float) -> Remedy:
+def zeroed(origin: Origin, turn: float, half: float) -> Remedy:
     """What reads θ1 further on by `turn` ± `half` rad, by a named zero that lies within that."""
     convention = replace(AS_READ, zero=(round(turn, 3), 0.0))
-    return Remedy(_settings(convention, log, half))
+    return Remedy(_zeros(convention, origin.reading, half))
 
 
-def _sources(convention: Convention, log: Read) -> Iterator[tuple[str, Any]]:
-    """Where the channels come from that have to change places."""
-    joints = log.origin.reading.joints
-    if convention.swapped and convention.torques_swapped and joints is not None:
-        yield "joints", [joints[1], joints[0]]
-        return
+def _settings(convention: Convention, origin: Origin) -> dict[str, Any]:
+    """The settings, by dotted names, that read a log by `convention`."""
+    reading = origin.reading
+    settings: dict[str, Any] = {}
     swapped = {"theta": convention.swapped, "tau": convention.torques_swapped}
-    for quantity in ("theta", "tau"):
-        if not swapped[quantity]:
-            continue
-        for joint, other in ((1, 2), (2, 1)):
-            name = f"{quantity}{other}"
-            source = log.origin.mapping.get(name, name)
-            yield f"{quantity}{joint}.source", source.partition(": ")[2] or source
+    if all(swapped.values()) and reading.joints is not None:
+        settings["joints"] = list(reversed(reading.joints))
+    else:
+        for quantity in [one for one, is_swapped in swapped.items() if is_swapped]:
+            for own, other in ("12", "21"):
+                name = quantity + other
+                source = origin.mapping.get(name, name)
+                settings[f"{quantity}{own}.source"] = source.partition(": ")[2] or source
+    # A channel that is swapped keeps what the profile says of its joint: names and units go with
+    # the joint.
+    for joint, scale in enumerate(convention.scale, start=1):
+        angle, torque = convention.signs[joint - 1], convention.torque_signs[joint - 1]
+        if angle < 0 and torque < 0:
+            signs = settings.setdefault("signs", list(reading.signs))
+            signs[joint - 1] *= -1
+        elif angle < 0 or torque < 0:
+            name = f"theta{joint}" if angle < 0 else f"tau{joint}"
+            channel = reading.channels.get(name)
+            # the sign that the profile gives the channel, beside that of its joint
+            sign = channel.sign * reading.signs[joint - 1] if channel else 1
+            settings[f"{name}.sign"] = -sign
+        units = [unit for one, unit in _UNITS.items() if isclose(scale, one)]
+        if units:
+            settings[f"theta{joint}.unit"] = units[0]
+        elif scale != 1:
+            settings[f"theta{joint}.gear_ratio"] = float(f"{scale:.6g}")
+    if convention.absolute:
+        settings["second_angle"] = "absolute"
+    if convention.base:
+        settings["drive"] = "base"
+    return settings | _zeros(convention, reading)
 
 
-def _own_sign(reading: Reading, name: str) -> int:
-    """The sign that the profile gives a channel, beside that of its joint."""
-    if name not in reading.channels:
-        return 1
-    return reading.channels[name].sign * reading.signs[int(name[-1]) - 1]
+def _zeros(convention: Convention, reading: Reading, within: float = _SAME) -> dict[str, Any]:
+    """The profile's zero and offsets, to add to recorded angles once signs and scales are right.
 
-
-def _zeros(convention: Convention, reading: Reading, within: float) -> dict[str, Any]:
-    """The profile's zero and offsets, to add to recorded angles once signs and scales are right."""
+    A named zero stands for one that is `within` as many rad.
+    """
+    absolute = reading.second_angle == "absolute"
     channels = (reading.channels.get(name) for name in ("theta1", "theta2"))
-    # what the channels' offsets added as the log was read
     own = np.array([one.offset if one else 0.0 for one in channels])
-    read = own + [ZEROS[reading.zero], 0.0]
-    if reading.second_angle == "absolute":
-        read[1] -= own[0]
-    moved = read
-    if convention.swapped:
-        moved = read[::-1]
-    moved = np.array(convention.signs) / np.array(convention.scale) * moved
-    if convention.absolute:
-        moved[1] -= moved[0]
-    moved = moved + convention.zero
-    if np.allclose(moved, read, rtol=1e-9, atol=_SAME) and not convention.absolute:
-        return {}
+    # what was added to the angles as the log was read, and what has to be
+    read = own + [ZEROS[reading.zero], -own[0] * absolute]
+    read = read[::-1] if convention.swapped else read
+    first, second = np.array(convention.signs) / np.array(convention.scale) * read
+    second += convention.zero[1] - first * convention.absolute
+    first += convention.zero[0]
     # the nearest of the named zeros, the profile's own first, and what is left of it as an offset
-    lefts = {name: remainder(float(moved[0]) - turned, 2 * pi) for name, turned in ZEROS.items()}
-    near = [name for name in (reading.zero, *ZEROS) if abs(lefts[name]) <= within]
-    zero = near[0] if near else reading.zero
-    offset, second = lefts[zero] * (not near), float(moved[1])
-    if convention.absolute:
-        second += offset
-    added = np.array([offset, remainder(second, 2 * pi)]) - (own - reading.offsets)
-    offsets = [float(f"{angle:.6g}") for angle in np.where(np.abs(added) < _SAME, 0.0, added)]
+    lefts = {name: remainder(first - turned, 2 * pi) for name, turned in ZEROS.items()}
+    zero = min((reading.zero, *ZEROS), key=lambda name: abs(lefts[name]) > within)
+    offset = lefts[zero] * (abs(lefts[zero]) > within)
+    added = np.array([offset, second + offset * (absolute or convention.absolute)]) - own
+    added = np.remainder(added + pi, 2 * pi) - pi
+    added[np.abs(added) < _SAME] = 0.0
     mending: dict[str, Any] = {}
     if zero != reading.zero:
         mending["zero"] = zero
-    if offsets != list(reading.offsets):
-        mending["offsets"] = offsets
+    if added.any():
+        mending["offsets"] = [float(f"{one:.6g}") for one in reading.offsets + added]
     return mending

@@ -15,8 +15,8 @@ from algid.estimators.convention_search import (
     _TURNS,
     Judgement,
     Recorded,
+    Trials,
     _families,
-    _trials,
     judge,
     judge_together,
 )
@@ -250,8 +250,7 @@ def test_no_convention_that_is_passed_over_comes_nearer(bench: Bench, row: str) 
         tau = np.random.default_rng(2).standard_normal(tau.shape)
     elif row != "none":
         theta, tau = spoiled(row, theta, tau)
-    trials = _trials([Recorded(theta, tau, DT)], True)
-    assert trials is not None
+    trials = Trials([Recorded(theta, tau, DT)], True)
     looked_at = trials.unscaled()
     every = [trials.under(one, *_TURNS) for families in _families() for one in families]
     best = min((one.score for one in looked_at if not one.broken), default=np.inf)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ RIGHT = moving_log()
 
 def mended(log: Log) -> Notice | None:
     """What sets a log right, by every convention tried on it."""
-    return mend(log, judged(log))
+    return mend(log.origin, judged(log))
 
 
 def written(path: Path, theta: FloatArray, tau: FloatArray) -> Path:
@@ -43,6 +44,8 @@ def recorded(name: str) -> tuple[FloatArray, FloatArray]:
             return np.stack([-a - np.pi / 2, b]), np.stack([-p, q])
         case "absolute, hanging":
             return np.stack([a + np.pi / 2, a + b + np.pi / 2]), RIGHT.tau
+        case "right":
+            return RIGHT.theta, RIGHT.tau
         case "swapped":
             return RIGHT.theta[::-1], RIGHT.tau[::-1]
         case "torques swapped":
@@ -88,9 +91,20 @@ def test_the_settings_named_mend_the_log(row: str, kind: str, tmp_path: Path) ->
     assert np.allclose(log.tau, -RIGHT.tau if turned else RIGHT.tau)
 
 
-def test_settings_change_what_a_profile_said(tmp_path: Path) -> None:
-    path = written(tmp_path / "arm.csv", RIGHT.theta, RIGHT.tau)
-    wrong = {"signs": [-1, 1], "tau1": {"sign": -1}, "zero": "hanging", "offsets": [0.0, 3.0]}
+@pytest.mark.parametrize(
+    ("row", "wrong"),
+    [
+        (
+            "right",
+            {"signs": [-1, 1], "tau1": {"sign": -1}, "zero": "hanging", "offsets": [0.0, 3.0]},
+        ),
+        ("absolute, hanging", {"second_angle": "absolute", "offsets": [-0.4, -0.4]}),
+    ],
+)
+def test_settings_change_what_a_profile_said(
+    row: str, wrong: dict[str, Any], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "arm.csv", *recorded(row))
     profile = with_settings(Profile(), wrong)
     found = mended(read_log(path, profile))
     assert found is not None

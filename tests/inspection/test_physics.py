@@ -69,7 +69,7 @@ def test_conventions_are_judged_over_all_stretches() -> None:
     log = replace(log, stamp_ns=log.stamp_ns[kept], theta=log.theta[:, kept], tau=log.tau[:, kept])
     assert is_right(judged(log))
     flipped = replace(log, tau=-log.tau)
-    found = mend(flipped, judged(flipped))
+    found = mend(flipped.origin, judged(flipped))
     assert found is not None
     assert found.remedies[0].settings == {"tau1.sign": -1, "tau2.sign": -1}
     alone = log.part(0, int(np.argmax(np.diff(log.stamp_ns))) + 1)
@@ -142,11 +142,8 @@ def judgement(
     )
 
 
-def read_by(reading: Reading | None = None, mapping: dict[str, str] | None = None) -> Log:
-    log = moving_log(10)
-    return replace(
-        log, origin=Origin("arm.csv", "csv", mapping or {}, reading=reading or Reading())
-    )
+def read_by(reading: Reading | None = None) -> Origin:
+    return Origin("arm.csv", "csv", {}, reading=reading or Reading())
 
 
 def mended(convention: Convention, reading: Reading | None = None) -> Notice:
@@ -167,12 +164,12 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
         (Convention(torque_signs=(1, -1)), "the sign of τ2 is wrong", "--set tau2.sign=-1"),
         (
             Convention(signs=(1, -1), torque_signs=(1, -1)),
-            "joint 2 counts the other way round",
+            "the signs of the joints are [1, -1]",
             "--set signs=[1, -1]",
         ),
         (
             Convention(swapped=True, torques_swapped=True),
-            "the joints are swapped",
+            "the angles of the joints are swapped and the torques of the joints are swapped",
             f'--set theta1.source="theta2" --set theta2.source="theta1" {TORQUES_SWAPPED}',
         ),
         (
@@ -191,18 +188,18 @@ TORQUES_SWAPPED = '--set tau1.source="tau2" --set tau2.source="tau1"'
             "--second-angle absolute",
         ),
         (Convention(base=True), "the second motor stands at the base", "--set drive=base"),
-        (Convention(scale=(DEGREES, 1.0)), "θ1 is in degrees", "--set theta1.unit=deg"),
-        (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in turns", "--set theta2.unit=rev"),
+        (Convention(scale=(DEGREES, 1.0)), "θ1 is in deg", "--set theta1.unit=deg"),
+        (Convention(scale=(1.0, 1 / (2 * math.pi))), "θ2 is in rev", "--set theta2.unit=rev"),
         (
             Convention(scale=(1.0, 7.00001)),
             "θ2 is the motor's angle, 7 times the joint's",
             "--set theta2.gear_ratio=7.00001",
         ),
-        (Convention(zero=(-HALF, 0.0)), "θ1 is zero hanging straight down", "--zero hanging"),
-        (Convention(zero=(HALF, 0.0)), "θ1 is zero upright", "--zero upright"),
+        (Convention(zero=(-HALF, 0.0)), "θ1 is zero where link 1 is hanging", "--zero hanging"),
+        (Convention(zero=(HALF, 0.0)), "θ1 is zero where link 1 is upright", "--zero upright"),
         (
             Convention(zero=(0.0, HALF)),
-            "the zero of θ2 is off by 90°",
+            "the angles have to be offset by [0.0, 1.5708] rad",
             "--set offsets=[0.0, 1.5708]",
         ),
     ],
