@@ -8,14 +8,12 @@ A log that cannot be a job, by its name or because another has it too, is one th
 
 from __future__ import annotations
 
-import glob
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
-from pathlib import Path
+from glob import glob
+from pathlib import Path, PurePath
 from urllib.parse import unquote
 
 from algid.base.errors import SettingError
@@ -54,61 +52,49 @@ def jobs_of(
     for source in sources:
         try:
             if not is_url(source) and is_manifest(Path(source)):
-                all_jobs = read_manifest(Path(source))
+                found = read_manifest(Path(source))
             else:
-                all_jobs = _paired(_logs(source, out, links), alone)
+                found = [_job_of(*one, alone) for one in _logs(source, out, links)]
         # a NUL in a path; folders within folders beyond what Python walks
         except (OSError, ValueError, RecursionError) as error:
             raise SettingError(
                 f"{source}: cannot look there ({error}); check its name and rights"
             ) from error
-        for job in all_jobs:
-            before = jobs.get(job.name, job)
-            if before != job:
-                job = _of_one_name(before, job)
-            jobs[job.name] = job
+        for job in found:
+            jobs[job.name] = _together(jobs.get(job.name, job), job)
     return [jobs[name] for name in sorted(jobs)]
 
 
 Found = tuple[str, str, str | None]
-"""A log's path or URL, its name below its source without suffix, and why it is unreadable."""
+"""A log's path or URL, its name below its source, and why it is unreadable."""
 
 
 def _logs(source: str, out: str, links: list[str]) -> list[Found]:
     """The logs of a source."""
-    if is_url(source):
-        place, below = f"{shown(out)}/", f"{shown(source)}/"
-        inside = place.removeprefix(below) if is_url(out) and place.startswith(below) else None
-        named: list[Found] = []
-        for url, name in list_urls(source):
-            parts = name.split("/")
-            hidden = any(part.startswith(".") for part in parts)
-            own = any(part.endswith(".algid") for part in parts[:-1])
-            if inside is not None:  # what this batch has written there
-                own |= name.startswith(unquote(inside)) if inside else name == TABLE
-            if name.lower().endswith(SUFFIXES) and not (hidden or own):
-                named.append((url, _stem(name), None))
-        return named
-    path, start = Path(source), None
-    if path.is_dir() and not _is_bag(path):
-        start = len(str(path)) + 1
-        found = [one for one in _walk(path, out, links) if one[1] or _is_log(one[0])]
-    elif path.exists():
-        found = [(source, None)]
-    else:
-        found = list(_matches(source, out, links))
-        if not found:
-            raise SettingError(f"{source}: there is no such file, folder or match; check the name")
-        found = [one for one in found if _is_bag(Path(one[0])) or not Path(one[0]).is_dir()]
-    named = []
-    for one, trouble in found:
-        name = one.rpartition("/")[2] if start is None else one[start:]
-        named.append((one, name if trouble else _stem(name), trouble))
-    return named
+    path = Path(source)
+    if is_url(source) or (path.is_dir() and not _is_bag(source)):
+        below = _below(source, out, links)
+        return [one for one in below if one[2] or _is_log(one[1]) or _is_bag(one[0])]
+    if path.exists():
+        return [(source, path.name, None)]
+    first, _, last = source.partition("**") if "**" in path.parts else (source, "", None)
+    if last and "**" in last:
+        raise SettingError(f"{source}: expected one ** at most; name the folders within it")
+    found = list[Found]()
+    for match in sorted(glob(first or ".")):  # noqa: PTH207 (it may be absolute)
+        if last is not None:
+            for one, name, trouble in _below(match, out, links):
+                if trouble or PurePath(name).match(last.strip("/") or "*"):
+                    found.append((one, PurePath(name).name, trouble))
+        elif _is_bag(match) or not Path(match).is_dir():
+            found.append((match, Path(match).name, None))
+    if not found:
+        raise SettingError(f"{source}: there is no such file, folder or match; check the name")
+    return found
 
 
-def _walk(folder: Path, out: str, links: list[str]) -> Iterator[tuple[str, str | None]]:
-    """Files and bags below a folder, and folders in which nobody may look with the reason why.
+def _below(source: str, out: str, links: list[str]) -> Iterator[Found]:
+    """Objects below a URL, or files and bags below a folder; and folders where nobody may look.
 
     Hidden ones, results and what lies in `out` are passed over. Links to folders are not entered,
     but added to `links`.
@@ -116,110 +102,81 @@ def _walk(folder: Path, out: str, links: list[str]) -> Iterator[tuple[str, str |
     Raises
     ------
     OSError
-        If nobody may look into `folder` itself.
+        If nobody may look into the source itself.
     """
-    unreadable: list[OSError] = []
+    ends = [unquote(shown(one)) if is_url(one) else os.path.realpath(one) for one in (out, source)]
+    inside = os.path.relpath(*ends)  # OUT as seen from the source
+
+    def is_passed_over(name: str) -> bool:
+        own = name == TABLE if inside == "." else f"{name}/".startswith(f"{inside}/")
+        return own or any(
+            part.startswith(".") or part.endswith(".algid") for part in name.split("/")
+        )
+
+    if is_url(source):
+        for url, name in list_urls(source):
+            if not is_passed_over(name):
+                yield url, name, None
+        return
+    folder, unreadable = str(Path(source)), list[OSError]()
     for place, folders, names in os.walk(folder, onerror=unreadable.append):
-        if BAG in names and place != str(folder):
+        below = place[len(folder) :].lstrip("/")
+        if BAG in names and below:
             folders.clear()
-            yield place, None
+            yield place, below, None
             continue
-        inner = list[str]()
+        entered = list[str]()
         for name in folders:
-            path = f"{place}/{name}"
-            if name.startswith(".") or name.endswith(".algid") or _is_same(path, out):
+            if is_passed_over(f"{below}/{name}".lstrip("/")):
                 continue
-            if os.path.islink(path):  # noqa: PTH114
-                links.append(path)
+            if os.path.islink(f"{place}/{name}"):  # noqa: PTH114
+                links.append(f"{place}/{name}")
             else:
-                inner.append(name)
-        folders[:] = inner
-        for name in sorted(names):
-            if not name.startswith(".") and (name != TABLE or not _is_same(place, out)):
-                yield f"{place}/{name}", None
+                entered.append(name)
+        folders[:] = entered
+        for name in (f"{below}/{name}".lstrip("/") for name in sorted(names)):
+            if not is_passed_over(name):
+                yield f"{folder}/{name}", name, None
     for error in unreadable:
         place = str(error.filename)
-        if place == str(folder):
+        if place == folder:
             raise error
-        trouble = f"{redacted_path(place)}: cannot look there ({error.strerror}); check its rights"
-        yield place, trouble
+        reason = f"{redacted_path(place)}: cannot look there ({error.strerror}); check its rights"
+        yield place, place[len(folder) + 1 :], reason
 
 
-def _is_same(folder: str, other: str) -> bool:
-    with suppress(OSError):  # there may be no other
-        return Path(folder).samefile(other)
-    return False
+def _is_bag(path: str) -> bool:
+    return Path(path, BAG).is_file()
 
 
-def _matches(pattern: str, out: str, links: list[str]) -> Iterator[tuple[str, str | None]]:
-    """Files and bags that a pattern names; ``**`` goes through folders as `_walk` does."""
-    parts = Path(pattern).parts
-    first = parts.index("**") if "**" in parts else len(parts)
-    # a pattern may be absolute
-    for match in sorted(glob.glob(str(Path(*parts[:first])))):  # noqa: PTH207
-        if first == len(parts):
-            yield match, None
-        elif Path(match).is_dir():
-            for path, trouble in _walk(Path(match), out, links):
-                if not trouble and _fits(Path(path).relative_to(match).parts, parts[first:]):
-                    yield path, None
+def _is_log(name: str) -> bool:
+    return name.lower().endswith(SUFFIXES)
 
 
-def _fits(parts: Sequence[str], pattern: Sequence[str]) -> bool:
-    """Whether a path's parts fit a pattern's, of which ``**`` stands for any number of folders."""
-    if not pattern:
-        return not parts
-    if pattern[0] == "**":
-        return any(_fits(parts[n:], pattern[1:]) for n in range(len(parts) + 1))
-    return bool(parts) and fnmatchcase(parts[0], pattern[0]) and _fits(parts[1:], pattern[1:])
+def _job_of(path: str, name: str, trouble: str | None, alone: str) -> Job:
+    """The job of one log; one whose name is unfit stands under another."""
+    if not trouble:
+        suffix = max((end for end in SUFFIXES if name.lower().endswith(end)), key=len, default="")
+        name = name[: len(name) - len(suffix)]
+    match = _ROLE.fullmatch(name)
+    name, role = (match["base"], match["role"]) if match else (name, alone)
+    fault = name_fault(name)
+    if fault and not trouble:
+        trouble = f"{redacted_path(path)}: a log's name becomes a folder's: {fault}; rename it"
+    if trouble:
+        return Job(safe_name(name), logs=(path,), trouble=trouble)
+    logs, loaded = ((), (path,)) if role == "loaded" else ((path,), ())
+    return Job(name, logs, loaded, robot=name.rpartition("/")[0] or None)
 
 
-def _is_bag(path: Path) -> bool:
-    return path.is_dir() and (path / BAG).is_file()
-
-
-def _is_log(path: str) -> bool:
-    return path.lower().endswith(SUFFIXES) or _is_bag(Path(path))
-
-
-def _stem(name: str) -> str:
-    suffix = max((end for end in SUFFIXES if name.lower().endswith(end)), key=len, default="")
-    return name[: len(name) - len(suffix)]
-
-
-def _paired(found: Iterable[Found], alone: str) -> list[Job]:
-    """A job for each name of logs that differ in their role alone.
-
-    One whose name is unfit stands under another.
-    """
-    jobs: dict[str, Job] = {}
-    for path, stem, trouble in found:
-        match = _ROLE.fullmatch(stem)
-        name, role = (match["base"], match["role"]) if match else (stem, alone)
-        fault = None if trouble else name_fault(name)
-        if fault is not None:
-            trouble = f"{redacted_path(path)}: a log's name becomes a folder's: {fault}; rename it"
-        if trouble:
-            job = Job(safe_name(name), logs=(path,), trouble=trouble)
-        else:
-            logs, loaded = ((), (path,)) if role == "loaded" else ((path,), ())
-            job = Job(name, logs, loaded, robot=name.rpartition("/")[0] or None)
-        first = jobs.get(job.name)
-        if first and (first.trouble or (first.logs and job.logs) or (first.loaded and job.loaded)):
-            job = _of_one_name(first, job)
-        elif first:
-            job = replace(first, logs=first.logs + job.logs, loaded=first.loaded + job.loaded)
-        jobs[job.name] = job
-    return list(jobs.values())
-
-
-def _of_one_name(first: Job, second: Job) -> Job:
-    """What stands for two jobs of one name: it cannot be run."""
-    logs = tuple(dict.fromkeys(first.logs + second.logs))
-    loaded = tuple(dict.fromkeys(first.loaded + second.loaded))
+def _together(first: Job, second: Job) -> Job:
+    """One job of two of one name: logs of both roles, or one that cannot be run."""
+    pairs = ((first.logs, second.logs), (first.loaded, second.loaded))
+    logs, loaded = (tuple(dict.fromkeys(one + other)) for one, other in pairs)
+    both = replace(first, logs=logs, loaded=loaded)
+    fits = all(one == other or not (one and other) for one, other in pairs)
+    if fits and replace(second, logs=logs, loaded=loaded) == both:
+        return both
     paths = ", ".join(map(redacted_path, (logs + loaded)[:MOST_NAMED]))
-    trouble = (
-        f"{first.name}: two jobs of one name ({paths}); rename a log, or name the jobs in a "
-        "manifest"
-    )
-    return replace(first, logs=logs, loaded=loaded, trouble=trouble)
+    remedy = "rename a log, or name the jobs in a manifest"
+    return replace(both, trouble=f"{first.name}: two jobs of one name ({paths}); {remedy}")

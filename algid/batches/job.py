@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import os
 import shutil
 import time
 from contextlib import nullcontext
@@ -22,7 +23,7 @@ from algid.base.files import refuse_links, sha256_of, temporary_folder
 from algid.base.runtime import keep_freed, keep_to_one_core
 from algid.base.stores import is_url, open_store, public, put_folder, reading
 from algid.batches.jobs import Job, redacted_path
-from algid.batches.records import Input, JobRecord, JobStatus, hash_of, stat_of
+from algid.batches.records import Input, JobRecord, JobStatus, stat_of
 from algid.identification.identify import identify
 from algid.identification.open_logs import Staged
 from algid.options import flag
@@ -32,8 +33,8 @@ from algid.settings import Settings
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-NO_SPACE = {errno.ENOSPC, errno.EDQUOT}
-NO_SPACE_LEFT = "No space left on device"  # what libraries say that raise exceptions of their own
+FULL = (os.strerror(errno.ENOSPC), os.strerror(errno.EDQUOT))
+"""What is said of a full disk, by libraries with exceptions of their own too."""
 TOO_LARGE = f"it needs more memory than a worker has; raise {flag('memory_limit')}"
 _PIECE = 1 << 23
 
@@ -92,7 +93,6 @@ def run_task(task: Task) -> JobRecord | str:
         if is_full(error):
             return text_of(error)
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
-        inputs = tuple(replace(one, sha256=hash_of(one.path)) for one in inputs)
         seconds = time.perf_counter() - start
         return task.record(JobStatus.FAILED, reason, inputs=inputs, seconds=seconds)
     judged, hashes = result.verdict, {log.path: log.sha256 for log in result.logs}
@@ -128,9 +128,7 @@ def run_task(task: Task) -> JobRecord | str:
 
 def is_full(error: BaseException) -> bool:
     """Whether there was no space left, as an exception or what it came from says."""
-    chain = list(chain_of(error))
-    numbers = {one.errno for one in chain if isinstance(one, OSError)}
-    return not numbers.isdisjoint(NO_SPACE) or any(NO_SPACE_LEFT in text_of(one) for one in chain)
+    return any(words in text_of(one) for one in chain_of(error) for words in FULL)
 
 
 def redacted(job: Job) -> Job:

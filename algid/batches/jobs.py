@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from algid.base.limits import LIMITS
 from algid.base.stores import public
@@ -17,6 +18,7 @@ Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 """What a column of the table can hold."""
 Label = str | Finite | Int64 | bool
+Time = Annotated[str, BeforeValidator(lambda cell: utc_of(str(cell)).isoformat())]
 TABLE = "jobs.parquet"
 """The table of all jobs, in OUT."""
 _TAKEN = (".algid", ".json")
@@ -44,7 +46,7 @@ class Job:
     loaded: tuple[str, ...] = ()
     profile: str | None = None
     robot: str | None = None
-    time: str | None = None
+    time: Time | None = None
     labels: Mapping[str, Label] = field(default_factory=dict)
     trouble: str | None = None
 
@@ -88,11 +90,9 @@ def utc_of(text: str) -> datetime:
     ValueError
         If it is none, or none that stamps in int64 nanoseconds can name: from 1970 to 2261.
     """
-    taken = datetime.fromisoformat(text)
-    try:
-        taken = taken.replace(tzinfo=UTC) if taken.tzinfo is None else taken.astimezone(UTC)
-    except OverflowError as error:
-        raise ValueError(str(error)) from error
-    if not 1970 <= taken.year <= 2261:
-        raise ValueError("it lies before 1970 or after 2261")
-    return taken
+    with suppress(ValueError, OverflowError):
+        taken = datetime.fromisoformat(text)
+        taken = taken.replace(tzinfo=taken.tzinfo or UTC).astimezone(UTC)
+        if 1970 <= taken.year <= 2261:
+            return taken
+    raise ValueError("expected ISO 8601 like 2026-01-31T12:00:00Z, from 1970 to 2261")

@@ -10,27 +10,34 @@ from __future__ import annotations
 import csv
 import io
 import math
-from datetime import date, datetime
+from contextlib import suppress
+from datetime import date
 from datetime import time as clock
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 
 from algid.base.errors import SettingError
-from algid.base.files import first_misfit, parsed_toml, read_start, read_text
+from algid.base.files import first_misfit, read_start, read_text, toml_content
 from algid.base.limits import LIMITS
 from algid.base.text import visible
 from algid.base.words import repeated
-from algid.batches.jobs import Job, Label, name_fault, utc_of
+from algid.batches.jobs import Job, Label, Time, name_fault
 
 
 def is_manifest(path: Path) -> bool:
     """Whether a source is a manifest: TOML, or CSV with columns name and logs or loaded."""
-    if path.suffix.lower() == ".toml":
-        return True
     if path.suffix.lower() != ".csv" or not path.is_file():
-        return False
+        return path.suffix.lower() == ".toml"
     # logs too come by here
     head = read_start(path, LIMITS.line_bytes).decode("utf-8-sig", errors="replace")
     columns = next(csv.reader(head.splitlines()[:1]), [])
@@ -45,52 +52,35 @@ def read_manifest(path: Path) -> list[Job]:
     SettingError
         If it cannot be read or a row is wrong.
     """
-    kind = "job" if path.suffix.lower() == ".toml" else "row"
+    kind, more = "row", dict[str, Any]()
+    if path.suffix.lower() == ".toml":
+        kind, more = "job", toml_content(path)
+        rows = more.pop("job", None)
+        if more or not isinstance(rows, list):
+            keys = visible(", ".join(more), 200)
+            raise SettingError(f"{path}: expected tables [[job]] alone, found {keys or 'none'}")
+    else:
+        try:
+            rows = _cells(path)
+        except (OSError, csv.Error, ValueError) as error:
+            raise SettingError(
+                f"{path}: the manifest cannot be read ({error!s:.200}); mend it"
+            ) from error
     try:
-        rows = _tables(path) if kind == "job" else _cells(path)
-    except (OSError, csv.Error, ValueError, RecursionError) as error:
-        raise SettingError(
-            f"{path}: the manifest cannot be read ({error!s:.200}); mend it"
-        ) from error
-    labels = {name for row in rows for name in row}
-    if len(labels) > LIMITS.columns:
-        raise SettingError(
-            f"{path}: expected labels of at most {LIMITS.columns} names, found {len(labels)}"
-        )
-    jobs = []
-    for number, row in enumerate(rows, start=1):
-        why = f"expected a name and logs, found {', '.join(row) or 'nothing'}"
-        if "name" in row and row.keys() & {"logs", "loaded"}:
-            try:
-                jobs.append(_Row.model_validate(row).job(path.parent))
-                continue
-            except ValidationError as error:
-                why = first_misfit(error)
-        raise SettingError(f"{path}: {kind} {number}: {visible(why, 300)}")
-    return jobs
-
-
-def _tables(path: Path) -> list[dict[str, Any]]:
-    content = parsed_toml(read_text(path))
-    rows = content.get("job")
-    tables = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
-    if set(content) != {"job"} or not tables:
-        keys = visible(", ".join(content) or "nothing", 200)
-        raise SettingError(f"{path}: expected tables [[job]] alone, found {keys}")
-    return rows  # type: ignore[return-value]
+        jobs = _ROWS.validate_python({f"{kind} {n}": row for n, row in enumerate(rows, start=1)})
+    except ValidationError as error:
+        raise SettingError(f"{path}: {visible(first_misfit(error), 300)}") from error
+    return [row.job(path.parent) for row in jobs.values()]
 
 
 def _cells(path: Path) -> list[dict[str, Any]]:
-    reader = csv.DictReader(io.StringIO(read_text(path, "utf-8-sig")))
+    """The cells of each row by column, but those that are empty."""
+    text = io.StringIO(read_text(path, "utf-8-sig"))
+    reader = csv.DictReader(text, restkey="cells beyond the header")
     twice = repeated(filter(None, reader.fieldnames or ()))
     if twice:
-        raise SettingError(f"{path}: two columns are named {twice[0]!r:.60}; rename one")
-    cells = list(reader)
-    if any(None in row for row in cells):
-        raise SettingError(
-            f"{path}: a row has more cells than the header; quote commas within a cell"
-        )
-    return [{name: cell for name, cell in row.items() if cell} for row in cells]
+        raise ValueError(f"two columns are named {twice[0]!r:.60}")
+    return [{name: cell for name, cell in row.items() if cell} for row in reader]
 
 
 def label_of(value: object) -> Label:
@@ -99,22 +89,18 @@ def label_of(value: object) -> Label:
     Raises
     ------
     ValueError
-        If it is neither text, a date, a truth value nor a finite number, or a whole one beyond 64
-        bits.
+        If it is neither text, a date, a truth value nor a number that a column can hold.
     """
-    if isinstance(value, str):
-        try:
-            number = float(value)
-        except ValueError:
-            return value
-        return number if math.isfinite(number) else value
     if isinstance(value, date | clock):
         return str(value)
-    whole = isinstance(value, int) and -(2**63) <= value < 2**63
-    if whole or (isinstance(value, float) and math.isfinite(value)):
-        return value  # type: ignore[return-value]
-    expected = "text, a date, true, false or a finite number, whole ones of 64 bits"
-    raise ValueError(f"expected {expected}")
+    if isinstance(value, str):
+        with suppress(ValueError):
+            if math.isfinite(number := float(value)):
+                return number
+        return value
+    if isinstance(value, int | float) and abs(value) < 2**63:
+        return value
+    raise ValueError("expected text, a date, true, false or a number below 2^63")
 
 
 def _name(name: str) -> str:
@@ -123,27 +109,10 @@ def _name(name: str) -> str:
     return name
 
 
-def _paths(cell: object) -> list[str]:
-    parts = cell.split(";") if isinstance(cell, str) else cell
-    if not isinstance(parts, list) or not all(map(_is_path, parts)):
-        raise ValueError("expected paths")
-    return [part.strip() for part in parts]
-
-
-def _is_path(part: object) -> bool:
-    return isinstance(part, str) and bool(part.strip()) and "\0" not in part
-
-
-def _time(cell: object) -> str:
-    try:
-        utc_of(str(cell))
-        return datetime.fromisoformat(str(cell)).isoformat()
-    except ValueError as error:
-        expected = "expected ISO 8601 like 2026-01-31T12:00:00Z, from 1970 to 2261"
-        raise ValueError(expected) from error
-
-
-_Paths = Annotated[list[str], BeforeValidator(_paths)]
+_Path = Annotated[str, Field(strict=True, pattern=r"^[^\x00]*[^\x00\s][^\x00]*$")]
+_Paths = Annotated[
+    list[_Path], BeforeValidator(lambda cell: cell.split(";") if isinstance(cell, str) else cell)
+]
 
 
 class _Row(BaseModel, extra="allow", coerce_numbers_to_str=True):
@@ -153,16 +122,27 @@ class _Row(BaseModel, extra="allow", coerce_numbers_to_str=True):
     name: Annotated[str, AfterValidator(_name)]
     logs: _Paths = []
     loaded: _Paths = []
-    profile: _Paths = []
+    profile: _Path | None = None
     robot: str | None = None
-    time: Annotated[str, BeforeValidator(_time)] | None = None
+    time: Time | None = None
+
+    @model_validator(mode="after")
+    def _has_logs(self) -> _Row:
+        if not (self.logs or self.loaded):
+            raise ValueError("expected logs, or loaded ones")
+        return self
 
     def job(self, folder: Path) -> Job:
         """The job, its paths as seen from `folder`."""
 
-        def placed(paths: list[str]) -> tuple[str, ...]:
-            return tuple(path if "://" in path else str(folder / path) for path in paths)
+        def placed(path: str) -> str:
+            path = path.strip()
+            return path if "://" in path else str(folder / path)
 
-        logs, loaded, profile = map(placed, (self.logs, self.loaded, self.profile))
-        own = {"profile": profile[0] if profile else None, "robot": self.robot, "time": self.time}
-        return Job(self.name, logs, loaded, labels=self.__pydantic_extra__, **own)
+        logs, loaded = (tuple(map(placed, paths)) for paths in (self.logs, self.loaded))
+        profile = self.profile and placed(self.profile)
+        labels = self.__pydantic_extra__
+        return Job(self.name, logs, loaded, profile, self.robot, self.time, labels)
+
+
+_ROWS = TypeAdapter(dict[str, _Row])

@@ -9,38 +9,33 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from algid import __version__
 from algid.base.errors import AlgidError, OutputError, SettingError, text_of
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store
-from algid.batches.job import Task, is_full, redacted, run_task
+from algid.batches.job import Task, inputs_of, is_full, redacted, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
     FAILURES,
     Input,
     JobRecord,
     JobStatus,
-    make_folders,
     read_records,
     record_name,
     stat_of,
-    unchanged,
     write_record,
 )
 from algid.batches.table import write_jobs
 from algid.batches.workers import CallFailedError, WorkerDiedError
-from algid.options import flag
 from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
 
-MOST_KILLS = 3
 RUN_AGAIN = "run again: what is finished is kept"
 MAKE_ROOM = f"make room and {RUN_AGAIN}"
 LOOK_EVERY = 2.0  # s, for logs that have arrived
@@ -102,7 +97,7 @@ class Batch:
     Parameters
     ----------
     store : OUT
-    recipe : what its jobs share
+    config : what its jobs share
     executor : who runs them
     slots : how many are handed out at once
     progress : called with the record of each job that ends, and how many of how many have
@@ -112,22 +107,20 @@ class Batch:
     def __init__(
         self,
         store: Store,
-        recipe: BatchConfig,
+        config: BatchConfig,
         executor: Executor,
         slots: int,
         progress: Callable[[JobRecord, int, int], object],
         shared: bool = False,
     ) -> None:
         self._shared = shared
-        self._store, self._recipe, self._executor = store, recipe, executor
+        self._store, self._config, self._executor = store, config, executor
         self._slots, self._progress = slots, progress
-        self._kills: Counter[str] = Counter()
         self._stopped: str | None = None
         self._ran = 0
         self._written = False
         self.stop = threading.Event()
         """If set, `run` returns at once; running jobs are left to whoever ends the executor."""
-        make_folders(store)
         self.anew = Counter[str]()
         """Jobs that had ended and were run again, by why."""
         self.records, self.unreadable = read_records(store)
@@ -141,38 +134,31 @@ class Batch:
         which it cannot be known whether its logs and results are as they were fails this time and
         keeps what is known of it.
         """
-        waiting, unreachable = deque[Task](), dict[str, JobRecord]()
+        waiting, unreachable, config = deque[Task](), dict[str, JobRecord](), self._config
         for job in jobs:
-            before, trouble, of = self.records.get(job.name), job.trouble, self._recipe
-            profile = None
+            before, profile = self.records.get(job.name), None
             try:
-                if trouble is None:
-                    profile = of.profile(job.profile)
+                if job.trouble is None:
+                    profile = config.profile(job.profile)
             except SettingError as error:
-                trouble = str(error)
-            task = Task(job, of.settings, profile, of.parameters, of.out, of.report)
-            if not (job.logs or of.parameters or trouble):
-                trouble = (
-                    f"{', '.join(job.loaded)}: a loaded log alone; add the arm's log without "
-                    f"payload, named {job.name}-unloaded.*, or give the arm's result as "
-                    f"{flag('parameters')}"
-                )
-            if trouble is not None:
-                ended = task.record(JobStatus.FAILED, trouble)
+                job = replace(job, trouble=str(error))
+            task = Task(job, config.settings, profile, config.parameters, config.out, config.report)
+            if job.trouble is not None:
+                ended = task.record(JobStatus.FAILED, job.trouble)
             elif before is None:
                 waiting.append(task)
                 continue
             else:
                 try:
-                    known = self._up_to_date(before, task, retry_failed)
+                    why = self._why_anew(before, task, retry_failed)
                 except AlgidError as error:
                     unreachable[job.name] = task.record(JobStatus.FAILED, str(error))
                     continue
-                if not isinstance(known, JobRecord):
-                    self.anew[known] += 1
+                if why:
+                    self.anew[why] += 1
                     waiting.append(task)
                     continue
-                ended = known
+                ended = replace(before, job=redacted(job))
             if ended != before:
                 self._keep(ended)
         left = self._work(waiting)
@@ -196,46 +182,49 @@ class Batch:
     ) -> Batched:
         """Run what is found until stopped.
 
-        Nothing but settled logs are taken, and a trouble is reported once.
+        Logs are taken once they are as the last look has seen them and hold something: others are
+        still being written. A trouble is reported once.
         """
-        settling, complaint = StableFiles(), ""
+        before, complaint = dict[str, tuple[Input, ...]](), ""
         ended = self.run([])
         while not self.stop.is_set():
             jobs = list[Job]()
             try:
-                jobs = settling.settled(look())
+                jobs = look()
             except AlgidError as error:  # a store may be away for a while
                 if str(error) != complaint and complain is not None:
                     complain(str(error))
                 complaint = str(error)
-            if jobs:
-                ended, retry_failed = self.run(jobs, retry_failed), False
+            now = {job.name: inputs_of(job) for job in jobs}
+            settled = list[Job]()
+            for job in jobs:
+                held = job.trouble or all(one.size for one in now[job.name])
+                if held and now[job.name] == before.get(job.name):
+                    settled.append(job)
+            if settled:
+                ended, retry_failed = self.run(settled, retry_failed), False
+            before = now
             self.stop.wait(LOOK_EVERY)
         return ended
 
-    def _up_to_date(self, record: JobRecord, task: Task, retry_failed: bool) -> JobRecord | str:
-        """The record with its job and logs as they are now, or why its job is run anew.
+    def _why_anew(self, record: JobRecord, task: Task, retry_failed: bool) -> str:
+        """Why a job that has ended is run anew; empty where its record stands.
 
-        Times of change that moved while the content did not are stored, so that it is hashed once
-        for them.
+        Raises
+        ------
+        AlgidError
+            If that cannot be known.
         """
-        job = redacted(task.job)
         if retry_failed and record.status in FAILURES:
             return "failed before"
         if record.basis != task.basis:
             other = record.version != __version__
             return f"of algid {record.version}" if other else "of other settings"
-        if record.has_result and not self._store.exists(f"{job.name}.algid/result.json"):
+        if record.has_result and not self._store.exists(f"{task.job.name}.algid/result.json"):
             return "without their result"
-        if (record.job.logs, record.job.loaded) != (job.logs, job.loaded):
-            return "of other logs"
-        found = list[Input]()
-        for before, path in zip(record.inputs, task.job.logs + task.job.loaded, strict=True):
-            now = unchanged(before, path)
-            if now is None:
-                return "of other logs"
-            found.append(now)
-        return replace(record, job=job, inputs=tuple(found))
+        inputs = tuple(map(stat_of, task.job.logs + task.job.loaded))
+        same = (record.job.logs, record.inputs) == (redacted(task.job).logs, inputs)
+        return "" if same else "of other logs"
 
     def _work(self, waiting: deque[Task]) -> int:
         """Run tasks; how many are left where the batch was stopped."""
@@ -258,17 +247,14 @@ class Batch:
         return len(waiting) + len(running)
 
     def _record(self, task: Task, future: Future[Any]) -> JobRecord | None:
-        """How the task ended, or None where it is to be run again."""
+        """How the task ended, or None where the batch cannot go on, which is no job's fault."""
         try:
             ended: JobRecord | str = future.result()
         except WorkerDiedError as died:
-            self._kills[task.job.name] += 1
-            if self._kills[task.job.name] < MOST_KILLS:
-                return None
-            return task.record(JobStatus.KILLED, f"it took its worker with it: {died}")
+            return task.record(JobStatus.KILLED, str(died))
         except CallFailedError as failed:
             return task.record(JobStatus.FAILED, str(failed))
-        except Exception as error:  # no job's fault: no process can be started, a cluster is lost
+        except Exception as error:  # no process can be started, a cluster is lost
             self._stop_because(f"{text_of(error)}; {RUN_AGAIN}")
             return None
         if isinstance(ended, JobRecord):
@@ -278,23 +264,21 @@ class Batch:
 
     def _keep(self, record: JobRecord) -> bool:
         """Write a record; where its job failed on other logs than before, their result goes."""
-        before = self.records.get(record.job.name)
-        if before is not None and not record.has_result:
-            pairs = zip(before.inputs, record.inputs, strict=False)
-            same = len(before.inputs) == len(record.inputs)
-            try:
-                if not (same and all(one.same_as(other) for one, other in pairs)):
-                    self._store.remove(f"{record.job.name}.algid")
-            except OutputError as error:
-                stays = f"; the result of what its log held before stays: {error}"
-                record = replace(record, reason=record.reason + stays)
+        name = record.job.name
+        before = self.records.get(name, record)
+        try:
+            if not record.has_result and before.inputs != record.inputs:
+                self._store.remove(f"{name}.algid")
+        except OutputError as error:
+            stays = f"; the result of what its log held before stays: {error}"
+            record = replace(record, reason=record.reason + stays)
         try:
             write_record(self._store, record)
         except OutputError as error:
             self._cannot_go_on(error)
             return False
-        self.records[record.job.name] = record
-        self.unreadable.pop(record_name(record.job.name), None)
+        self.records[name] = record
+        self.unreadable.pop(record_name(name), None)
         self._written = False
         return True
 
@@ -306,42 +290,20 @@ class Batch:
         self.stop.set()
 
 
-class StableFiles:
-    """Find jobs whose logs are unchanged since the last look: others are still being written."""
-
-    def __init__(self) -> None:
-        self._before: dict[str, list[Input] | None] = {}
-
-    def settled(self, jobs: Sequence[Job]) -> list[Job]:
-        """Those of `jobs` whose logs are as the last call saw them, and hold something."""
-        before, self._before, still = self._before, {}, []
-        for job in jobs:
-            now = None
-            with suppress(AlgidError):  # whoever reads it says why it cannot be looked at
-                now = list(map(stat_of, job.logs + job.loaded))
-            self._before[job.name] = now
-            held = now is None or all(one.size for one in now)
-            if held and job.name in before and before[job.name] == now:
-                still.append(job)
-        return still
-
-
 @contextmanager
 def stopped_by_signals(stop: threading.Event) -> Iterator[None]:
     """Ctrl-C and SIGTERM set `stop`; signals of other threads are left to the main one."""
-
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        stop.set()
-
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [(number, signal.signal(number, handle)) for number in numbers]
+    before = {
+        number: signal.signal(number, lambda *_: stop.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:
-        for number, handler in before:
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 

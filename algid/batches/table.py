@@ -10,13 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from algid.base.stores import Store
 from algid.batches.jobs import TABLE, utc_of
-from algid.batches.records import COLUMNS, JobRecord
+from algid.batches.records import JobRecord
 
 if TYPE_CHECKING:
     import polars as pl
 
-_OF_LOGS = {"logs": "path", "sha256": "sha256", "size": "size", "changed": "mtime_ns"}
-"""By column of lists the field of each log."""
+COLUMNS = (
+    *("job", "robot", "time", "status", "reason", "seconds"),
+    *("log_seconds", "verdict", "headline", "reasons", "command", "estimator"),
+    *("version", "settings", "logs", "sha256", "size", "changed"),
+)
+"""Columns that every table has."""
+_OF_LOGS = (("logs", "path"), ("sha256", "sha256"), ("size", "size"), ("changed", "mtime_ns"))
+"""Columns of lists, and the field of each log."""
 FIRST_EPOCH_NS = 10**17  # stamps before 1973 count from some start, not from 1970
 
 
@@ -38,39 +44,34 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     """
     import polars as pl
 
-    rows = []
-    for one in records:
-        row: dict[str, Any] = {**vars(one), "status": one.status.value, "reasons": [*one.reasons]}
-        row |= {"job": one.job.name, "robot": one.job.robot, "time": time_of(one)}
-        row["settings"] = json.dumps(one.settings, sort_keys=True)
-        for column, name in _OF_LOGS.items():
-            row[column] = [getattr(log, name) for log in one.inputs]
-        # a file's time of change may be any
-        row["changed"] = [ns if abs(ns) < 2**63 else None for ns in row["changed"]]
-        rows.append(row)
-    texts, numbers, instant = pl.List(pl.String), pl.List(pl.Int64), pl.Datetime("ns", "UTC")
+    texts, sizes, times = pl.List(pl.String), pl.List(pl.Int64), pl.List(pl.Datetime("ns", "UTC"))
     kinds: dict[str, Any] = dict.fromkeys(COLUMNS, pl.String)
     kinds |= {"time": pl.Datetime("us", "UTC"), "seconds": pl.Float64, "log_seconds": pl.Float64}
-    kinds |= {"reasons": texts, "logs": texts, "sha256": texts, "size": numbers, "changed": numbers}
-    columns = {
-        name: pl.Series([row[name] for row in rows], dtype=kind) for name, kind in kinds.items()
-    }
-    columns["changed"] = columns["changed"].cast(pl.List(instant))
-    for name in sorted({name for one in records for name in one.job.labels}):
-        labels = [one.job.labels.get(name) for one in records]
-        if all(label is None or type(label) in (int, float) for label in labels):
-            columns[f"label_{name}"] = pl.Series(labels, dtype=pl.Float64, strict=False)
-        else:
-            words = [None if label is None else str(label) for label in labels]
-            columns[f"label_{name}"] = pl.Series(words, dtype=pl.String)
+    kinds |= {"reasons": texts, "logs": texts, "sha256": texts, "size": sizes, "changed": times}
+    rows = list[dict[str, Any]]()
+    labels = {name for one in records for name in one.job.labels}
+    words = set[str]()  # labels that are not numbers in every job
+    for one in records:
+        words |= {name for name, label in one.job.labels.items() if type(label) in (str, bool)}
+    for name in sorted(labels):
+        kinds[f"label_{name}"] = pl.String if name in words else pl.Float64
     for name in sorted({name for one in records for name in one.estimates}):
-        values, errors, states = zip(
-            *(one.estimates.get(name, (None, None, None)) for one in records), strict=True
-        )
-        columns[name] = pl.Series(values, dtype=pl.Float64)
-        columns[f"{name}_std"] = pl.Series(errors, dtype=pl.Float64)
-        columns[f"{name}_status"] = pl.Series(states, dtype=pl.String)
-    return pl.DataFrame(columns)
+        kinds |= {name: pl.Float64, f"{name}_std": pl.Float64, f"{name}_status": pl.String}
+    for one in records:
+        row: dict[str, Any] = {**vars(one), "job": one.job.name, "robot": one.job.robot}
+        row |= {"time": time_of(one), "settings": json.dumps(one.settings, sort_keys=True)}
+        row |= {column: [getattr(log, name) for log in one.inputs] for column, name in _OF_LOGS}
+        for name, label in one.job.labels.items():
+            row[f"label_{name}"] = str(label) if name in words else label
+        for name, numbers in one.estimates.items():
+            row |= zip((name, f"{name}_std", f"{name}_status"), numbers, strict=True)
+        rows.append(row)
+    return pl.DataFrame(
+        [
+            pl.Series(name, [row.get(name) for row in rows], kind, strict=False)
+            for name, kind in kinds.items()
+        ]
+    )
 
 
 def time_of(record: JobRecord) -> datetime | None:

@@ -28,18 +28,19 @@ THREADS = (
     *("POLARS_MAX_THREADS", "ARROW_NUM_THREADS"),
 )
 """One thread a worker: more would fight for the same cores."""
+MOST_KILLS = 3
 TOO_LONG = (
     f"it took longer than {{:g}} s; raise {flag('timeout')}, and run it again with "
     f"{flag('retry_failed')}"
 )
 
 
-class WorkerDiedError(Exception):
-    """The process that ran a call is gone, and it is not known that the call was at fault."""
-
-
 class CallFailedError(Exception):
     """A call raised an exception, took too long or broke its process; its text says which."""
+
+
+class WorkerDiedError(CallFailedError):
+    """Every process that ran the call is gone, and it is not known that the call was at fault."""
 
 
 class Workers(ThreadPoolExecutor):
@@ -53,8 +54,9 @@ class Workers(ThreadPoolExecutor):
 
     Notes
     -----
-    A future fails with `WorkerDiedError` where its call's process is killed, and with
-    `CallFailedError` where the call raises, breaks its process, or takes longer than `timeout`.
+    A call whose process is killed runs in another, `MOST_KILLS` times at most: then its future
+    fails with `WorkerDiedError`. It does with `CallFailedError` where the call raises, breaks its
+    process, or takes longer than `timeout`.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class Workers(ThreadPoolExecutor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Run ``fn(*args, **kwargs)`` in a worker."""
-        return super().submit(self._answer, fn, args, kwargs)
+        return super().submit(self._answer, (fn, args, kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
         """End the workers at once, whatever they do."""
@@ -97,7 +99,7 @@ class Workers(ThreadPoolExecutor):
         if self._stopped:  # it was not yet there to be killed
             self._slot.process.kill()
 
-    def _answer(self, *call: Any) -> Any:
+    def _answer(self, call: tuple[Any, ...], kills: int = 1) -> Any:
         """What a call gives in this thread's process."""
         slot, notes, reason = self._slot, Notes(), None
         try:
@@ -126,8 +128,10 @@ class Workers(ThreadPoolExecutor):
             reason = notes.end(number)[1]
         if reason is not None:
             raise CallFailedError(reason)
+        if kills < MOST_KILLS and not self._stopped:
+            return self._answer(call, kills + 1)
         how = f"exit code {-number}" if number <= 0 else signal.Signals(number).name
-        raise WorkerDiedError(f"the worker was ended by {how}")
+        raise WorkerDiedError(f"it took its worker with it: the worker was ended by {how}")
 
 
 def serve() -> None:

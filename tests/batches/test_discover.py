@@ -126,14 +126,14 @@ def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
         ("**/*.mcap", ["a", "b"]),
         ("**/y/*", ["b", "c"]),
         ("x/**", ["a", "b", "bag", "c"]),
-        ("**/x/**/*.csv", ["c"]),
-        ("**/**/[ab].*", ["a", "b"]),
         ("*.txt", ["f.txt"]),
         ("**/f.*", ["f.txt"]),
     ):
         assert [job.name for job in jobs_of([str(tmp_path / pattern)], "out")] == names, pattern
     with pytest.raises(SettingError, match="no such file, folder or match"):
         jobs_of([f"{tmp_path}/**/*.bag"], "out")
+    with pytest.raises(SettingError, match=r"expected one \*\* at most; name the folders"):
+        jobs_of([f"{tmp_path}/**/x/**/*.csv"], "out")
 
 
 def test_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
@@ -165,30 +165,20 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("name,logs\n../x,a.csv\n", "row 1: name: a job's name becomes a folder's"),
-        ("name,logs\nx,\n", "row 1: expected a name and logs"),
-        ("name,logs,time\nx,a.csv,yesterday\n", "row 1: time: expected ISO 8601"),
+        ("name,logs\n../x,a.csv\n", "row 1.name: a job's name becomes a folder's"),
+        ("name,logs\nx,\n", "row 1: expected logs, or loaded ones"),
+        ("name,logs,time\nx,a.csv,yesterday\n", "row 1.time: expected ISO 8601"),
         (
             "name,logs,time\nx,a.csv,0001-01-01T00:00+23:59\n",
-            "row 1: time: expected ISO 8601.* from 1970 to 2261",
+            "row 1.time: expected ISO 8601.* from 1970 to 2261",
         ),
-        (
-            "name,logs\na.algid/b,a.csv\n",
-            "row 1: name: a job's name .* no folder .* ends in .algid",
-        ),
-        (
-            "name,logs\njobs.parquet/b,a.csv\n",
-            "row 1: name: a job's name .* no folder that is jobs.parquet",
-        ),
-        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1: name: a job's name .* at most 1000 bytes"),
-        ("name,logs,logs\nx,a.csv,b.csv\n", "two columns are named 'logs'; rename one"),
-        (
-            "name,logs," + ",".join(map(str, range(5000))) + "\nx,a" + ",1" * 5000,
-            "expected labels of at most 4096 names, found 5002",
-        ),
-        ("name,logs\nx,a,b,c\n", "a row has more cells"),
-        ("name,logs\nx,a.csv;;b.csv\n", "row 1: logs: expected paths, found 'a.csv;;b.csv'"),
-        ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2: logs: expected paths, found"),
+        ("name,logs\na.algid/b,a.csv\n", "row 1.name: a job's name .* ends in .algid"),
+        ("name,logs\njobs.parquet/b,a.csv\n", "row 1.name: .* no folder that is jobs.parquet"),
+        (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1.name: a job's name .* at most 1000 bytes"),
+        ("name,logs,logs\nx,a.csv,b.csv\n", ".*two columns are named 'logs'"),
+        ("name,logs\nx,a,b,c\n", "row 1.cells beyond the header: expected text.*found .'b', 'c'."),
+        ("name,logs\nx,a.csv;;b.csv\n", "row 1.logs.1: .* found ''"),
+        ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2.logs.0: "),
         (
             "name,logs\n" + "x" * 140_000 + ",a.csv\n",
             "the manifest cannot be read \\(field larger than",
@@ -204,44 +194,22 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", r"expected tables \[\[job\]\] alone, found nothing"),
-        ("job = [1]", r"expected tables \[\[job\]\] alone, found job"),
-        (
-            "more = 1\n[[job]]\nname = 'x'\nlogs = 'a.csv'",
-            r"expected tables \[\[job\]\] alone, found more, job",
-        ),
-        ("[[job]]\nlogs = 'a.csv'", "job 1: expected a name and logs, found logs"),
-        (
-            "[[job]]\n\"line\\nfeed\" = 'a.csv'",
-            r"job 1: expected a name and logs, found line\\x0afeed",
-        ),
-        ("[[job]]\nname = 'x'\nlogs = 5", "job 1: logs: expected paths, found 5"),
-        (
-            "[[job]]\nname = 'x'\nlogs = ['a.csv', 5]",
-            r"job 1: logs: expected paths, found \['a.csv', 5\]",
-        ),
-        (
-            "[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']",
-            r"job 1: logs: expected paths, found \['a.csv', ' '\]",
-        ),
-        ("[[job]]\nname = 'x'\nloaded = \"a\\u0000.csv\"", "job 1: loaded: expected paths"),
-        ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1: time: expected ISO 8601"),
-        (
-            "a = " + "[" * 5000 + "]" * 5000,
-            r"the manifest cannot be read \(maximum recursion depth",
-        ),
-        ("[[job", "the manifest cannot be read"),
-        (
-            f"{JOB}payload = 1{'0' * 400}",
-            "job 1: payload: expected text, a date, true, .* 64 bits, found ",
-        ),
-        (
-            f"{JOB}payload = 0x1{'0' * 5000}",
-            "job 1: payload: expected text, a date, true, .* 64 bits, found ",
-        ),
-        (f"{JOB}payload = nan", "job 1: payload: .* finite number"),
-        (f"{JOB}payload = {{a = 1}}", "job 1: payload: .* found {'a': 1}"),
-        (f"{JOB}robot = [1]", r"job 1: robot: .* found \[1\]"),
+        ("", r"expected tables \[\[job\]\] alone, found none"),
+        ("job = [1]", "job 1: .*found 1"),
+        (f"more = 1\n{JOB}", r"expected tables \[\[job\]\] alone, found more"),
+        ("[[job]]\nlogs = 'a.csv'", "job 1.name: field required"),
+        ("[[job]]\nname = 'x'\nlogs = 5", "job 1.logs: expected a valid list, found 5"),
+        ("[[job]]\nname = 'x'\nlogs = ['a.csv', 5]", "job 1.logs.1: .*found 5"),
+        ("[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']", "job 1.logs.1: .*found ' '"),
+        ("[[job]]\nname = 'x'\nloaded = \"a\\u0000.csv\"", "job 1.loaded.0: "),
+        ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1.time: expected ISO 8601"),
+        ("a = " + "[" * 5000 + "]" * 5000, r"not TOML \(maximum recursion depth"),
+        ("[[job", "not TOML"),
+        (f"{JOB}payload = 1{'0' * 400}", "job 1.payload: expected text, a date, .*, found "),
+        (f"{JOB}payload = 0x1{'0' * 5000}", "job 1.payload: expected text, a date, .*, found "),
+        (f"{JOB}payload = nan", "job 1.payload: .* number below"),
+        (f"{JOB}payload = {{a = 1}}", "job 1.payload: .* found {'a': 1}"),
+        (f"{JOB}robot = [1]", r"job 1.robot: .* found \[1\]"),
     ],
 )
 def test_a_bad_manifest_in_toml_is_refused_by_its_place(
@@ -254,7 +222,7 @@ def test_a_bad_manifest_in_toml_is_refused_by_its_place(
 
 def test_a_manifest_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
-        SettingError, match=r"m\.toml: the manifest cannot be read .*No such file.*mend it$"
+        SettingError, match=r"m\.toml: cannot read it .*No such file.*check the name$"
     ):
         jobs_of([str(tmp_path / "m.toml")], "out")
     (tmp_path / "m.csv").write_bytes(b"name,logs\nx,\xff.csv\n")
