@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from algid.api.export import export
     from algid.api.identify import identify
     from algid.api.inspect import inspect
-    from algid.api.read import read_log
+    from algid.api.read import read_log, write_log
     from algid.api.result import Result, read_result
     from algid.api.synth import synthesise
     from algid.api.track import track
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from algid.profile import Profile
     from algid.settings import Settings
     from algid.synth.simulator import simulate
-    from algid.writers import write_log
 
 __version__ = "0.2.0"
 
@@ -80,7 +79,7 @@ _HOMES = {
     "synthesise": "algid.api.synth",
     "track": "algid.api.track",
     "validate": "algid.api.validate",
-    "write_log": "algid.writers",
+    "write_log": "algid.api.read",
 }
 
 

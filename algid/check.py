@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +13,6 @@ from algid.base.errors import ResultError, SettingError
 from algid.base.files import read_toml
 from algid.options import flag
 from algid.results import Result
-from algid.results.model import Table4Row
 
 LARGEST = 1e9
 """Percent."""
@@ -66,50 +65,39 @@ def judge(result: Result, largest: float | str | Path) -> list[Judged]:
     ResultError
         If the result holds no truth to compare with, or no case of the paper.
     """
-    known = [row for row in result.table4 if row.truth is not None]
-    if not known:
+    log, names = result.log.path, [row.parameter for row in result.table4 if row.truth is not None]
+    if not names:
         raise ResultError(
-            f"{result.log.path}: the log holds no true parameters; only synthetic logs can be "
-            "checked"
+            f"{log}: the log holds no true parameters; only synthetic logs can be checked"
         )
-    limits = _limits(result.log.path, known, largest)
-    judged = []
-    for row in result.table4:
-        if row.parameter in limits:
-            judged.append(Judged(row.parameter, row.error_percent, limits[row.parameter]))
-    return judged
-
-
-def _limits(
-    log: str, known: Sequence[Table4Row], largest: float | str | Path
-) -> Mapping[str, float]:
-    """The largest error in percent of the rows whose truth is known, by parameter."""
-    names = [row.parameter for row in known]
+    limits: Mapping[str, float | None]
     if largest == "paper":
-        limits = {}
-        for row in known:
-            if row.paper_error_percent is not None:
-                limits[row.parameter] = row.paper_error_percent
-        if not limits:
+        limits = {row.parameter: row.paper_error_percent for row in result.table4}
+        if not any(limits[name] is not None for name in names):
             raise ResultError(
                 f"{log}: not a case of the paper; give {flag('max_error')} in percent"
             )
-        return limits
-    if str(largest).endswith(".toml"):
-        limits = read_toml(Path(largest), _Tolerances).max_error_percent  # type: ignore[arg-type]
+    elif str(largest).endswith(".toml"):
+        limits = read_toml(Path(str(largest)), _Tolerances).max_error_percent
         for name in limits:
             if name not in names:
                 raise SettingError(
                     f"{largest}: max_error_percent.{name}: expected one of {', '.join(names)}"
                 )
-        return limits
-    try:
-        percent = float(largest)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        percent = -1.0
-    if not 0 <= percent <= LARGEST:
-        raise SettingError(
-            f"{flag('max_error')}: expected a number from 0 to {LARGEST:g}, paper, or a TOML file, "
-            f"found {largest!r:.60}"
-        )
-    return dict.fromkeys(names, percent)
+    else:
+        try:
+            percent = float(largest)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            percent = -1.0
+        if not 0 <= percent <= LARGEST:
+            raise SettingError(
+                f"{flag('max_error')}: expected a number from 0 to {LARGEST:g}, paper, or a TOML "
+                f"file, found {largest!r:.60}"
+            )
+        limits = dict.fromkeys(names, percent)
+    judged = []
+    for row in result.table4:
+        limit = limits.get(row.parameter)
+        if row.truth is not None and limit is not None:
+            judged.append(Judged(row.parameter, row.error_percent, limit))
+    return judged

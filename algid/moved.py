@@ -27,6 +27,7 @@ MOVED: Mapping[str, str] = {
     # keywords of Python
     "synthesise(excitation=…)": "torque=, as the flag",
     "synthesise(kind=…)": "format=, as the flag",
+    "write_log(kind=…)": "format=",
     "design(wanted=…)": "for_=, as the flag --for",
     "batch(profile_for=…)": "leave it out: keywords hold over each log's profile",
 }
@@ -41,23 +42,16 @@ def refuse_moved(arguments: Sequence[str]) -> None:
     SettingError
         If the command, or a flag, has moved: it says what to do instead.
     """
-    words = [word.partition("=")[0] for word in arguments if word.startswith("--")]
-    names = [f"algid {arguments[0]}" if arguments else "", *words]
-    spaced = " ".join(arguments).replace("=", " ")
-    names += [name for name in MOVED if "=" in name and name.replace("=", " ") in spaced]
-    for name in names:
-        _refuse(name)
-        setting = name.removeprefix("--").replace("-", "_")
-        if name.startswith("--") and setting in BY_SET:
-            raise SettingError(f"{name} is not in this version; instead: {flag(setting)}=VALUE")
+    call = f"algid {' '.join(arguments)} ".replace("=", " ")
+    by_set = {f"--{name.replace('_', '-')}": f"{flag(name)}=VALUE" for name in BY_SET}
+    for name, now in {**MOVED, **by_set}.items():
+        if f"{name.replace('=', ' ')} " in call:
+            raise SettingError(f"{name} is not in this version; instead: {now}")
 
 
 def refuse_moved_keywords(verb: str, names: Iterable[str]) -> None:
     """Raise `SettingError` at a keyword of a verb that has moved."""
     for name in names:
-        _refuse(f"{verb}({name}=…)")
-
-
-def _refuse(name: str) -> None:
-    if name in MOVED:
-        raise SettingError(f"{name} is not in this version; instead: {MOVED[name]}")
+        old = f"{verb}({name}=…)"
+        if old in MOVED:
+            raise SettingError(f"{old} is not in this version; instead: {MOVED[old]}")

@@ -11,11 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from algid.base.limits import Range
-
 SET = "--set "
 """Before a setting without a flag of its own."""
-EVERYDAY, ADVANCED = "Options", "Advanced"
+ARGUMENTS, EVERYDAY, ADVANCED = "Arguments", "Options", "Advanced"
 """Panels of a command's help."""
 EVERYDAY_FIELDS = ("angle_unit", "torque_unit", "joints", "zero", "cross_validate")
 """Of settings and profiles; the others are for seldom."""
@@ -53,8 +51,8 @@ class Option:
     ----------
     kind : type
         What is typed, where Python takes more.
-    range : pair of float
-        The least and the largest value of a number.
+    check : type
+        What pydantic holds a value against, and makes of text; its words where there are any.
     panel : str
         Where help shows it.
     flag : str
@@ -75,11 +73,11 @@ class Option:
     """
 
     kind: Any = None
-    range: Range | None = None
+    check: Any = None
     panel: str = ""
     flag: str = ""
     default: Any = None
-    suggested: Callable[[], list[str]] | None = None
+    suggested: Callable[[], Sequence[str]] | None = None
     name: str = ""
     help: str = ""
     words: Sequence[str] = ()

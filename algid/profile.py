@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr, ValidationError
 
@@ -25,10 +25,10 @@ def _usual(unit: object) -> object:
 
 
 if TYPE_CHECKING:  # a type checker cannot read a registry
-    AngleUnit: TypeAlias = str
-    VelocityUnit: TypeAlias = str
-    TorqueUnit: TypeAlias = str
-    TimeUnit: TypeAlias = str
+    AngleUnit = str
+    VelocityUnit = str
+    TorqueUnit = str
+    TimeUnit = str
 else:
     AngleUnit = Annotated[Literal[names_of("angle")], BeforeValidator(_usual)]
     VelocityUnit = Annotated[Literal[names_of("velocity")], BeforeValidator(_usual)]
@@ -347,10 +347,8 @@ def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:
     """
     if not earlier:
         return profile
-    known = with_settings(Profile(), earlier)
-    if profile is None:
-        return known
-    return with_settings(known, profile.model_dump(exclude_unset=True))
+    own = {} if profile is None else profile.model_dump(exclude_unset=True)
+    return with_settings(with_settings(Profile(), earlier), own)
 
 
 def load_profile(path: Path) -> Profile:

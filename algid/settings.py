@@ -19,34 +19,16 @@ from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 from algid.options import Option, flag
 from algid.profile import Effort, PathText, field
 
-if TYPE_CHECKING:  # a type checker cannot read a registry
+if TYPE_CHECKING:
     from algid.signals.shift import TorqueShift
 
     EstimatorName = str
-else:
+else:  # a type checker cannot read a registry
     EstimatorName = Literal[NAMES]
-
-
 OF_BOTH = ("gravity", "effort", "velocity")
 """Settings that a profile has too: there they are of its log's driver and arm."""
 OF_PRIOR = ("prior", "prior_error")
 """The same of its arm alone: they do not say how a log is read."""
-EXTERNAL_GRAVITY = (
-    f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
-    f"{flag('gravity')} out, or say {flag('effort')} gravity-compensated"
-)
-
-
-def refuse_contradictions(given: Mapping[str, Any]) -> None:
-    """Refuse settings, by name as they were given, that cannot both be meant.
-
-    Raises
-    ------
-    SettingError
-        If gravity is given for a torque that has nothing of the arm's weight.
-    """
-    if given.get("effort") == "external" and given.get("gravity") is not None:
-        raise SettingError(EXTERNAL_GRAVITY)
 
 
 def _poles(given: Any) -> object:
@@ -71,7 +53,7 @@ def _poles(given: Any) -> object:
 
 
 def _terms() -> list[str]:
-    from algid.model import CHOICES
+    from algid.model import CHOICES  # numpy
 
     return ["auto", "plain", *CHOICES]
 
@@ -156,7 +138,10 @@ class Settings(BaseModel):
     def model_post_init(self, _context: Any, /) -> None:
         """Refuse what no single field shows."""
         if self.effort == "external" and self.gravity != DEFAULTS["gravity"]:
-            raise SettingError(EXTERNAL_GRAVITY)
+            raise SettingError(
+                f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
+                f"{flag('gravity')} out, or say {flag('effort')} gravity-compensated"
+            )
         if self.model not in ("auto", "plain"):
             self._check_terms()
         self._refuse_what_it_lacks(estimator_of(self.estimator))

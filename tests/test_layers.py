@@ -21,7 +21,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "staging": room("guard"),
     "limits": room(),
     "units": room(),
-    "options": room("limits"),
+    "options": room(),
     "faults": room("errors guard options"),
     "progress": room(),
     "significance": room(),
@@ -105,7 +105,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "api": room(
         "arm batches check designs errors exits exports files fleet identification "
         "inspection limits log methods moved notices options physics profile progress "
-        "readers report results runtime settings stores synth text tracks units words writers",
+        "readers report results runtime settings stores synth text tracks units writers",
         "numpy plotly polars pydantic",
     ),
     "cli": room(

@@ -12,10 +12,6 @@ if TYPE_CHECKING:
     from algid.report.document import Document, Table
 
 
-def _nothing() -> Iterable[str]:
-    return ()
-
-
 class Manual(str):
     """Markdown, which a terminal shows as such."""
 
@@ -26,8 +22,7 @@ class Answer:
 
     Parameters
     ----------
-    shown : callable
-        Gives documents, tables and lines for standard output.
+    shown : documents, tables and lines for standard output
     json : callable, or None
         Gives the same as the text of a JSON file.
     remarks : sequence of str
@@ -37,7 +32,7 @@ class Answer:
     exit : Exit
     """
 
-    shown: Callable[[], Iterable[Document | Table | str]] = _nothing
+    shown: Iterable[Document | Table | str] = ()
     json: Callable[[], str] | None = None
     remarks: Sequence[str] = ()
     complaints: Sequence[str] = ()

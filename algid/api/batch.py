@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,9 +10,19 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
+from pydantic import ByteSize, Field
+
 from algid.api.answer import Answer
-from algid.api.given import opened
-from algid.api.options import OUT, AnyResult, Options, ProfileLike, meant, settings_of
+from algid.api.options import (
+    OUT,
+    AnyResult,
+    Options,
+    ProfileLike,
+    bounded,
+    meant,
+    opened,
+    settings_of,
+)
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
@@ -32,6 +41,8 @@ if TYPE_CHECKING:
 
 UNIT = "jobs"
 """What progress counts."""
+Size = Annotated[str | int, Option(check=Annotated[ByteSize, Field(ge=1 << 29)])]
+Part = Annotated[str, Option(check=Annotated[str, Field(pattern="^[0-9]{1,9}/[0-9]{1,9}$")])]
 Complaint = Callable[[str], None]
 """Hears, in one line, what goes wrong while a batch goes on."""
 
@@ -44,13 +55,13 @@ def batch(
     *,
     parameters: AnyResult | None = None,
     profile: ProfileLike | None = None,
-    workers: Annotated[int, Option(range=(1, 4096))] | None = None,
+    workers: Annotated[int, bounded((1, 4096), int)] | None = None,
     scheduler: str | None = None,
-    memory_limit: str | None = None,
-    timeout: Annotated[float, Option(range=(1e-3, 1e7))] = 3600.0,
+    memory_limit: Size | None = None,
+    timeout: Annotated[float, bounded((1e-3, 1e7))] = 3600.0,
     retry_failed: bool = False,
     watch: bool = False,
-    part: str | None = None,
+    part: Part | None = None,
     report: bool = True,
     progress: Progress | None = None,
     complain: Complaint | None = None,
@@ -133,7 +144,10 @@ def batch(
     if not place.strip():
         raise SettingError("-o: expected a folder or a URL, found none; name where results go")
     store = open_store(place)
-    bytes_each = None if memory_limit is None else bytes_of(memory_limit)
+    if memory_limit is not None and sys.platform == "darwin":
+        raise SettingError(
+            f"{flag('memory_limit')}: macOS does not bound the memory of a process; leave it out"
+        )
     asked, of_profile = settings_of(settings, profile, options)
     said = meant(profile, of_profile)
     known = None if parameters is None else opened(parameters)
@@ -167,11 +181,15 @@ def batch(
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
     if part is not None:
-        jobs = share_of(jobs, part, watch)
+        number, count = map(int, part.split("/"))
+        if watch or not 1 <= number <= count:
+            expected = f"expected 1/N to N/N, and no {flag('watch')}"
+            raise SettingError(f"{flag('part')}: {expected}, found {part!r:.60}")
+        jobs = jobs[number - 1 :: count]
     with locked(place, shared=part is not None):
         sweep(store)
         try:
-            with _workers(place, scheduler, workers, bytes_each, timeout) as (executor, slots):
+            with _workers(place, scheduler, workers, memory_limit, timeout) as (executor, slots):
                 running = Batch(
                     *(store, recipe, executor, slots, ended_job), shared=part is not None
                 )
@@ -216,12 +234,12 @@ def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
         complaints.append(ended.stopped)
     elif ended.interrupted:
         ended_as = Exit.STOPPED
-    return Answer(lambda: lines, complaints=complaints, exit=ended_as)
+    return Answer(lines, complaints=complaints, exit=ended_as)
 
 
 @contextmanager
 def _workers(
-    out: str, scheduler: str | None, workers: int | None, memory_limit: int | None, timeout: float
+    out: str, scheduler: str | None, workers: int | None, memory_limit: Any, timeout: float
 ) -> Iterator[tuple[Executor, int]]:
     """The workers, and how many jobs to hand out at once; they end with the block."""
     from algid.base.runtime import cores
@@ -238,32 +256,3 @@ def _workers(
 
     with cluster(scheduler, None if is_url(out) else Path(out, FOLDER), timeout) as both:
         yield both
-
-
-def share_of(jobs: list[Job], part: str, watch: bool = False) -> list[Job]:
-    """The jobs of a part like ``2/40``, every 40th from the second; raises `SettingError`."""
-    found = re.fullmatch("([0-9]{1,9})/([0-9]{1,9})", part)
-    number, count = map(int, found.groups()) if found else (0, 0)
-    if watch or not 1 <= number <= count:
-        expected = f"expected 1/N to N/N, and no {flag('watch')}"
-        raise SettingError(f"{flag('part')}: {expected}, found {part!r:.60}")
-    return jobs[number - 1 :: count]
-
-
-def bytes_of(text: str) -> int:
-    """A size like ``2GB``; raises `SettingError` where it is none, or too small to work in."""
-    from pydantic import ByteSize, TypeAdapter, ValidationError
-
-    if sys.platform == "darwin":
-        raise SettingError(
-            f"{flag('memory_limit')}: macOS does not bound the memory of a process; leave it out"
-        )
-    try:
-        size = TypeAdapter(ByteSize).validate_python(text.lower().removesuffix("b") + "b")
-    except ValidationError:
-        size = ByteSize(0)
-    if size < 1 << 29:
-        raise SettingError(
-            f"{flag('memory_limit')}: expected at least 512MiB, like 2GB, found {text!r}"
-        )
-    return size

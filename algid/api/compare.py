@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
-from algid.api.given import opened
-from algid.api.options import Force
+from algid.api.options import Force, opened
 from algid.api.signature import verb
 from algid.base.errors import SettingError
-from algid.base.files import refuse_existing
 from algid.options import Option
 from algid.results import Result
 
@@ -78,8 +76,6 @@ def compare(
         )
     if labels is not None and len(labels) != len(given):
         raise SettingError(f"labels: expected {len(given)}, found {len(labels)}")
-    if out is not None:
-        refuse_existing(page_of(Path(out)), force)
     read = [opened(one) for one in given]
     paths = [Path(one) for one in given if not isinstance(one, Result)]
     if labels is None and len(paths) == len(read):
@@ -104,7 +100,7 @@ def page_of(out: Path) -> Path:
 def answer(found: Comparison, given: Mapping[str, Any]) -> Answer:
     """The tables."""
     remarks = [f"wrote {page_of(Path(given['out']))}"] if "out" in given else []
-    return Answer(found.tables, found.as_json, remarks)
+    return Answer(found.tables(), found.as_json, remarks)
 
 
 def labels_of(paths: Sequence[Path]) -> list[str]:

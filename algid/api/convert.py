@@ -11,7 +11,6 @@ from algid.api.options import OUT, Force, LogOptions, ProfileLike, meant
 from algid.api.signature import verb
 from algid.base.errors import OutputError
 from algid.base.exits import exit_of
-from algid.base.files import refuse_existing
 from algid.options import Option
 
 if TYPE_CHECKING:
@@ -79,7 +78,6 @@ def convert(
     target = Path(out)
     if target.suffix.lstrip(".").lower() not in FORMATS:
         raise OutputError(f"{target}: expected a name that ends in .{', .'.join(FORMATS)}")
-    refuse_existing(target, force)
     reader = open_log(source, meant(profile, options))
     notices: list[Notice] = []
 

@@ -7,11 +7,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
-from algid.api.given import called, folder_or_none
-from algid.api.options import AnyLog, Folder, Force, Length, Mass, Seed, cases, meant
+from algid.api.options import (
+    CASES,
+    AnyLog,
+    Folder,
+    Force,
+    Length,
+    Mass,
+    Seed,
+    bounded,
+    called,
+    folder_or_none,
+    meant,
+)
 from algid.api.signature import verb
 from algid.base.exits import exit_of
-from algid.base.files import refuse_existing
 from algid.base.limits import PHYSICAL, PLANNED, PRIOR_ERROR
 from algid.options import Option
 from algid.results import Result
@@ -23,33 +33,33 @@ if TYPE_CHECKING:
 UNIT = "steps"
 """What progress counts."""
 
-Noise = Annotated[float, Option(range=(1e-12, PHYSICAL.noise[1]))]
+Noise = Annotated[float, bounded((1e-12, PHYSICAL.noise[1]))]
 Pair = float | tuple[float, float] | str
 Span = float | tuple[float, float] | str | tuple[tuple[float, float], tuple[float, float]]
 
 
 @verb
 def design(
-    prior: Annotated[Result | str | Path, Option(kind=str, suggested=cases)],
+    prior: Annotated[Result | str | Path, Option(kind=str, suggested=lambda: CASES)],
     *,
     limits: str | Path | None = None,
     range: Span | None = None,  # noqa: A002  # as the flag
     speed: Pair | None = None,
     acceleration: Pair | None = None,
     torque: Pair | None = None,
-    tip_height: Annotated[float, Option(range=PLANNED["tip_height"])] | None = None,
-    duration: Annotated[float, Option(range=PLANNED["duration"])] | None = None,
-    rate: Annotated[float, Option(range=PLANNED["rate"])] | None = None,
+    tip_height: Annotated[float, bounded(PLANNED["tip_height"])] | None = None,
+    duration: float | None = None,
+    rate: float | None = None,
     runs: tuple[int, int] | str | None = None,
     for_: Sequence[str] | str | None = None,
     position_noise: Noise | None = None,
     torque_noise: Noise | None = None,
     noise_from: AnyLog | None = None,
-    prior_error: Annotated[float, Option(range=PRIOR_ERROR)] | None = None,
+    prior_error: Annotated[float, bounded(PRIOR_ERROR)] | None = None,
     payload: Mass | None = None,
     l1: Length | None = None,
     l2: Length | None = None,
-    margin: Annotated[float, Option(range=(0, 0.5))] = 0.05,
+    margin: Annotated[float, bounded((0, 0.5))] = 0.05,
     joints: tuple[str, str] | str = "joint1,joint2",
     seed: Seed = 0,
     out: Folder | None = None,
@@ -154,25 +164,21 @@ def design(
         None if limits is None else Path(limits), {name: own[name] for name in Request.model_fields}
     )
     names, source = meant(None, {"joints": joints}).joints, called(prior)
-    folder = None
-    if out is not None:
-        folder = folder_of(source, Path(out))
-        refuse_existing(folder, force)
-    known = prior_of(
-        prior if isinstance(prior, Result) else source,
-        None if asked.runs is None else bool(asked.runs[1] > 0),
-        PriorKnowledge(l1, l2, payload, None if prior_error is None else prior_error / 100),
-    )
-    log: Any = noise_from
-    if log is not None and not isinstance(log, Log):
-        log = read_log(log)
-    noise = noise_of(known, position_noise, torque_noise, log)
-    campaign = campaign_of(known, asked, noise, for_, margin, seed)
-    if progress is not None:
-        progress("searching", 0, 0)
-    with folder_or_none(folder, force) as temporary:
-        with one_blas_thread():
-            planned = Planned(plan(campaign, progress), source, command, names, known.doubts)
+    folder = None if out is None else folder_of(source, Path(out))
+    with folder_or_none(folder, force) as temporary, one_blas_thread():
+        known = prior_of(
+            prior if isinstance(prior, Result) else source,
+            None if asked.runs is None else bool(asked.runs[1] > 0),
+            PriorKnowledge(l1, l2, payload, None if prior_error is None else prior_error / 100),
+        )
+        log: Any = noise_from
+        if log is not None and not isinstance(log, Log):
+            log = read_log(log)
+        noise = noise_of(known, position_noise, torque_noise, log)
+        campaign = campaign_of(known, asked, noise, for_, margin, seed)
+        if progress is not None:
+            progress("searching", 0, 0)
+        planned = Planned(plan(campaign, progress), source, command, names, known.doubts)
         if temporary is not None:
             write_design(planned, temporary)
     return planned
@@ -180,8 +186,10 @@ def design(
 
 def answer(planned: Planned, given: Mapping[str, Any]) -> Answer:
     """The plan; 3 where a parameter stays open."""
+    from algid.designs.write import Planned
+
     return Answer(
-        lambda: [planned.document()],
+        map(Planned.document, [planned]),
         planned.as_json,
         [f"wrote {folder_of(given['prior'], given['out'])}"],
         exit=exit_of(failed=bool(planned.open_parameters), lost=False),

@@ -8,16 +8,36 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from pydantic import BeforeValidator
+
 from algid.api.answer import Answer
-from algid.api.given import called, numbers, opened
-from algid.api.options import AnyResult, Folder, Force, Length, Mass, Seed
+from algid.api.options import (
+    AnyResult,
+    Folder,
+    Force,
+    Length,
+    Mass,
+    Seed,
+    bounded,
+    called,
+    opened,
+    parts_of,
+    within,
+)
 from algid.api.signature import verb
 from algid.base.errors import SettingError
-from algid.base.files import refuse_existing, whole_file, whole_folder
+from algid.base.files import whole_file, whole_folder
 from algid.options import Option, flag
 
 if TYPE_CHECKING:
     from algid.notices import Notice
+
+
+_Size = Annotated[float, within((-1e3, 1e3))]
+Flange = Annotated[
+    Sequence[float] | str,
+    Option(check=Annotated[tuple[_Size, _Size, _Size], BeforeValidator(parts_of)]),
+]
 
 
 @dataclass(frozen=True)
@@ -52,10 +72,10 @@ def export(
     l2: Length | None = None,
     m1: Mass | None = None,
     m2: Mass | None = None,
-    rotor1: Annotated[float, Option(range=(0, 1e6))] | None = None,
-    draws: Annotated[int, Option(range=(1, 100_000))] | None = None,
+    rotor1: Annotated[float, bounded((0, 1e6))] | None = None,
+    draws: Annotated[int, bounded((1, 100_000), int)] | None = None,
     seed: Seed = 0,
-    flange: Sequence[float] | str | None = None,
+    flange: Flange | None = None,
     out: Folder | None = None,
     force: Force = False,
 ) -> Exported:
@@ -120,12 +140,11 @@ def export(
     if to in ("csv", "parquet") and draws is None:
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
     knowns = Knowns(l1, l2, m1, m2, rotor1)
-    place = None if flange is None else _flange(flange, to)
+    if flange is not None and to != "payload":
+        raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
     path = None if out is None else Path(out)
-    if path is not None:
-        if path == Path() or (path.is_dir() and draws is None):
-            path /= file_of(Path(called(result)), to, draws)
-        refuse_existing(path, force)
+    if path is not None and (path == Path() or (path.is_dir() and draws is None)):
+        path /= file_of(Path(called(result)), to, draws)
     if draws is not None:
         from algid.exports.draws import drawn_files
 
@@ -138,18 +157,11 @@ def export(
     read, file, call = opened(result), called(result), ""
     text, warnings = exported(read, file, to, knowns)
     if to == "payload":
-        call = controller_call(read, file, knowns, place)
+        call = controller_call(read, file, knowns, flange)  # type: ignore[arg-type]  # numbers
     if path is not None:
         with whole_file(path, force=force) as temporary:
             temporary.write_text(text, encoding="utf-8")
     return Exported(text, warnings, path, call=call)
-
-
-def _flange(given: Sequence[float] | str, to: str) -> Any:
-    """A flange's place and direction out of three numbers, or of X,Y,ANGLE."""
-    if to != "payload":
-        raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
-    return numbers("flange", given, (1e3, 1e3, 360.0), "metres and degrees like 0.12,0,-90")
 
 
 def file_of(result: Path, to: str, draws: int | None = None) -> str:
@@ -173,7 +185,7 @@ def file_of(result: Path, to: str, draws: int | None = None) -> str:
 def answer(made: Exported, _given: Mapping[str, Any]) -> Answer:
     """What does not fit, and the file."""
     return Answer(
-        lambda: made.call.splitlines(),
+        made.call.splitlines(),
         remarks=[f"wrote {made.path}"],
         complaints=[one.text for one in made.warnings],
     )

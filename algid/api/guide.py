@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from algid.api.answer import Answer, Manual
 from algid.api.signature import options_of
 from algid.base.errors import SettingError
-from algid.notices import code_of_now, message, messages
+from algid.notices import code_of_now, message
 from algid.options import Option
 
 FOLDER = Path(str(resources.files("algid"))) / "guide"
@@ -22,7 +22,7 @@ TOPICS = (
 """The pages, in their order."""
 
 
-def guide(topic: Annotated[str, Option(suggested=lambda: [*TOPICS])] | None = None) -> str:
+def guide(topic: Annotated[str, Option(suggested=lambda: TOPICS)] | None = None) -> str:
     """Read the guide in the terminal.
 
     Parameters
@@ -63,7 +63,7 @@ def guide(topic: Annotated[str, Option(suggested=lambda: [*TOPICS])] | None = No
 
 def answer(text: str, _given: Mapping[str, Any]) -> Answer:
     """The page."""
-    return Answer(lambda: [Manual(text)])
+    return Answer([Manual(text)])
 
 
 def text_of(topic: str) -> str:
@@ -71,7 +71,28 @@ def text_of(topic: str) -> str:
     text = (FOLDER / f"{topic}.md").read_text(encoding="utf-8")
 
     def table(mark: re.Match[str]) -> str:
-        return str(getattr(_tables(), mark[1])(_registry(mark[1])))
+        from algid.base import exits
+        from algid.base.units import UNITS
+        from algid.methods import ESTIMATORS
+        from algid.moved import MOVED
+        from algid.notices import messages
+        from algid.physics.terms import OPTIONAL
+        from algid.profile import Profile
+        from algid.readers.formats import FORMATS
+        from algid.settings import Settings
+
+        registries: Mapping[str, Any] = {
+            "estimators": ESTIMATORS,
+            "exits": exits,
+            "formats": FORMATS,
+            "messages": messages(),
+            "moved": MOVED,
+            "profile": options_of(Profile),
+            "settings": options_of(Settings),
+            "terms": OPTIONAL,
+            "units": UNITS,
+        }
+        return str(getattr(_tables(), mark[1])(registries[mark[1]]))
 
     return re.sub(r"<!-- (\w+) -->\n", table, text)
 
@@ -81,40 +102,3 @@ def _tables() -> Any:
     from algid.exports.templating import template
 
     return template(FOLDER / "tables.md.j2").module
-
-
-def _registry(mark: str) -> Any:
-    """What a table is made of."""
-    if mark == "exits":
-        from algid.base import exits
-
-        return exits
-    if mark == "units":
-        from algid.base.units import UNITS
-
-        return UNITS
-    if mark == "estimators":
-        from algid.methods import ESTIMATORS
-
-        return ESTIMATORS
-    if mark == "moved":
-        from algid.moved import MOVED
-
-        return MOVED
-    if mark == "terms":
-        from algid.physics.terms import OPTIONAL
-
-        return OPTIONAL
-    if mark == "formats":
-        from algid.readers.formats import FORMATS
-
-        return FORMATS
-    if mark == "profile":
-        from algid.profile import Profile
-
-        return options_of(Profile)
-    if mark == "settings":
-        from algid.settings import Settings
-
-        return options_of(Settings)
-    return messages()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
@@ -21,8 +21,6 @@ from algid.api.options import (
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
-from algid.base.text import visible
-from algid.base.words import counted
 from algid.options import ADVANCED, Option, flag
 
 if TYPE_CHECKING:
@@ -150,24 +148,9 @@ def answer(result: PlainResult, given: Mapping[str, Any]) -> Answer:
     from algid.report.page import result_document
     from algid.results import result_json
 
-    remarks = [f"wrote {result_folder(result.log.path, given['out'], given.get('name'))}"]
-    if given["verbose"]:
-        notes = (f"note: {visible(note)}" for note in result.notes)
-        remarks = [*_reading(result), *notes, *remarks]
     return Answer(
-        lambda: [result_document(result)] if given["verbose"] else brief(result),
+        map(result_document, [result]) if given["verbose"] else brief(result),
         lambda: result_json(result),
-        remarks,
+        [f"wrote {result_folder(result.log.path, given['out'], given.get('name'))}"],
         exit=exit_of(failed=result.verdict.failed or not result.complete, lost=result.data_lost),
     )
-
-
-def _reading(result: PlainResult) -> Iterator[str]:
-    """What was read, and how."""
-    for log in result.logs:
-        size = f"{counted(log.rows, 'sample')}, {log.duration:.6g} s at {log.rate:.6g} Hz"
-        yield visible(f"{log.role} {log.path}: {size}, {log.format}")
-        for signal, source in log.mapping.items():
-            yield visible(f"  {signal} from {source}")
-    for name, value in result.settings.items():
-        yield visible(f"{name} = {value}")

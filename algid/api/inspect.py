@@ -6,6 +6,7 @@ import json
 import shlex
 import shutil
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -14,7 +15,7 @@ from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meant
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
-from algid.base.files import refuse_existing, whole_file
+from algid.base.files import whole_file
 from algid.base.text import lines_of
 from algid.options import flag
 
@@ -83,11 +84,8 @@ def inspect(
 
         if not isinstance(log, str | Path):
             raise SettingError(f"{flag('write_profile')}: expected the path of a log, found arrays")
-        file = profile_file(write_profile)
-        refuse_existing(file, force)
-        text = draft_profile(Path(log))
-        with whole_file(file, force=force) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+        with whole_file(profile_file(write_profile), force=force) as temporary:
+            temporary.write_text(draft_profile(Path(log)), encoding="utf-8")
     return inspect_log(log, own)
 
 
@@ -114,4 +112,4 @@ def answer(found: Inspection, given: Mapping[str, Any]) -> Answer:
         file = profile_file(given["write_profile"])
         again = shlex.join(["algid", "inspect", str(given["log"]), flag("profile"), str(file)])
         ended, remarks = Exit.OK, [f"wrote {file}; edit it, then try: {again}"]
-    return Answer(shown, lambda: json.dumps(found.as_dict(), indent=2) + "\n", remarks, exit=ended)
+    return Answer(shown(), partial(json.dumps, found.as_dict(), indent=2), remarks, exit=ended)

@@ -2,22 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+import json
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
-from algid.api.signature import refuse_unknown
+from pydantic import Field
+
 from algid.base.errors import SettingError
-from algid.base.files import parsed_toml
-from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS
+from algid.base.files import parsed_toml, whole_folder
+from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, Range
 from algid.options import ADVANCED, Option, flag
 from algid.profile import Effort, Profile, load_profile, over, with_settings
-from algid.settings import OF_BOTH, Settings, refuse_contradictions
+from algid.settings import OF_BOTH, Settings
 
 if TYPE_CHECKING:
     from algid.identification.open_logs import LogLike
     from algid.results import Result
+
+
+def within(bounds: Range) -> Any:
+    """What a number's type states of its least and its largest value."""
+    return Field(ge=bounds[0], le=bounds[1])
+
+
+def bounded(bounds: Range, kind: Any = float) -> Option:
+    """The same of a verb's keyword."""
+    return Option(check=Annotated[kind, within(bounds)])
+
 
 ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=Path)]
 """A profile, the path of its file, or what would stand in that."""
@@ -30,19 +44,16 @@ AnyResult = Annotated["Result | str | Path", Option(kind=Path)]
 OUT = "-o"
 Folder = Annotated[str | Path, Option(default=Path())]
 """Where a command writes: the working folder by default."""
-Length = Annotated[float, Option(range=KNOWN_LENGTH)]
-Mass = Annotated[float, Option(range=KNOWN_MASS)]
-Seed = Annotated[int, Option(range=(0, 2**63))]
+Length = Annotated[float, bounded(KNOWN_LENGTH)]
+Mass = Annotated[float, bounded(KNOWN_MASS)]
+Seed = Annotated[int, bounded((0, 2**63), int)]
 Force = Annotated[bool, Option(panel=ADVANCED)]
 Export = Annotated[bool | Literal["mcap"], Option(panel=ADVANCED)]
 """Whether what is shown over time is also written as MCAP."""
 
 
-def cases() -> list[str]:
-    """The cases that algid knows, for completion."""
-    return ["case1", "case2"]
-
-
+CASES = ("case1", "case2")
+"""The cases that algid knows, for completion."""
 Channel = Mapping[str, Any]
 
 
@@ -102,6 +113,14 @@ class Options(LogOptions, total=False):
     cross_validate: bool
 
 
+def refuse_unknown(options: Iterable[str], known: Collection[str]) -> None:
+    """Raise `SettingError` at a name that is none of the known ones."""
+    for name in options:
+        if name not in known:
+            near = get_close_matches(name, known, n=1) or known
+            raise SettingError(f"{name}: no setting has this name; expected {', '.join(near)}")
+
+
 def settings_of(
     settings: Settings | None, profile: ProfileLike | None, options: Mapping[str, Any]
 ) -> tuple[Settings, dict[str, Any]]:
@@ -112,8 +131,7 @@ def settings_of(
     SettingError
         If an option is none of `Settings` or of `Profile`, or a setting's value is wrong.
     """
-    refuse_unknown(options, (*Settings.model_fields, *Profile.model_fields))
-    refuse_contradictions(options)
+    refuse_unknown(options, Options.__annotations__)
     own = {name: options[name] for name in options if name in Settings.model_fields}
     of_profile = {name: options[name] for name in options if name not in own}
     of_both = {name: own[name] for name in OF_BOTH if name in own}
@@ -170,19 +188,49 @@ def _in_memory(given: Any, profile: Profile | None) -> Any:
     return given
 
 
-def setting_of(line: str) -> dict[str, Any]:
-    """A setting out of ``NAME=VALUE``, as a line of TOML; a bare word is text.
+def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
+    """What ``NAME=VALUE`` sets, each a line of TOML; a bare word is text.
 
     Raises
     ------
     SettingError
-        If it is none.
+        If a line is none, or sets what is not known.
     """
-    name, equals, text = line.partition("=")
-    channel, dot, key = name.strip().partition(".")
-    if not (equals and channel):
-        raise SettingError(f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1")
-    value: Any = text.strip()
-    with suppress(ValueError, RecursionError):
-        value = parsed_toml(f"value = {text}")["value"]
-    return {channel: {key.strip(): value} if dot else value}
+    document, found = "", dict[str, Any]()
+    for line in lines:
+        name, equals, text = line.partition("=")
+        try:
+            parsed_toml(f"value = {text}")
+        except (ValueError, RecursionError):
+            text = json.dumps(text.strip(), ensure_ascii=False)
+        document += f"{name}{equals}{text}\n"
+        try:
+            found = parsed_toml(document)
+        except (ValueError, RecursionError) as error:
+            raise SettingError(
+                f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1, each key once"
+            ) from error
+        refuse_unknown(found, known)
+    return found
+
+
+def parts_of(given: Any) -> Any:
+    """The parts of text between commas, or what comes in parts already."""
+    return given.split(",") if isinstance(given, str) else given
+
+
+def opened(given: Result | str | Path) -> Result:
+    """A result, read where its file or folder is given."""
+    from algid.results import Result, read_result
+
+    return given if isinstance(given, Result) else read_result(given)
+
+
+def called(given: Result | str | Path) -> str:
+    """What a result is called where it is wrong: its file, or its log."""
+    return str(given) if isinstance(given, str | Path) else given.log.path
+
+
+def folder_or_none(folder: Path | None, force: bool) -> AbstractContextManager[Path | None]:
+    """A folder to write into, whole or not at all; None where nothing is to be written."""
+    return nullcontext() if folder is None else whole_folder(folder, force)

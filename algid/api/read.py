@@ -1,15 +1,19 @@
-"""Read a log into memory."""
+"""Read a log into memory, and write one."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from algid import writers
 from algid.api.options import LogOptions, ProfileLike, meant
+from algid.api.signature import verb
 
 if TYPE_CHECKING:
     from algid.log import Log
     from algid.readers.memory import FrameOrArrays
+
+write_log = verb(writers.write_log)
 
 
 def read_log(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +16,7 @@ from algid.options import Option, flag
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
+    from algid.report.document import Document
 
 
 @verb
@@ -68,56 +70,36 @@ def report(
     made = []
     for folder in map(Path, results):
         if (folder / "jobs.parquet").is_file():
-            made.append(_of_batch(folder, out, progress))
+            from algid.fleet.history import history_of, write_history
+            from algid.fleet.page import fleet_document
+
+            history = history_of(folder / "jobs.parquet", progress)
+            written = write_history(history, Path(out or folder), folder)
+            shown: Iterable[Document] = map(fleet_document, [history])
+            as_json = partial(json.dumps, history.as_dict(), indent=2, allow_nan=False)
         elif out is not None:
             raise SettingError(f"{flag('out')}: {folder} is no batch, and keeps its pages itself")
         elif is_track(folder):
-            made.append(_of_track(folder, bool(export)))
+            from algid.tracks import page
+            from algid.tracks.result import read_track, track_json
+
+            track = read_track(folder)
+            written = page.write_pages(track, folder, bool(export))
+            shown, as_json = map(page.track_document, [track]), partial(track_json, track)
         else:
-            made.append(_of_result(folder, bool(export), shared_library, progress))
+            from algid.report.export import export_mcap
+            from algid.report.page import result_document, write_pages
+            from algid.results import read_result, result_json
+
+            result = read_result(folder)
+            written = write_pages(folder, shared_library, progress)
+            if export:
+                written.append(export_mcap(folder, progress))
+            shown, as_json = map(result_document, [result]), partial(result_json, result)
+        made.append(Answer(shown, as_json, [f"wrote {path}" for path in written]))
     return made
 
 
 def answer(made: list[Answer], _given: Mapping[str, Any]) -> list[Answer]:
     """One after another."""
     return made
-
-
-def _of_result(
-    folder: Path, export: bool, shared_library: bool, progress: Progress | None
-) -> Answer:
-    from algid.report.export import export_mcap
-    from algid.report.page import result_document, write_pages
-    from algid.results import read_result, result_json
-
-    result = read_result(folder)
-    written = write_pages(folder, shared_library, progress)
-    if export:
-        written.append(export_mcap(folder, progress))
-    return Answer(lambda: [result_document(result)], lambda: result_json(result), _lines(written))
-
-
-def _of_track(folder: Path, export: bool) -> Answer:
-    from algid.tracks.page import track_document, write_pages
-    from algid.tracks.result import read_track, track_json
-
-    result = read_track(folder)
-    written = write_pages(result, folder, export)
-    return Answer(lambda: [track_document(result)], lambda: track_json(result), _lines(written))
-
-
-def _of_batch(folder: Path, out: str | Path | None, progress: Progress | None) -> Answer:
-    from algid.fleet.history import history_of, write_history
-    from algid.fleet.page import fleet_document
-
-    history = history_of(folder / "jobs.parquet", progress)
-    written = write_history(history, Path(out or folder), folder)
-    return Answer(
-        lambda: [fleet_document(history)],
-        lambda: json.dumps(history.as_dict(), indent=2, allow_nan=False) + "\n",
-        _lines(written),
-    )
-
-
-def _lines(written: list[Path]) -> list[str]:
-    return [f"wrote {path}" for path in written]

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import builtins
 import inspect
-import math
 import re
 import sys
 import types
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from algid.base.errors import SettingError
+from algid.base.files import misfit
 from algid.moved import refuse_moved_keywords
-from algid.options import ADVANCED, EVERYDAY, EVERYDAY_FIELDS, Option, flag
+from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, EVERYDAY_FIELDS, Option, flag
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
@@ -57,6 +57,7 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
         if kind is None:  # text where Python takes several forms
             kind = kinds[0] if len(kinds) == 1 and get_origin(kinds[0]) is None else str
             kind = Path if Path in kinds else kind
+        argument = one.kind is not one.KEYWORD_ONLY and not stated.flag
         panel, default = EVERYDAY, stated.default if one.default is None else one.default
         if is_model:  # a field that is not typed is not said
             panel = EVERYDAY if name in EVERYDAY_FIELDS else ADVANCED
@@ -66,56 +67,41 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
             name=name,
             kind=kind,
             default=default,
-            panel=stated.panel or panel,
+            panel=ARGUMENTS if argument else stated.panel or panel,
             flag=stated.flag or flag(name, off=default is True),
             help=helps.get(own) or f"{', '.join(words)}.",
             words=words,
-            argument=one.kind is not one.KEYWORD_ONLY and not stated.flag,
+            check=stated.check or (Literal[*words] if words else None),
+            argument=argument,
             or_file=Path in kinds,
         )
     return found
 
 
 def verb(function: Verb) -> Verb:
-    """A function whose keywords are refused where they are none that it takes.
+    """A function that is called with what pydantic makes of its keywords.
 
-    A number is out of its bounds, a word none of those that are known, a name has moved.
+    One that is out of its bounds, none of the words that are known, or of a name that has moved is
+    refused.
     """
 
     @wraps(function)
     def called(*args: Any, **given: Any) -> Any:
+        from pydantic import TypeAdapter, ValidationError
+
         refuse_moved_keywords(function.__name__, given)
-        said = inspect.signature(function).bind(*args, **given).arguments
+        bound = inspect.signature(function).bind(*args, **given)
         for name, one in options_of(function).items():
-            value = said.get(name)
-            if value is None or isinstance(value, bool):
+            value = bound.arguments.get(name)
+            if one.check is None or value is None or isinstance(value, bool):
                 continue
-            right, expected = True, ""
-            if one.words:
-                right, expected = value in one.words, f"one of {', '.join(one.words)}"
-            elif one.range is not None:
-                low, high = one.range
-                expected = f"a number from {low:g} to {high:g}"
-                finite = isinstance(value, int | float) and math.isfinite(value)
-                right = finite and low <= value <= high
-            if not right:
-                raise SettingError(f"{one.flag}: expected {expected}, found {value!r:.60}")
-        return function(*args, **given)
+            try:
+                bound.arguments[name] = TypeAdapter(one.check).validate_python(value)
+            except ValidationError as error:
+                raise SettingError(f"{one.flag}: {misfit(error)[1]}") from None
+        return function(*bound.args, **bound.kwargs)
 
     return called  # type: ignore[return-value]  # it takes and gives the same
-
-
-def refuse_unknown(options: Iterable[str], known: Iterable[str]) -> None:
-    """Raise `SettingError` at a name that is none of the known ones."""
-    from difflib import get_close_matches
-
-    names = list(dict.fromkeys(known))
-    for name in options:
-        if name not in names:
-            mend = f"known are {', '.join(names)}"
-            for near in get_close_matches(name, names, n=1):
-                mend = f"did you mean {near}?"
-            raise SettingError(f"{name}: no setting has this name; {mend}")
 
 
 def head(verb: Callable[..., Any]) -> list[str]:

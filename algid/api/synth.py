@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import fields, replace
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from pydantic import AfterValidator, BeforeValidator
+
+from algid.api import example
 from algid.api.answer import Answer
-from algid.api.given import numbers
-from algid.api.options import Folder, Force, Seed, cases
+from algid.api.options import CASES, Folder, Force, Seed, bounded, parts_of, within
 from algid.api.signature import options_of, verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file
@@ -30,34 +31,68 @@ if TYPE_CHECKING:
 
 FIRST_YEAR, LAST_YEAR = 1970, 2037
 """Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
-MOST = (PHYSICAL.angle[1], PHYSICAL.angle[1], PHYSICAL.speed[1], PHYSICAL.speed[1])
-"""Of a state: angles in rad and velocities in rad/s."""
 
-State = Sequence[float]
-Noise = Annotated[float, Option(range=PHYSICAL.noise)]
-Schedule = Sequence[tuple[float, float]]
+
+def _moment(given: object) -> datetime:
+    """A date, in UTC where it names no zone."""
+    start = datetime.fromisoformat(str(given))
+    if not FIRST_YEAR <= start.year <= LAST_YEAR:
+        raise ValueError(f"expected a date from {FIRST_YEAR} to {LAST_YEAR}")
+    return start.replace(tzinfo=start.tzinfo or UTC)
+
+
+def _pairs(given: Any) -> Any:
+    """Pairs out of S=KG,…."""
+    return [part.split("=") for part in given.split(",")] if isinstance(given, str) else given
+
+
+def _increasing(schedule: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    times = [time for time, _ in schedule]
+    if times != sorted(set(times)):
+        raise ValueError("expected increasing times like 2=0.05,4=0")
+    return schedule
+
+
+_Angle = Annotated[float, within(PHYSICAL.angle)]
+_Speed = Annotated[float, within(PHYSICAL.speed)]
+_Time = Annotated[float, within((0, PHYSICAL.duration[1]))]
+_Mass = Annotated[float, within((0, PHYSICAL.mass[1]))]
+State = Annotated[
+    Sequence[float] | str,
+    Option(check=Annotated[tuple[_Angle, _Angle, _Speed, _Speed], BeforeValidator(parts_of)]),
+]
+Schedule = Annotated[
+    Sequence[tuple[float, float]] | str,
+    Option(
+        check=Annotated[
+            list[tuple[_Time, _Mass]], BeforeValidator(_pairs), AfterValidator(_increasing)
+        ]
+    ),
+]
+Moment = Annotated[datetime | date | str, Option(check=Annotated[Any, BeforeValidator(_moment)])]
+Noise = Annotated[float, bounded(PHYSICAL.noise)]
 
 
 @verb
 def synthesise(
-    case: Annotated[str | Path, Option(kind=str, suggested=cases)],
+    case: Annotated[str | Path, Option(kind=str, suggested=lambda: CASES)],
     *,
-    duration: Annotated[float, Option(range=PHYSICAL.duration)] | None = None,
-    rate: Annotated[float, Option(range=PHYSICAL.rate)] = 1000.0,
-    torque: Annotated[str | Path | Log, Option(kind=str, suggested=lambda: [*run.EXCITATIONS])]
+    duration: Annotated[float, bounded(PHYSICAL.duration)] | None = None,
+    rate: Annotated[float, bounded(PHYSICAL.rate)] = 1000.0,
+    torque: Annotated[str | Path | Log, Option(kind=str, suggested=lambda: run.EXCITATIONS)]
     | None = None,
     motion: str | Path | None = None,
     torque_hold: Literal["exact", "zoh", "foh"] = "exact",
-    initial: State | str | None = None,
+    initial: State | None = None,
     sensors: Sensors | None = None,
     position_noise: Noise | None = None,
     torque_noise: Noise | None = None,
-    encoder_bits: Annotated[int, Option(range=(4, 32))] | None = None,
+    encoder_bits: Annotated[int, bounded((4, 32), int)] | None = None,
     jitter: Noise | None = None,
-    drop: Annotated[float, Option(range=(0, 0.9))] | None = None,
+    drop: Annotated[float, bounded((0, 0.9))] | None = None,
     seed: Seed | None = None,
-    start_time: datetime | date | str | None = None,
-    payload_schedule: Schedule | str | None = None,
+    start_time: Moment | None = None,
+    payload_schedule: Schedule | None = None,
     out: Folder | None = None,
     format: Literal["mcap", "parquet", "csv"] = "mcap",  # noqa: A002  # as the flag
     force: Force = False,
@@ -137,78 +172,61 @@ def synthesise(
     """
     own = locals()
     if case == "example":
-        return _example(own)  # type: ignore[return-value]  # five
-    arm = load_case(str(case))
-    of_sensors = {one.name: own.get(one.name) for one in fields(Sensors)}
-    measured = replace(
-        sensors or Sensors(),
-        **{name: value for name, value in of_sensors.items() if value is not None},
-    )
-    if start_time is not None:
-        measured = replace(measured, start_ns=_start_ns(start_time))
-    plan = None
-    if motion is not None:
-        from algid.synth.follow import read_plan
+        for name, one in options_of(synthesise).items():
+            if name not in ("case", "out", "force") and own[name] not in (None, one.default):
+                raise SettingError(f"{one.flag}: the example is always the same; leave it out")
+        files = _files(out, [*(f"{name}.csv" for name in example.LOGS), example.PROFILE], force)
+        logs = example.example_logs()
+    else:
+        arm = load_case(str(case))
+        of_sensors = {one.name: own.get(one.name) for one in fields(Sensors)}
+        if start_time is not None:
+            of_sensors["start_ns"] = int(start_time.timestamp()) * 10**9  # type: ignore[union-attr]
+        set_of_them = {name: value for name, value in of_sensors.items() if value is not None}
+        measured = replace(sensors or Sensors(), **set_of_them)
+        plan = None
+        if motion is not None:
+            from algid.synth.follow import read_plan
 
-        for name in ("initial", "payload_schedule", "torque"):
-            if own[name] is not None:
-                raise SettingError(
-                    f"{flag(name)} {own[name]}: a motion starts where it was planned and carries "
-                    "one payload; leave it out"
-                )
-        plan = read_plan(Path(motion))
-        duration = duration or plan.duration
-    duration = duration or 1.0
-    samples, (least, most) = round(rate * duration) + 1, PHYSICAL.samples
-    if not least <= samples <= most:
-        raise SettingError(
-            f"{flag('duration')}: {duration:g} s at {flag('rate')} {rate:g} Hz are "
-            f"{samples:.3g} samples; expected {least:g} to {most:g}"
-        )
-    recording = run.Acquisition(rate, duration, sensors=measured)
-    if initial is not None:
-        state = numbers("initial", initial, MOST, "four numbers like -1.57,0,0,0")
-        recording = replace(recording, initial=state)
-    drive = _drive(arm, "case" if torque is None else torque, torque_hold, recording)
-    roles, schedule = ["unloaded", "loaded"][: 1 + bool(arm.payload)], None
-    if payload_schedule is not None:
-        roles, schedule = ["schedule"], _schedule(payload_schedule)
-    files = _files(out, [f"{arm.name}-{role}.{format}" for role in roles], force)
-    logs = run.synthesise(arm, plan or drive, recording, progress, schedule)
+            for name in ("initial", "payload_schedule", "torque"):
+                if own[name] is not None:
+                    raise SettingError(
+                        f"{flag(name)} {own[name]}: a motion starts where it was planned and "
+                        "carries one payload; leave it out"
+                    )
+            plan = read_plan(Path(motion))
+            duration = duration or plan.duration
+        duration = duration or 1.0
+        samples, (least, most) = round(rate * duration) + 1, PHYSICAL.samples
+        if not least <= samples <= most:
+            raise SettingError(
+                f"{flag('duration')}: {duration:g} s at {flag('rate')} {rate:g} Hz are "
+                f"{samples:.3g} samples; expected {least:g} to {most:g}"
+            )
+        recording = run.Acquisition(rate, duration, sensors=measured)
+        if initial is not None:
+            recording = replace(recording, initial=initial)  # type: ignore[arg-type]  # numbers
+        drive = _drive(arm, "case" if torque is None else torque, torque_hold, recording)
+        roles = ["unloaded", "loaded"][: 1 + bool(arm.payload)]
+        if payload_schedule is not None:
+            roles = ["schedule"]
+        files = _files(out, [f"{arm.name}-{role}.{format}" for role in roles], force)
+        schedule: Any = payload_schedule
+        logs = run.synthesise(arm, plan or drive, recording, progress, schedule)
     for file, log in zip(files, logs, strict=False):
         write_log(file, log, truth=log.origin.truth, force=force)
-    return tuple(logs)  # type: ignore[return-value]  # of a schedule one, as its docstring says
+    for file in files[len(logs) :]:
+        with whole_file(file, force=force) as temporary:
+            temporary.write_text(example.PROFILE_TEXT, encoding="utf-8")
+    return tuple(logs)  # type: ignore[return-value]  # as many as its docstring says
 
 
 def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     """The files."""
     names = [f"{log.origin.path}.{given['format']}" for log in logs]
     if given["case"] == "example":
-        names = _example_names()
-    return Answer(lambda: [str(Path(given["out"]) / name) for name in names])
-
-
-def _example_names() -> list[str]:
-    from algid.api.example import LOGS, PROFILE
-
-    return [*(f"{name}.csv" for name in LOGS), PROFILE]
-
-
-def _example(given: Mapping[str, Any]) -> tuple[Log, ...]:
-    """The logs of `algid.api.example`, which are what they are."""
-    from algid.api.example import PROFILE_TEXT, example_logs
-
-    for name, one in options_of(synthesise).items():
-        if name not in ("case", "out", "force") and given[name] not in (None, one.default):
-            raise SettingError(f"{one.flag}: the example is always the same; leave it out")
-    force = given["force"]
-    files, logs = _files(given["out"], _example_names(), force), example_logs()
-    for file, log in zip(files, logs, strict=False):
-        write_log(file, log, force=force)
-    for file in files[len(logs) :]:
-        with whole_file(file, force=force) as temporary:
-            temporary.write_text(PROFILE_TEXT, encoding="utf-8")
-    return tuple(logs)
+        names = [*(f"{log.origin.path}.csv" for log in logs), example.PROFILE]
+    return Answer([str(Path(given["out"]) / name) for name in names])
 
 
 def _files(out: str | Path | None, names: Sequence[str], force: bool) -> list[Path]:
@@ -217,36 +235,6 @@ def _files(out: str | Path | None, names: Sequence[str], force: bool) -> list[Pa
     for file in files:
         refuse_existing(file, force)
     return files
-
-
-def _start_ns(given: datetime | date | str) -> int:
-    """A date in ns since 1970, in UTC where it names no zone."""
-    with suppress(ValueError):
-        start = datetime.fromisoformat(str(given))
-        if FIRST_YEAR <= start.year <= LAST_YEAR:
-            return int(start.replace(tzinfo=start.tzinfo or UTC).timestamp()) * 10**9
-    raise SettingError(
-        f"{flag('start_time')}: expected a date from {FIRST_YEAR} to {LAST_YEAR} like "
-        f"2026-01-31T12:00:00, found {given!r:.60}"
-    )
-
-
-def _schedule(given: Schedule | str) -> list[tuple[float, float]]:
-    """Times in s, increasing, and payloads in kg out of pairs, or of S=KG,…."""
-    pairs: Any = given
-    if isinstance(given, str):
-        pairs = [part.split("=") for part in given.split(",")]
-    longest, heaviest = PHYSICAL.duration[1], PHYSICAL.mass[1]
-    with suppress(TypeError, ValueError):
-        schedule = [(float(time), float(mass)) for time, mass in pairs]
-        within = all(0 <= time <= longest and 0 <= mass <= heaviest for time, mass in schedule)
-        times = [time for time, _ in schedule]
-        if schedule and within and times == sorted(set(times)):
-            return schedule
-    raise SettingError(
-        f"{flag('payload_schedule')}: expected increasing times and payloads of 0 or more like "
-        f"2=0.05,4=0, found {given!r}"
-    )
 
 
 def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquisition) -> Torque:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.given import folder_or_none
 from algid.api.options import (
     AnyLog,
     Export,
@@ -16,6 +15,7 @@ from algid.api.options import (
     Length,
     LogOptions,
     ProfileLike,
+    folder_or_none,
     meant,
 )
 from algid.api.signature import verb
@@ -128,7 +128,7 @@ def answer(result: TrackResult, given: Mapping[str, Any]) -> Answer:
     from algid.tracks.result import track_json
 
     return Answer(
-        lambda: [track_document(result)],
+        map(track_document, [result]),
         lambda: track_json(result),
         [f"wrote {track_folder(str(given['log']), given['out'])}"],
         exit=exit_of(failed=verdict(result).failed or not result.complete, lost=result.data_lost),

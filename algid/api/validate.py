@@ -7,8 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.given import called, opened
-from algid.api.options import AnyResult, Loaded, LogOptions, Logs, ProfileLike, meant
+from algid.api.options import (
+    AnyResult,
+    Loaded,
+    LogOptions,
+    Logs,
+    ProfileLike,
+    bounded,
+    called,
+    meant,
+    opened,
+)
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
@@ -28,7 +37,7 @@ def validate(
     logs: Logs | None = None,
     loaded: Loaded | None = None,
     *,
-    max_nrmse: Annotated[float, Option(range=(0, 1e9))] | None = None,
+    max_nrmse: Annotated[float, bounded((0, 1e9))] | None = None,
     max_error: Annotated[float | str | Path, Option(kind=str)] | None = None,
     simulate: bool = False,
     profile: ProfileLike | None = None,
@@ -140,4 +149,4 @@ def answer(found: Validated, given: Mapping[str, Any]) -> Answer:
             yield f"OVER: normalised RMSE past {given['max_nrmse']:g}"
 
     ended = Exit.LIMIT if found.over else Exit.OK
-    return Answer(shown, found.as_json, complaints=found.warnings, exit=ended)
+    return Answer(shown(), found.as_json, complaints=found.warnings, exit=ended)

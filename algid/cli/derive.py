@@ -11,20 +11,21 @@ import inspect
 import re
 import shlex
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 import click
 from click.shell_completion import CompletionItem
 
-from algid.api.signature import EMPTY, head, options_of, refuse_unknown
+from algid.api.signature import EMPTY, head, options_of
 from algid.base.exits import epilog
 from algid.base.text import lines_of
 from algid.cli.output import complain, shown
-from algid.options import ADVANCED, EVERYDAY, VALUES, Option
+from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, VALUES, Option
 
 COMMANDS: Mapping[str, str] = {
     "inspect": "inspect",
@@ -44,27 +45,26 @@ COMMANDS: Mapping[str, str] = {
 PRINTED = ("inspect", "design", "identify", "validate", "track", "report", "compare")
 """Commands that print tables, or JSON."""
 LETTERS = {"out": "-o", "quiet": "-q", "verbose": "-v"}
-ARGUMENTS = "Arguments"
+HELP = Option(panel=ADVANCED)
+"""Of the option that click adds."""
 
 
 class Command(click.Command):
     """A command whose help has a line an option, by panel."""
 
-    def __init__(self, name: str, taken: list[Option], **options: Any) -> None:
-        super().__init__(name, params=[_parameter(one) for one in taken], **options)
-        self.taken = {one.name: one for one in taken}
+    taken: Mapping[str, Option]
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write arguments and options."""
-        rows: dict[str, list[tuple[str, str]]] = {ARGUMENTS: [], EVERYDAY: [], ADVANCED: []}
+        panels: dict[str, list[tuple[str, str]]] = {ARGUMENTS: [], EVERYDAY: [], ADVANCED: []}
         for one in self.get_params(ctx):
-            known = self.taken.get(one.name or "", Option(panel=ADVANCED))  # help is none of ours
-            record = one.get_help_record(ctx) or (str(one.metavar), known.help)
-            rows[ARGUMENTS if known.argument else known.panel].append(record)
-        for panel, entries in rows.items():
-            if entries:
+            known = self.taken.get(str(one.name), HELP)
+            label, text = one.get_help_record(ctx) or (str(one.metavar), "")
+            panels[known.panel].append((label, text or known.help))
+        for panel, rows in panels.items():
+            if rows:
                 with formatter.section(panel):
-                    formatter.write_dl(entries)
+                    formatter.write_dl(rows)
 
 
 def listed(name: str) -> str:
@@ -75,41 +75,63 @@ def listed(name: str) -> str:
     return " ".join(found[1].split()) if found else ""
 
 
+def every_command(
+    *,
+    format: Annotated[Any, Option(kind=click.Choice(["table", "json"]), panel=ADVANCED)] = "table",  # noqa: A002
+    verbose: Annotated[bool, Option(panel=ADVANCED)] = False,
+    quiet: Annotated[bool, Option(panel=ADVANCED)] = False,
+) -> None:
+    """Take what a command takes beside its verb's keywords.
+
+    Parameters
+    ----------
+    format : str
+        What to print.
+    verbose : bool
+        All tables, logs, settings.
+    quiet : bool
+        Print nothing but errors.
+    """
+
+
 def command(name: str) -> Command:
     """The command that calls a verb."""
     module = import_module(f"algid.api.{name}")
     verb = getattr(module, COMMANDS[name])
-    of_logs = _of_logs(verb)
-    every = {**options_of(verb), **of_logs}
-    taken = [one for one in every.values() if not one.by_set]
-    by_set = [one for one in every.values() if one.by_set]
+    parameters, of_logs = inspect.signature(verb).parameters, _of_logs(verb)
+    every = [*options_of(verb).values(), *of_logs.values()]
+    by_set = [one for one in every if one.by_set]
+    taken = [one for one in every if not one.by_set]
     if by_set:
+        lines = [f"{one.name}={word}" for one in by_set for word in one.words or [""]]
         text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
         if of_logs:
             text = "Any other setting, as tau1.sign=-1; may be repeated."
-        lines = [f"{one.name}={word}" for one in by_set for word in one.words or [""]]
-        taken.append(_of_command("set", text, list[str], suggested=lambda: lines))
-    if name in PRINTED:
-        words = click.Choice(["table", "json"])
-        taken.append(_of_command("format", "What to print.", words, default="table"))
-    if name == "identify":
-        taken.append(_of_command("verbose", "All tables, logs, settings.", bool, default=False))
-    taken.append(_of_command("quiet", "Print nothing but errors.", bool, default=False))
+        several = Option(list[str], panel=ADVANCED, suggested=lambda: lines)
+        taken.append(replace(several, name="set", flag="--set", help=text))
+    own = dict(options_of(every_command))
+    if name not in PRINTED:
+        del own["format"]
+    if name != "identify":
+        del own["verbose"]
+    taken += own.values()
     settable = [one.name.partition(".")[0] for one in (*of_logs.values(), *by_set)]
 
-    def run(**typed: Any) -> None:
+    def run(
+        quiet: bool,
+        verbose: bool = False,
+        set: Sequence[str] = (),  # noqa: A002
+        **typed: Any,
+    ) -> None:
         """Call the verb with what is typed, print its answer, and end with its exit code."""
+        from algid.api.options import set_by
         from algid.base.runtime import keep_freed
         from algid.report.progress import progress
 
         keep_freed()
-        quiet, verbose = typed.pop("quiet"), typed.pop("verbose", False)
         as_json = name in PRINTED and typed.pop("format") == "json"
         given = {key: value for key, value in typed.items() if value not in (None, ())}
-        for line in given.pop("set", ()):
-            take(given, line, settable)
-        given = getattr(module, "typed", dict)(given)
-        parameters = inspect.signature(verb).parameters
+        given = getattr(module, "typed", dict)(given | set_by(set, settable))
         arguments = [one.name for one in taken if one.argument]
         callers = {"command": shlex.join(["algid", *sys.argv[1:]]), "complain": complain}
         with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
@@ -125,19 +147,9 @@ def command(name: str) -> Command:
 
     *above, example = head(verb)
     text = "\n\n".join((*above, "\b\n" + "\n".join(lines_of(example, 76, rest="  "))))
-    return Command(name, taken, help=text, epilog=epilog(name), callback=run)
-
-
-def take(given: dict[str, Any], line: str, settable: Collection[str]) -> None:
-    """Put one ``NAME=VALUE`` among what is given."""
-    from algid.api.options import setting_of
-
-    setting = setting_of(line)
-    refuse_unknown(setting, settable)
-    for name, value in setting.items():
-        if isinstance(value, Mapping) and isinstance(given.get(name), Mapping):
-            value = {**given[name], **value}
-        given[name] = value
+    made = Command(name, params=list(map(_parameter, taken)), help=text, callback=run)
+    made.epilog, made.taken = epilog(name), {one.name: one for one in taken}
+    return made
 
 
 def _parameter(one: Option) -> click.Parameter:
@@ -173,16 +185,12 @@ def _completion(one: Option) -> Callable[..., list[CompletionItem]]:
     def complete(_ctx: object, _parameter: object, incomplete: str) -> list[CompletionItem]:
         before, comma, last = incomplete.rpartition(",")
         used = before.split(",")
-        words = one.words if one.suggested is None else one.suggested()
+        words = one.suggested() if one.suggested else one.words
         found = [word for word in words if word.startswith(last) and word not in used]
         files = [CompletionItem(incomplete, type="file")] if one.or_file else []
         return files + [CompletionItem(before + comma + word) for word in found]
 
     return complete
-
-
-def _of_command(name: str, text: str, kind: Any, **more: Any) -> Option:
-    return Option(kind, name=name, help=text, flag=f"--{name}", panel=ADVANCED, **more)
 
 
 def _of_logs(verb: Callable[..., Any]) -> dict[str, Option]:

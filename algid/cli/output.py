@@ -27,9 +27,9 @@ def printable(text: str) -> str:
     return letters.printable(without_credentials(text))
 
 
-def say(text: str, *, end: str = "\n") -> None:
+def say(text: str) -> None:
     """Print to standard output, which carries results."""
-    print(printable(text), end=end)
+    print(printable(text))
 
 
 def remark(text: str) -> None:
@@ -75,9 +75,9 @@ def shown(answer: Answer, json: bool, quiet: bool) -> None:
     if quiet:
         return
     if json and answer.json is not None:
-        say(answer.json(), end="")
+        say(answer.json().rstrip())
     else:
-        for part in answer.shown():
+        for part in answer.shown:
             _print(part)
     for line in answer.remarks:
         remark(line)

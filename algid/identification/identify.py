@@ -31,7 +31,7 @@ from algid.methods import estimator_of, settles
 from algid.options import flag
 from algid.physics.effort import absent
 from algid.results import Result, read_result, write_result
-from algid.settings import DEFAULTS, OF_BOTH, OF_PRIOR, Settings, refuse_contradictions
+from algid.settings import DEFAULTS, OF_BOTH, OF_PRIOR, Settings
 
 if TYPE_CHECKING:
     from algid.identification.by_likelihood import Fitted
@@ -182,9 +182,8 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
         names = OF_BOTH
         stated["effort"] = earlier.result.settings.get("effort")
     if meaning is not None:
-        own = {name: getattr(meaning, name) for name in names if name in meaning.model_fields_set}
-        refuse_contradictions(own)
-        stated |= own
+        for name in meaning.model_fields_set.intersection(names):
+            stated[name] = getattr(meaning, name)
     set_by_user = {name for name in stated if getattr(settings, name) != DEFAULTS[name]}
     for name in set_by_user:
         del stated[name]

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from algid.api.options import meant
+from algid.api.options import meant, set_by
 from algid.cli import run
 from algid.cli.app import app
-from algid.cli.derive import take
 from algid.profile import Profile
 
 __all__ = ["app", "call", "profile_from"]
@@ -41,6 +40,4 @@ def call(*arguments: str | Path) -> Done:
 def profile_from(flags: Mapping[str, Any]) -> Profile | None:
     """The profile that flags mean, as a command hands them to its verb."""
     options = {name: value for name, value in flags.items() if name != "set"}
-    for line in flags.get("set", []):
-        take(options, line, Profile.model_fields)
-    return meant(None, options)
+    return meant(None, options | set_by(flags.get("set", ()), Profile.model_fields))

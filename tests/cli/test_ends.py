@@ -114,16 +114,21 @@ class Watched:
         return Batched([GOOD] * len(self.heard), len(jobs), 0)
 
 
+def logged(name: str) -> Any:
+    return SimpleNamespace(name=name, trouble="")
+
+
 def test_a_watch_complains_once_and_retries_what_failed_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     looks: list[Any] = [
         SettingError("logs: gone"),
         SettingError("logs: gone"),
-        ["a"],
+        [logged("a")],
+        [logged("a")],
         SettingError("twice"),
-        [],
-        ["b"],
+        [logged("b")],
+        [logged("b")],
     ]
 
     def look() -> Any:
@@ -132,13 +137,11 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
             raise found
         return found
 
-    monkeypatch.setattr(
-        "algid.batches.run.StableFiles", lambda: SimpleNamespace(settled=lambda jobs: jobs)
-    )
-    running: Any = Watched(6)
+    monkeypatch.setattr("algid.batches.run.inputs_of", lambda _job: (SimpleNamespace(size=1),))
+    running: Any = Watched(7)
     heard: list[str] = []
     ended = Batch.watch(running, look, True, heard.append)
-    assert running.heard == [([], False), (["a"], True), (["b"], False)]
+    assert running.heard == [([], False), ([logged("a")], True), ([logged("b")], False)]
     assert len(ended.records) == 3
     assert heard == ["logs: gone", "twice"]
 
