@@ -160,7 +160,8 @@ def draw(title: str, arm: str, number: int) -> Seen:
 
 
 def _seen(arm: str, number: int, told: str, passed: bool) -> Seen:
-    return {"passes": [passed], "not": [] if passed else [f"({arm}, {number}: {told})"]}
+    failing = [] if passed else [f"({arm}, {number}: {told})"]
+    return {"passes": [passed], "not": failing, "told": [told]}
 
 
 def _noticed(result: Result, code: str, k: FloatArray) -> bool:

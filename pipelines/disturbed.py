@@ -22,6 +22,7 @@ from scipy.stats import sem
 from algid.arm import Arm, FloatArray
 from algid.identification.identify import identify
 from algid.log import Log
+from algid.model import RIGID
 from algid.synth.excitation import wide_multi_sine
 from algid.synth.simulator import HANGING
 from pipelines.accuracy_scenes import random_arm, waves
@@ -31,7 +32,6 @@ from pipelines.simulator import Arms, inertias, swung
 DT, DURATION, LOGS = 2e-3, 10.0, 6
 SHARE, PERSISTENCE = 0.3, 0.1  # of the drive's RMS; s
 SIGMA = 1e-4  # rad; ten times as much in N m
-NAMES = ("k1", "k2", "k3", "k4", "k5")
 SPEED = 8.0  # rad/s: of the PD loop
 FIRST_ARM = 60
 _FREQUENCIES = np.array([0.3, 0.7, 1.1, 1.6, 2.3])
@@ -122,7 +122,7 @@ def draw(feedback: bool, reference: bool, number: int, _draw: int) -> Seen:
         asked = made.reference[n] if reference and made.reference is not None else None
         logs.append(Log.from_arrays(t, *signals, reference=asked, name=f"run {n}"))
     result = identify(logs, report=False)
-    seen = judged(result, dict(zip(NAMES, made.arm.constants(), strict=False)))
+    seen = judged(result, dict(zip(RIGID, made.arm.constants(), strict=False)))
     return seen | {"by": [result.estimator], "bias": [float(np.mean(seen["error"]))]}
 
 

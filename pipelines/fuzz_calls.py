@@ -85,10 +85,9 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
         return "traceback", _trace(err)
     if code not in CODES:
         return "code", f"{code}: {err[-300:]}"
-    own_words = "╰" in err  # typer's box about a wrong call shows the caller's own arguments
-    if printable(out) != out or (printable(err) != err and not own_words):
+    if printable(out) != out or printable(err) != err:
         return "escape", repr((out + err)[-600:])
-    told = bool(last) and last[-1].startswith(("algid: ", "╰"))
+    told = bool(last) and last[-1].startswith("algid: ")
     # which prints why, among the rest
     if code == 2 and not told and "inspect" not in call:
         return "lines", err[-600:]

@@ -43,8 +43,8 @@ IDEAS = {
     r"|diagnostics\.by_themselves"
     r"|saturation\._solved|evidence\.\w*(sandwich|dispersion)\w*)$",
     "tests of the model": r"^(refined\.\w*refuted\w*|log_likelihood\.refuted|identifiability\.judge"
-    r"|misfit\.misfit|by_likelihood\._refuted_alone|\w+\.score_test)$",
-    "choosers of terms": r"^(terms\.select|model_choice\.revised|shrunk\.shrunk)$",
+    r"|misfit\.misfit|\w+\.score_test)$",
+    "choosers of terms": r"^(terms\.select|model_choice\.revised)$",
 }
 """By idea, a pattern of `module.function` or of the source of each function of the core that holds
 it: one each is enough."""

@@ -13,7 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-USED = ("bags", "dask", "hdf5")
+USED = ("dask", "hdf5")
 """Extras that algid itself imports."""
 
 

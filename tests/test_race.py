@@ -14,17 +14,11 @@ NEEDS = {
     "pinocchio regressors": "pinocchio",
 }
 SLOW = {"MuJoCo sysid", *(peer for peer in EXAMPLES if peer.startswith(("output", "IDIM")))}
-LONG = {"output error", "IDIM-IV, every term"}
-"""A minute each: their kin, with and without every term, run the same code in seconds."""
 
 
 @pytest.mark.parametrize(
     "peer",
-    [
-        pytest.param(peer, marks=pytest.mark.slow if peer in SLOW else ())
-        for peer in EXAMPLES
-        if peer not in LONG
-    ],
+    [pytest.param(peer, marks=pytest.mark.slow if peer in SLOW else ()) for peer in EXAMPLES],
 )
 def test_a_contender_reproduces_its_example(peer: str) -> None:
     if peer in NEEDS:

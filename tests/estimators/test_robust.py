@@ -19,9 +19,9 @@ from algid.estimators.fit import Fit
 from algid.estimators.parametrisation import Shared
 from algid.estimators.problem import Problem, Source, WeakSettings
 from algid.estimators.robust import WINDOWS, Expected, RobustProblem, _crossed, dispersion, shrink
-from algid.model import Model
+from algid.model import RIGID, Model
 from algid.signals.segments import Segment
-from pipelines.disturbed import DT, NAMES, Scene, scene
+from pipelines.disturbed import DT, Scene, scene
 from pipelines.race_peers import even
 from pipelines.run_to_run import runs as runs_of
 
@@ -159,7 +159,7 @@ def settled(made: Scene, *, reference: bool = False) -> tuple[Fit, Fit]:
 
 def off(fit: Fit, made: Scene) -> FloatArray:
     """Errors of k1 … k5 in half widths of their intervals."""
-    places = [fit.names.index(name) for name in NAMES]
+    places = [fit.names.index(name) for name in RIGID]
     truth = made.arm.constants()[:5]
     return np.abs(fit.values[places] - truth) / (fit.quantile * fit.std[places])
 
@@ -224,7 +224,7 @@ def test_a_single_run_of_a_real_arm_agrees_with_the_others(shared_data: Path) ->
     others: list[Source] = [partial(list, [run]) for place, run in enumerate(runs) if place != 6]
     rest = least_squares(others, WeakSettings())
     found = alone.with_scatter(least, least, [{"window": window} for window in WINDOWS])
-    places = [found.names.index(name) for name in NAMES]
+    places = [found.names.index(name) for name in RIGID]
     away = np.abs(found.values - rest.values)[places]
     assert np.max(away / np.hypot(least.std, rest.std)[places]) > 3
     assert np.max(away / np.hypot(found.std, rest.std)[places]) < 3
