@@ -100,7 +100,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "results",
         "jinja2 numpy polars scipy",
     ),
-    "fleet": room("arm errors files limits model notices physics progress report "
+    "fleet": room("arm errors files limits model notices progress report "
                   "significance text verdict words", "numpy polars scipy"),
     "api": room(
         "arm batches check designs errors exits exports files fleet identification "

@@ -70,12 +70,12 @@ def report(
     made = []
     for folder in map(Path, results):
         if (folder / "jobs.parquet").is_file():
-            from algid.fleet.history import history_of, write_history
-            from algid.fleet.page import fleet_document
+            from algid.fleet.history import history_of
+            from algid.fleet.page import write_history
 
             history = history_of(folder / "jobs.parquet", progress)
-            written = write_history(history, Path(out or folder), folder)
-            shown: Iterable[Document] = map(fleet_document, [history])
+            document, written = write_history(history, Path(out or folder), folder)
+            shown: Iterable[Document] = [document]
             as_json = partial(json.dumps, history.as_dict(), indent=2, allow_nan=False)
         elif out is not None:
             raise SettingError(f"{flag('out')}: {folder} is no batch, and keeps its pages itself")

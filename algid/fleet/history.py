@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,27 +10,16 @@ from typing import Any
 import polars as pl
 
 from algid.base.errors import ResultError
-from algid.base.files import whole_file
 from algid.base.limits import LIMITS
 from algid.base.progress import Progress
 from algid.base.words import counted
 from algid.fleet.findings import FEWEST, SPAN, followed
+from algid.model import FIRST_TERMS, Model
 from algid.notices import Notice
-from algid.physics.terms import ALWAYS, OPTIONAL
 
 MONTH_DAYS = 30.4375
-
-
-def _usual() -> Iterator[str]:
-    """The parameters of the terms that every robot has, and of those that are usual."""
-    for term in (*ALWAYS, *OPTIONAL):
-        if term in ALWAYS or term.usual:
-            yield from term.names
-
-
-PARAMETERS = tuple(_usual())
+PARAMETERS = Model(FIRST_TERMS).names
 """Those that most robots have: others would be tested on few logs."""
-FEWEST_PEERS = 3  # logs of a robot, among which one can be known from the others
 
 
 def read_jobs(path: Path) -> pl.DataFrame:
@@ -45,39 +33,32 @@ def read_jobs(path: Path) -> pl.DataFrame:
         If the table is missing or not one of algid batch.
     """
     expected = "expected jobs.parquet of algid batch"
-    if not path.is_file():
-        problem = "it is no regular file" if path.exists() else "there is no such file"
-        raise ResultError(f"{path}: {problem}; {expected}")
     try:
         names = list(pl.read_parquet_schema(path))
         missing = [name for name in ("job", "robot", "status", "time") if name not in names]
         if missing:
             raise ResultError(f"{path}: no column {', '.join(missing)}; {expected}")
-        followed = [name for name in PARAMETERS if name in names and f"{name}_std" in names]
-        payload = ["label_payload", "m_p", "m_p_std"]
-        numbers = payload + followed + [f"{name}_std" for name in followed]
-        wanted = ["job", "robot", "status", "time", *numbers]
-        jobs = pl.read_parquet(path, columns=[name for name in wanted if name in names])
-        jobs = jobs.with_columns(
-            pl.lit(None, pl.Float64).alias(name) for name in payload if name not in names
-        )
+        pairs = [(name, f"{name}_std") for name in (*PARAMETERS, "m_p")]
+        numbers = [name for pair in pairs if {*pair} <= {*names} for name in pair]
+        numbers += ["label_payload"] if "label_payload" in names else []
+        jobs = pl.read_parquet(path, columns=["job", "robot", "status", "time", *numbers])
         # a manifest's labels may be words: then they are no numbers
-        size = pl.col(numbers).cast(pl.Float64, strict=False).abs()
-        least = 1 / LIMITS.largest_value
-        sound = (size <= LIMITS.largest_value) & ((size == 0) | (size >= least))
+        number = pl.col(numbers).cast(pl.Float64, strict=False)
         jobs = jobs.with_columns(
             pl.col("job", "robot", "status").cast(pl.String),
             pl.col("time").cast(pl.Datetime("us", "UTC")),
-            pl.when(sound).then(pl.col(numbers).cast(pl.Float64, strict=False)).name.keep(),
+            pl.when(number.abs() <= LIMITS.largest_value).then(number),
         )
     # a panic of polars is no Exception
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
         raise ResultError(f"{path}: cannot read it ({reason}); {expected}") from error
+    lacking = {*("label_payload", "m_p", "m_p_std")} - {*numbers}
     age = pl.col("time") - pl.col("time").min().over("robot")
-    jobs = jobs.with_columns(t=age.dt.total_seconds() / (86400 * MONTH_DAYS))
-    finished = jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
-    return finished.with_columns(month=pl.col("t").floor().cast(pl.Int32))
+    t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
+    none = {name: pl.lit(None, pl.Float64) for name in lacking}
+    jobs = jobs.with_columns(t=t, month=t.floor().cast(pl.Int32), **none)
+    return jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,34 +81,26 @@ class History:
     nameless: int = 0
 
     @property
-    def robots(self) -> int:
-        """How many there are."""
-        return self.roster.height
-
-    @property
-    def logs(self) -> int:
-        """How many there are, of all robots."""
-        return int(self.roster["logs"].sum())
-
-    @property
     def untested(self) -> list[Notice]:
         """What was not looked for, and why."""
-        undated = int(self.roster["undated"].sum())
-        steady = self.roster.filter(~pl.col("tested")).height
-        alone = self.roster.filter(pl.col("logs") < FEWEST_PEERS).height
-        reasons: list[dict[str, Any]] = [
-            {"case": "nameless", "count": self.nameless},
-            {"case": "undated", "count": undated},
-            {"case": "steady", "count": steady, "least": FEWEST, "months": SPAN},
-            {"case": "alone", "count": alone, "least": FEWEST_PEERS},
+        counts = {
+            "nameless": self.nameless,
+            "undated": int(self.roster["undated"].sum()),
+            "steady": self.roster.height - int(self.roster["tested"].sum()),
+        }
+        more = {"least": FEWEST, "months": SPAN}
+        return [
+            Notice("NOT_TESTED", numbers={"case": case, "count": count} | more)
+            for case, count in counts.items()
+            if count
         ]
-        return [Notice("NOT_TESTED", numbers=one) for one in reasons if one["count"]]
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""
-        rows = {}
-        for name, frame in (("robots", self.roster), ("findings", self.findings)):
-            rows[name] = json.loads(frame.fill_nan(None).write_json())
+        rows = {
+            name: json.loads(frame.fill_nan(None).write_json())
+            for name, frame in (("robots", self.roster), ("findings", self.findings))
+        }
         return {**rows, "untested": [one.text for one in self.untested]}
 
 
@@ -151,41 +124,18 @@ def history_of(path: Path, progress: Progress | None = None) -> History:
     if not jobs.height:
         raise ResultError(
             f"{path}: none of {counted(finished.height, 'finished job')} has a robot; give each "
-            "robot's logs a folder "
-            "of their own, or name robots in a manifest, and run algid batch again"
+            "robot's logs a folder of their own, or name robots in a manifest, and run algid batch "
+            "again"
         )
     windows, findings = followed(jobs, names, progress)
-    tested = windows.filter(pl.col("p").is_not_nan())["robot"].unique().implode()
-    roster = (
-        jobs.group_by("robot")
-        .agg(
-            pl.len().alias("logs"),
-            pl.col("time").null_count().alias("undated"),
-            pl.col("time").min().alias("first"),
-            pl.col("time").max().alias("last"),
-            pl.col("job").sort_by("time", nulls_last=False).last().alias("latest"),
-        )
-        .with_columns(tested=pl.col("robot").is_in(tested))
-        .sort("robot")
+    time, tested = pl.col("time"), windows.drop_nulls("p")["robot"].unique().implode()
+    roster = jobs.group_by("robot").agg(
+        logs=pl.len(),
+        undated=time.null_count(),
+        first=time.min(),
+        last=time.max(),
+        latest=pl.col("job").sort_by("time", nulls_last=False).last(),
     )
+    roster = roster.with_columns(tested=pl.col("robot").is_in(tested)).sort("robot")
     listed = jobs.sort("robot", "time", descending=[False, True], nulls_last=True)
     return History(windows, findings, roster, listed, finished.height - jobs.height)
-
-
-def write_history(history: History, out: Path, batch: Path) -> list[Path]:
-    """Write ``fleet.parquet``, ``findings.parquet``, ``fleet.html`` with links into `batch`.
-
-    Raises
-    ------
-    OutputError
-        If `out` cannot be written.
-    """
-    from algid.fleet.page import fleet_document
-    from algid.report.render import page
-
-    for name, frame in (("fleet.parquet", history.windows), ("findings.parquet", history.findings)):
-        with whole_file(out / name) as temporary:
-            frame.write_parquet(temporary)
-    with whole_file(out / "fleet.html") as temporary:
-        temporary.write_text(page(fleet_document(history, batch, out)), encoding="utf-8")
-    return [out / name for name in ("fleet.parquet", "findings.parquet", "fleet.html")]

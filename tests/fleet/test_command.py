@@ -82,9 +82,8 @@ def _batch(folder: Path, robots: int = 2, logs: int = 10, start_ns: int = START)
 def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["report", str(_batch(tmp_path)), "-o", str(tmp_path / "page")])
     assert done.exit_code == 0, done.output
-    assert "2 robots, 20 logs: 1 drift and 1 payload label" in done.stdout
-    assert "payload label" in done.stdout
-    assert "1 log stands out: r0/0 (m_p, 400 σ)" in " ".join(done.stdout.split())
+    assert "2 robots, 20 logs: 1 drift and 1 payload" in done.stdout
+    assert "1 payload unlike the label: m_p of r0/0" in " ".join(done.stdout.split())
     assert "wrote" in done.stderr
     assert {path.name for path in (tmp_path / "page").iterdir()} == {
         "fleet.parquet",
@@ -97,24 +96,21 @@ def test_drift_and_findings_are_printed_and_written(tmp_path: Path) -> None:
 def test_every_log_is_a_point_with_its_interval(tmp_path: Path) -> None:
     _batch(tmp_path)
     history = history_of(tmp_path / "jobs.parquet")
-    jobs = history.jobs.filter(pl.col("robot") == "r0")
+    jobs = history.jobs.filter(robot="r0")
     plot = overview(history)
     assert plot is not None
-    assert [one["text"] for one in plot.figure.layout["annotations"]] == [
-        "<b>r0: k6, N m s/rad</b>"
-    ]
-    (points,), (mean,), (drift,) = (
-        named(plot.figure.data, name) for name in ("log", "mean", "drift")
-    )
+    titles = [one["text"] for one in plot.figure.layout["annotations"]]
+    assert titles == ["<b>r0: k6, N m s/rad</b>", "<b>r0: m_p, kg</b>"]
+    points, mean, found = (named(plot.figure.data, name)[0] for name in ("log", "mean", "finding"))
     assert typed(points["x"]) == pytest.approx(jobs["time"].dt.epoch("ms").to_list(), rel=1e-9)
     assert typed(points["y"]) == pytest.approx(jobs["k6"].to_list(), rel=1e-6)
     half = norm.ppf(0.975) * jobs["k6_std"]
     assert points["error_y"]["array"] == pytest.approx(half.to_list(), rel=1e-6)
     assert plot.figure.layout["xaxis"]["type"] == "date"
-    windows = history.windows.filter((pl.col("robot") == "r0") & (pl.col("parameter") == "k6"))
+    windows = history.windows.filter(robot="r0", parameter="k6")
     assert typed(mean["y"]) == pytest.approx(windows["mean"].to_list(), rel=1e-6)
-    assert typed(drift["y"]) == pytest.approx(windows.filter("drift")["mean"].to_list(), rel=1e-6)
-    assert drift["marker"]["symbol"] != points["marker"]["symbol"]
+    assert typed(found["y"]) == pytest.approx([jobs["k6"][0]], rel=1e-6)  # a drift ends there
+    assert found["marker"]["symbol"] != points["marker"]["symbol"]
 
 
 def test_the_page_is_two_tables_and_a_figure_and_leads_to_reports(tmp_path: Path) -> None:
