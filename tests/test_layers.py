@@ -70,7 +70,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "report": room(
         "arm arrow blocks criteria errors files inspection log methods model notices options "
         "progress quantiles results ros2 significance text verdict words writers",
-        "jinja2 markupsafe mcap numpy plotly pyarrow rich"
+        "jinja2 markupsafe mcap numpy plotly pyarrow pydantic_core rich"
     ),
     "check": room("errors files options results", "pydantic"),
     "identification": room(

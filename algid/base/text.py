@@ -9,6 +9,7 @@ import math
 import re
 import textwrap
 import unicodedata
+from collections.abc import Sequence
 
 LONGEST = 300
 # Controls drive a terminal, format characters reorder what is read, separators break lines.
@@ -54,11 +55,12 @@ def file_name(path: str) -> str:
     return visible(path.replace("\\", "/").rstrip("/").rpartition("/")[2] or path)
 
 
-def joined(words: list[str]) -> str:
-    """The words as a list in a sentence: a, b and c."""
-    if len(words) < 2:
-        return "".join(words)
-    return f"{', '.join(words[:-1])} and {words[-1]}"
+def joined(words: Sequence[str], most: int | None = None) -> str:
+    """The words as a list in a sentence, at most so many of them: a, b and 3 more."""
+    words = list(words)
+    if most is not None and len(words) > most:
+        words[most:] = [f"{len(words) - most} more"]
+    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
 
 
 def unit_text(unit: str) -> str:

@@ -165,7 +165,7 @@ def motion(design: Design) -> Plot:
             panels.curve(place, design.t[::every], y, f"joint {joint + 1}", colour, 1.4, dash)
             for side in sides:
                 if abs(side[joint]) < 3 * size:  # a limit far away would flatten the motion
-                    panels.line(place, y=float(side[joint]), colour=colour)
+                    panels.mark(place, float(side[joint]), way="y", colour=colour)
     panels.axes(len(series) - 1, "time, s")
     reading = (
         "The motion starts and ends at rest; torques are the believed arm's. Dashed lines are "

@@ -96,7 +96,7 @@ def robot_table(history: History, links: Links) -> Table:
         latest = (visible(row["latest"]), visible(row["robot"]), str(row["logs"]))
         rows.append((*latest, str(found), _day(row["first"]), _day(row["last"])))
     columns, cut = "Latest log | Robot | Logs | Findings | From | To", _cut(history.roster, "robot")
-    return Table("Robots", columns, tuple(rows), cut, links).without_empty()
+    return Table("Robots", columns, tuple(rows), cut, links)
 
 
 def finding_table(history: History, links: Links) -> Table:
@@ -169,7 +169,7 @@ def overview(history: History) -> Plot | None:
         if marked.any():
             panels.dots(place, times[marked], y[marked], "finding", RED, 13, "circle-open")
         for day in _dates(found.filter(robot=robot, kind="step")["time"].unique().sort()).tolist():
-            panels.line(place, x=day, colour=RED)
+            panels.mark(place, day, colour=RED)
         windows = history.windows.filter(robot=robot, parameter=name)
         for stint in windows.partition_by("stint", maintain_order=True):
             panels.curve(place, _dates(stint["end"]), stint["mean"].to_numpy(), "mean", GREY, 2)

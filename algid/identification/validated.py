@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from algid.base.text import ABSENT, file_name, significant, visible
+from algid.base.text import ABSENT, file_name, visible
 from algid.estimators.rollout import HORIZONS, RolloutScore
 from algid.identification.validate import Simulation
 from algid.report.document import Table
-from algid.report.tables import by_state
+from algid.report.tables import prediction_table
 from algid.results import TorquePrediction
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ class Validated:
 
     def tables(self) -> Iterator[Table]:
         """The predictions, and the simulations if there are any."""
-        yield self._predicted()
+        called = self._called()
+        yield prediction_table({called[name]: one for name, one in self.predictions.items()})
         if self.simulation is not None:
             yield self._rolled()
 
@@ -99,28 +100,6 @@ class Validated:
         if len(set(called)) < len(called):
             called = list(map(visible, self.logs))
         return dict(zip(self.logs, called, strict=True)) | {EVERY: EVERY}
-
-    def _predicted(self) -> Table:
-        rows: list[tuple[str, ...]] = []
-        called = self._called()
-        for name, one in self.predictions.items():
-            if one is None:
-                rows.append((called[name], "too short", ABSENT, ABSENT, ABSENT))
-                continue
-            for joint in range(2):
-                rmse = significant(one.rmse[joint], 4)
-                nrmse = significant(one.nrmse[joint], 4)
-                r2 = significant(one.r2[joint], 4)
-                rows.append((called[name], str(joint + 1), rmse, nrmse, r2))
-        note = ""
-        if self.total is not None:
-            note = f"Filter: {self.total.filter}."
-            states = by_state(self.total)
-            if states:
-                note += f" RMSE of all logs: {states}."
-        return _table(
-            "Torque prediction", ("Log", "Joint", "RMSE, N m", "RMSE / RMS", "R²"), rows, note
-        )
 
     def _rolled(self) -> Table:
         rows: list[tuple[str, ...]] = []
@@ -134,14 +113,8 @@ class Validated:
                         rmse = _number(row["rmse"][joint])
                         moved = _number(row["moved"][joint])
                     rows.append((called[name], horizon, starts, str(joint + 1), rmse, moved))
-        headings = ("Log", "Horizon, s", "States", "Joint", "RMSE, rad", "Moved, rad")
-        return _table("Angles of the arm simulated forward", headings, rows)
-
-
-def _table(
-    title: str, headings: tuple[str, ...], rows: list[tuple[str, ...]], note: str = ""
-) -> Table:
-    return Table(title, " | ".join(headings), tuple(rows), note)
+        headings = "Log | Horizon, s | States | Joint | RMSE, rad | Moved, rad"
+        return Table("Angles of the arm simulated forward", headings, rows)
 
 
 def _as_json(one: TorquePrediction | None) -> dict[str, Any] | None:

@@ -19,7 +19,6 @@ from algid.results import Result
 
 FRAMES = 30.0  # a second
 MOST_FRAMES = 6_000
-READING = "Play it: does this arm move as yours did?"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +50,13 @@ class ArmDrawing:
     aside: float = 0.0
 
     @property
-    def frames(self) -> tuple[FloatArray, FloatArray]:
+    def frames(self) -> dict[str, list[float]]:
         """Times and angles at `FRAMES` a second, fewer of a long motion."""
-        seconds = float(self.t[-1] - self.t[0])
-        count = int(min(max(round(seconds * FRAMES), 1), MOST_FRAMES, max(self.t.size - 1, 1))) + 1
-        t = np.linspace(self.t[0], self.t[-1], count)
-        return t, np.stack([np.interp(t, self.t, row) for row in self.theta])
+        first, last = self.t[0], self.t[-1]
+        t = np.linspace(first, last, 2 + int(min((last - first) * FRAMES, MOST_FRAMES)))
+        theta1, theta2 = (np.interp(t, self.t, row) for row in self.theta)
+        rows = {"t": t, "theta1": theta1, "theta2": theta2}
+        return {name: values.round(4).tolist() for name, values in rows.items()}
 
 
 def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
@@ -65,37 +65,25 @@ def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
     None where l1 follows from nothing, or no motion is at hand.
     """
     value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
-    l1, l2, gravity = _length(result, "l1"), _length(result, "l2"), result.settings.get("gravity")
-    if l1 is None and isinstance(gravity, int | float):
+    held = {name: one.estimate for name, one in result.payload.items()}
+    lengths = {name: held.get(name, result.settings.get(name)) for name in ("l1", "l2")}
+    l1, l2, gravity = lengths["l1"], lengths["l2"], result.settings.get("gravity")
+    if l1 is None and gravity is not None:
         l1 = length_by_coupling(value, gravity)  # l1 = g |K1| / |K2| (Table 1)
     if l1 is None or l1 <= 0 or raw is None:
         return None
-    own = {name: values[raw.samples["log"] == 0] for name, values in raw.samples.items()}
-    known = np.isfinite(own["theta1"]) & np.isfinite(own["theta2"])
+    t, theta = raw.samples["t"], np.stack([raw.samples["theta1"], raw.samples["theta2"]])
+    known = (raw.samples["log"] == 0) & np.isfinite(theta).all(axis=0)
     if np.count_nonzero(known) < 2:
         return None
     first, second, _ = moments_of(value)
-    # θ1's zero against gravity, of an arm whose moments have phases
-    turn = cmath.phase(second / first) if first and second and set(value) & set(SINES) else 0.0
-    reading = f"{READING} l1 is {significant(l1, 3)} m."
-    if l2 is None:
-        reading += (
-            f" Link 2's length is not known: it is drawn as long as link 1 (give {flag('l2')})."
-        )
-    mass, beside = (result.payload.get(name) for name in ("m_p", "y_p"))
-    payload = ""
-    if mass is not None and mass.estimate is not None:
-        payload = f"payload of {significant(mass.estimate, 3)} kg"
-    aside = beside.estimate or 0.0 if beside else 0.0
-    theta = np.stack([own["theta1"][known] + turn, own["theta2"][known]])
-    return ArmDrawing(l1, l2 or l1, own["t"][known], theta, reading, payload, aside=aside)
-
-
-def _length(result: Result, name: str) -> float | None:
-    """A link's length in m: estimated with the payload, or given."""
-    value = result.settings.get(name)
-    if name in result.payload:
-        value = result.payload[name].estimate
-    if not isinstance(value, int | float) or value <= 0:
-        return None
-    return float(value)
+    if first and second and set(value) & set(SINES):
+        theta[0] += cmath.phase(second / first)  # θ1's zero against gravity
+    reading = f"Play it: does this arm move as yours did? l1 is {significant(l1, 3)} m."
+    if l2 is None or l2 <= 0:
+        l2, way = l1, flag("l2")
+        reading += f" Link 2's length is not known: it is drawn as long as link 1 (give {way})."
+    mass = held.get("m_p")
+    payload = "" if mass is None else f"payload of {significant(mass, 3)} kg"
+    aside = held.get("y_p") or 0.0
+    return ArmDrawing(l1, l2, t[known], theta[:, known], reading, payload, aside=aside)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -20,8 +20,8 @@ from algid.base.words import counted
 from algid.report.document import Document, Section, Table
 from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot, names_down
 from algid.report.render import page
-from algid.report.tables import flat_settings
-from algid.results import Estimate, Result
+from algid.report.tables import settings_of
+from algid.results import Result
 from algid.results.rows import row_of
 
 NAME = "compare.html"
@@ -35,32 +35,26 @@ SYMBOLS = ("circle", "square", "diamond", "x", "cross")
 class Comparison:
     """Results side by side; the first one is what the others are measured against."""
 
-    labels: tuple[str, ...]
-    results: tuple[Result, ...]
+    labels: Sequence[str]
+    results: Sequence[Result]
 
     def __repr__(self) -> str:
-        far = self.largest_sigma
-        largest = "no distance" if far is None else f"the largest distance {far:.1f} σ"
-        return f"Comparison({', '.join(self.labels)}: {largest})"
+        return f"Comparison({', '.join(self.labels)}: {verdict(self).headline})"
 
     @cached_property
-    def by_name(self) -> dict[str, list[Estimate | None]]:
-        """The estimates of each parameter that any of the results has."""
+    def sigma(self) -> dict[str, list[float | None]]:
+        """By parameter of any result the distance of each from the first one, in σ."""
         names = dict.fromkeys(name for one in self.results for name in one.estimates)
-        return {name: [one.estimates.get(name) for one in self.results] for name in names}
-
-    @cached_property
-    def sigma(self) -> dict[str, tuple[float | None, ...]]:
-        """By parameter the distance of each other result from the first one, in σ."""
-        pairs = self.by_name.items()
-        return {name: tuple(distance(first, one) for one in rest) for name, (first, *rest) in pairs}
+        return {
+            name: [distance(self.results[0], one, name) for one in self.results] for name in names
+        }
 
     @cached_property
     def far(self) -> list[tuple[float, str]]:
         """The size of each distance that is known, the largest first, and what it is of."""
         found = []
         for name, row in self.sigma.items():
-            for label, far in zip(self.labels[1:], row, strict=True):
+            for label, far in zip(self.labels, row, strict=True):
                 if far is not None:
                     found.append((abs(far), f"{visible(name)} of {label} ({far:+.1f} σ)"))
         return sorted(found, reverse=True)
@@ -73,42 +67,44 @@ class Comparison:
     @cached_property
     def settings(self) -> dict[str, list[str]]:
         """What was set otherwise, and how the first log of each kind was read otherwise."""
-        every = list(map(_settings, self.results))
-        names = dict.fromkeys(name for settings in every for name in settings)
-        rows = {name: [settings.get(name, ABSENT) for settings in every] for name in names}
-        return {name: values for name, values in rows.items() if len(set(values)) > 1}
+        every = []
+        for one in self.results:
+            every.append(settings_of(one) | {"estimator": one.estimator, "algid": one.version})
+        differ = dict[str, list[str]]()
+        for name in dict.fromkeys(name for settings in every for name in settings):
+            values = [settings.get(name, ABSENT) for settings in every]
+            # a command names the logs and says again what is set; who told is no difference
+            aside = name == "command" or name.startswith("used.") or name.endswith("told")
+            if not aside and len(set(values)) > 1:
+                differ[name] = values
+        return differ
 
     def tables(self) -> tuple[Table, Table]:
         """The estimates one below the other, as wide for many results as for two; the settings."""
         estimates, settings = [], []
-        for name, several in self.by_name.items():
-            first = several[0]
-            for label, one, far in zip(
-                self.labels, several, (None, *self.sigma[name]), strict=True
-            ):
+        for name, row in self.sigma.items():
+            first = self.results[0].estimates.get(name)
+            for label, result, far in zip(self.labels, self.results, row, strict=True):
+                one, change = result.estimates.get(name), ABSENT
                 if one is None:
                     continue
-                row, change = row_of(name, one), ABSENT
-                if one is not first and first and first.estimate and one.estimate is not None:
+                if far is not None and first and first.estimate and one.estimate is not None:
                     change = percent(one.estimate - first.estimate, first.estimate, 3)
-                number = (row.with_half, row.unit, row.status)
-                estimates.append((row.name, label, *number, formatted(far, "+.1f"), change))
+                of = row_of(name, one)
+                number = (of.with_half, of.unit, of.status)
+                estimates.append((of.name, label, *number, formatted(far, "+.1f"), change))
         for name, values in self.settings.items():
             for label, value in zip(self.labels, values, strict=True):
                 settings.append((visible(name), label, visible(value)))
         note = f"Differences are against {self.labels[0]}; ± is 95 %, σ combines both intervals."
         same = "Every setting is the same, and every log was read the same way."
+        columns = "Parameter | Result | Estimate | Unit | Status | Δ/σ | Δ %"
         return (
-            Table(
-                "Estimates side by side",
-                "Parameter | Result | Estimate | Unit | Status | Δ/σ | Δ %",
-                tuple(estimates),
-                note,
-            ),
+            Table("Estimates side by side", columns, estimates, note),
             Table(
                 "Settings that differ",
                 "Setting | Result | Value",
-                tuple(settings),
+                settings,
                 "" if settings else same,
             ),
         )
@@ -116,12 +112,11 @@ class Comparison:
     def as_json(self) -> str:
         """Estimates, 95 % intervals and distances in σ as the text of a JSON file."""
         parameters = {}
-        for name, several in self.by_name.items():
-            numbers = {
-                key: [None if one is None else getattr(one, key) for one in several]
-                for key in ("estimate", "std", "ci95")
-            }
-            parameters[name] = numbers | {"sigma": [None, *self.sigma[name]]}
+        for name, row in self.sigma.items():
+            several = [one.estimates.get(name) for one in self.results]
+            keys = ("estimate", "std", "ci95")
+            numbers = {key: [getattr(one, key, None) for one in several] for key in keys}
+            parameters[name] = numbers | {"sigma": row}
         content = {"labels": self.labels, "parameters": parameters, "settings": self.settings}
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -134,35 +129,22 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     shown = list(map(visible, labels or [file_name(result.log.path) for result in results]))
     if len(set(shown)) < len(shown):
         shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
-    return Comparison(tuple(shown), tuple(results))
+    return Comparison(shown, results)
 
 
-def distance(first: Estimate | None, other: Estimate | None) -> float | None:
-    """Signed distance of `other` from `first` over their combined half intervals, in σ.
+def distance(first: Result, other: Result, name: str) -> float | None:
+    """Signed distance of a parameter of `other` from `first` over combined half intervals, in σ.
 
     Of normal intervals that is their combined standard deviation. Of Student's it is larger, so
     that 95 % of the differences that chance makes lie within 1.96 of either.
     """
-    if first is None or other is None or first.estimate is None or other.estimate is None:
-        return None
-    if first.half is None or other.half is None:
-        return None
-    combined = math.hypot(first.half, other.half) / NORMAL
-    return (other.estimate - first.estimate) / combined if combined else None
-
-
-def _settings(result: Result) -> dict[str, str]:
-    """How a result was made: its settings, and how the first log of each kind was read."""
-    settings = flat_settings(result.settings)
-    settings.pop("command", None)  # it names the logs, and says again what is set
-    settings |= {"estimator": result.estimator, "algid": result.version}
-    for log in reversed(result.logs):
-        if log.reading is not None:
-            for name, text in flat_settings(asdict(log.reading)).items():
-                # who said so is no difference
-                if not name.endswith("told"):
-                    settings[f"{log.role} log: {name.removeprefix('channels.')}"] = text or ABSENT
-    return settings
+    values, halves = [], []
+    for one in (first.estimates.get(name), other.estimates.get(name)):
+        if first is not other and one and one.estimate is not None and one.half is not None:
+            values.append(one.estimate)
+            halves.append(one.half)
+    combined = math.hypot(*halves) / NORMAL
+    return (values[1] - values[0]) / combined if len(values) == 2 and combined else None
 
 
 def write_comparison(found: Comparison, path: Path, force: bool) -> None:
@@ -174,16 +156,16 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
         If it cannot be written, or exists and `force` is not set.
     """
     names, (estimates, settings) = found.labels, found.tables()
-    figures = [_distances(found)] if found.far else []
+    figure = _distances(found) if found.far else None
     document = Document(
         title="Comparison",
         verdict=verdict(found),
         sections=(
-            Section("numbers", "Differences", (*figures, estimates)),
+            Section("numbers", "Differences", (figure, estimates)),
             Section("settings", "Settings that differ", (settings,)),
         ),
         kicker="results side by side",
-        name=joined(list(names)) if len(names) < 4 else f"{names[0]} and {len(names) - 1} more",
+        name=joined(names, 3),
         facts=f"{counted(len(names), 'result')} · measured against {names[0]}",
         made=f"Made by algid {__version__}.",
     )
@@ -197,9 +179,7 @@ def verdict(found: Comparison) -> Verdict:
         return Verdict("reservations", "no parameter has error bars in two results")
     beyond = [words for size, words in found.far if size > FAR]
     if beyond:
-        more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
-        differ = "differs" if len(beyond) == 1 else "differ"
-        headline = f"{joined(beyond[:3])}{more} {differ} by more than {FAR:.2g} σ"
+        headline = f"more than {FAR:.2g} σ apart: {joined(beyond, 3)}"
         return Verdict("reservations", headline, title="Different")
     inside = sum(size <= NORMAL for size, _ in found.far)
     within = f"{inside} of {counted(len(found.far), 'difference')} within {NORMAL:.2f} σ"
@@ -208,14 +188,13 @@ def verdict(found: Comparison) -> Verdict:
 
 def _distances(found: Comparison) -> Plot:
     """How far each result is from the first, in σ of both intervals."""
-    names = [name for name, row in found.sigma.items() if set(row) != {None}]
-    panels = Panels([f"Distance from {found.labels[0]}, σ"], height=70 + 24 * len(names))
-    for place, label in enumerate(found.labels[1:]):
-        far = np.array([found.sigma[name][place] for name in names], dtype=np.float64)
+    rows = {name: row for name, row in found.sigma.items() if any(far is not None for far in row)}
+    panels = Panels([f"Distance from {found.labels[0]}, σ"], height=70 + 24 * len(rows))
+    for place, far in enumerate(np.array(list(rows.values()), dtype=np.float64).T[1:]):
         look = COLOURS[place % len(COLOURS)], 8, SYMBOLS[place % len(SYMBOLS)]
-        panels.dots(0, far, names, label, *look)
-    reach = max(1.1 * (found.largest_sigma or 0.0), 4.0)
-    panels.axes(0, {"range": [-reach, reach]}, names_down(names))
-    panels.stretch(0, -NORMAL, NORMAL, BLUE)
+        panels.dots(0, far, list(rows), found.labels[place + 1], *look)
+    reach = max(1.1 * found.far[0][0], 4.0)
+    panels.axes(0, {"range": [-reach, reach]}, names_down(list(rows)))
+    panels.mark(0, -NORMAL, NORMAL, colour=BLUE)
     reading = f"Within the band, ± {NORMAL:.2f} σ, chance alone puts 19 of 20 differences."
     return Plot("distances", "Distances in σ", panels, reading)

@@ -7,8 +7,8 @@ each. Terminal, Markdown and page set it, each in one way for all of them.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from algid.base.text import ABSENT
@@ -28,39 +28,36 @@ class Table:
     Parameters
     ----------
     title, rows
-    columns : headings with " | " between; a terminal without room for all leaves out the last ones
+    columns : headings with " | " between; one that holds nothing but dashes is not shown, and a
+        terminal without room for all leaves out the last ones
     note : one line below it
     links : where the names of rows lead, which only a page shows
     """
 
     title: str
     columns: str
-    rows: tuple[tuple[str, ...], ...]
+    rows: Sequence[tuple[str, ...]]
     note: str = ""
     links: Mapping[str, str] | None = None
 
-    def without_empty(self) -> Table:
-        """The table less the columns that hold nothing."""
-        if not self.rows:
-            return self
-        pairs = zip(self.columns.split(" | "), zip(*self.rows, strict=True), strict=True)
-        full = [(heading, cells) for heading, cells in pairs if set(cells) - {ABSENT, ""}]
-        headings, cells = zip(*full, strict=True)
-        return replace(self, columns=" | ".join(headings), rows=tuple(zip(*cells, strict=True)))
-
     @property
-    def heads(self) -> list[tuple[str, Kind]]:
-        """Headings and kinds: the row's name, a status, a number where all cells are, or text."""
-        heads = list[tuple[str, Kind]]()
+    def heads(self) -> list[tuple[int, str, Kind]]:
+        """Place, heading and kind of each column that holds something.
+
+        The row's name, a status, a number where all cells are, or text.
+        """
+        heads = list[tuple[int, str, Kind]]()
         for place, heading in enumerate(self.columns.split(" | ")):
             cells = {row[place] for row in self.rows} - {ABSENT, ""}
             kind: Kind = "number" if all(map(NUMBER.fullmatch, cells)) else "text"
-            heads.append((heading, "status" if heading == "Status" else kind if place else "name"))
+            kind = "status" if heading == "Status" else kind if place else "name"
+            if cells:
+                heads.append((place, heading, kind))
         return heads
 
 
-Content = Table | Plot | str | tuple[str, ...]
-"""A sentence is text, a list of them a tuple."""
+Content = Table | Plot | str | Sequence[str] | None
+"""A sentence is text; where there is nothing to show it is None."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +73,12 @@ class Section:
 
     key: str
     title: str
-    content: tuple[Content, ...]
+    content: Sequence[Content]
     folded: bool = False
 
     @property
     def shown(self) -> list[Content]:
-        """The content less tables without a row and empty lists."""
+        """The content less tables without a row, and what is empty."""
         return [one for one in self.content if (one.rows if isinstance(one, Table) else one)]
 
 
@@ -101,7 +98,7 @@ class Document:
 
     title: str
     verdict: Verdict
-    sections: tuple[Section, ...]
+    sections: Sequence[Section]
     kicker: str = ""
     name: str = ""
     facts: str = ""

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from algid.arm import CONSTANT_NAMES
 from algid.base.progress import Progress
-from algid.base.text import file_name, significant
+from algid.base.text import file_name, joined, significant
 from algid.base.words import counted
 from algid.methods import settles
 from algid.report.arm import arm_of
 from algid.report.document import Content, Document, Section
-from algid.report.figures import figures, figures_of_paper, intervals
+from algid.report.figures import figures, intervals, over_time
 from algid.report.plot import Plot
 from algid.report.render import markdown, page, write_library, write_texts
 from algid.report.series import drawn
@@ -55,44 +55,46 @@ def write_pages(
     result = read_result(folder)
     if shared_library:
         write_library(folder.parent)
-    text = page(result_document(result, folder, progress), shared_library)
-    return write_texts(
-        folder, {"report.html": text, "report.md": markdown(result_document(result))}
-    )
+    document = result_document(result, folder, progress)
+    texts = {"report.html": page(document, shared_library), "report.md": markdown(document)}
+    return write_texts(folder, texts)
 
 
 def result_document(
     result: Result, folder: Path | None = None, progress: Progress | None = None
 ) -> Document:
     """The report of an identification; with its `folder` also the figures and its samples."""
-    fit, leads = result.fit, settles(result.estimator)
+    fit, leads, raw = result.fit, settles(result.estimator), None
     names = [file_name(log.path) for log in result.logs]
-    first, fitted, terms = list[Content](arm_tables(result)), tuple[Content, ...](), list[Content]()
-    plots, paper, raw = list[Plot](), list[Content](), None
-    other, zero = nuisance_tables(result)
+    plots, first = list[Plot](), list[Content](arm_tables(result))
+    fitted, terms, paper = list[Content](), list[Content](), list[Content]()
     if folder is not None:
         raw = drawn(folder / "torque.parquet", progress=progress)
-        plots, paper = figures(folder, result, raw), [*figures_of_paper(folder, result)]
+        plots = figures(folder, result, raw)
+        paper += [over_time(folder, result, name) for name in ("estimates", "loaded")]
     if fit is not None:
-        first += [*([] if folder is None else [intervals(result)]), prediction_table(fit)]
-        fitted, terms = fit_tables(fit), [terms_table(fit)]
-    parts = [Section(plot.key, plot.title, (plot,)) for plot in plots]
-    notes, asked = tuple(one.sentence for one in result.verdict.notes), replaced_estimator(result)
+        tried = {"logs used": fit.residual, "each log by the others": fit.cross_validation}
+        known = {name: one for name, one in tried.items() if one is not None}
+        first += [intervals(result) if folder is not None else None, prediction_table(known)]
+        fitted, terms = [*fit_tables(fit)], [terms_table(fit)]
+    other, zero = nuisance_tables(result)
+    parts = [Section(plot.key, plot.title, [plot]) for plot in plots]
+    notes, asked = [one.sentence for one in result.verdict.notes], replaced_estimator(result)
     estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
     origin = [("algid", result.version), ("estimator", estimator)]
-    made_by = (result_settings(result), provenance_table(origin, result.logs))
+    made_by = [result_settings(result), provenance_table(origin, result.logs)]
     title = "The paper's figure and tables"
-    of_paper = Section("paper", title, (*paper, *paper_tables(result)), not leads)
+    of_paper = Section("paper", title, [*paper, *paper_tables(result)], not leads)
     may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
     sections = [
-        Section("numbers", "Numbers", tuple(first)),
+        Section("numbers", "Numbers", first),
         *([of_paper] if leads else []),
         *parts[:1],
-        Section("terms", "Other terms of the torque", (other, *terms)),
-        Section("zero", may_be, (zero,), folded=True),
+        Section("terms", "Other terms of the torque", [other, *terms]),
+        Section("zero", may_be, [zero], folded=True),
         *parts[1:],
         Section("fit", "Noise, whiteness and bounds", fitted, folded=True),
-        Section("data", "Data quality", (notes, *log_tables(result.logs)), folded=True),
+        Section("data", "Data quality", [notes, *log_tables(result.logs)], folded=True),
         Section("settings", "Settings and provenance", made_by, folded=True),
         *([] if leads else [of_paper]),
     ]
@@ -101,9 +103,9 @@ def result_document(
     return Document(
         title=f"Identification of {names[0]}",
         verdict=result.verdict,
-        sections=tuple(sections),
+        sections=sections,
         kicker="identification of a two-link arm",
-        name=names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more",
+        name=joined(names, 1),
         facts=f"{constants.count(Status.OK)} of {counted(len(constants), 'constant')} identified · "
         f"{result.estimator} estimator · {seconds} s of log at "
         f"{significant(result.log.rate, 4)} Hz · "

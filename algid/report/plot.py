@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.quantiles import median
 from algid.base.text import visible
 
 BLUE, ORANGE, GREEN, GREY, RED = "#3b82c4", "#d9772b", "#2e9c6a", "#8b95a4", "#d0453c"
@@ -62,23 +61,14 @@ class Panels:
             "height": height * rows + FRAME,
         }
         for place, title in enumerate(titles):
-            x, _ = self.axes(place)
-            if together and place:
-                x["matches"] = "x"
+            self.axes(place, {"matches": "x"} if together and place else "")
             self.text(place, title)
 
-    def axes(
-        self, place: int, x: dict[str, Any] | str = "", y: dict[str, Any] | str = ""
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Both axes of a panel, with their titles or more of their settings."""
-        both = []
-        for way, given in (("x", x), ("y", y)):
-            name = ref(f"{way}axis", place)
-            axis: dict[str, Any] = self.layout.setdefault(name, {})
-            if given:
-                axis |= {"title": {"text": given}} if isinstance(given, str) else given
-            both.append(axis)
-        return both[0], both[1]
+    def axes(self, place: int, x: dict[str, Any] | str = "", y: dict[str, Any] | str = "") -> None:
+        """Set titles of a panel's axes, or more of their settings."""
+        for name, given in ((ref("xaxis", place), x), (ref("yaxis", place), y)):
+            axis = self.layout.setdefault(name, {})
+            axis |= {"title": {"text": given}} if given and isinstance(given, str) else given or {}
 
     def add(self, place: int, x: Any, y: Any, name: str, **more: Any) -> None:
         """Add a trace; the first of a name stands in the legend."""
@@ -126,18 +116,27 @@ class Panels:
             fill = {"fill": "toself", "fillcolor": PALE, "hoverinfo": "skip"}
             self.curve(place, around, edge, name, width=0, **fill)
 
-    def line(
-        self, place: int, *, x: Any = None, y: Any = None, colour: str = GREY, dash: str = "dash"
+    def mark(
+        self,
+        place: int,
+        low: Any,
+        high: Any = None,
+        way: str = "x",
+        colour: str = GREY,
+        dash: str = "dash",
     ) -> None:
-        """Add a level line at `y`, or an upright one at `x`, over the whole panel."""
-        ends = self._over(place, x0=x, x1=x) if y is None else self._over(place, y0=y, y1=y)
-        look = {"color": colour, "width": 1.2, "dash": dash}
-        self.layout["shapes"].append(ends | {"type": "line", "line": look})
-
-    def stretch(self, place: int, low: float, high: float, colour: str = GREY) -> None:
-        """Add an upright band over the whole panel."""
-        look = {"fillcolor": colour, "opacity": 0.16, "line": {"width": 0}, "layer": "below"}
-        self.layout["shapes"].append(self._over(place, x0=low, x1=high) | look | {"type": "rect"})
+        """Add a line over the whole panel where an axis is `low`, or a band up to `high`."""
+        look: dict[str, Any] = {
+            "type": "line",
+            "line": {"color": colour, "width": 1.2, "dash": dash},
+        }
+        if high is not None:
+            look = {"type": "rect", "fillcolor": colour, "opacity": 0.16, "line": {"width": 0}}
+            look["layer"] = "below"
+        over = "y" if way == "x" else "x"
+        ends = {f"{way}0": low, f"{way}1": low if high is None else high}
+        ends |= {f"{over}0": 0, f"{over}1": 1, f"{over}ref": f"{ref(over, place)} domain"}
+        self.layout["shapes"].append(look | ends | {f"{way}ref": ref(way, place)})
 
     def heat(self, names: Sequence[str], x: Any, z: FloatArray, **more: Any) -> None:
         """Fill the only panel with a map of numbers, a row a name."""
@@ -155,13 +154,6 @@ class Panels:
             at["text"] = f"<b>{at['text']}</b>"
         at |= {"y": 1, "yref": f"{ref('y', place)} domain", "xanchor": "left", "showarrow": False}
         self.layout["annotations"].append(at)
-
-    def _over(self, place: int, **ends: Any) -> dict[str, Any]:
-        """Where a shape lies that reaches over the whole panel along the axis not given."""
-        refs = {"xref": ref("x", place), "yref": ref("y", place)}
-        open_way = "y" if "x0" in ends else "x"
-        refs[f"{open_way}ref"] += " domain"
-        return refs | {f"{open_way}0": 0, f"{open_way}1": 1} | ends
 
 
 def names_down(names: Sequence[str]) -> dict[str, Any]:
@@ -185,18 +177,20 @@ def packed(values: Any, exact: bool = False) -> Any:
     """Numbers as plotly's typed array.
 
     In single precision, unless they are integers, such as dates, or beyond it, or are to be
-    `exact` and its error is over 1 % of their usual step, as that of times in a long log.
+    `exact` and their steps are not, as those of times in a long log.
     """
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         return values
-    limits = np.finfo(np.float32)
-    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    kind = "f8" if values.dtype.kind in "iu" or largest > float(limits.max) else "f4"
-    if exact:
-        steps = np.abs(np.diff(values))
-        steps = steps[steps > 0]
-        if steps.size and median(steps) < 100 * float(limits.eps) * largest:
-            kind = "f8"
-    text = base64.b64encode(np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()).decode()
+    whole = values.astype("<f8")
+    with np.errstate(over="ignore"):
+        short = whole.astype("<f4")
+    kept = values.dtype.kind == "f" and np.array_equal(np.isinf(short), np.isinf(whole))
+    if exact and kept:
+        kept = np.allclose(np.diff(short), np.diff(whole), 0.01, 0.0, equal_nan=True)
+    made = short if kept else whole
     shape = {} if values.ndim == 1 else {"shape": ", ".join(map(str, values.shape))}
-    return {"dtype": kind, "bdata": text, **shape}
+    return {
+        "dtype": made.dtype.str[1:],
+        "bdata": base64.b64encode(made.tobytes()).decode(),
+        **shape,
+    }

@@ -11,8 +11,6 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
-import json
-import math
 import re
 import secrets
 from collections.abc import Mapping
@@ -20,6 +18,8 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from pydantic_core import to_json
 
 from algid.base.files import whole_file
 from algid.base.text import visible
@@ -42,13 +42,9 @@ def page(document: Document, shared_library: bool = False) -> str:
 
     It carries the plotting library; with `shared_library` it asks for the one beside the folder.
     """
-    drawn: dict[str, Any] = {}
-    for plot in document.plots:
-        drawn[plot.key] = {"data": plot.figure.data, "layout": plot.figure.layout}
+    drawn: dict[str, Any] = {plot.key: vars(plot.figure) for plot in document.plots}
     if document.arm is not None:
-        t, theta = document.arm.frames
-        rows = dict(zip(("t", "theta1", "theta2"), (t, *theta), strict=True))
-        drawn["arm"] = {name: values.round(4).tolist() for name, values in rows.items()}
+        drawn["arm"] = document.arm.frames
     place = secrets.token_hex(32)  # nobody who writes the content can predict it
     text = (
         _environment(_shown)
@@ -56,7 +52,7 @@ def page(document: Document, shared_library: bool = False) -> str:
         .render(
             document=document,
             most=MOST_REASONS,
-            drawn=packed_text(gzip.compress(strict_json(drawn).encode(), mtime=0)),
+            drawn=packed_text(gzip.compress(to_json(drawn, inf_nan_mode="null"), mtime=0)),
             library="" if shared_library else packed_text(library()),
             beside=LIBRARY,
             nonce=place,
@@ -115,19 +111,6 @@ def _escaped(value: object) -> object:
     if type(value) is not str:
         return value
     return Markup(SPECIAL.sub(r"\\\1", visible(value, len(value))))
-
-
-def strict_json(value: object) -> str:
-    """`value` as JSON; a number that is none is null, as a gap in a line is."""
-    return json.dumps(_of_numbers(value), allow_nan=False, separators=(",", ":"))
-
-
-def _of_numbers(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _of_numbers(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_of_numbers(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def packed_text(content: bytes) -> str:

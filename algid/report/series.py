@@ -29,7 +29,7 @@ ROWS = 1 << 18
 POINTS = 2_400
 """Of a series: twice what a page is wide."""
 SAMPLES = 2_000
-MOTION = ("t", "theta1", "theta2", "omega1", "omega2")
+HALF = 0.5  # s before and after the largest residual
 GOLDEN = 0.6180339887498949
 
 
@@ -71,7 +71,7 @@ def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[
 def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
     """Split blocks where their column ``log`` changes: pairs of log and its stretch."""
     for block in found:
-        log = block.get("log", np.zeros(block["t"].size))
+        log = block.setdefault("log", np.zeros(block["t"].size))
         edges = [0, *(np.flatnonzero(np.diff(log)) + 1).tolist(), log.size]
         for first, last in pairwise(edges):
             if last > first:
@@ -79,11 +79,15 @@ def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
 
 
 def table(path: Path) -> dict[str, NDArray[Any]]:
-    """The columns of a small file, none where it is not there. Raises `ResultError`."""
+    """Texts and numbers of a small file by column, none where it is not there.
+
+    Raises `ResultError`.
+    """
     if not path.is_file():
         return {}
     with _parquet(path) as file:
-        return {name: np.array(values) for name, values in file.read().to_pydict().items()}
+        columns = file.read().to_pydict().items()
+    return {name: np.array(of, None if str in map(type, of) else float) for name, of in columns}
 
 
 def facts_of(path: Path) -> tuple[list[str], int, dict[bytes, bytes]]:
@@ -99,13 +103,13 @@ class Drawn:
     Parameters
     ----------
     columns : with `x`, the time that runs on from log to log, s, and NaN rows where a line breaks
-    samples : of angles and velocities, whole rows spread evenly over the logs
-    worst : of either joint the largest residual, when in s, and in which log
+    samples : whole rows spread evenly over the logs
+    worst : by joint the largest residual, when in s, in which log, and its block's samples about it
     """
 
     columns: Block
     samples: Block
-    worst: tuple[tuple[float, float, int], ...]
+    worst: dict[int, tuple[float, float, int, Block]]
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
@@ -114,7 +118,9 @@ class Drawn:
     def starts(self) -> dict[int, float]:
         """Where each log begins on the axis `x`."""
         places = np.flatnonzero(np.diff(self["log"], prepend=-1))
-        return {int(self["log"][place]): float(self["x"][place]) for place in places}
+        return dict(
+            zip(self["log"][places].astype(int).tolist(), self["x"][places].tolist(), strict=True)
+        )
 
 
 def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) -> Drawn | None:
@@ -130,24 +136,27 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     if not path.is_file():
         return None
     total = facts_of(path)[1]
-    bucket = max(1, -(-2 * total // points))
-    step = max(1, total // SAMPLES)
-    parts, samples, periods, done = list[Block](), list[Block](), [0.0], 0
-    worst = [(0.0, 0.0, 0)] * 2
+    bucket, step = max(1, -(-2 * total // points)), max(1, total // SAMPLES)
+    parts, samples, worst = list[Block](), list[Block](), dict[int, Any]()
+    period, done, last, shift = 0.0, 0, 0, 0.0
     for log, part in by_log(blocks(path)):
-        with_residuals(part)
         t = part["t"]
-        part["log"] = np.full(t.size, float(log))
-        if t.size > 1:
-            periods.append(median(np.diff(t)))
-        for joint, before in enumerate(worst, start=1):
-            size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
-            place = int(size.argmax())
-            worst[joint - 1] = max(before, (float(size[place]), float(t[place]), log))
+        if log != last:  # a hundredth is left between logs
+            last, shift = log, 1.01 * parts[-1]["x"][-1] - t[0]
+        part["x"] = t + shift
+        period = max(period, median(np.diff(t)))  # NaN, of one sample, is not larger
+        for joint in (1, 2):
+            if f"tau{joint}_predicted" in part:
+                left = part[f"tau{joint}"] - part[f"tau{joint}_predicted"]
+                part[f"residual{joint}"], size = left, np.abs(np.nan_to_num(left))
+                place = int(size.argmax())
+                if size[place] > worst.get(joint, (0.0,))[0]:
+                    near = rows_of(part, np.abs(t - t[place]) <= HALF)
+                    worst[joint] = float(size[place]), float(t[place]), log, near
         # which sample of a stretch moves by the golden ratio: never in step with the motion
         at = np.arange(0, t.size, step)
         at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), t.size - 1)
-        samples.append({name: part[name][at] for name in ("log", *MOTION) if name in part})
+        samples.append(rows_of(part, at))
         parts.append(reduced(part, bucket))
         done += t.size
         if progress is not None:
@@ -155,18 +164,12 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     if not parts:
         raise ResultError(f"{path}: it holds no rows; identify again with this version")
     columns = concatenated(parts)
-    columns["x"], end = columns["t"].copy(), None
-    for log in np.unique(columns["log"]):
-        own = columns["log"] == log
-        if end is not None:
-            columns["x"][own] += 1.01 * end - columns["t"][own][0]
-        end = columns["x"][own].max()
-    apart = np.diff(columns["t"]) > CUT * bucket * max(periods)
+    apart = np.diff(columns["t"]) > CUT * bucket * period
     broken = np.flatnonzero(apart | (np.diff(columns["log"]) > 0)) + 1
     for name, values in columns.items():
         nothing = values[broken - 1] if name in ("log", "x") else np.nan
         columns[name] = np.insert(values, broken, nothing)
-    return Drawn(columns, concatenated(samples), tuple(worst))
+    return Drawn(columns, concatenated(samples), worst)
 
 
 def reduced(part: Block, size: int) -> Block:
@@ -179,26 +182,3 @@ def reduced(part: Block, size: int) -> Block:
         low, high = np.fmin.reduceat(values, at), np.fmax.reduceat(values, at)
         short[name] = np.stack([low, high], axis=1).ravel()
     return short
-
-
-def between(path: Path, log: int, low: float, high: float) -> Block:
-    """Every sample of a log with t in [low, high]; row groups elsewhere are not read."""
-    with _parquet(path) as file:  # a filter would import datasets, and pandas where it is found
-        names, wanted = file.schema_arrow.names, []
-        for group in range(file.num_row_groups):
-            columns = file.metadata.row_group(group)
-            logs, times = (columns.column(names.index(of)).statistics for of in ("log", "t"))
-            if logs.min <= log <= logs.max and times.min <= high and times.max >= low:
-                wanted.append(group)
-        rows = file.read_row_groups(wanted)
-        block = {name: numbers_of(rows[name].combine_chunks()) for name in rows.column_names}
-    near = (block["log"] == log) & (block["t"] >= low) & (block["t"] <= high)
-    return with_residuals(rows_of(block, near))
-
-
-def with_residuals(part: Block) -> Block:
-    """The block with what the prediction leaves of each torque, where it holds one."""
-    for joint in (1, 2):
-        if f"tau{joint}_predicted" in part:
-            part[f"residual{joint}"] = part[f"tau{joint}"] - part[f"tau{joint}_predicted"]
-    return part

@@ -7,6 +7,7 @@ shows a table makes its text visible.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from algid.arm import CONSTANT_NAMES
@@ -25,8 +26,6 @@ from algid.report.document import Table
 from algid.results import Estimate, FitSummary, LogSummary, Result, Status, TorquePrediction
 from algid.results.rows import known_truth, rows_of
 
-CONVENTIONS = ("zero", "second_angle", "drive", "signs", "offsets")
-"""How the angles and torques of a log were taken."""
 INTERVALS_REST_ON = {
     "likelihood": "the likelihood, which takes it to be white",
     "sandwich": "a sandwich, which lets it be coloured; what differs from run to run is not "
@@ -34,11 +33,6 @@ INTERVALS_REST_ON = {
     "jackknife": "the larger of a sandwich, which lets it be coloured, and a jackknife over "
     "the logs",
 }
-STATES = (
-    ("rmse_moving", "moving"),
-    ("rmse_rest", "at rest"),
-    ("rmse_held", "at rest beyond ± f of dry friction"),
-)
 
 
 def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Result) -> Table:
@@ -50,18 +44,19 @@ def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Resul
     return Table(
         title,
         "Parameter | Estimate | ± 95 % | Unit | Status | ±, % | Truth | Error, % | Meaning",
-        tuple(rows),
-    ).without_empty()
+        rows,
+    )
 
 
 def arm_tables(result: Result) -> tuple[Table, ...]:
     """The arm first: its constants, its payload and the stiffness of its joints."""
     constants = {name: one for name, one in result.parameters.items() if name in CONSTANT_NAMES}
-    stiffness = result.fit.stiffness if result.fit else {}
     return (
         estimates_table("Constants", constants, result),
         estimates_table("Payload", result.payload, result),
-        estimates_table("Stiffness of elastic joints", stiffness, result),
+        estimates_table(
+            "Stiffness of elastic joints", result.fit.stiffness if result.fit else {}, result
+        ),
     )
 
 
@@ -91,48 +86,40 @@ def paper_tables(result: Result) -> tuple[Table, ...]:
         Table(
             "Table 4",
             "Parameter | Estimate | ± 95 % | Unit | Truth | Error, % | Paper, %",
-            tuple(rows),
+            rows,
             "Names and order of the paper's Table 4; Paper, % is the error it reports. The paper "
             "does not state its torque: that of the synthetic cases was sought for this table.",
-        ).without_empty(),
+        ),
     )
 
 
-def prediction_table(fit: FitSummary) -> Table:
-    """How well the model predicts the torque: of the logs used, and of each log by the others."""
-    rows, notes = [], list[str]()
-    for where, one in (
-        ("logs used", fit.residual), ("each log by the others", fit.cross_validation)
-    ):  # fmt: skip
+def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
+    """How well the model predicts the torque, by what is predicted; None is too short to judge.
+
+    Also of joints while they move and while they stand, where one stands at times.
+    """
+    rows, filters = [], []
+    for where, one in found.items():
         if one is None:
+            rows.append((where, "too short", *[ABSENT] * 6))
             continue
-        for joint, rmse, nrmse, r2 in zip("12", one.rmse, one.nrmse, one.r2, strict=True):
-            numbers = (significant(rmse, 3), significant(100 * nrmse, 3), f"{r2:.5f}")
-            rows.append((where, joint, *numbers))
-        states = by_state(one)
-        notes += [f"Filter: {one.filter}.", *([f"RMSE of {where}: {states}."] if states else [])]
+        filters.append(f"Filter: {one.filter}.")
+        rests = one.rmse_rest not in (None, (None, None))
+        for joint in range(2):
+            states = []
+            for state in (one.rmse_moving, one.rmse_rest, one.rmse_held):
+                states.append(significant(state[joint], 3) if state and rests else ABSENT)
+            numbers = (significant(one.rmse[joint], 3), significant(100 * one.nrmse[joint], 3))
+            rows.append((where, str(joint + 1), *numbers, f"{one.r2[joint]:.5f}", *states))
+    note = " ".join(dict.fromkeys(filters))
+    if any(row[-1] != ABSENT for row in rows):
+        note += " Beyond ± f: at rest, less what dry friction may be."
     return Table(
         "Torque prediction",
-        "Torque predicted | Joint | RMSE, N m | RMSE / RMS, % | R²",
-        tuple(rows),
-        " ".join(dict.fromkeys(notes)),
+        "Torque of | Joint | RMSE, N m | RMSE / RMS, % | R² | Moving | At rest | Beyond ± f",
+        rows,
+        note,
     )
-
-
-def by_state(found: TorquePrediction) -> str:
-    """The RMSE of joints that move and of joints that stand, in words; empty where none stands."""
-    if found.rmse_rest in (None, (None, None)):
-        return ""
-    parts = []
-    for joint in range(2):
-        known = []
-        for name, words in STATES:
-            rmse = (getattr(found, name) or (None, None))[joint]
-            if rmse is not None:
-                known.append(f"{significant(rmse, 3)} {words}")
-        if known:
-            parts.append(f"joint {joint + 1} {', '.join(known)}")
-    return f"{'; '.join(parts)} (N m)"
 
 
 def terms_table(fit: FitSummary) -> Table:
@@ -155,9 +142,9 @@ def terms_table(fit: FitSummary) -> Table:
     return Table(
         "Terms tried",
         "Term | Change of BIC | Held-out error, % | Log odds | Kept | Why",
-        tuple(rows),
+        rows,
         note,
-    ).without_empty()
+    )
 
 
 def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
@@ -170,23 +157,16 @@ def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
         tests.append((name, yes_or_no(test.white), *numbers))
     for one in fit.broken_bounds:
         bounds.append((one.bound, significant(one.value, 4), significant(one.distance_sigma, 2)))
+    basis = f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}."
     return (
-        Table(
-            "Noise of the logs",
-            "Signal | Noise, std | Unit",
-            tuple(noise),
-        ),
+        Table("Noise of the logs", "Signal | Noise, std | Unit", noise),
         Table(
             "Whiteness of the residual",
             "Residual | White | p-value | Lag-one correlation",
-            tuple(tests),
-            f"The intervals rest on {INTERVALS_REST_ON[fit.intervals]}.",
+            tests,
+            basis,
         ),
-        Table(
-            "Physical bounds that are broken",
-            "Bound | Value | Broken by, σ",
-            tuple(bounds),
-        ),
+        Table("Physical bounds that are broken", "Bound | Value | Broken by, σ", bounds),
     )
 
 
@@ -200,50 +180,52 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
             taken.setdefault(pair, []).append(file_name(log.path))
     channels = []
     for pair, names in taken.items():
-        these = joined(names)
-        if len(names) > NAMED:
-            these = f"{names[0]} and {len(names) - 1} more"
-        channels.append((*pair, "all logs" if len(names) == len(logs) else these))
+        channels.append((*pair, "all logs" if len(names) == len(logs) else joined(names, NAMED)))
     return (
-        Table(
-            "Logs",
-            "Log | Arm | Format | Samples | Duration, s | Rate, Hz",
-            tuple(rows),
-        ),
-        Table("Channels", "Signal | Taken from | Log", tuple(channels)),
+        Table("Logs", "Log | Arm | Format | Samples | Duration, s | Rate, Hz", rows),
+        Table("Channels", "Signal | Taken from | Log", channels),
     )
 
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
     """Settings by dotted name."""
-    rows = tuple(flat_settings(settings).items())
-    return Table("Settings", "Setting | Value", rows)
+    return Table("Settings", "Setting | Value", list(flat_settings(settings).items()))
+
+
+def settings_of(result: Result) -> dict[str, str]:
+    """What was asked for, how the first log of each kind was read, and what the logs decided."""
+    used, model, delay, fit = dict[str, Any](), result.torque_model, result.delay, result.fit
+    if model is not None:
+        used["terms"] = ", ".join(model.terms) or "plain"
+        if "coulomb" in model.terms:
+            used["Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
+    if delay is not None and delay.estimate is not None:
+        used["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
+    if fit is not None and fit.torque_hold is not None:
+        used["torque_hold"] = fit.torque_hold.used
+    read = {
+        f"{log.role} log": asdict(log.reading)
+        for log in reversed(result.logs)
+        if log.reading is not None
+    }
+    return flat_settings(result.settings | read | {"used": used})
 
 
 def result_settings(result: Result) -> Table:
-    """What was asked for, what the logs decided, and how the first log of each kind was read."""
-    settings, decided = dict(result.settings), dict[str, Any]()
-    model, delay, fit = result.torque_model, result.delay, result.fit
-    if model is not None:
-        decided["terms"] = ", ".join(model.terms) or "plain"
-        if "coulomb" in model.terms:
-            decided["Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
-    if delay is not None and delay.estimate is not None:
-        decided["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
-    if fit is not None and fit.torque_hold is not None:
-        decided["torque_hold"] = fit.torque_hold.used
-    for log in reversed(result.logs):
-        if log.reading is not None:
-            read = {name.replace("_", " "): getattr(log.reading, name) for name in CONVENTIONS}
-            settings[f"{log.role} log"] = read
-    return settings_table(settings | {"used": decided})
+    """The settings that are set, less those of channels."""
+    rows = settings_of(result).items()
+    return Table(
+        "Settings",
+        "Setting | Value",
+        [row for row in rows if row[1] != ABSENT and ".channels." not in row[0]],
+    )
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """Settings by dotted name, each value as text."""
+    """Settings by dotted name, each value as one reads it in a profile."""
     flat: dict[str, str] = {}
     for name, value in settings.items():
-        if isinstance(value, Mapping) and value:
+        if isinstance(value, Mapping):
             flat |= flat_settings(value, f"{prefix}{name}.")
         else:
             flat[f"{prefix}{name}"] = setting_text(value)
@@ -252,15 +234,13 @@ def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, st
 
 def setting_text(value: object) -> str:
     """A setting's value as one reads it in a profile."""
-    if value is None:
-        return ABSENT
     if isinstance(value, bool):
         return yes_or_no(value)
     if isinstance(value, float):
         return f"{value:.12g}"
     if isinstance(value, list | tuple):
-        return ", ".join(setting_text(item) for item in value)
-    return str(value)
+        value = ", ".join(map(setting_text, value))
+    return ABSENT if value in (None, "") else str(value)
 
 
 def provenance_table(rows: Sequence[tuple[str, str]], logs: Sequence[LogSummary]) -> Table:
@@ -269,4 +249,4 @@ def provenance_table(rows: Sequence[tuple[str, str]], logs: Sequence[LogSummary]
     for log in logs:
         every.append((f"path of {file_name(log.path)}", log.path))
         every.append((f"sha256 of {file_name(log.path)}", log.sha256 or "unknown, fetched in part"))
-    return Table("Provenance", "What | Value", tuple(every))
+    return Table("Provenance", "What | Value", every)

@@ -62,23 +62,23 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
     )
     styles = {"name": "bold", "number": "", "text": "", "status": "bold yellow"}
     rows = [[visible(cell, LONGEST) for cell in row] for row in table.rows]
-    kinds, used = list[Kind](), 0
-    for place, (heading, kind) in enumerate(table.heads):
+    kinds, used = dict[int, Kind](), 0
+    for place, heading, kind in table.heads:
         # rich itself breaks words and cuts digits before it lets a column go
         cells = [heading, *(row[place] for row in rows)]
         words = cells if kind == "number" else " ".join(cells).split()
         least = max(min(cell_len(word), LONGEST_WORD) for word in words)
         used += least + 2
-        if place and used - 2 > console.width:
+        if kinds and used - 2 > console.width:
             break
-        kinds.append(kind)
+        kinds[place] = kind
         side: Literal["left", "right"] = "right" if kind == "number" else "left"
         made.add_column(Text(heading), justify=side, overflow="fold", min_width=least)
     for row in rows:
         line = []
-        for cell, kind in zip(row, kinds, strict=False):
-            good = kind == "status" and cell == Status.OK.value and not failed
-            line.append(Text(cell, "green" if good else styles[kind]))
+        for place, kind in kinds.items():
+            good = kind == "status" and row[place] == Status.OK.value and not failed
+            line.append(Text(row[place], "green" if good else styles[kind]))
         made.add_row(*line)
     console.print(made)
     if table.note:

@@ -118,7 +118,7 @@ def stretch_table(result: TrackResult) -> Table:
         "Payload by stretch",
         "Stretch | From, s | To, s | Payload | ± 95 % | Unit | Status | Truth | Error",
         tuple(rows),
-    ).without_empty()
+    )
 
 
 def change_table(result: TrackResult) -> Table:
@@ -137,7 +137,7 @@ def change_table(result: TrackResult) -> Table:
         "Change | At, s | By | Unit | Between, s | Truth at, s",
         tuple(rows),
         "Between: the change's 95 % interval.",
-    ).without_empty()
+    )
 
 
 def quality_tables(result: TrackResult) -> tuple[Table, ...]:
@@ -249,11 +249,11 @@ def payload_figure(result: TrackResult) -> Plot:
     if len(track.changes) <= MOST_MARKS:
         for _, start, end in track.changes.tolist():
             for place in (0, 1):
-                panels.stretch(place, start, end, ORANGE)
+                panels.mark(place, start, end, colour=ORANGE)
     space = SPACE * (max(reach) - min(reach)) or 0.05
     panels.axes(0, y={"range": [min(reach) - space, max(reach) + space]})
     panels.curve(1, t, left, "residual", ORANGE, 1.0)
-    panels.line(1, y=1.0)
+    panels.mark(1, 1.0, way="y")
     panels.axes(1, "time, s", {"rangemode": "tozero"})
     reading = (
         "Blue should run level, green within its band; the payload may step in the orange bands. "

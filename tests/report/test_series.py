@@ -45,10 +45,12 @@ def test_every_bucket_keeps_its_smallest_and_its_largest(
         kept = short["tau1"][short["log"] == log]
         assert np.nanmin(kept) == own["tau1"].min()
         assert np.nanmax(kept) == own["tau1"].max()
-    size, t, log = short.worst[0]
+    size, t, log, near = short.worst[1]
     left = np.abs(residual)
     place = int(left.argmax())
     assert (size, t, log) == (left.max(), frame["t"][place], frame["log"][place])
+    assert np.abs(near["residual1"]).max() == size
+    assert np.abs(near["t"] - t).max() <= 0.5
     # a bucket of 40: its first pair is its smallest and its largest value
     if block > 8000:
         first = frame["theta2"].to_numpy()[:40]
