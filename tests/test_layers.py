@@ -65,8 +65,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "quantiles ros2 runtime units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
-    "inspection": room("arm criteria errors estimators faults log model notices profile quantiles "
-                       "readers signals units", "numpy pydantic"),
+    "inspection": room("arm criteria errors estimators faults files log model notices profile "
+                       "quantiles readers signals text units", "numpy pydantic"),
     "report": room(
         "arm arrow blocks criteria errors files inspection log methods model notices options "
         "progress quantiles results ros2 significance text verdict words writers",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from difflib import get_close_matches
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 from pydantic import Field
 
 from algid.base.errors import SettingError
-from algid.base.files import parsed_toml, whole_folder
+from algid.base.files import as_toml, parsed_toml, whole_folder
 from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, Range
 from algid.options import ADVANCED, Option, flag
 from algid.profile import Effort, Profile, load_profile, over, with_settings
@@ -202,7 +201,7 @@ def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
         try:
             parsed_toml(f"value = {text}")
         except (ValueError, RecursionError):
-            text = json.dumps(text.strip(), ensure_ascii=False)
+            text = as_toml(text.strip())
         document += f"{name}{equals}{text}\n"
         try:
             found = parsed_toml(document)

@@ -269,13 +269,13 @@ class Recordings:
 
     def _examined(self, log: Recording, block: Log, *, whole: bool) -> tuple[Notice, ...]:
         """What the named checks find in the first block of a log."""
-        from algid.inspection.checks import CONTRADICTIONS, noticed
+        from algid.inspection.checks import CONTRADICTIONS, admitted, examine
 
         begin = block if whole else block.part(0, EXAMINED)
         if log.role not in self._limits:
             self._judge_arm(log, begin)
         alike = [one for one in self.logs if one.role == log.role]
-        notices = noticed(
+        found = examine(
             begin,
             gravity=log.weight,
             effort=log.effort,
@@ -283,6 +283,7 @@ class Recordings:
             alone=len(alike) == 1,
             known=self._known[log.role],
         )
+        notices = admitted(begin, found, whole=whole)
         if len(alike) == 1 and any(one.code in CONTRADICTIONS for one in notices):
             self._limits[log.role] = ()  # of an arm that is not this one
         return notices

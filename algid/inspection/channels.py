@@ -3,25 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+import re
+from collections.abc import Callable, Iterator
+from itertools import product
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from algid.arm import FloatArray
 from algid.base.criteria import CUT
+from algid.base.errors import LogError
 from algid.base.quantiles import median, quantile
 from algid.estimators.saturation import UNSEEN, Saturation
-from algid.inspection.candidates import torques_beside
-from algid.inspection.figures import differences, robust_deviation, saturated_share, thinned
+from algid.inspection.figures import (
+    channels,
+    noise_floor,
+    robust_deviation,
+    saturated_share,
+    source,
+    thinned,
+)
 from algid.log import Log
 from algid.notices import Notice, Remedy
+from algid.readers.formats import entries_at
 
 _DENORMAL = 1e-6
 _SPIKE = 30.0
-_TURN_BACK, _STANDS, _CLEAR = 3, 0.4, 6.0
-"""Turning points: samples before and after, share of their speed, their speed over the noise."""
+_STANDS, _CLEAR = 0.4, 6.0
+"""Turning points: share of the speed three samples off, and that speed over the noise."""
 _DEAD, _DEAD_RUNS = 0.1, 20
 """A torque that keeps one value for so many s and usual runs is not measured."""
 _HELD_RUNS, _HELD_SHARE = 50, 0.6
@@ -29,6 +37,13 @@ _HELD_RUNS, _HELD_SHARE = 50, 0.6
 _OFF_STEP, _IN_STEP = 0.15, 0.9
 """Largest distance of a held torque's runs from whole steps, and least share of such runs."""
 _TURN = 2 * math.pi
+_TORQUES = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
+_CURRENTS = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
+_OTHER = re.compile(
+    r"cmd|command|desired|target|limit|(?<![a-z])des(?![a-z])|\(empty\)$", re.IGNORECASE
+)
+_MOST = 3
+"""Channels that are named in the place of a torque that is none."""
 
 
 def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
@@ -37,53 +52,48 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
     That of a joint without a motor may be anything. A limit that motion shows to be true is no
     reason to doubt; of one that cuts the torque off `algid.inspection.clipping` warns.
     """
-    cut_off = {limit.joint + 1 for limit in known.limits}
+    apart = {limit.joint + 1 for limit in known.limits} | {log.origin.reading.passive}
     for joint, tau in enumerate(log.tau, start=1):
-        if joint == log.origin.reading.passive:
-            continue
         name = f"tau{joint}"
-        largest, what = float(np.abs(tau).max()), _source(log, name)
+        seen, share = {"channel": source(log.origin, name)}, saturated_share(tau)
+        largest = float(np.abs(tau).max())
+        if joint in apart:
+            continue
         if largest < _DENORMAL or tau.min() == tau.max():
             case = "constant" if largest >= _DENORMAL else "tiny" if largest else "zero"
-            seen = {"case": case, "channel": what, "largest": largest, "value": float(tau[0])}
-            remedies = torques_beside(log, name) if case == "zero" else []
+            remedies = torques_beside(log, name)
             remedies = remedies or [Remedy({f"{name}.source": None}, "name the measured torque")]
-            if case == "zero" and log.tau[2 - joint].any() and not log.origin.reading.passive:
+            if log.tau[2 - joint].any() and not log.origin.reading.passive:
                 remedies.append(Remedy({"passive": joint}, "for a joint without a motor"))
-            yield Notice("EFFORT_ZERO", numbers=seen, refuse=True, remedies=tuple(remedies))
-        elif joint not in cut_off:
-            share = saturated_share(tau)
-            if share > 0.01:
-                sound = joint - 1 in known.sound
-                case = {True: "true", False: "open"}[sound]
-                seen = {"channel": what, "percent": 100 * share, "case": case}
-                yield Notice("SATURATED_EFFORT", numbers=seen, note=sound)
+            numbers = seen | {"case": case, "largest": largest, "value": float(tau[0])}
+            yield Notice("EFFORT_ZERO", numbers=numbers, refuse=True, remedies=tuple(remedies))
+        elif share > 0.01:
+            sound = joint - 1 in known.sound
+            numbers = seen | {"percent": 100 * share, "case": "true" if sound else "open"}
+            yield Notice("SATURATED_EFFORT", numbers=numbers, note=sound)
 
 
-def dead_efforts(log: Log) -> Iterator[Notice]:
-    """Torques whose longest run of one value is far longer than their runs elsewhere.
+def torques_beside(log: Log, channel: str) -> list[Remedy]:
+    """What else in the log's file may be the torque `channel`, and the settings that take it.
 
-    A run at the largest or the smallest value is a limit's, and slow publishers repeat every value
-    as often.
+    Torques come before currents, and those of the same joint, by its number, before all others.
     """
-    for name, tau in zip(("tau1", "tau2"), log.tau, strict=True):
-        changed = tau[1:] != tau[:-1]
-        count = np.count_nonzero(changed)
-        if count < _DEAD_RUNS or count == changed.size:  # all runs are of one sample
-            continue
-        changes = np.flatnonzero(changed)
-        runs = np.diff(changes)
-        longest = int(np.argmax(runs))
-        first, length = int(changes[longest]) + 1, int(runs[longest])
-        usual = quantile(thinned(runs), 0.95)
-        at_limit = tau[first] in (tau.max(), tau.min())
-        if not at_limit and length * log.period >= _DEAD and length >= _DEAD_RUNS * usual:
-            numbers = {
-                "channel": _source(log, name),
-                "seconds": length * log.period,
-                "start": first * log.period,
-            }
-            yield Notice("SENSOR_FAULT", numbers={"case": "torque"} | numbers)
+    try:
+        entries = entries_at(Path(log.origin.path))
+    except LogError:  # a log in memory, or a file that is gone
+        return []
+    used, found = set(log.origin.mapping.values()), []
+    amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
+    for (words, unit), entry in product(((_TORQUES, {}), (_CURRENTS, amperes)), entries):
+        for field in entry.fields or (entry.name,):
+            home, place = {}, field
+            if entry.fields:
+                home, place = {f"{channel}.topic": entry.name}, f"{entry.name}: {field}"
+            if words.search(field) and not _OTHER.search(field) and place not in used:
+                takes = home | {f"{channel}.source": field} | unit
+                found.append((channel[-1] not in place, Remedy(takes, "the log also holds")))
+    found.sort(key=lambda one: one[0])
+    return [remedy for _, remedy in found[:_MOST]]
 
 
 def held_efforts(log: Log) -> Iterator[Notice]:
@@ -93,124 +103,116 @@ def held_efforts(log: Log) -> Iterator[Notice]:
     are of every length. A log whose angles are held as well was recorded slowly as a whole.
     """
     for joint, (theta, tau) in enumerate(zip(log.theta, log.tau, strict=True), start=1):
-        changed = tau[1:] != tau[:-1]
-        count = np.count_nonzero(changed)
-        if not _HELD_RUNS <= count < changed.size * _HELD_SHARE:
+        changes = np.flatnonzero(tau[1:] != tau[:-1])
+        if not _HELD_RUNS <= changes.size < (tau.size - 1) * _HELD_SHARE:
             continue
-        runs = np.diff(np.flatnonzero(changed))
+        runs = np.diff(changes)
         usual = median(thinned(runs))
         off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
         in_step = float(np.mean(off <= _OFF_STEP * usual))
-        moves = np.count_nonzero(theta[1:] != theta[:-1]) > 1.5 * count
+        moves = np.count_nonzero(theta[1:] != theta[:-1]) > 1.5 * changes.size
         if usual >= 2 and in_step >= _IN_STEP and moves:
             numbers = {
-                "channel": _source(log, f"tau{joint}"),
+                "channel": source(log.origin, f"tau{joint}"),
                 "held": 1e3 * usual * log.period,
                 "late": 5e2 * (usual - 1) * log.period,
             }
             yield Notice("HELD_EFFORT", numbers=numbers)
 
 
-def angles(log: Log) -> Iterator[Notice]:
-    """Angles that never change, jump by a turn, or freeze until they jump."""
-    for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
-        steps, what = np.diff(theta), _source(log, name)
-        sizes = np.abs(steps, out=steps)
-        largest = sizes.max()
-        if not largest:
-            yield Notice(
-                "HARDLY_DRIVEN",
-                numbers={"case": "constant", "channel": what, "value": float(theta[0])},
-            )
+def stuck(log: Log) -> Iterator[Notice]:
+    """Torques that keep one value far longer than elsewhere, angles that do so until they jump.
+
+    A run at the largest or the smallest torque is a limit's, slow publishers repeat every value as
+    often, and an angle that rests goes on by a usual step.
+    """
+    for name, values in channels(log):
+        sizes = np.abs(np.diff(values))
+        changes = np.flatnonzero(sizes)
+        runs, case = np.diff(changes), "torque"
+        if not runs.size or runs.size == sizes.size - 1:  # no run is longer than a sample
             continue
-        wraps = 0
-        if largest > 0.8 * _TURN:  # of most logs no step is, and none has to be looked at
-            # over a gap that cuts the log, a joint may have turned round
-            joined = np.diff(log.stamp_ns) <= CUT * log.period * 1e9
-            wraps = int(np.count_nonzero((np.abs(sizes - _TURN) < 0.1 * _TURN) & joined))
+        if name.startswith("tau"):
+            held = values[changes[1:]]
+            least = max(_DEAD / log.period, _DEAD_RUNS * quantile(thinned(runs), 0.95))
+            long = (runs >= least) & (held > values.min()) & (held < values.max())
+            long &= changes.size >= _DEAD_RUNS
+        else:
+            case, usual = "angle", quantile(thinned(sizes[changes]), 0.99)
+            long = (runs > max(10, round(0.02 / log.period))) & (sizes[changes[1:]] > 5 * usual)
+        longest = int(np.argmax(runs * long))
+        if long[longest]:
+            start, length = int(changes[longest]) + 1, int(runs[longest])
+            lasts = {"seconds": length * log.period, "start": start * log.period}
+            numbers = {"case": case, "channel": source(log.origin, name)} | lasts
+            yield Notice("SENSOR_FAULT", numbers=numbers)
+
+
+def angles(log: Log) -> Iterator[Notice]:
+    """Angles that never change, or jump by a turn."""
+    # over a gap that cuts the log, a joint may have turned round
+    joined = np.diff(log.stamp_ns) <= CUT * log.period * 1e9
+    for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
+        what, sizes = source(log.origin, name), np.abs(np.diff(theta))
+        if not sizes.any():
+            numbers = {"case": "constant", "channel": what, "value": float(theta[0])}
+            yield Notice("HARDLY_DRIVEN", numbers=numbers)
+        wraps = int(np.count_nonzero((np.abs(sizes - _TURN) < 0.1 * _TURN) & joined))
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and median(thinned(sizes)) < 0.5:
-            yield Notice(
-                "WRAPPED_ANGLE",
-                numbers={"channel": what, "count": wraps},
-                refuse=True,
-                remedies=(Remedy({f"{name}.unwrap": True}),),
-            )
-        if np.count_nonzero(sizes) == sizes.size:  # it never stands still
-            continue
-        moving = np.flatnonzero(sizes)
-        runs, usual = np.diff(moving), quantile(thinned(sizes[moving]), 0.99)
-        long_enough = max(10, round(0.02 / log.period))
-        frozen = np.flatnonzero((runs > long_enough) & (sizes[moving[1:]] > 5 * usual))
-        if frozen.size:
-            start = (int(moving[frozen[0]]) + 1) * log.period
-            length = int(runs[frozen[0]]) * log.period
-            numbers = {"channel": what, "seconds": length, "start": start}
-            yield Notice("SENSOR_FAULT", numbers={"case": "angle"} | numbers)
+            unwrap = (Remedy({f"{name}.unwrap": True}),)
+            numbers = {"channel": what, "count": wraps}
+            yield Notice("WRAPPED_ANGLE", numbers=numbers, refuse=True, remedies=unwrap)
 
 
 def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
     """Angles or velocities in degrees, by each other or by how far the angles turn.
 
     A joint may turn as often as it will: `is_to_scale` says whether physics holds for the log as
-    it was read, and no scale of its angles does better.
+    it was read, and no scale of its angles does better. A unit that the user has said is no reason
+    to refuse.
     """
-    ratios = (0.0, 0.0)
+    ratios, found = np.zeros(2), []
     if log.omega is not None:
-        ratios = (_travelled_over_summed(log, 0), _travelled_over_summed(log, 1))
+        path = np.cumsum(log.omega * np.gradient(log.t), axis=1)
+        apart = max(1, len(log) // 200)
+        travelled, summed = (
+            np.abs(np.diff(one[:, ::apart])).sum(axis=1) for one in (log.theta, path)
+        )
+        ratios = np.divide(travelled, summed, out=ratios, where=summed > 0)
     pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
-    for joint, ratio in enumerate(ratios, start=1):
-        for what, quantity, factor in pairs:
-            if len(log) > 20 and 0.8 < ratio / factor < 1.25:
-                seen = {"case": "signal", "what": what, "joint": joint}
-                yield _in_degrees(log, f"{quantity}{joint}", seen)
+    for (joint, ratio), (what, quantity, factor) in product(
+        enumerate(ratios.tolist(), start=1), pairs
+    ):
+        if len(log) > 20 and 0.8 < ratio / factor < 1.25:
+            seen = {"case": "signal", "what": what, "joint": joint}
+            found.append((f"{quantity}{joint}", seen))
     widest = np.abs(log.theta).max(axis=1)
-    row = int(np.argmax(widest))
-    if widest[row] > 12 * math.pi and not any(ratios) and not is_to_scale():
-        seen = {"case": "reach", "largest": float(widest[row])}
-        yield _in_degrees(log, f"theta{row + 1}", seen)
-
-
-def _travelled_over_summed(log: Log, row: int) -> float:
-    """Angle travelled over velocity summed, robustly; 0 where there is no velocity or no motion."""
-    assert log.omega is not None
-    width = max(1, len(log) // 200)
-    travelled = np.abs(np.diff(log.theta[row, ::width]))
-    summed = np.add.reduceat(np.abs(log.omega[row]), np.arange(0, len(log), width))
-    summed = summed[: travelled.size] / width * np.diff(log.t[::width])
-    moving = travelled > 0.2 * travelled.max()
-    total = float(np.sum(summed[moving]))
-    if total <= 0:
-        return 0.0
-    return float(np.sum(travelled[moving])) / total
-
-
-def _in_degrees(log: Log, name: str, seen: Mapping[str, Any]) -> Notice:
-    """Refused, unless the user has said the unit of the channel `name`."""
-    if log.origin.reading.told(name):
-        unit = log.origin.reading.channels[name].unit
-        return Notice("DEGREES", numbers=dict(seen) | {"unit": unit})
-    in_degrees = "where they are in degrees"
-    right = Remedy({f"{name}.unit": "rad"}, "where it is right")
-    remedies: tuple[Remedy, ...] = (Remedy({f"{name}.unit": "deg"}, in_degrees), right)
-    if name.startswith("theta"):
-        gear = Remedy({f"{name}.gear_ratio": None}, "for the angle of a motor behind its gear")
-        remedies = (Remedy({"angle_unit": "deg"}, in_degrees), gear, right)
-    numbers = dict(seen) | {"unit": None}
-    return Notice("DEGREES", numbers=numbers, refuse=True, remedies=remedies)
+    if widest.max() > 12 * math.pi and not ratios.any() and not is_to_scale():
+        seen = {"case": "reach", "largest": float(widest.max())}
+        found.append((f"theta{np.argmax(widest) + 1}", seen))
+    for name, seen in found:
+        told = log.origin.reading.told(name)
+        unit = "angle_unit" if name.startswith("theta") else f"{name}.unit"
+        remedies = (
+            Remedy({unit: "deg"}, "where they are in degrees"),
+            Remedy({f"{name}.gear_ratio": None}, "for those of a motor behind its gear"),
+            Remedy({f"{name}.unit": "rad"}, "where it is right"),
+        )
+        numbers = seen | {"unit": log.origin.reading.channels[name].unit if told else None}
+        yield Notice("DEGREES", numbers=numbers, refuse=not told, remedies=() if told else remedies)
 
 
 def spikes(log: Log) -> Iterator[Notice]:
     """Single samples that fit neither what comes before them nor what follows.
 
     They lie thirty times further off the middle of their neighbours than noise and bends of the
-    signal do. The sample after a step fits what follows, and a pulse of the torque where the joint
-    turns back is dry friction's.
+    signal do, and so do these neighbours for their sake. The sample after a step fits what follows,
+    and a pulse of the torque where the joint turns back is dry friction's.
     """
     if len(log) < 20:
         return
-    names = ("theta1", "theta2", "tau1", "tau2")
-    for name, values in zip(names, (*log.theta, *log.tau), strict=True):
+    for name, values in channels(log):
         off = values[:-2] + values[2:]  # in place: a long log's arrays cost more than the sums
         off *= -0.5
         off += values[1:-1]
@@ -219,41 +221,20 @@ def spikes(log: Log) -> Iterator[Notice]:
         limit = _SPIKE * max(deviation, quantile(thinned(size), 0.9))
         if limit == 0:
             continue
-        places = np.flatnonzero(size > limit) + 1
-        places = places[_alone(values, places, size[places - 1])]
-        if name.startswith("tau"):
-            places = places[~_turns_back(log.theta[int(name[-1]) - 1], places)]
+        places = np.flatnonzero(size[1:-1] > limit) + 2
+        own, beside = size[places - 1], np.minimum(size[places - 2], size[places])
+        step = np.abs(values[places + 1] - values[places - 1])
+        places = places[(step < 0.2 * own) & (beside > 0.25 * own)]
+        if places.size and name.startswith("tau"):
+            theta = log.theta[int(name[-1]) - 1]
+            travel = np.abs(theta[2:] - theta[:-2])
+            before, here, behind = (
+                travel[np.clip(places + shift, 0, travel.size - 1)] for shift in (-4, -1, 2)
+            )
+            slower = np.minimum(before, behind)
+            turns_back = (here < _STANDS * slower) & (slower > _CLEAR * noise_floor(theta))
+            places = places[~turns_back]
         if places.size:
-            first = float(log.t[places[0]])
-            seen = {"channel": _source(log, name), "count": len(places), "start": first}
-            yield Notice("SENSOR_FAULT", numbers={"case": "spikes"} | seen)
-
-
-def _alone(values: FloatArray, places: NDArray[np.int64], size: FloatArray) -> NDArray[np.bool_]:
-    """Whether values (N,) at `places` fit neither the line before nor after, though these agree."""
-    before, after = values[places - 1], values[places + 1]
-    from_before = 2 * before - values[np.maximum(places - 2, 0)]
-    from_after = 2 * after - values[np.minimum(places + 2, values.size - 1)]
-    here = values[places]
-    misfit = np.minimum(np.abs(here - from_before), np.abs(here - from_after))
-    return (np.abs(after - before) < 0.2 * size) & (misfit > 0.5 * size)
-
-
-def _turns_back(theta: FloatArray, places: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether a joint stands still at `places` for a sample, and moves before it and behind."""
-    noise = robust_deviation(differences(theta, 3)) / math.sqrt(20)
-    inside = np.clip(places, _TURN_BACK + 1, theta.size - _TURN_BACK - 2)
-
-    def travel(places: NDArray[np.int64]) -> FloatArray:
-        return np.abs(theta[places + 1] - theta[places - 1])
-
-    slower = np.minimum(travel(inside - _TURN_BACK), travel(inside + _TURN_BACK))
-    return (travel(inside) < _STANDS * slower) & (slower > _CLEAR * noise)
-
-
-def _source(log: Log, name: str) -> str:
-    """A channel and what it is called in the log."""
-    source = log.origin.mapping.get(name, name)
-    if source == name:
-        return name
-    return f"{name} ({source})"
+            seen = {"count": len(places), "start": float(log.t[places[0]])}
+            what = {"case": "spikes", "channel": source(log.origin, name)}
+            yield Notice("SENSOR_FAULT", numbers=what | seen)

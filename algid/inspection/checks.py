@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from functools import cache, partial
 
 from algid.base.errors import LogError
 from algid.estimators.convention_search import Judgement
-from algid.estimators.saturation import Saturation
-from algid.inspection.channels import (
-    angles,
-    dead_efforts,
-    degrees,
-    efforts,
-    held_efforts,
-    spikes,
-)
-from algid.inspection.clipping import saturation
+from algid.estimators.saturation import UNSEEN, Saturation
+from algid.inspection.channels import angles, degrees, efforts, held_efforts, spikes, stuck
 from algid.inspection.conventions import doubted, is_to_scale, judged, mend
 from algid.inspection.sampling import rests, sampling
 from algid.log import Log
@@ -34,7 +26,7 @@ def examine(
     effort: str | None = None,
     whole: bool = True,
     alone: bool = True,
-    known: Saturation | None = None,
+    known: Saturation = UNSEEN,
     tried: Callable[[], Judgement | None] | None = None,
 ) -> tuple[Notice, ...]:
     """Everything that the checks find in a log.
@@ -53,7 +45,7 @@ def examine(
     alone : bool
         False where the conventions of several logs are judged together: see `mends`.
     known : Saturation
-        Limits of torques that the motion shows, where they are known already.
+        Limits of torques that the motion shows.
     tried : callable
         Gives what all conventions say of the log, where that is asked for elsewhere too.
 
@@ -65,53 +57,36 @@ def examine(
     if len(log) < 4:
         return ()
     tried = tried or cache(partial(judged, log, gravity=gravity > 0))
-    external = effort == "external"
-    if known is None:
-        known = saturation(log, gravity=gravity, effort=effort)
-    every: list[Notice] = []
-    if not external:
-        every += efforts(log, known)
-        every += dead_efforts(log)
-    every += held_efforts(log)
-    every += angles(log)
-    every += degrees(log, lambda: is_to_scale(tried()))
-    every += spikes(log)
-    every += sampling(log)
-    every += rests(log, whole)
-    notices = [yielding(notice, log.origin.reading.accepted) for notice in every]
-    if external or not alone or any(notice.refuse for notice in notices):
-        return tuple(notices)
-    mended = mend(log.origin, tried())
-    if mended is not None:
-        return *notices, mended
-    doubt = doubted(log.origin, tried()) if gravity > 0 else None
-    return (*notices, doubt) if doubt else tuple(notices)
+    every = [
+        *([] if effort == "external" else efforts(log, known)),
+        *held_efforts(log),
+        *stuck(log),
+        *angles(log),
+        *degrees(log, lambda: is_to_scale(tried())),
+        *spikes(log),
+        *sampling(log),
+        *rests(log, whole),
+    ]
+    notices = tuple(yielding(notice, log.origin.reading.accepted) for notice in every)
+    if effort == "external" or not alone or any(notice.refuse for notice in notices):
+        return notices
+    found = mend(log.origin, tried()) or doubted(log.origin, tried())
+    return (*notices, found) if found else notices
 
 
-def noticed(
-    log: Log,
-    *,
-    gravity: float = 9.81,
-    effort: str | None = None,
-    whole: bool = True,
-    alone: bool = True,
-    known: Saturation | None = None,
-) -> tuple[Notice, ...]:
-    """What `examine` finds, as notices.
+def admitted(log: Log, found: Iterable[Notice], *, whole: bool = True) -> tuple[Notice, ...]:
+    """What `examine` finds in a log that is used nevertheless, or in its beginning.
 
     Raises
     ------
     LogError
         If a check forbids the use of a log that is all there.
     """
-    notices = []
-    for notice in examine(
-        log, gravity=gravity, effort=effort, whole=whole, alone=alone, known=known
-    ):
+    notices, looked_at = [], 0 if whole else round(log.duration)
+    for notice in found:
         if notice.refuse and whole:
             raise LogError(f"{log.origin.path}: {notice.code}: {notice.clause}")
-        looked_at = round(log.duration)
-        if looked_at and not whole:
+        if looked_at:
             numbers = dict(notice.numbers) | {"looked_at": looked_at}
             notice = replace(notice, text="", numbers=numbers)
         notices.append(replace(notice, refuse=False))

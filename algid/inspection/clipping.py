@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from algid.estimators.saturation import UNSEEN, Limit, Saturation, saturation_of
+from algid.inspection.figures import source
 from algid.log import Log, Origin
 from algid.notices import Notice, Remedy
 from algid.signals.segments import Segment, segments
@@ -49,10 +50,8 @@ def clipped(
     """What there is to say of each limit beyond which `counts` samples of `rows` lie."""
     notices = []
     for limit, count in zip(limits, counts, strict=True):
-        name = f"tau{limit.joint + 1}"
-        source = origin.mapping.get(name, name)
         numbers = {
-            "channel": name if source == name else f"{name} ({source})",
+            "channel": source(origin, f"tau{limit.joint + 1}"),
             "level": max(abs(side) for side in (limit.low, limit.high) if np.isfinite(side)),
             "count": count,
             "percent": 100 * count / rows,

@@ -146,9 +146,10 @@ def mends(
 def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     """What gravity says against a log as it was read, of which no one convention is sure.
 
-    None where the log is right, or shows a real arm no better with other signs or another zero.
+    None where the log is right, shows a real arm no better with other signs or another zero, or the
+    arm has no weight.
     """
-    if judgement is None or is_right(judgement):
+    if judgement is None or is_right(judgement) or K4 not in judgement.as_read.names:
         return None
     as_read, trials = judgement.as_read, judgement.trials
     k, left = as_read.constants, float(as_read.left.max())

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
+from algid.base.files import as_toml
+from algid.base.text import visible
 from algid.base.units import names_of
 from algid.inspection.report import look
-from algid.log import Reading
+from algid.log import Origin
 from algid.readers import open_log
 from algid.readers.formats import FORMATS
 from algid.readers.table import CHANNELS
@@ -82,43 +85,32 @@ def draft_profile(path: Path) -> str:
         If there is no such log, or its format is unknown.
     """
     kind, entries, origin, refused = look(path, lambda: open_log(path).origin)
-    text = _HEAD
+    origin = origin or Origin(str(path), kind, {})
+    reading, on_topics = origin.reading, kind in _ON_TOPICS
+    known: dict[str, Any] = {"joints": reading.joints, "time_unit": reading.time_unit}
+    if reading.topics:
+        known["topic"] = reading.topics[0]
+    if not on_topics:
+        known["time"] = origin.mapping.get("t")
+    text = _filled(_HEAD, known)
     if refused:
-        text += f"# {_safe(refused)}\n"
+        text += f"# {visible(refused, 1000)}\n"
     for one in entries[:64]:
-        text += f"# in the log: {_safe(one.name)[:80]} ({_safe(one.type)[:60]})\n"
-    mapping, reading = dict[str, str](), Reading()
-    if origin is not None:
-        mapping, reading = origin.mapping, origin.reading
-    own = "".join(reading.topics[:1])
-    joints = ", ".join(map(_quoted, reading.joints or ()))
-    text = _filled(text, "topic", _quoted(own))
-    text = _filled(text, "joints", joints and f"[{joints}]")
-    if kind not in _ON_TOPICS:
-        text = _filled(text, "time", _quoted(mapping.get("t", "")))
-    text = _filled(text, "time_unit", _quoted(reading.time_unit or ""))
+        text += f"# in the log: {visible(one.name, 80)} ({visible(one.type, 60)})\n"
     for name in CHANNELS:
-        topic, source = own, mapping.get(name, "")
-        if kind in _ON_TOPICS:
-            topic, _, source = source.partition(": ")
-        channel = _filled(_CHANNEL, "source", _quoted(source))
-        channel = _filled(channel, "topic", _quoted(topic if topic != own else ""))
-        text += f"\n[{name}]\n{channel}{_UNITS[name[:-1]]}"
+        own = {"source": origin.mapping.get(name, "")}
+        if on_topics:
+            own["topic"], _, own["source"] = own["source"].partition(": ")
+            if own["topic"] == known.get("topic"):
+                del own["topic"]
+        text += f"\n[{name}]\n{_filled(_CHANNEL, own)}{_UNITS[name[:-1]]}"
     return text
 
 
-def _filled(text: str, name: str, value: str) -> str:
-    """The text with a key's value in the place of its commented line, where there is one."""
-    if value in ("", '""'):
-        return text
-    return re.sub(rf"(?m)^# {name} = .*", lambda _: f"{name} = {value}", text, count=1)
-
-
-def _quoted(text: str) -> str:
-    """As a TOML basic string: escapes as in JSON, and the one control character it leaves."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _safe(text: str) -> str:
-    """The text without what cannot be printed."""
-    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)
+def _filled(text: str, known: Mapping[str, Any]) -> str:
+    """The text with what is known of some keys in the place of their commented lines."""
+    for name, value in known.items():
+        if value:
+            line = f"{name} = {as_toml(value)}"
+            text = re.sub(rf"(?m)^# {name} = .*", line.replace("\\", r"\\"), text, count=1)
+    return text

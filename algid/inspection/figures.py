@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -13,14 +13,30 @@ from algid.arm import FloatArray
 from algid.base.criteria import GAP
 from algid.base.quantiles import distinct, median
 from algid.estimators.convention_search import Judgement
-from algid.log import Log
+from algid.log import Log, Origin
 from algid.model import K2, K3, K4, K5
-from algid.notices import Notice, of_codes
+from algid.notices import of_codes
 from algid.readers.clock import PAUSE
 from algid.signals.spacing import near_stamps, spaced
 
 ENOUGH = 1 << 18
 """Values that give a quantile of any number of them: a median to 0.25 % of the deviation."""
+
+
+def channels(
+    log: Log, quantities: Sequence[str] = ("theta", "tau")
+) -> Iterator[tuple[str, FloatArray]]:
+    """The channels (N,) of some quantities of a log by their names, ``theta1`` first."""
+    for quantity in quantities:
+        pair = getattr(log, quantity)
+        for joint, values in enumerate(() if pair is None else pair, start=1):
+            yield f"{quantity}{joint}", values
+
+
+def source(origin: Origin, name: str) -> str:
+    """A channel, and what it is called in its log where that is another name."""
+    own = origin.mapping.get(name, name)
+    return name if own == name else f"{name} ({own})"
 
 
 def thinned(values: Any) -> Any:
@@ -94,7 +110,7 @@ def dynamic_figures(judgement: Judgement | None) -> DynamicFigures | None:
     if judgement is None:
         return None
     one = judgement.as_read
-    k, std = dict(zip(one.names, one.k.tolist(), strict=True)), np.sqrt(np.diag(one.covariance))
+    k, std = one.constants, np.sqrt(np.diag(one.covariance))
     return DynamicFigures(
         condition=float(np.sqrt(np.linalg.cond(one.covariance / np.outer(std, std)))),
         explained=1 - float(one.left.max()),
@@ -116,8 +132,6 @@ def robust_deviation(values: FloatArray) -> float:
 
     Of many values those that `thinned` leaves.
     """
-    if values.size == 0:
-        return 0.0
     values = thinned(values)
     return 1.4826 * median(np.abs(values - median(values)))
 
@@ -128,27 +142,21 @@ def grid_step(values: FloatArray) -> float:
     Else 0.
     """
     levels = distinct(values[:20_000])
-    if levels.size <= 2:
-        return 0.0
     steps = np.diff(levels)
     steps = steps[steps > 1e-9 * np.abs(levels).max()]
-    smallest = steps.min(initial=np.inf)
-    ratios = steps / smallest
-    if not steps.size or np.abs(ratios - np.rint(ratios)).max() >= 0.05:
+    if steps.size < 2:
         return 0.0
-    return float(smallest)
+    ratios = steps / steps.min()
+    on_grid = np.abs(ratios - np.rint(ratios)).max() < 0.05
+    return float(steps.min()) if on_grid else 0.0
 
 
 def saturated_share(values: FloatArray) -> float:
     """Share of samples at the highest or lowest value whose neighbours on both sides are too."""
-    if values.size < 3:
-        return 0.0
     low, high = values.min(), values.max()
-    if low == high:
-        return 0.0
     extreme = (values == high) | (values == low)
     inner = extreme[2:] & extreme[1:-1] & extreme[:-2]
-    return float(np.count_nonzero(inner) / values.size)
+    return float(np.count_nonzero(inner) / values.size) if low < high else 0.0
 
 
 def clock_figures(log: Log) -> ClockFigures:
@@ -162,7 +170,9 @@ def clock_figures(log: Log) -> ClockFigures:
         stamp_ns = np.concatenate([block.stamp_ns for block in spaced([log], period)])
     steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
     wide = steps > GAP * period
-    gaps = _without_pauses(steps[wide], PAUSE * period, log.notices)
+    gaps = steps[wide]
+    pauses = sum(one.numbers.get("joined", 0) for one in of_codes(log.notices, "GAPS"))
+    gaps = np.delete(gaps, np.argsort(np.abs(gaps - PAUSE * period))[:pauses])
     return ClockFigures(
         rows=len(log),
         duration=log.duration,
@@ -171,11 +181,3 @@ def clock_figures(log: Log) -> ClockFigures:
         gaps=gaps.size,
         longest_gap=float(gaps.max(initial=0.0)),
     )
-
-
-def _without_pauses(gaps: FloatArray, pause: float, notices: Iterable[Notice]) -> FloatArray:
-    """The gaps (N,), in s, less as many of a pause's length as runs were joined."""
-    joined = 0
-    for one in of_codes(notices, "GAPS"):
-        joined += one.numbers.get("joined", 0)
-    return np.delete(gaps, np.argsort(np.abs(gaps - pause))[:joined])

@@ -25,6 +25,7 @@ from algid.inspection.figures import (
     ClockFigures,
     DynamicFigures,
     SignalFigures,
+    channels,
     clock_figures,
     dynamic_figures,
     signal_figures,
@@ -34,6 +35,9 @@ from algid.notices import Notice, has_code, lossy
 from algid.readers import read_log
 from algid.readers.formats import Entry, entries_at, entries_of, format_of
 from algid.readers.memory import NAME, open_columns
+
+if TYPE_CHECKING:
+    from algid.profile import Profile
 
 T = TypeVar("T")
 
@@ -56,9 +60,7 @@ def look(log: Any, read: Callable[[], T]) -> tuple[str, tuple[Entry, ...], T | N
 
 def _called(log: Any) -> str:
     """A log's path, or what stands for one in memory."""
-    if isinstance(log, str | Path):
-        return str(log)
-    return NAME
+    return str(log) if isinstance(log, str | Path) else NAME
 
 
 def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
@@ -75,10 +77,6 @@ def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
         table = open_columns(log)
         return table.kind, entries_of(table)
     return format_of(Path(log)).name, entries_at(Path(log))
-
-
-if TYPE_CHECKING:
-    from algid.profile import Profile
 
 
 @dataclass(frozen=True)
@@ -132,38 +130,32 @@ def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
     LogError
         If there is no such log, or its format is unknown.
     """
+    from algid.profile import Profile
 
-    def samples() -> Log:
-        if isinstance(log, Log):
-            return log
-        return read_log(log, profile)
-
-    kind, entries, content, refused = look(log, samples)
+    own = profile or Profile()
+    kind, entries, content, refused = look(
+        log, lambda: log if isinstance(log, Log) else read_log(log, own)
+    )
     if content is None:
         return Inspection(_called(log), kind, entries, refused=refused)
-    gravity, effort = 9.81, None
-    if profile is not None:
-        gravity, effort = profile.gravity, profile.effort
-    known = saturation(content, gravity=gravity, effort=effort)
-    tried = cache(partial(judged, content, gravity=gravity > 0))
-    findings = examine(content, gravity=gravity, effort=effort, known=known, tried=tried)
+    asked: dict[str, Any] = {"gravity": own.gravity, "effort": own.effort}
+    known = saturation(content, **asked)
+    tried = cache(partial(judged, content, gravity=own.gravity > 0))
+    findings = examine(content, **asked, known=known, tried=tried)
     counts = beyond(content, known.limits)
     findings += tuple(clipped(content.origin, known.limits, counts, len(content)))
     reasons = [f"{one.code}: {one.clause}" for one in findings if one.refuse]
-    signals = {}
-    for name, pair in (("theta", content.theta), ("tau", content.tau), ("omega", content.omega)):
-        for joint, values in enumerate(() if pair is None else pair, start=1):
-            signals[f"{name}{joint}"] = signal_figures(values)
+    every = channels(content, ("theta", "tau", "omega"))
     return Inspection(
-        path=content.origin.path if isinstance(log, Log) else _called(log),
+        path=content.origin.path,
         format=kind,
         entries=entries,
         refused="; ".join(reasons) or None,
         mapping=content.origin.mapping,
         synthetic=content.origin.truth is not None,
         clock=clock_figures(content),
-        signals=signals,
-        dynamics=dynamic_figures(None if effort == "external" else tried()),
+        signals={name: signal_figures(values) for name, values in every},
+        dynamics=dynamic_figures(None if own.effort == "external" else tried()),
         notices=content.notices,
         findings=findings,
     )

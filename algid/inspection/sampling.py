@@ -9,8 +9,8 @@ import numpy as np
 
 from algid.arm import FloatArray
 from algid.base.quantiles import median, medians, quantile
-from algid.inspection.figures import clock_figures, differences, noise_floor, signal_figures
-from algid.log import Log
+from algid.inspection.figures import clock_figures, differences, grid_step, noise_floor
+from algid.log import IntArray, Log
 from algid.notices import Notice, Remedy
 from algid.signals.spacing import NEAR, near_stamps
 
@@ -25,29 +25,24 @@ _REST, _STILL = 0.5, 1e-3
 def sampling(log: Log) -> Iterator[Notice]:
     """Logs too short or too slow for their motion; stamps that cluster, miss samples or jitter."""
     clock = clock_figures(log)
-    period = 1e3 / clock.rate
+    rate, period = clock.rate, 1e3 / clock.rate
     if clock.duration < _SHORTEST:
         yield Notice("SHORT_LOG", numbers={"case": "estimate", "seconds": clock.duration})
     samples = samples_a_period(log)
     if samples < _FEWEST:
-        yield Notice(
-            "SLOW_SAMPLING", numbers={"case": "period", "samples": samples, "rate": clock.rate}
-        )
+        yield Notice("SLOW_SAMPLING", numbers={"case": "period", "samples": samples, "rate": rate})
     near = near_stamps(log.stamp_ns, log.period)
     if near:
-        yield Notice(
-            "UNEVEN_STAMPS",
-            numbers={"case": "near", "count": near, "share": NEAR, "period": period},
-        )
+        clusters = {"case": "near", "count": near, "share": NEAR, "period": period}
+        yield Notice("UNEVEN_STAMPS", numbers=clusters)
     lost = lost_steps(log)
     if lost:
         override = Remedy({"accept": "LOST_SAMPLES"}, "to use it nevertheless")
         yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=(override,))
     if clock.gaps:
-        yield Notice(
-            "GAPS", numbers={"case": "gaps", "count": clock.gaps, "seconds": clock.longest_gap}
-        )
-    if clock.jitter * clock.rate > 0.01:
+        gaps = {"case": "gaps", "count": clock.gaps, "seconds": clock.longest_gap}
+        yield Notice("GAPS", numbers=gaps)
+    if clock.jitter * rate > 0.01:
         error = np.sqrt(np.mean(np.diff(log.theta, 2, axis=1) ** 2, axis=1)) / 8
         small = all(error <= [noise_floor(theta) for theta in log.theta])
         seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": float(error.max())}
@@ -83,30 +78,21 @@ def lost_steps(log: Log) -> int:
     often.
     """
     count = len(log) - 3
-
-    def steps(first: int) -> FloatArray:
-        return np.asarray(differences(log.theta[:, first : first + count + 1], 1))
-
-    def seconds(first: int) -> FloatArray:
-        return np.asarray(differences(log.stamp_ns[first : first + count + 1], 1) * 1e-9)
-
-    shares, clear = [], np.True_
-    for by in ([seconds(first) for first in range(3)], [1.0, 1.0, 1.0]):
-        own, around = steps(1) / by[1], 0.5 * (steps(0) / by[0] + steps(2) / by[2])
-        power = np.sum(around**2, axis=0)
-        share = np.sum(own * around, axis=0) / np.maximum(power, 1e-300)
-        off = np.sqrt(np.sum((own - share * around) ** 2, axis=0))
-        clear = clear & (power > quantile(power, 0.25)) & (off < _LOST * np.sqrt(power))
-        shares.append(share)
-    each = count / max(1, power.size)  # of a long log some steps stand for all
-    velocity, plain = shares
-    double = (np.abs(velocity - 2) < _LOST) & (np.abs(plain - 2) < _LOST)
-    none = (np.abs(velocity) < _LOST) & (np.abs(plain) < _LOST)
-    lost = round(each * np.count_nonzero(clear & double))
-    chance = round(each * np.count_nonzero(clear & none))
-    if lost <= max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance):
-        return 0
-    return lost
+    spans = [slice(first, first + count + 1) for first in range(3)]
+    before, own, after = (differences(log.theta[:, span], 1) for span in spans)
+    times = [differences(log.stamp_ns[span], 1) for span in spans]
+    twice, none = np.True_, np.True_
+    for here, around in (
+        (own, 0.5 * (before + after)),
+        (own / times[1], 0.5 * (before / times[0] + after / times[2])),
+    ):
+        size = np.linalg.norm(around, axis=0)
+        near, moves = _LOST * size, size > quantile(size, 0.25)
+        twice = twice & moves & (np.linalg.norm(here - 2 * around, axis=0) < near)
+        none = none & moves & (np.linalg.norm(here, axis=0) < near)
+    each = count / max(1, own.shape[1])  # of a long log some steps stand for all
+    lost, chance = (round(each * np.count_nonzero(steps)) for steps in (twice, none))
+    return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
 
 
 def rests(log: Log, whole: bool) -> Iterator[Notice]:
@@ -117,35 +103,27 @@ def rests(log: Log, whole: bool) -> Iterator[Notice]:
     The log does not say which it is: the rest is named, with the flags that leave it out, and
     stays.
     """
-    room = np.empty(2)
-    for joint, theta in enumerate(log.theta):
-        one = signal_figures(theta)
-        room[joint] = max(8 * one.noise, 2 * one.step, _STILL * (one.high - one.low))
-    few = max(4, round(0.02 / log.period))
-    before = _still(log.t, log.theta, room, few)
-    if before == log.duration:
+    few, rests, flags = max(4, round(0.02 / log.period)), [], {}
+    # how far noise and encoder let an angle be from its place
+    room = [
+        max(8 * noise_floor(theta), 2 * grid_step(theta), _STILL * float(np.ptp(theta)))
+        for theta in log.theta
+    ]
+
+    def away(ends: FloatArray) -> IntArray:
+        """The samples in which an angle is not where it is in the `ends` (2, few)."""
+        off = np.abs(log.theta - medians(ends)[:, None]) > np.array(room)[:, None]
+        return np.flatnonzero(off.any(axis=0))
+
+    first, last = away(log.theta[:, :few]), away(log.theta[:, -few:])
+    if not (first.size and last.size):
         return
-    after = 0.0
-    if whole:
-        after = _still(log.duration - log.t[::-1], log.theta[:, ::-1], room, few)
-    words, cut = [], {}
-    if before >= _REST:
-        words.append(f"for its first {before:.3g} s")
-        cut["start"] = float(f"{before:.4g}")
-    if after >= _REST:
-        words.append(f"for its last {after:.3g} s")
-        cut["end"] = float(f"{log.duration - after:.4g}")
-    if words:
-        yield Notice("RESTS", numbers={"rests": words}, remedies=(Remedy(cut),))
-
-
-def _still(t: FloatArray, theta: FloatArray, room: FloatArray, few: int) -> float:
-    """Seconds until an angle (2, N) at times t (N,) leaves its place, the median of `few` samples.
-
-    `room` (2,) is how far noise and encoder let it be from there.
-    """
-    moved = t.size
-    for angle, place, least in zip(theta, medians(theta[:, :few]), room, strict=True):
-        away = np.abs(angle - place) > least
-        moved = min(moved, int(np.argmax(away)) if away.any() else t.size)
-    return float(t[moved - 1]) if moved else 0.0
+    start, end = log.t[max(first[0] - 1, 0)], log.t[min(last[-1] + 1, len(log) - 1)]
+    if start >= _REST:
+        rests.append(f"for its first {start:.3g} s")
+        flags["start"] = float(f"{start:.4g}")
+    if whole and log.duration - end >= _REST:
+        rests.append(f"for its last {log.duration - end:.3g} s")
+        flags["end"] = float(f"{end:.4g}")
+    if rests:
+        yield Notice("RESTS", numbers={"rests": rests}, remedies=(Remedy(flags),))

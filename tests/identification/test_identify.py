@@ -17,7 +17,6 @@ from algid.arm import CONSTANT_NAMES
 from algid.base.errors import LogError, ResultError
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
-from algid.inspection.checks import noticed
 from algid.log import Log
 from algid.profile import Profile
 from algid.results import Status, read_result, result_schema
@@ -27,6 +26,7 @@ from algid.synth.sensors import Sensors
 from algid.synth.simulator import simulate
 from pipelines.accuracy_scenes import random_arm
 from pipelines.saturation import log_of
+from tests.inspection.test_checks import noticed
 
 PAPER = Settings(estimator="paper")
 WEAK = Settings(estimator="weak", model="plain")

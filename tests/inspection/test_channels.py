@@ -14,10 +14,10 @@ import pytest
 from algid.arm import FloatArray
 from algid.base.errors import LogError
 from algid.inspection import channels
-from algid.inspection.checks import noticed
 from algid.inspection.sampling import lost_steps, rests, samples_a_period, sampling
 from algid.log import ChannelReading, IntArray, Log, Origin, Reading
 from algid.notices import Notice, of_codes
+from tests.inspection.test_checks import noticed
 
 ROWS = 2000
 T = np.arange(ROWS) * 1e-3
@@ -57,11 +57,8 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
         [*channels.efforts(logged(tau=np.stack([tau[0], 0 * tau[1]]), mapping={"tau2": "effort"}))]
     )
     assert (zero.code, zero.refuse) == ("EFFORT_ZERO", True)
-    assert zero.clause == (
-        f"tau2 (effort) is zero in every sample: name the measured torque: {other}; for a joint "
-        "without a motor: "
-        "--set passive=2"
-    )
+    rest = f"name the measured torque: {other}; for a joint without a motor: --set passive=2"
+    assert zero.clause == f"tau2 (effort) is zero in every sample: {rest}"
     none = [*channels.efforts(logged(tau=0 * tau))]  # a joint that is passive needs another's motor
     assert [one.advice for one in none] == [
         f"name the measured torque: --set tau{joint}.source=NAME" for joint in (1, 2)
@@ -73,7 +70,7 @@ def test_each_torque_that_is_none_is_told_with_its_source_and_what_names_another
     )
     held = only([*channels.efforts(logged(tau=np.stack([tau[0], np.full(ROWS, -2.5)])))])
     assert held.code == "EFFORT_ZERO"
-    assert held.clause == f"tau2 is -2.5 N m in every sample: name the measured torque: {other}"
+    assert held.clause == f"tau2 is -2.5 N m in every sample: {rest}"
 
 
 def test_a_millionth_of_a_newton_metre_is_a_torque_and_a_passive_joint_needs_none() -> None:
@@ -108,9 +105,7 @@ def test_a_torque_that_drops_out_is_told_with_when_and_how_long(
 ) -> None:
     tau = np.stack([np.sin(3 * T) + T, np.sin(40 * T)])
     tau[1, first : first + length] = 0.25
-    assert [one.text for one in channels.dead_efforts(logged(tau=tau))] == (
-        [] if told is None else [told]
-    )
+    assert [one.text for one in channels.stuck(logged(tau=tau))] == ([] if told is None else [told])
 
 
 @pytest.mark.parametrize(("repeated", "dead"), [(1, True), (20, True), (21, False), (50, False)])
@@ -121,7 +116,7 @@ def test_a_slow_publisher_is_told_from_a_torque_that_drops_out(repeated: int, de
     tau = np.stack(
         [np.sin(3 * T) + T, np.concatenate([held[:start], np.full(400, 0.123), held[start:-400]])]
     )
-    assert bool([*channels.dead_efforts(logged(tau=tau))]) == dead
+    assert bool([*channels.stuck(logged(tau=tau))]) == dead
 
 
 @pytest.mark.parametrize("turns", [1, 3])
@@ -162,7 +157,7 @@ def test_a_sensor_that_freezes_and_jumps_is_told_with_when_and_how_long(
     """
     theta = np.stack([np.sin(T), T.copy()])
     theta[1, 600 : 600 + length] = theta[1, 600]
-    found = [*channels.angles(logged(theta))]
+    found = [*channels.stuck(logged(theta))]
     if told:
         assert only(found).text == "theta2 freezes for 0.021 s from t = 0.6 s, then jumps"
         assert not only(found).refuse
@@ -171,7 +166,7 @@ def test_a_sensor_that_freezes_and_jumps_is_told_with_when_and_how_long(
     rested = np.stack(
         [np.sin(T), np.concatenate([T[:600], np.full(300, T[599]), T[600 : ROWS - 300]])]
     )
-    assert [*channels.angles(logged(rested))] == []  # it stood still, and went on as before
+    assert [*channels.stuck(logged(rested))] == []  # it stood still, and went on as before
 
 
 def test_an_angle_that_never_changes_is_told_beside_what_the_other_one_does() -> None:
@@ -219,6 +214,7 @@ def test_what_is_in_degrees_is_told_with_the_flags_of_its_channel() -> None:
     velocity = only([*channels.degrees(turning((math.pi / 180, 1.0)), never)])
     assert [one.settings for one in velocity.remedies] == [
         {"omega1.unit": "deg"},
+        {"omega1.gear_ratio": None},
         {"omega1.unit": "rad"},
     ]
     assert angle.refuse

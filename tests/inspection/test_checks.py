@@ -11,7 +11,7 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.base.errors import LogError
-from algid.inspection.checks import examine, noticed, yielding
+from algid.inspection.checks import admitted, examine, yielding
 from algid.inspection.conventions import judged
 from algid.inspection.figures import dynamic_figures, signal_figures
 from algid.log import Log, Origin
@@ -48,6 +48,11 @@ def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
 def signals_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """No convention is sought: for checks that look at signals."""
     monkeypatch.setattr("algid.inspection.checks.judged", lambda *_, **__: None)
+
+
+def noticed(log: Log, *, whole: bool = True) -> tuple[Notice, ...]:
+    """What the checks find in a log that is used nevertheless."""
+    return admitted(log, examine(log, whole=whole), whole=whole)
 
 
 def codes(log: Log) -> list[str]:

@@ -15,7 +15,6 @@ import pytest
 
 from algid.arm import Arm, inverse_dynamics
 from algid.estimators.conventions import Convention
-from algid.inspection.checks import noticed
 from algid.inspection.conventions import is_right, judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
@@ -25,7 +24,7 @@ from algid.profile import load_profile
 from algid.readers import read_log
 from algid.readers.table import CHANNELS
 from tests.cli.commands import profile_from
-from tests.inspection.test_checks import moving_log
+from tests.inspection.test_checks import moving_log, noticed
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
 
@@ -280,5 +279,5 @@ def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
     assert tomllib.loads(text) == {name: {} for name in CHANNELS}
     assert text.splitlines()[13].startswith("# ")
     assert str(tmp_path / "arm.csv") in text
-    assert "# in the log: angle \ufffda (int64)" in text
+    assert "# in the log: angle \\u200ba (int64)" in text
     assert '# source = "NAME"' in text

@@ -267,7 +267,7 @@ def add_toys(package: Path) -> None:
     inserted(formats, '        case "rosbag2" | "db3" | "bag":', OPENED)
     (package / "inspection" / "toy.py").write_text(CHECK)
     checks = package / "inspection" / "checks.py"
-    inserted(checks, "    every += rests(log, whole)\n", "    every += toys(log)\n")
+    inserted(checks, "        *rests(log, whole),\n", "        *toys(log),\n")
     inserted(checks, "from algid.log import", "from algid.inspection.toy import toys\n")
     inserted(
         package / "messages.toml",

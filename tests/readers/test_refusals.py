@@ -19,12 +19,11 @@ import numpy as np
 import pytest
 
 from algid.base.errors import LogError
-from algid.inspection.checks import noticed
 from algid.log import Log
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
-from tests.inspection.test_checks import moving_log, spoiled
+from tests.inspection.test_checks import moving_log, noticed, spoiled
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
 
