@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from algid.base.runtime import Beside, Worker, ahead, keep_to_one_core
+from algid.base.runtime import ahead, executor, keep_to_one_core
 
 
 def test_items_read_ahead_keep_their_order() -> None:
@@ -34,27 +34,6 @@ def test_no_thread_is_left_when_the_consumer_leaves() -> None:
     assert threading.active_count() == before
 
 
-@pytest.mark.parametrize("damaged", [1, 2])  # while items come, and behind the last one
-def test_an_error_of_the_work_reaches_whoever_hands_items_over(damaged: int) -> None:
-    def work(item: int) -> None:
-        if item == damaged:
-            raise ValueError("damaged")
-
-    def hand_over() -> None:
-        with Worker(work) as worker:
-            for item in range(3):
-                worker.push(item)
-
-    with pytest.raises(ValueError, match="damaged"):
-        hand_over()
-
-
-def test_work_beside_gives_its_result_or_its_error() -> None:
-    assert Beside(lambda: 6 * 7).result() == 42
-    with pytest.raises(ZeroDivisionError):
-        Beside(lambda: 1 // 0).result()
-
-
 @pytest.fixture
 def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("algid.base.runtime._has_other_cores", True)  # to be put back
@@ -64,12 +43,8 @@ def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("one_core")
 def test_a_process_that_keeps_to_one_core_starts_no_thread() -> None:
     before = threading.active_count()
-    seen: list[int] = []
-    with Worker(seen.append) as worker:
-        for item in ahead(iter(range(5))):
-            worker.push(item)
-            assert threading.active_count() == before, item
-    assert seen == [0, 1, 2, 3, 4]
-    assert Beside(threading.current_thread).result() is threading.current_thread()
+    for item in ahead(iter(range(5))):
+        assert threading.active_count() == before, item
+    assert executor(1).submit(threading.current_thread).result() is threading.current_thread()
     with pytest.raises(ZeroDivisionError):
-        Beside(lambda: 1 // 0).result()
+        executor(1).submit(lambda: 1 // 0).result()

@@ -26,7 +26,7 @@ def test_endless_nesting_is_refused(text: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a = " + "9" * 80_000, "a whole number of too many digits"),
+        ("a = " + "9" * 80_000, "Exceeds the limit"),
         ("a = [" + "1," * (1 << 21) + "]", "more than 4 MiB"),
     ],
 )

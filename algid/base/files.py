@@ -47,14 +47,8 @@ def writing(place: Path | str, trouble: str = "cannot write") -> Iterator[None]:
 
 
 def reason_of(error: OSError) -> str:
-    """What the system says, in its own words: libraries put them into a text of their own."""
-    own = str(error).partition("\n")[0][:200]
-    known = next((words for words in map(os.strerror, _FULL) if words in own), None)
-    return known or error.strerror or own or type(error).__name__
-
-
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""What befalls a disk while it is written to."""
+    """What the system says, or the library that raises its exception."""
+    return error.strerror or str(error).partition("\n")[0][:200] or type(error).__name__
 
 
 def refuse_links(folder: Path, name: str) -> None:
@@ -86,15 +80,8 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
     OutputError
         If the folder cannot be made or written to, or the file exists and `force` is not set.
     """
-
-    def make(place: Path) -> None:
-        place.touch(mode=0o600, exist_ok=False)
-
-    with _whole(path, make, sweep=sweep, force=force) as temporary:
+    with _whole(path, Path.touch, sweep=sweep, force=force) as temporary:
         yield temporary
-        mask = os.umask(0)  # others may read it as far as the user's mask allows
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
 
 
 @contextmanager
@@ -120,15 +107,11 @@ def _whole(
 def sha256_of(path: Path) -> str:
     """SHA-256 of a file, or of a folder's files in the order of their names."""
     digest = hashlib.sha256()
-    files = [path]
-    if path.is_dir():
-        files = sorted(path.iterdir())
-    for file in files:
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
         # one of none is empty, or waits for ever, as /proc/kmsg does
         if file.is_file() and file.stat().st_size:
             with file.open("rb") as opened:
-                while chunk := opened.read(1 << 20):
-                    digest.update(chunk)
+                hashlib.file_digest(opened, lambda: digest)
     return digest.hexdigest()
 
 
@@ -226,19 +209,13 @@ def parsed_toml(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If it is not TOML (`tomllib.TOMLDecodeError`), or larger than `LIMITS` allow.
+        If it is not TOML, or larger than `LIMITS` allow.
     RecursionError
         If lists or tables lie too deep within one another.
     """
     if len(text) > LIMITS.toml_bytes:
         raise ValueError(f"more than {LIMITS.toml_bytes >> 20} MiB")
-    try:
-        return tomllib.loads(text)
-    except ValueError as error:
-        if isinstance(error, tomllib.TOMLDecodeError):
-            raise
-        # Python reads no whole number of more than 4,300 digits, and says so to programmers
-        raise ValueError("a whole number of too many digits") from error
+    return tomllib.loads(text)
 
 
 def first_misfit(error: ValidationError) -> str:

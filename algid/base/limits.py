@@ -86,8 +86,6 @@ class FileLimits:
     # batches
     name_bytes: int = 1000
     """Of a job's name with its folders: a path may have 4096."""
-    estimate_letters: int = 200
-    """Of the name of a parameter, or of a sum of several."""
 
 
 LIMITS = FileLimits()

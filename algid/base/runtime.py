@@ -17,13 +17,12 @@ from __future__ import annotations
 
 import ctypes
 import os
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from functools import cache
 from itertools import islice
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 _VARIABLES = (
     "OPENBLAS_NUM_THREADS",
@@ -117,61 +116,3 @@ def ahead(source: Iterator[T]) -> Iterator[T]:
         while item := coming.result():
             coming = pool.submit(list, islice(source, 1))
             yield item[0]
-
-
-class Worker(Generic[T]):
-    """Work on items in a thread of its own, in order and one at a time, while they are used.
-
-    Its ``with`` block ends once the work does. The work's exception is raised where the next item
-    is handed over, or at the end of the block.
-    """
-
-    def __init__(self, work: Callable[[T], None]) -> None:
-        self._work = work
-        self._pool = executor(1)
-        self._before: Future[None] | None = None
-
-    def __enter__(self) -> Worker[T]:
-        return self
-
-    def push(self, item: T) -> None:
-        """Hand over an item, once the work on the one before is done."""
-        if self._before is not None:
-            self._before.result()
-        self._before = self._pool.submit(self._work, item)
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._pool.shutdown()
-        if kind is None and self._before is not None:
-            self._before.result()
-
-
-class Beside(Generic[T]):
-    """A piece of work in a thread of its own, which does not keep the process alive.
-
-    Done at once on one core.
-    """
-
-    def __init__(self, work: Callable[[], T]) -> None:
-        self._work = work
-        self._found: list[T] = []
-        self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, daemon=True) if _has_other_cores else None
-        if self._thread is None:
-            self._run()
-        else:
-            self._thread.start()
-
-    def _run(self) -> None:
-        try:
-            self._found.append(self._work())
-        except BaseException as error:  # handed to whoever asks for the result
-            self._error = error
-
-    def result(self) -> T:
-        """What the work gave, once it has ended; its exception is raised here."""
-        if self._thread is not None:
-            self._thread.join()
-        if self._error is not None:
-            raise self._error
-        return self._found[0]

@@ -24,7 +24,7 @@ from algid.base.errors import AlgidError, LogError, OutputError, without_credent
 from algid.base.files import read_whole, refuse_links, refuse_url, remove_whole, whole_file
 
 if TYPE_CHECKING:
-    from pyarrow.fs import FileInfo, FileSystem
+    from pyarrow.fs import FileSystem
 
 MOST_LISTED = 1_000_000
 """Entries below a prefix or a folder: more are no robot's logs."""
@@ -128,7 +128,7 @@ class Store:
         Raises
         ------
         OutputError
-            If they cannot be listed, or the bucket that holds them does not exist.
+            If they cannot be listed, are too many, or their bucket does not exist.
         """
         from pyarrow.fs import FileSelector, FileType
 
@@ -139,11 +139,9 @@ class Store:
             entries = self.filesystem.get_file_info(
                 FileSelector(path, recursive=True, allow_not_found=True)
             )
-            bucket = self.root.partition("/")[0]
-            if not entries and not _is_there(self.filesystem.get_file_info(bucket)):
-                raise OutputError(
-                    f"{self.place}: there is no bucket {bucket}; check its name, or make it"
-                )
+            bucket = self.filesystem.get_file_info(self.root.partition("/")[0])
+        if bucket.type == FileType.NotFound:
+            raise OutputError(f"{self.place}: there is no such bucket; check its name, or make it")
         if len(entries) > MOST_LISTED:
             raise OutputError(
                 f"{self.place}: expected at most {MOST_LISTED:,} objects, found {len(entries):,}; "
@@ -276,37 +274,24 @@ def _first_line(error: BaseException) -> str:
     return without_credentials(str(error)).split("\n", maxsplit=1)[0][:200]
 
 
-def _is_there(info: FileInfo) -> bool:
-    from pyarrow.fs import FileType
-
-    return bool(info.type != FileType.NotFound)
-
-
 def put_folder(store: Store, name: str, folder: Path) -> None:
-    """Make the files below `name` those of a folder.
+    """Make the objects below `name` those of a result's folder.
 
     ``result.json`` vouches for the others: the one that is there goes before any of them, the new
-    one comes last.
+    one comes last. Therefore it is taken out of the folder.
 
     Raises
     ------
     OutputError
         If a file cannot be written, or one that is there cannot be removed.
     """
-    files = {
-        f"{name}/{path.relative_to(folder).as_posix()}": path
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-    voucher = f"{name}/result.json"
-    there = store.names(name)
-    others = (files.keys() | there) - {voucher}
-    if others and voucher in there:
-        store.remove(voucher)
-    for file in sorted(others):
-        if file in files:
-            store.write(file, files[file].read_bytes())
-        else:
-            store.remove(file)
-    if voucher in files:
-        store.write(voucher, files[voucher].read_bytes())
+    from pyarrow.fs import copy_files
+
+    voucher = folder / "result.json"
+    content = voucher.read_bytes()
+    voucher.unlink()
+    store.remove(f"{name}/result.json")
+    store.remove(name)
+    with _translated(f"{store.place}/{name}", OutputError, "cannot write there"):
+        copy_files(str(folder), f"{store.root}/{name}", destination_filesystem=store.filesystem)
+    store.write(f"{name}/result.json", content)

@@ -18,63 +18,35 @@ from pathlib import Path
 from typing import Any
 
 from algid import __version__
-from algid.base.errors import AlgidError, SettingError, text_of
+from algid.base.errors import OutputError, SettingError
 from algid.base.runtime import cores
-from algid.batches.workers import CallFailedError, WorkerDiedError, Workers
+from algid.batches.workers import Workers
 from algid.options import flag
 
 SECONDS = 10  # for a scheduler to answer
 
 
-class WorkersGoneError(AlgidError):
-    """Jobs cannot be run, and it is no job's fault."""
-
-
 class Cluster(Executor):
-    """Calls run on a cluster; what is no call's own fault is a `WorkersGoneError`.
+    """Calls run on a cluster; if a worker dies, Dask runs its calls on others.
+
+    A future gives an exception as its answer: see `job_of`.
 
     Parameters
     ----------
     client : Dask's
-    address : of its scheduler
     out : folder that all workers must see, if any
     timeout : s that a call may take; None for any
     """
 
-    def __init__(self, client: Any, address: str, out: Path | None, timeout: float | None) -> None:
-        self._executor, self._address = client.get_executor(pure=False), address
+    def __init__(self, client: Any, out: Path | None, timeout: float | None) -> None:
+        self._executor = client.get_executor(pure=False)
         self._job, self._terms = job_of(__version__), (out, timeout)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **_none: Any) -> Future[Any]:
-        """Run ``fn(*args)`` on a worker; if that dies, Dask runs it on another."""
-        future: Future[Any] = Future()
-
-        def settle(done: Future[Any]) -> None:
-            from distributed.scheduler import KilledWorker
-
-            if not future.set_running_or_notify_cancel():  # the batch has ended meanwhile
-                return None
-            try:
-                answer = done.result()
-                if not isinstance(answer, Exception):
-                    return future.set_result(answer)
-                error, reason = answer, str(answer)
-            except KilledWorker as killed:
-                error = CallFailedError(f"it took its workers with it ({killed!s:.80})")
-            except BaseException as lost:  # a task that is lost is cancelled
-                error, reason = None, text_of(lost).partition("\n")[0]
-            if not isinstance(error, CallFailedError | WorkerDiedError):
-                said = f"{flag('scheduler')} {self._address}: it is gone or cannot run jobs"
-                error = WorkersGoneError(f"{said} ({reason}); look at it")
-            return future.set_exception(error)
-
-        try:
-            remote = self._executor.submit(self._job, pickle.dumps((*self._terms, fn, args)))
-        except Exception as error:  # the client is closed
-            remote = Future()
-            remote.set_exception(error)
-        remote.add_done_callback(settle)
-        return future
+        """Run ``fn(*args)`` on a worker."""
+        call = pickle.dumps((*self._terms, fn, args))
+        answer: Future[Any] = self._executor.submit(self._job, call)
+        return answer
 
 
 def job_of(version: str) -> Callable[[bytes], Any]:
@@ -107,7 +79,7 @@ def run_here(
     """What ``fn(*args)`` gives on this worker, or an exception."""
     if out is not None and not out.is_dir():
         place = f"choose a place with {flag('out')} that all machines see"
-        return WorkersGoneError(f"{socket.gethostname()} does not see {out.parent}; {place}")
+        return OutputError(f"{socket.gethostname()} does not see {out.parent}; {place}")
     try:
         return _slots(timeout).submit(fn, *args).result()
     except Exception as error:
@@ -159,7 +131,7 @@ def cluster(
             raise SettingError(
                 f"{flag('scheduler')} {address}: it has no workers; start dask worker {address}"
             )
-        yield Cluster(client, address, out, timeout), 2 * threads
+        yield Cluster(client, out, timeout), 2 * threads
     finally:
         with suppress(Exception):  # of a scheduler that is gone
             client.close(timeout=SECONDS)

@@ -233,7 +233,12 @@ class Batch:
         while (running or waiting) and not self.stop.is_set():
             while waiting and len(running) < self._slots:
                 task = waiting.popleft()
-                running[self._executor.submit(run_task, task)] = task
+                try:
+                    future = self._executor.submit(run_task, task)
+                except Exception as error:  # a client that is closed
+                    future = Future()
+                    future.set_exception(error)
+                running[future] = task
             for future in wait(running, _STOP_EVERY, FIRST_COMPLETED).done:
                 task = running.pop(future)
                 record = self._record(task, future)
@@ -249,17 +254,20 @@ class Batch:
     def _record(self, task: Task, future: Future[Any]) -> JobRecord | None:
         """How the task ended, or None where the batch cannot go on, which is no job's fault."""
         try:
-            ended: JobRecord | str = future.result()
-        except WorkerDiedError as died:
-            return task.record(JobStatus.KILLED, str(died))
-        except CallFailedError as failed:
-            return task.record(JobStatus.FAILED, str(failed))
-        except Exception as error:  # no process can be started, a cluster is lost
-            self._stop_because(f"{text_of(error)}; {RUN_AGAIN}")
-            return None
+            ended = future.result()
+        except Exception as error:
+            ended = error
         if isinstance(ended, JobRecord):
             return ended
-        self._stop_because(f"{ended}; {MAKE_ROOM}")
+        if isinstance(ended, WorkerDiedError) or type(ended).__name__ == "KilledWorker":  # Dask's
+            return task.record(JobStatus.KILLED, f"it took its worker with it: {ended!s:.80}")
+        if isinstance(ended, CallFailedError):
+            return task.record(JobStatus.FAILED, str(ended))
+        if isinstance(ended, str):
+            self._stop_because(f"{ended}; {MAKE_ROOM}")
+        else:  # no process can be started, a cluster is lost
+            why = text_of(ended).removeprefix("Exception: ").partition("\n")[0]
+            self._stop_because(f"no worker can run jobs ({why}); {RUN_AGAIN}")
         return None
 
     def _keep(self, record: JobRecord) -> bool:

@@ -131,7 +131,7 @@ class Workers(ThreadPoolExecutor):
         if kills < MOST_KILLS and not self._stopped:
             return self._answer(call, kills + 1)
         how = f"exit code {-number}" if number <= 0 else signal.Signals(number).name
-        raise WorkerDiedError(f"it took its worker with it: the worker was ended by {how}")
+        raise WorkerDiedError(f"the worker was ended by {how}")
 
 
 def serve() -> None:

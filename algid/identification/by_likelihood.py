@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from algid.base.names import outside, within
-from algid.base.runtime import Worker
+from algid.base.runtime import executor
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
@@ -206,9 +207,14 @@ def _scored(
         yield from moving()
         return
     gathered = PredictionSums(model, settings.torque_shift())
-    with Worker(gathered.push) as worker:
+    pushed: Future[None] | None = None
+    with executor(1) as pool:
         for piece in moving():
-            worker.push(piece)
+            if pushed is not None:
+                pushed.result()
+            pushed = pool.submit(gathered.push, piece)
             yield piece
+    if pushed is not None:
+        pushed.result()
     gathered.finish()
     sums[log] = gathered

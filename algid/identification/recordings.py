@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Literal
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from algid.base.errors import LogError
 from algid.base.names import evenly_spread
 from algid.base.progress import Progress
-from algid.base.runtime import Beside
+from algid.base.runtime import executor
 from algid.log import Log, Origin
 from algid.notices import Notice
 from algid.results import LogSummary
@@ -66,7 +67,7 @@ class Recording:
     """All of a log that was looked at before its first pass."""
     _findings: tuple[Notice, ...] | None = field(default=None, init=False)
     _kept: tuple[Segment, ...] | None = field(default=None, init=False)
-    _hash: Beside[str] | None = field(default=None, init=False)
+    _hash: Future[str] | None = field(default=None, init=False)
 
     @property
     def duration(self) -> float:
@@ -236,7 +237,7 @@ class Recordings:
         from algid.inspection.clipping import beyond, clipped
 
         if log.digest is not None and log._hash is None and not 0 < log.promised <= SHORT:
-            log._hash = Beside(log.digest)
+            log._hash = executor(1).submit(log.digest)
         first_pass = log.rows is None
         rows, first_ns, last_ns = 0, 0, 0
         notices = list(log.notices)

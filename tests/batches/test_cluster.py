@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, Executor, Future
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -17,9 +17,11 @@ import polars as pl
 import pytest
 
 import algid
-from algid.batches.cluster import Cluster, WorkersGoneError, job_of
+from algid.base.stores import open_store
+from algid.batches.cluster import job_of
 from algid.batches.job import Task
 from algid.batches.jobs import Job
+from algid.batches.run import Batch, BatchConfig
 from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.settings import Settings
 from algid.synth.sensors import Sensors
@@ -31,34 +33,34 @@ __all__ = ["dask"]
 pytest.importorskip("distributed", reason="distributed is absent")
 
 
-def _ended(outcome: Any) -> Future[Any]:
-    """What a cluster makes of a call whose task gives `outcome`, or raises it."""
-
-    def submit(*_call: object) -> Future[Any]:
-        done: Future[Any] = Future()
-        if isinstance(outcome, tuple):
-            done.set_exception(outcome[0])
-        else:
-            done.set_result(outcome)
-        return done
-
-    client = SimpleNamespace(get_executor=lambda **_: SimpleNamespace(submit=submit))
-    return Cluster(client, "tcp://there:1", None, None).submit(calls.add, 1, 1)
-
-
-def test_what_is_no_calls_fault_ends_the_batch_and_what_is_fails_alone() -> None:
+def test_what_is_no_jobs_fault_ends_the_batch_and_what_is_fails_alone(tmp_path: Path) -> None:
     from distributed.scheduler import KilledWorker
 
-    assert _ended(2).result() == 2
-    for own in (CallFailedError("as asked"), WorkerDiedError("as asked")):
-        with pytest.raises(type(own), match="as asked"):
-            _ended(own).result()
+    class Lost(Executor):
+        def submit(self, *_call: Any, **_more: Any) -> Future[Any]:
+            outcome = outcomes.pop()
+            if isinstance(outcome, OSError):
+                raise outcome
+            done: Future[Any] = Future()
+            if isinstance(outcome, CallFailedError):
+                done.set_result(outcome)
+            else:
+                done.set_exception(outcome)
+            return done
+
     killed = KilledWorker("run-1", cast(Any, SimpleNamespace(address="tcp://box:1")), 3)
-    with pytest.raises(CallFailedError, match="it took its workers with it"):
-        _ended((killed,)).result()
-    for fault in (OSError("as asked"), (CancelledError(),), (OSError("as asked"),)):
-        with pytest.raises(WorkersGoneError, match=r"^--scheduler tcp://there:1: .*; look at it$"):
-            _ended(fault).result()
+    config = BatchConfig(str(tmp_path), Settings(), lambda _file: None)
+    ends = list[Any]()
+    faults: list[BaseException] = [CallFailedError("as asked"), WorkerDiedError("as asked"), killed]
+    outcomes: list[BaseException] = [CancelledError(), OSError("as asked"), *reversed(faults)]
+    while outcomes:
+        batch = Batch(open_store(str(tmp_path)), config, Lost(), 1, lambda *_: None)
+        ended = batch.run([Job("a", ("a.csv",))], retry_failed=True)
+        ends.append(ended.stopped or ended.records[0].status.value)
+    assert ends[:3] == ["failed", "killed", "killed"]
+    for told in ends[3:]:
+        assert told.startswith("no worker can run jobs (")
+        assert told.endswith("); run again: what is finished is kept")
 
 
 def test_a_worker_runs_jobs_of_its_own_version_that_see_the_output(tmp_path: Path) -> None:

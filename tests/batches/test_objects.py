@@ -184,11 +184,11 @@ def test_credentials_are_not_printed(served: Served, source: str, out: str, code
         assert word not in done.out + done.err
 
 
-def test_a_bucket_that_is_not_there_is_named(served: Served) -> None:
+def test_a_bucket_that_is_not_there_is_told(served: Served) -> None:
     absent = f"s3://no-such-lab/logs{served.query}"
-    with pytest.raises(OutputError, match="there is no bucket no-such-lab"):
+    with pytest.raises(OutputError, match="no-such-lab/logs: there is no such bucket"):
         jobs_of([absent], "out")
-    with pytest.raises(OutputError, match="there is no bucket no-such-lab"):
+    with pytest.raises(OutputError, match="no-such-lab/logs: there is no such bucket"):
         _run(served, absent)
 
 
@@ -260,11 +260,11 @@ def test_a_new_result_leaves_nothing_of_the_old_one(served: Served, tmp_path: Pa
     )
     new = _folder(tmp_path / "new", "result.json", "report.md")
     served.denied = lambda method, path: method != "DELETE" and path.endswith("report.md")
-    with pytest.raises(OutputError, match=r"a\.algid/report\.md: cannot write there"):
+    with pytest.raises(OutputError, match=r"/out/a\.algid: cannot write there"):
         put_folder(store, "a.algid", new)
     served.denied = lambda _method, _path: False
     assert not store.exists("a.algid/result.json")  # it would vouch for what is no longer its own
-    put_folder(store, "a.algid", new)
+    put_folder(store, "a.algid", _folder(new, "result.json"))
     assert store.names("a.algid") == ["a.algid/report.md", "a.algid/result.json"]
     assert store.read("a.algid/result.json") == b"new result.json"
     put_folder(store, "a.algid", _folder(tmp_path / "alone", "result.json"))
