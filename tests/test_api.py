@@ -96,7 +96,7 @@ def test_a_result_of_schema_3_is_still_read(tmp_path: Path) -> None:
     ]
     content["schema_version"] = 2
     file.write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(ResultError, match="expected 3 or 4, found 2; identify again"):
+    with pytest.raises(ResultError, match="expected 4, found 2; identify again"):
         algid.read_result(file)
 
 

@@ -23,7 +23,7 @@ from tests.report.folders import build
         (("parameters", "k1", "status"), "FINE", "parameters.k1.status: "),
         (("fit", "covariance", 0), 1.0, "fit.covariance.0: "),
         (("log", "rows"), "many", "log.rows: "),
-        (("schema_version",), 2, "schema_version: expected 3 or 4, found 2"),
+        (("schema_version",), 2, "schema_version: expected 4, found 2"),
     ],
 )
 def test_a_file_that_is_no_result_is_one_line(

@@ -16,10 +16,10 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError, computed_field
+from pydantic import BaseModel, ConfigDict, ValidationError, computed_field, model_validator
 
 from algid.base.errors import ResultError
-from algid.base.files import first_misfit, read_text, whole_file
+from algid.base.files import first_misfit, read_whole, whole_file
 from algid.base.significance import NORMAL
 from algid.base.verdict import Verdict
 from algid.log import Reading
@@ -234,23 +234,16 @@ class TorquePrediction(_Model):
         So is the R² of a joint's residual while it moves: at rest friction is any torque up to ± f,
         which contradicts no model.
         """
-        of_load = self.of_load or self.nrmse
+        of_load, moving = self.of_load or self.nrmse, self.rmse_moving or (None, None)
         joints = []
-        for joint, r2, moving, of in zip((1, 2), self.r2, self._r2_moving(), of_load, strict=True):
-            if max(r2, moving) < least and of > TRIFLE:
+        for joint, r2, rmse, now, of in zip(
+            (1, 2), self.r2, self.rmse, moving, of_load, strict=True
+        ):
+            if now is not None and rmse > 0:
+                r2 = max(r2, 1 - (1 - r2) * (now / rmse) ** 2)
+            if r2 < least and of > TRIFLE:
                 joints.append(joint)
         return tuple(joints)
-
-    def _r2_moving(self) -> list[float]:
-        """The share of the torque's variance beyond the residual's square while a joint moves.
-
-        That of all samples where it never moves, or that was not looked at.
-        """
-        shares = list(self.r2)
-        for place, moving in enumerate(self.rmse_moving or ()):
-            if moving is not None and self.rmse[place] > 0:
-                shares[place] = 1 - (1 - self.r2[place]) * (moving / self.rmse[place]) ** 2
-        return shares
 
 
 class Repeatability(_Model):
@@ -303,12 +296,10 @@ class FitSummary(_Model):
         """
         import numpy as np
 
-        size = len(self.covariance_names)
-        padded = np.full((size + 1, size + 1), np.nan)
-        padded[:size, :size] = np.array(self.covariance, dtype=np.float64).reshape(size, size)
-        place_of = dict(zip(self.covariance_names, range(size), strict=True))
-        places = [place_of.get(name, size) for name in names]
-        return padded[np.ix_(places, places)]
+        rows = zip(self.covariance_names, self.covariance, strict=True)
+        known = {name: dict(zip(self.covariance_names, row, strict=True)) for name, row in rows}
+        found = [[known.get(one, {}).get(other) for other in names] for one in names]
+        return np.array(found, dtype=np.float64).reshape(len(names), len(names))
 
 
 class Result(_Model):
@@ -357,6 +348,15 @@ class Result(_Model):
     more_logs: list[LogSummary] = []
     data_lost: bool = False
     notices: list[Notice] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_now(cls, content: Any) -> Any:
+        """What a file holds: its verdict is made anew, and version 3 has defaults for the rest."""
+        if isinstance(content, dict):
+            content = {name: value for name, value in content.items() if name != "verdict"}
+            content |= {"schema_version": 4} if content.get("schema_version") == 3 else {}
+        return content
 
     @computed_field  # type: ignore[prop-decorator]
     @property
@@ -499,23 +499,16 @@ def read_result(path: str | Path) -> Result:
     """
     path = Path(path)
     file = path / "result.json" if path.is_dir() else path
-    wanted, again = "expected a result of algid identify", "identify again with this version"
     try:
-        content = json.loads(read_text(file))
-        version = content.get("schema_version") if isinstance(content, dict) else None
-        if version not in (3, SCHEMA_VERSION):
-            raise ResultError(
-                f"{file}: schema_version: expected 3 or {SCHEMA_VERSION}, found {version!r:.60}; "
-                f"{again}"
-            )
-        content.pop("verdict", None)  # it is made anew
-        result = Result.model_validate(content | {"schema_version": SCHEMA_VERSION})
+        result = Result.model_validate_json(read_whole(file))
     except OSError as error:
-        raise ResultError(f"{file}: cannot read it ({error.strerror}); {wanted}") from error
+        raise ResultError(
+            f"{file}: cannot read it ({error.strerror}); expected a result of algid identify"
+        ) from error
     except ValidationError as error:
-        raise ResultError(f"{file}: {first_misfit(error)}; {again}") from error
-    except (ValueError, RecursionError) as error:
-        raise ResultError(f"{file}: not JSON ({error}); {wanted}") from error
+        raise ResultError(
+            f"{file}: {first_misfit(error)}; identify again with this version"
+        ) from error
     # notices of schema 3 have codes of then, and texts of their own
     notices = [replace(one, code=code_of_now(one.code)) for one in result.notices]
     return result.model_copy(update={"notices": notices})

@@ -97,7 +97,7 @@ def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]
     identify(wide[0], None, PAPER, out=tmp_path, report=False)
     file = tmp_path / "case1-unloaded.algid" / "result.json"
     file.write_text(file.read_text().replace('"schema_version": 4', '"schema_version": 7'))
-    with pytest.raises(ResultError, match="expected 3 or 4, found 7"):
+    with pytest.raises(ResultError, match="expected 4, found 7"):
         read_result(file)
 
 

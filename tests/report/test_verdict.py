@@ -109,7 +109,7 @@ CASES = {
     "one lost": Case(lambda r: of(r, LOST, "k5"), codes=["NOT_IDENTIFIABLE"], words="8 of 9"),
     "half lost": Case(lambda r: of(r, LOST, *NAMES[:4]), codes=["NOT_IDENTIFIABLE"]),
     "most lost": Case(lambda r: of(r, LOST, *NAMES[:5]), "failed", ["NOT_IDENTIFIABLE"], "only 4"),
-    "all weak": Case(lambda r: alone(r, WEAK), "failed", ["WEAK_EXCITATION"], "too weakly excited"),
+    "all weak": Case(lambda r: alone(r, WEAK), "failed", ["WEAK_EXCITATION"], "no parameter"),
     "all vague": Case(lambda r: alone(r, VAGUE), "failed", ["NOT_SIGNIFICANT"], "no parameter"),
     "vague term of the logs": Case(lambda r: chosen(r, "logs"), "good"),
     "vague term of the user": Case(lambda r: chosen(r, "settings"), codes=["NOT_SIGNIFICANT"]),
@@ -120,7 +120,7 @@ CASES = {
     "bound": Case(lambda r: with_fit(r, **broken(4.0)), codes=["BROKEN_BOUND"]),
     "coloured": Case(coloured, codes=["NOT_WHITE"]),
     "coloured, allowed for": Case(lambda r: coloured(r, "sandwich"), "good"),
-    "not converged": Case(lambda r: with_fit(r, converged=False), "failed", [], " iterations"),
+    "not converged": Case(lambda r: with_fit(r, converged=False), "failed", [], "not converge"),
     "R² of 91 %": Case(lambda r: with_fit(r, **predicted(0.91, 0.93)), "good"),
     "R² of 89 %": Case(
         lambda r: with_fit(r, intervals="sandwich", **predicted(0.89, 0.99)),
