@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,8 @@ _HELD_RUNS, _HELD_SHARE = 50, 0.6
 _OFF_STEP, _IN_STEP = 0.15, 0.9
 """Largest distance of a held torque's runs from whole steps, and least share of such runs."""
 _TURN = 2 * math.pi
+_AS_DEGREES = 0.055
+"""Of the logarithm of a degree: a fifth of a ratio of angles to velocities, either way."""
 _TORQUES = re.compile(r"(?<![a-z])(torques?|efforts?|tau(?![a-z])|moment)", re.IGNORECASE)
 _CURRENTS = re.compile(r"(?<![a-z])(currents?|i_?q)(?![a-z])", re.IGNORECASE)
 _OTHER = re.compile(
@@ -172,7 +175,7 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
     it was read, and no scale of its angles does better. A unit that the user has said is no reason
     to refuse.
     """
-    ratios, found = np.zeros(2), []
+    ratios, found = np.zeros(2), list[tuple[str, dict[str, Any]]]()
     if log.omega is not None:
         path = np.cumsum(log.omega * np.gradient(log.t), axis=1)
         apart = max(1, len(log) // 200)
@@ -180,18 +183,17 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
             np.abs(np.diff(one[:, ::apart])).sum(axis=1) for one in (log.theta, path)
         )
         ratios = np.divide(travelled, summed, out=ratios, where=summed > 0)
-    pairs = (("angles", "theta", 180 / math.pi), ("velocities", "omega", math.pi / 180))
-    for (joint, ratio), (what, quantity, factor) in product(
-        enumerate(ratios.tolist(), start=1), pairs
-    ):
-        if len(log) > 20 and 0.8 < ratio / factor < 1.25:
+    for joint, ratio in enumerate(ratios.tolist(), start=1):
+        power = math.log(max(ratio, 1e-9)) / math.log(180 / math.pi)
+        if len(log) > 20 and abs(abs(power) - 1) < _AS_DEGREES:
+            what, quantity = ("angles", "theta") if power > 0 else ("velocities", "omega")
             seen = {"case": "signal", "what": what, "joint": joint}
             found.append((f"{quantity}{joint}", seen))
     widest = np.abs(log.theta).max(axis=1)
     if widest.max() > 12 * math.pi and not ratios.any() and not is_to_scale():
         seen = {"case": "reach", "largest": float(widest.max())}
         found.append((f"theta{np.argmax(widest) + 1}", seen))
-    for name, seen in found:
+    for name, numbers in found:
         told = log.origin.reading.told(name)
         unit = "angle_unit" if name.startswith("theta") else f"{name}.unit"
         remedies = (
@@ -199,7 +201,7 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
             Remedy({f"{name}.gear_ratio": None}, "for those of a motor behind its gear"),
             Remedy({f"{name}.unit": "rad"}, "where it is right"),
         )
-        numbers = seen | {"unit": log.origin.reading.channels[name].unit if told else None}
+        numbers["unit"] = log.origin.reading.channels[name].unit if told else None
         yield Notice("DEGREES", numbers=numbers, refuse=not told, remedies=() if told else remedies)
 
 

@@ -80,11 +80,6 @@ def recorded(log: Log, seconds: float = math.inf) -> list[Recorded]:
     return parts
 
 
-def is_right(judgement: Judgement | None) -> bool:
-    """Whether physics holds for a log as it was read, and for no other convention."""
-    return judgement is not None and judgement.alone and judgement.best.convention == AS_READ
-
-
 def is_to_scale(judgement: Judgement | None) -> bool:
     """True if the log shows a real arm as it was read, and no scale of its angles a better one."""
     if judgement is None:
@@ -149,16 +144,19 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     None where the log is right, shows a real arm no better with other signs or another zero, or the
     arm has no weight.
     """
-    if judgement is None or is_right(judgement) or K4 not in judgement.as_read.names:
+    if judgement is None or K4 not in judgement.as_read.names:
         return None
     as_read, trials = judgement.as_read, judgement.trials
+    if judgement.alone and judgement.best.convention == AS_READ:
+        return None
     k, left = as_read.constants, float(as_read.left.max())
     if left < EXPLAINED and math.hypot(k[K2], k[K4]) < _LEAST_PULL * abs(k[K3] + k[K5]):
         weightless = trials.weightless()
         if weightless.convincing and weightless.left.max() < left + _OF_WEIGHT:
             driver = Remedy({"effort": "gravity-compensated"}, "for such a driver")
-            remedies = driver, Remedy({"gravity": 0}, "for a horizontal plane")
-            return Notice("GRAVITY_COMPENSATED", numbers={"case": "arm"}, remedies=remedies)
+            level = Remedy({"gravity": 0}, "for a horizontal plane")
+            numbers = {"case": "arm"}
+            return Notice("GRAVITY_COMPENSATED", numbers=numbers, remedies=(driver, level))
     named = trials.under(_TORQUES, AS_READ.zero) + trials.under(_ALL, AS_READ.zero)
     named += trials.under(AS_READ, *_SIDEWAYS) + trials.under(_TORQUES, *_SIDEWAYS)
     likely = []
@@ -234,10 +232,7 @@ def _zeros(convention: Convention, reading: Reading, within: float = _SAME) -> d
     own = np.array([one.offset if one else 0.0 for one in channels])
     # what was added to the angles as the log was read, and what has to be
     read = own + [ZEROS[reading.zero], -own[0] * absolute]
-    read = read[::-1] if convention.swapped else read
-    first, second = np.array(convention.signs) / np.array(convention.scale) * read
-    second += convention.zero[1] - first * convention.absolute
-    first += convention.zero[0]
+    first, second = convention.angles(read[:, None])[:, 0].tolist()
     # the nearest of the named zeros, the profile's own first, and what is left of it as an offset
     lefts = {name: remainder(first - turned, 2 * pi) for name, turned in ZEROS.items()}
     zero = min((reading.zero, *ZEROS), key=lambda name: abs(lefts[name]) > within)
@@ -245,9 +240,6 @@ def _zeros(convention: Convention, reading: Reading, within: float = _SAME) -> d
     added = np.array([offset, second + offset * (absolute or convention.absolute)]) - own
     added = np.remainder(added + pi, 2 * pi) - pi
     added[np.abs(added) < _SAME] = 0.0
-    mending: dict[str, Any] = {}
-    if zero != reading.zero:
-        mending["zero"] = zero
-    if added.any():
-        mending["offsets"] = [float(f"{one:.6g}") for one in reading.offsets + added]
-    return mending
+    offsets = [float(f"{one:.6g}") for one in reading.offsets + added]
+    named = {"zero": zero} if zero != reading.zero else {}
+    return named | {"offsets": offsets} if added.any() else named

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from algid.arm import FloatArray
 from algid.base.criteria import GAP
@@ -46,11 +46,8 @@ def thinned(values: Any) -> Any:
 
 def differences(values: Any, order: int) -> Any:
     """Differences of that order of values (…, N), `thinned`; below `ENOUGH` the same as NumPy's."""
-    count = values.shape[-1] - order
-    parts = [thinned(values[..., place : count + place]) for place in range(order + 1)]
-    while len(parts) > 1:
-        parts = [after - before for before, after in pairwise(parts)]
-    return parts[0]
+    windows = sliding_window_view(values, order + 1, axis=-1).swapaxes(-1, -2)
+    return np.diff(thinned(windows), order, axis=-2)[..., 0, :]
 
 
 @dataclass(frozen=True)

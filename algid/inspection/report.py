@@ -48,10 +48,16 @@ def look(log: Any, read: Callable[[], T]) -> tuple[str, tuple[Entry, ...], T | N
     Raises
     ------
     LogError
-        As `contents`.
+        If there is no such log, or not even its list of entries can be read.
     """
     with during("opening", _called(log)):
-        kind, entries = contents(log)
+        if isinstance(log, Log):
+            kind, entries = log.origin.format, tuple[Entry, ...]()
+        elif isinstance(log, str | Path):
+            kind, entries = format_of(Path(log)).name, entries_at(Path(log))
+        else:
+            table = open_columns(log)
+            kind, entries = table.kind, entries_of(table)
     try:
         return kind, entries, read(), None
     except LogError as error:
@@ -61,22 +67,6 @@ def look(log: Any, read: Callable[[], T]) -> tuple[str, tuple[Entry, ...], T | N
 def _called(log: Any) -> str:
     """A log's path, or what stands for one in memory."""
     return str(log) if isinstance(log, str | Path) else NAME
-
-
-def contents(log: Any) -> tuple[str, tuple[Entry, ...]]:
-    """Format and entries of a log.
-
-    Raises
-    ------
-    LogError
-        If there is no such log, or not even its list of entries can be read.
-    """
-    if isinstance(log, Log):
-        return log.origin.format, ()
-    if not isinstance(log, str | Path):
-        table = open_columns(log)
-        return table.kind, entries_of(table)
-    return format_of(Path(log)).name, entries_at(Path(log))
 
 
 @dataclass(frozen=True)
@@ -99,11 +89,8 @@ class Inspection:
     findings: tuple[Notice, ...] = ()
 
     def __repr__(self) -> str:
-        if self.refused is not None:
-            return f"Inspection({self.path!r}, refused: {self.refused:.160})"
-        rows = 0 if self.clock is None else self.clock.rows
         codes = ", ".join(dict.fromkeys(one.code for one in (*self.notices, *self.findings)))
-        return f"Inspection({self.path!r}, N = {rows:,}, found: {codes or 'nothing'})"
+        return f"Inspection({self.path!r}, {self.refused or codes or 'nothing found'})"
 
     @property
     def lossy(self) -> bool:

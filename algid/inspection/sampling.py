@@ -73,25 +73,21 @@ def lost_steps(log: Log) -> int:
 
     0 where noise or a slow motion leaves it open.
 
-    A velocity that is twice the mean of its neighbours' is a lost sample's, if the angles' plain
-    step is twice theirs too: one alone is a stamp's jitter. Noise makes a step that is zero as
-    often.
+    A step that is twice the mean of its neighbours' is a lost sample's, where the stamps of all
+    three are even: others are a stamp's jitter. Noise makes a step that is zero as often.
     """
     count = len(log) - 3
     spans = [slice(first, first + count + 1) for first in range(3)]
     before, own, after = (differences(log.theta[:, span], 1) for span in spans)
-    times = [differences(log.stamp_ns[span], 1) for span in spans]
-    twice, none = np.True_, np.True_
-    for here, around in (
-        (own, 0.5 * (before + after)),
-        (own / times[1], 0.5 * (before / times[0] + after / times[2])),
-    ):
-        size = np.linalg.norm(around, axis=0)
-        near, moves = _LOST * size, size > quantile(size, 0.25)
-        twice = twice & moves & (np.linalg.norm(here - 2 * around, axis=0) < near)
-        none = none & moves & (np.linalg.norm(here, axis=0) < near)
-    each = count / max(1, own.shape[1])  # of a long log some steps stand for all
-    lost, chance = (round(each * np.count_nonzero(steps)) for steps in (twice, none))
+    periods = np.array([differences(log.stamp_ns[span], 1) for span in spans]) * 1e-9 / log.period
+    around = 0.5 * (before + after)
+    size = np.linalg.norm(around, axis=0)
+    clear = (size > quantile(size, 0.25)) & np.all(np.abs(periods - 1) < _LOST, axis=0)
+    each = count / max(1, size.size)  # of a long log some steps stand for all
+    lost, chance = (
+        round(each * np.count_nonzero(clear & (np.linalg.norm(off, axis=0) < _LOST * size)))
+        for off in (own - 2 * around, own)
+    )
     return lost if lost > max(_LOST_SHARE * len(log), _FEWEST, _AGAINST * chance) else 0
 
 

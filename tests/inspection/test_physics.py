@@ -14,8 +14,8 @@ import polars as pl
 import pytest
 
 from algid.arm import Arm, inverse_dynamics
-from algid.estimators.conventions import Convention
-from algid.inspection.conventions import is_right, judged, mend
+from algid.estimators.conventions import AS_READ, Convention
+from algid.inspection.conventions import judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
 from algid.log import Log, Origin, Reading
@@ -66,7 +66,9 @@ def test_conventions_are_judged_over_all_stretches() -> None:
     log = swung()
     kept = (log.t % 2.0) > 1.0
     log = replace(log, stamp_ns=log.stamp_ns[kept], theta=log.theta[:, kept], tau=log.tau[:, kept])
-    assert is_right(judged(log))
+    right = judged(log)
+    assert right is not None
+    assert (right.alone, right.best.convention) == (True, AS_READ)
     flipped = replace(log, tau=-log.tau)
     found = mend(flipped.origin, judged(flipped))
     assert found is not None

@@ -13,7 +13,7 @@ import pytest
 import scipy.io
 
 from algid.base.errors import LogError
-from algid.inspection.report import contents, inspect_log
+from algid.inspection.report import inspect_log
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.formats import format_of
@@ -119,9 +119,9 @@ def test_hdf5_is_read_and_its_arrays_are_listed(tmp_path: Path) -> None:
     log = read_log(path)
     assert np.array_equal(log.theta, LOG.theta)
     assert np.array_equal(log.tau, LOG.tau)
-    kind, entries = contents(path)
-    assert kind == "hdf5"
-    assert {entry.name for entry in entries} == {
+    found = inspect_log(path)
+    assert found.format == "hdf5"
+    assert {entry.name for entry in found.entries} == {
         "q[0]",
         "q[1]",
         "tau[0]",
