@@ -47,7 +47,7 @@ def open_log(path: str | Path | FrameOrArrays, profile: Profile | None = None) -
 
 def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader:
     """Open a log that stands in one file, or in memory."""
-    from algid.readers.flat import open_table
+    from algid.readers.flat import offer_table, open_offered
     from algid.readers.table_cells import TableFile
 
     if isinstance(path, str | Path):
@@ -55,14 +55,14 @@ def _open_one(path: str | Path | FrameOrArrays, profile: Profile) -> TableReader
 
         found = open_file(Path(path), profile)
         if not isinstance(found, TableFile):
-            from algid.readers.messages.reader import open_messages
+            from algid.readers.messages.reader import offer_messages
 
-            return open_messages(found, profile)
+            return open_offered(offer_messages(found, profile), profile)
     else:
         from algid.readers.memory import open_columns
 
         found = open_columns(path)
-    return open_table(found, profile)
+    return open_offered(offer_table(found, profile), profile)
 
 
 def read_log(path: str | Path | FrameOrArrays, profile: Profile | None = None) -> Log:

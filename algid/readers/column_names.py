@@ -88,7 +88,7 @@ _SUFFIX_UNIT = re.compile(
     r"lbf?ft|lbf?in|ozf?in|ma|rpm|inch(?:es)?|"
     r"grad|volts?|s|secs?|seconds|[mun]s(?:ec)?|millis|micros|nanos|(?:milli|micro|nano)seconds)$"
 )
-_JOINT_NAMED = re.compile(r"^(.*/[^/]+)/(position|velocity|effort)$")
+_JOINT_NAMED = re.compile(r"^(.*/[^/]+)/(\w+)$")
 _JOINT_PLACED = re.compile(r"^.*/(position|velocity|effort)[.\[/](\d+)\]?$")
 _STATE = re.compile(
     r"^(?:\w+[./])*\w*state[./]?(?:\[(?P<joint>\d{1,3})\][./](?P<stem>\w+)"
@@ -145,7 +145,7 @@ def take_apart(column: str) -> Name:
             break
     if text in TIMES and (known := unit_of(text)):  # "millis" says its unit itself
         unit = known
-    if match := _JOINT_NAMED.match(text):
+    if (match := _JOINT_NAMED.match(text)) and match[2] in _STEMS:
         return Name(match[2], match[1], unit)
     if match := _JOINT_PLACED.match(text):
         return Name(match[1], match[2], unit)

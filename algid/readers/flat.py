@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,7 @@ from algid.readers.column_names import (
 )
 from algid.readers.joints import moving_joints, reading_of
 from algid.readers.log_reader import TableReader, make_reader
+from algid.readers.offered import Clock, Offered
 from algid.readers.stated import lines_of
 from algid.readers.table import JOINT_CHANNELS, REFERENCES, SampleTable, in_pairs
 from algid.readers.table_cells import TableCells, TableFile, cells_of, decoded, groups_in, units_of
@@ -45,8 +46,6 @@ if TYPE_CHECKING:
 
 _LOOKED = 1 << 14
 """Samples in which the joints that are not read are looked at."""
-_LISTED = 12
-"""Arrays of other lengths that a message lists."""
 INDEX = "__index_level_0__"
 """What pandas calls an index without a name where a frame becomes Arrow or Parquet."""
 
@@ -76,121 +75,147 @@ def as_log_error(path: object, kind: str) -> Iterator[None]:
         ) from error
 
 
-def open_table(table: TableFile, profile: Profile) -> TableReader:
-    """A reader of the columns that a profile, or their names, choose.
-
-    Raises
-    ------
-    LogError
-        If a channel has no column, or its column holds no numbers.
-    """
-    path, rows, sums = table.path, cells_of(table), table.companion.sums
-    cells, stated = rows.by_name, units_of(rows)
-    gone = [name for name in sums if name not in cells]
-    if gone:
-        raise LogError(
-            f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
-            "changed or damaged; write it again, or remove its truth if it was changed on purpose"
-        )
-    index = cells.get(INDEX)
-    if index and index.is_clock and not (profile.time or time_among(cells)):
-        profile = profile.model_copy(update={"time": INDEX})
-    try:
-        sources, joints = _columns(path, list(cells), profile)
-    except LogError as error:
-        if not table.others:
-            raise
-        more = ", ".join(table.others[:_LISTED])
-        raise LogError(f"{error}; the log also holds, of another length: {more}") from error
-    for name, source in sources.items():
-        cell = cells[source]
-        if not (cell.is_number or (name == "t" and cell.is_clock)):
-            held = str(cell.type).removeprefix("large_").removesuffix("_view")[:80]
-            raise LogError(f"{path}: column {source!r} for {name} holds {held}; expected numbers")
-    notices = [*table.notices, *groups_in(table)]
-    named = all(profile.channel(name).column for name in profile.needed)
-    reading = Reading(joints_told="profile" if named else "names")
-    if profile.joints or (joints and not named):
-        reading, order = reading_of(joints or (), profile)
-        notices += order
-    notices += _doubts(path, sources, stated, profile)
-    units = units_in_names(sources, stated)
-    unit = profile.time_unit or unit_of(units.pop("t", ""))
-    clock = Clock(unit, unit is not None)
-    mapping = {"t": f"rows at {profile.rate or 0:g} Hz", **sources}
-    if "t" not in sources:  # any column has a cell in each row that is counted
-        sources["t"], clock = sources[profile.needed[0]], Clock("ns", True, profile.rate)
-    elif cells[sources["t"]].is_clock:
-        clock = Clock("ns", True)
-    elif unit is None and all(sources[name] == name for name in ("t", *profile.needed)):
-        clock = Clock("s", False)  # algid's own names mean algid's own units
-    reading = replace(reading, clock="column", time_unit=clock.unit)
-
-    def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
-        return samples(rows, {"t": sources["t"], **others}, clock, {}, [], _LOOKED)
-
-    angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
-    others = other_joints(cells, angles)
-    others = {joint: one for joint, one in others.items() if cells[one].is_number}
-    # of counts nobody knows how far they are
-    angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
-    notices += moving_joints(others, look, angle) if angle else ()
-    return make_reader(
-        Origin(path, table.kind, mapping, table.companion.truth, reading),
-        partial(samples, rows, sources, clock, sums),
-        profile,
-        units,
-        tuple(notices),
-        table.rows or table.expected,
-        (*table.said, *lines_of(decoded(table.schema.metadata))),
-    )
-
-
-def _columns(
-    path: str, available: Sequence[str], profile: Profile
-) -> tuple[dict[str, str], tuple[str, str] | None]:
-    """By canonical channel its column, and the joints' own names.
-
-    A profile names columns, else their names tell. Of rows without a time there is no "t".
+def offer_table(table: TableFile, profile: Profile) -> Offered:
+    """The cells of a table's rows, and those of them that a profile or their names choose.
 
     Raises
     ------
     LogError
         If a column is missing, or stands there for more joints than two.
     """
+    path, rows, sums = table.path, cells_of(table), table.companion.sums
+    cells = rows.by_name
+    gone = [name for name in sums if name not in cells]
+    if gone:
+        raise LogError(
+            f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
+            "changed or damaged; write it again, or remove its truth if it was changed on purpose"
+        )
     by_user = {name: profile.channel(name).column for name in profile.channels}
     by_user["t"] = profile.time
+    index = cells.get(INDEX)
+    if index and index.is_clock and not (profile.time or time_among(cells)):
+        by_user["t"] = INDEX
     named = {name: column for name, column in by_user.items() if column}
-    listed = ", ".join(repr(name[:40]) for name in available[:16])
-    if len(available) > 16:
-        listed += f" and {len(available) - 16} more"
+    offered = Offered(
+        path,
+        table.kind,
+        cells,
+        named,
+        partial(samples, rows, sums),
+        table.companion.truth,
+        rows=table.rows or table.expected,
+        units=units_of(rows),
+        notices=(*table.notices, *groups_in(table)),
+        said=(*table.said, *lines_of(decoded(table.schema.metadata))),
+        others=table.others,
+    )
     for name, column in named.items():
-        if column not in available:
+        if column not in cells:
             raise LogError(
                 f"{path}: {name} is to be taken from {column!r}, which is not there; "
-                f"found {listed}; name another: {_naming([name])}"
+                f"found {offered.listed()}; name another: {_naming([name])}"
             )
     try:
-        choice = choose(available, profile.joints, named, profile.passive, profile.needed)
+        choice = choose(cells, profile.joints, named, profile.passive, profile.needed)
     except LookupError as error:
         two = Remedy({"joints": None}, "choose two")
         raise LogError(
             f"{path}: {error}; {two}; or name each column: {_naming(['theta1'])} …"
         ) from error
-    sources = choice.columns | named
+    return replace(offered, chosen=choice.columns | named, joints=choice.joints)
+
+
+def open_offered(offered: Offered, profile: Profile) -> TableReader:
+    """A reader of what a log offers, as a profile, or the log itself, says what it means.
+
+    Raises
+    ------
+    LogError
+        If a channel has no source, or that holds no numbers.
+    """
+    path, fields = offered.path, offered.fields
+    sources = _sources(offered, profile)
+    for name, source in sources.items():
+        one = fields[source]
+        if not (one.is_number or (name == "t" and one.is_clock)):
+            held = str(one.type).removeprefix("large_").removesuffix("_view")[:80]
+            raise LogError(f"{path}: column {source!r} for {name} holds {held}; expected numbers")
+    notices = list(offered.notices)
+    named = all(profile.channel(name).column for name in profile.needed)
+    reading = Reading(joints_told="profile" if named else "names")
+    pair = [sources[name] for name in profile.needed[:2]]
+    own = [one.joint for name, one in fields.items() if name in pair and one.joint]
+    joints = (own[0], own[1]) if len(own) == 2 else offered.joints
+    if profile.joints or (joints and not named):
+        reading, order = reading_of(joints or (), profile)
+        notices += order
+    notices += _doubts(offered, sources, profile)
+    units = units_in_names(sources, offered.units)
+    unit = profile.time_unit or unit_of(units.pop("t", ""))
+    clock = Clock(unit, unit is not None)
+    mapping = {"t": f"rows at {profile.rate or 0:g} Hz"}
+    for name, source in sources.items():
+        one = fields[source]
+        mapping[name] = f"{one.topic}: {one.column}" if one.topic else source
+    if "t" not in sources:  # any column has a cell in each row that is counted
+        sources["t"], clock = sources[profile.needed[0]], Clock("ns", True, profile.rate)
+    elif fields[sources["t"]].is_clock:
+        clock = Clock("ns", True)
+    elif unit is None and all(sources[name] == name for name in ("t", *profile.needed)):
+        clock = Clock("s", False)  # algid's own names mean algid's own units
+    topics = dict.fromkeys(fields[source].topic for name, source in sources.items() if name != "t")
+    reading = replace(
+        reading,
+        clock=offered.clock,
+        time_unit=clock.unit if offered.clock == "column" else None,
+        topics=tuple(filter(None, topics)),
+    )
+
+    def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
+        return offered.tables({"t": sources["t"], **others}, clock, [], _LOOKED)
+
+    angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
+    others = dict[str, str]()
+    for joint, source in other_joints(fields, angles).items():
+        if fields[source].is_number and len(others) < LIMITS.other_joints:
+            others[fields[source].joint or joint] = source
+    # of counts nobody knows how far they are
+    angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
+    notices += moving_joints(others, look, angle) if angle else ()
+    return make_reader(
+        Origin(path, offered.kind, mapping, offered.truth, reading),
+        partial(offered.tables, sources, clock),
+        profile,
+        units,
+        tuple(notices),
+        offered.rows,
+        offered.said,
+    )
+
+
+def _sources(offered: Offered, profile: Profile) -> dict[str, str]:
+    """By canonical channel the name of its field; of rows without a time there is no "t".
+
+    Raises
+    ------
+    LogError
+        If one is missing.
+    """
+    sources = dict(offered.chosen)
     if profile.passive and (driven := sources.get(f"tau{3 - profile.passive}")):
         # of a joint without a motor nothing is looked at
         sources.setdefault(f"tau{profile.passive}", driven)
-    for reference, torque in zip(REFERENCES, (profile.tau1, profile.tau2), strict=True):
-        if torque.q_des and "tau1" in profile.channels:
+    for reference, torque in zip(REFERENCES, ("tau1", "tau2"), strict=True):
+        if getattr(profile, torque).q_des and torque in profile.channels:
             # what the controller follows makes the torque
-            sources.setdefault(reference, torque.q_des)
+            sources.setdefault(reference, sources[torque])
     sources = in_pairs(sources, profile.velocity)
     sources = {name: one for name, one in sources.items() if name in ("t", *profile.channels)}
     needed = profile.needed if profile.rate is not None else ("t", *profile.needed)
     missing = [name for name in needed if name not in sources]
     if missing:
-        text = f"{path}: no column for {', '.join(missing)}; found {listed}; "
+        text = f"{offered.path}: no column for {', '.join(missing)}; found {offered.listed()}; "
         text += f"name them: {_naming(missing)}"
         if "t" in missing:
             rate = "; or give the samples a second of a log without a time"
@@ -201,7 +226,7 @@ def _columns(
                 "; a PD law makes them of q_des, kp and kd of [tau1] and [tau2] (algid guide logs)"
             )
         raise LogError(text)
-    return sources, choice.joints
+    return sources
 
 
 def _naming(channels: Sequence[str]) -> Remedy:
@@ -209,13 +234,11 @@ def _naming(channels: Sequence[str]) -> Remedy:
     return Remedy({"time" if name == "t" else f"{name}.source": None for name in channels})
 
 
-def _doubts(
-    path: str, sources: Mapping[str, str], stated: Mapping[str, str], profile: Profile
-) -> Iterator[Notice]:
+def _doubts(offered: Offered, sources: Mapping[str, str], profile: Profile) -> Iterator[Notice]:
     """What to say of commands, of units that differ in a name and beside it, and of motors.
 
-    `stated` are units by column that the file states elsewhere than in the columns' names. Motors'
-    signals are told where nobody tells their gear, currents where they are taken for torques.
+    Motors' signals are told where nobody tells their gear, currents where they are taken for
+    torques.
 
     Raises
     ------
@@ -228,7 +251,10 @@ def _doubts(
     of_joints, of_motors = list[str](), list[str]()
     for name, column in sources.items():
         user = profile.time_unit if name == "t" else profile.channel(name).unit
-        said, beside = unit_of(take_apart(column).unit or ""), unit_of(stated.get(column, ""))
+        said, beside = (
+            unit_of(take_apart(column).unit or ""),
+            unit_of(offered.units.get(column, "")),
+        )
         numbers = {"case": "stated", "column": column, "name": name, "unit": said or beside}
         if name == "t" and user and numbers["unit"] not in (None, user):
             numbers |= {"taken": user, "why": "as configured"}
@@ -242,7 +268,7 @@ def _doubts(
         if current and user in TORQUE:
             numbers = {"case": "current", "column": column, "name": name, "given": user}
             yield Notice("OTHER_UNIT", numbers=numbers)
-        if not on_motor_side(column):
+        if offered.fields[column].topic or not on_motor_side(column):
             of_joints.append(name)
         elif not (current or "gear_ratio" in profile.channel(name).model_fields_set):
             of_motors.append(name)
@@ -254,23 +280,17 @@ def _doubts(
         "tell the gear, turns of the motor in one of the joint, 1 for a direct drive",
     )
     if of_joints:
-        raise LogError(f"{path}: {named}: signals of motors beside those of joints; {gears}")
+        raise LogError(
+            f"{offered.path}: {named}: signals of motors beside those of joints; {gears}"
+        )
     yield Notice("OTHER_UNIT", numbers={"case": "motor", "columns": named}, remedies=(gears,))
-
-
-class Clock(NamedTuple):
-    """Unit of a time column, whether anybody states it, and rate in Hz of rows without a time."""
-
-    unit: str | None
-    stated: bool
-    rate: float | None = None
 
 
 def samples(
     rows: TableCells,
+    sums: Mapping[str, int],
     sources: Mapping[str, str],
     clock: Clock,
-    sums: Mapping[str, int],
     told: list[Notice],
     most: int | None = None,
 ) -> Iterator[SampleTable]:
@@ -279,11 +299,11 @@ def samples(
     Parameters
     ----------
     rows : TableCells
+    sums : mapping
+        Of the words of each column, as they were written.
     sources : mapping
         Cells by channel, the time's as "t".
     clock : Clock
-    sums : mapping
-        Of the words of each column, as they were written.
     told : list of Notice
         At the end it has what is to be said of the other rows, too.
     most : int, optional

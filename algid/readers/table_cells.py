@@ -12,7 +12,7 @@ import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -96,6 +96,7 @@ class Cell:
     scale: float = 1.0
     offset: float = 0.0
     unit: str = ""
+    topic: ClassVar[str] = ""
 
     @property
     def is_number(self) -> bool:

@@ -140,7 +140,7 @@ def test_inspect_of_a_refused_mcap_shows_joints_and_fields(tmp_path: Path) -> No
     assert "/joint_states: joints shoulder, elbow; fields" in text
     assert "position[shoulder], position[elbow]" in text
     assert "effort (empty)" in text
-    assert "'/joint_states' with the joints shoulder, elbow, whose effort stay empty" in text
+    assert "no topic holds theta1, theta2, tau1, tau2 of two joints; found '/joint_states'" in text
     found = json.loads(run("inspect", tmp_path / "log.mcap", "--format", "json", code=2))
     assert found["entries"][0]["joints"] == names
 

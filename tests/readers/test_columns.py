@@ -16,7 +16,7 @@ from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers.arrays import of_arrays
 from algid.readers.column_names import Name, take_apart
-from algid.readers.flat import open_table
+from algid.readers.flat import offer_table
 from tests.readers.headers import TableReader, opened
 
 PLAIN = "t q1 q2 tau1 tau2"
@@ -95,7 +95,7 @@ def test_columns_that_were_written_must_be_there() -> None:
     with pytest.raises(
         LogError, match="the columns tau2, omega1 that were written are not there: the file was"
     ):
-        open_table(replace(table, companion=Companion(None, sums)), Profile())
+        offer_table(replace(table, companion=Companion(None, sums)), Profile())
 
 
 @pytest.mark.parametrize("passive", [1, 2])

@@ -125,6 +125,13 @@ class MessageFile:
         """Messages of a topic that the file counts."""
         return sum(self.counts.get(number, 0) for number in self.topics.get(topic, ()))
 
+    def lacking(self, what: str) -> str:
+        """That the file lacks what is looked for; damage to it may be why."""
+        if self.damage:
+            where = "; ".join(list(dict.fromkeys(self.damage))[:3])
+            what = f"the file is damaged ({where}); copy it again; in what is left: {what}"
+        return f"{self.path}: {what}"
+
     def listed(self) -> str:
         """The topics with their types, for a message."""
         topics = [

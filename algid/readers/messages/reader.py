@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from algid.base.errors import LogError
-from algid.log import Origin, Reading
 from algid.notices import Notice, Remedy
 from algid.profile import Profile
 from algid.readers.clock import Series, aligned, in_order, whole_topic
-from algid.readers.joints import moving_joints, reading_of
-from algid.readers.log_reader import TableReader, make_reader
 from algid.readers.messages.joint_topic import (
     TOPIC,
     find_joint_topic,
@@ -20,15 +17,12 @@ from algid.readers.messages.joint_topic import (
     references_of,
     stamp_in,
     stated_of,
-    topic_of,
 )
 from algid.readers.messages.layout import MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import Topic
-from algid.readers.table import REFERENCES, ROWS, SampleTable, in_pairs
-
-_LOOKED = 1 << 14
-"""Messages whose other joints are looked at."""
+from algid.readers.offered import Clock, Offered, TopicField
+from algid.readers.table import REFERENCES, ROWS, SampleTable
 
 
 @dataclass(frozen=True)
@@ -44,8 +38,8 @@ class MessageLog:
     notices: tuple[Notice, ...] = ()
 
 
-def open_messages(log: MessageLog, profile: Profile) -> TableReader:
-    """A reader of the topics and fields that a profile, or the messages themselves, choose.
+def offer_messages(log: MessageLog, profile: Profile) -> Offered:
+    """The fields of the topics that a profile, or the messages themselves, choose.
 
     Raises
     ------
@@ -53,88 +47,137 @@ def open_messages(log: MessageLog, profile: Profile) -> TableReader:
         If no topic holds the joints, several do, or a message cannot be read.
     """
     file = log.files[0]()
-    given: dict[str, tuple[str | None, str]] = {}
-    for name in profile.channels:
-        topic, path = profile.place(name)
-        if path:
-            given[name] = (topic, path)
+    given = {name: profile.place(name) for name in profile.channels if profile.place(name)[1]}
     # where each channel comes from: the topic with joint states, then what the profile names
-    sources: dict[str, tuple[str | None, str]] = {}
-    units: dict[str, str] = {}
-    reading, notices, found = Reading(joints_told="profile"), list[Notice](), None
-    if not set(profile.needed) <= given.keys() and (found := find_joint_topic(file, profile)):
-        for name, path in found.paths.items():
-            if name in profile.channels:
-                sources[name] = (found.topic, path)
-        units = {name: unit for name, unit in found.units.items() if name not in given}
-        reading, order = reading_of(found.joints, profile)
-        if found.named:
-            notices += order
-            if reading.joints and given.keys().isdisjoint(REFERENCES):
-                sources |= references_of(file, reading.joints)
+    fields, chosen = dict[str, TopicField](), dict[str, str]()
+    notices, home, joints = [*log.notices], None, None
+    if not set(profile.needed) <= given.keys() and (
+        found := find_joint_topic(file, profile, given)
+    ):
+        home, fields, joints = found.topic, dict(found.fields), found.choice.joints
+        columns = found.choice.columns.items()
+        chosen = {name: one for name, one in columns if name in profile.channels}
         if found.beside:
-            numbers = {"case": "topic", "topic": found.topic, "others": ", ".join(found.beside[:4])}
+            numbers = {"case": "topic", "topic": home, "others": ", ".join(found.beside[:4])}
             other = Remedy({"topic": found.beside[0]}, "for the other")
             notices.append(Notice("JOINT_ORDER", numbers=numbers, remedies=(other,)))
-    sources |= given
-    sources = in_pairs(sources, profile.velocity)
-    homes: dict[str, dict[str, str]] = {}  # paths by topic, the main one first
-    mapping = {}
-    for name, (own, path) in sources.items():
-        home = own or (found.topic if found else None)
-        if home is None:
+    named = dict[str, TopicField]()
+    own = [fields[chosen[name]].joint for name in ("theta1", "theta2") if name in chosen]
+    if len(own) == 2 and all(own) and given.keys().isdisjoint(REFERENCES):
+        named |= references_of(file, own)
+    for name, (topic, path) in given.items():
+        if not (topic or home):
             raise LogError(f"{file.path}: {name} is taken from {path!r} without a topic: {TOPIC}")
-        homes.setdefault(home, {})[name] = path
-        mapping[name] = f"{home}: {path}"
-    topics, said = list[Topic](), list[str]()
-    for home, paths in homes.items():
+        named[name] = TopicField(str(path), topic or home or "")
+    for name, one in named.items():
+        chosen[name] = f"{one.topic}/{one.column}/"  # a name in which nothing is a unit
+        fields[chosen[name]] = one
+    units, said = dict[str, str](), list[str]()
+    topics = dict[str, Topic]()
+    for home in dict.fromkeys(fields[one].topic for one in chosen.values()):
+        paths = {name: one.column for name, one in fields.items() if one.topic == home}
+        wanted = {name: fields[one].column for name, one in chosen.items() if one in paths}
         layouts = list[MessageLayout]()
         for layout in layouts_of(file, home):
             layouts.append(layout)
-            if layout.has(paths.values()) and stamp_in(layout):
+            if layout.has(wanted.values()) and stamp_in(layout):
                 break  # later messages tell nothing more
-        topics.append(topic_of(file, home, paths, layouts, profile))
+        topics[home] = _topic(file, home, wanted, layouts, profile)
         stated, lines = stated_of(file, home, paths, layouts)
-        units = stated | units
+        units |= stated
         said += lines
-    # the main topic has the clock, and the joints that are not read
-    main, clock = topics[0], "log"
-    mapping["t"] = "log time"
-    if profile.clock != "log" and main.stamp is not None:
-        mapping["t"], clock = f"{main.name}: {main.stamp[0].rpartition('.')[0]}", "header"
-    others = found.others if found is not None and found.topic == main.name else {}
-    reading = replace(reading, topics=tuple(homes), clock=clock)
-    beside = moving_joints(
-        others, lambda paths: Topic(main.name, paths, None, "log").tables(file, [], _LOOKED)
+    # the main topic has the clock
+    main = next(iter(topics.values()))
+    chosen["t"], time = "log time", TopicField("", is_clock=True)
+    if stamped := main.clock != "log" and main.stamp is not None:
+        chosen["t"] = main.stamp[0].rpartition(".")[0]
+        time = TopicField(chosen["t"], main.name, is_clock=True)
+    fields[chosen["t"]] = time
+    return Offered(
+        log.path,
+        log.kind,
+        fields,
+        chosen,
+        partial(_tables, log, topics, fields),
+        file.truth,
+        "header" if stamped else "log",
+        joints,
+        file.count(main.name),
+        units,
+        tuple(notices),
+        tuple(said),
     )
-    origin = Origin(log.path, log.kind, mapping, file.truth, reading)
-
-    told = (*log.notices, *notices, *beside)
-    tables = partial(_tables, log, topics)
-    return make_reader(origin, tables, profile, units, told, file.count(main.name), said)
 
 
-def _tables(log: MessageLog, topics: Sequence[Topic], told: list[Notice]) -> Iterator[SampleTable]:
-    """The samples of the first topic, each with what the others have at its time."""
+def _topic(
+    file: MessageFile,
+    name: str,
+    paths: dict[str, str],
+    layouts: Sequence[MessageLayout],
+    profile: Profile,
+) -> Topic:
+    """A topic to read, of whose first messages one has each of the `paths`."""
+    if not layouts:
+        each = Remedy({"tau1.topic": None}, "for one channel")
+        text = f"there is no message on topic {name!r}; found {file.listed()}; name another"
+        raise LogError(file.lacking(f"{text}: {TOPIC}; {each}"))
+    for channel, path in paths.items():
+        if not any(layout.find(path) for layout in layouts):
+            known = next((list(one.numbers)[:12] for one in layouts if one.numbers), ["nothing"])
+            raise LogError(
+                f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found "
+                f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
+            )
+    stamp = next(filter(None, map(stamp_in, layouts)), None)
+    if profile.clock == "header" and stamp is None:
+        log_clock = Remedy({"clock": "log"})
+        raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
+    return Topic(name, paths, stamp, profile.clock)
 
-    def read(topic: Topic, told: list[Notice]) -> Iterator[SampleTable]:
+
+def _tables(
+    log: MessageLog,
+    topics: Mapping[str, Topic],
+    fields: Mapping[str, TopicField],
+    sources: Mapping[str, str],
+    _clock: Clock,
+    told: list[Notice],
+    most: int = ROWS,
+) -> Iterator[SampleTable]:
+    """The samples of the first topic, each with what the others have at its time.
+
+    Tables have at least `most` rows, but for the last. All stamps are in ns.
+
+    Raises
+    ------
+    LogError
+        If another topic has no sample.
+    """
+
+    def read(name: str, told: list[Notice]) -> Iterator[SampleTable]:
+        topic = replace(topics[name], paths=homes[name])
         for opened in log.files:
-            yield from topic.tables(opened(), told, ROWS)
+            yield from topic.tables(opened(), told, most)
 
-    samples = read(topics[0], told)
-    if len(topics) == 1:
+    homes: dict[str, dict[str, str]] = {}
+    for channel, source in sources.items():
+        if channel != "t":
+            homes.setdefault(fields[source].topic, {})[channel] = fields[source].column
+    main, *others = homes
+    samples = read(main, told)
+    if not others:
         return samples
     needed, followed = list[Series](), list[Series]()
-    for one in topics[1:]:
-        only_followed = set(one.paths) <= set(REFERENCES)
+    for one in others:
+        only_followed = set(homes[one]) <= set(REFERENCES)
         own = list[Notice]() if only_followed else told  # it may be missing
         try:
-            series = whole_topic(log.path, one.name, one.paths, read(one, own), own)
+            series = whole_topic(log.path, one, homes[one], read(one, own), own)
             (followed if only_followed else needed).append(series)
         except LogError as error:
             if not only_followed:
                 raise
             why = str(error).removeprefix(f"{log.path}: ")
-            numbers = {"case": "reference", "topic": one.name, "why": why}
+            numbers = {"case": "reference", "topic": one, "why": why}
             told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
     return aligned(in_order(log.path, samples, told), needed, told, followed)

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from algid.base.errors import LogError
-from algid.base.limits import LIMITS
-from algid.log import IntArray
 from algid.notices import Notice, Remedy
+from algid.readers.flat import to_nanoseconds
 from algid.readers.messages.codec import codec_for
 from algid.readers.messages.layout import Decoder
 from algid.readers.messages.message_file import MessageFile
@@ -108,7 +106,12 @@ class Topic:
         """The samples with the stamps of the chosen clock and float64 columns."""
         columns, stamps = dict(table.columns), table.stamp_ns
         if _STAMP[0] in columns:
-            header = _nanoseconds(place, columns.pop(_STAMP[0]), columns.pop(_STAMP[1]))
+            try:
+                header = to_nanoseconds(columns.pop(_STAMP[0]), "s")
+                header += to_nanoseconds(columns.pop(_STAMP[1]), "ns")
+            except ValueError as error:
+                log_clock = Remedy({"clock": "log"}, "take the recorder's times")
+                raise LogError(f"{place}: a header stamp with {error}; {log_clock}") from error
             if self._header is None and len(table):
                 still = len(table) > 1 and not np.any(header != header[0])
                 self._header = self.clock == "header" or not still
@@ -123,26 +126,3 @@ class Topic:
             )
         floats = {name: np.asarray(values, np.float64) for name, values in columns.items()}
         return SampleTable(stamps, floats)
-
-
-def _nanoseconds(place: str, seconds: NDArray[Any], nanoseconds: NDArray[Any]) -> IntArray:
-    """Stamps (N,) of headers in ns.
-
-    Raises
-    ------
-    LogError
-        If one is beyond int64 nanoseconds, or not finite.
-    """
-    most = np.maximum(np.abs(1.0 * seconds), np.abs(1e-9 * nanoseconds))
-    wrong = np.flatnonzero(~(most < 1e-9 * LIMITS.largest_time_ns))
-    if wrong.size:
-        log_clock = Remedy({"clock": "log"}, "take the recorder's times")
-        found = f"{seconds[wrong[0]]} s and {nanoseconds[wrong[0]]} ns"
-        raise LogError(
-            f"{place}: a header stamp with {found}; expected whole numbers below 2^63 ns; "
-            f"{log_clock}"
-        )
-    whole = np.floor(seconds)
-    if seconds.dtype.kind == "f":
-        nanoseconds = nanoseconds + np.rint((seconds - whole) * 1e9)
-    return whole.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
