@@ -502,8 +502,10 @@ def read_result(path: str | Path) -> Result:
     try:
         result = Result.model_validate_json(read_whole(file))
     except OSError as error:
+        # `identify -o FOLDER` writes FOLDER/LOG.algid
+        named = "".join(f"; name {one}" for one in sorted(path.glob("*.algid"))[:1])
         raise ResultError(
-            f"{file}: cannot read it ({error.strerror}); expected a result of algid identify"
+            f"{file}: cannot read it ({error.strerror}); expected a result of algid identify{named}"
         ) from error
     except ValidationError as error:
         raise ResultError(

@@ -93,6 +93,9 @@ def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) ->
 def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ResultError, match=r"result\.json: cannot read it"):
         export_mcap(tmp_path)
+    (tmp_path / "run1.algid").mkdir()
+    with pytest.raises(ResultError, match=r"; name .*run1\.algid$"):
+        export_mcap(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["torque", "estimates"])
