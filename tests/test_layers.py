@@ -34,7 +34,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "arm": room(packages="numpy", library=PURE),
     "blocks": room(packages="numpy"),
     "arrow": room(packages="numpy pyarrow"),
-    "compiled": room("arm", "numpy scipy"),
+    "compiled": room(packages="numpy scipy"),
     "quantiles": room("arm", "numpy"),
     "names": room("arm", "numpy", PURE),
     "physics": room("arm names", "numpy", PURE),
