@@ -24,6 +24,8 @@ from algid.readers.table_cells import LABELS
 _SAMPLES = 64
 TOPIC = Remedy({"topic": None})
 _USUAL = "/joint_states"
+_INTERFACES = "interface_values"
+"""What each joint has of a DynamicJointState, beside its name."""
 _TELLING = (b"effort", b"tau_est", b"tau_J")
 """Names of torques in definitions: of ROS, Unitree, libfranka."""
 _JOINT_REFERENCES = "/joint_references"
@@ -100,47 +102,41 @@ def find_joint_topic(
         If none holds two joints, several do, or one holds more and none was selected.
     """
     fitting: dict[str, JointTopic] = {}
-    crowded, refused, lacking = list[str](), list[str](), list[str]()
+    refused, lacking = list[str](), list[str]()
     needed = [name for name in profile.needed if name not in given]
+    choose_two = Remedy({"joints": None}, "choose two")
+    by_place = Remedy({"theta1.source": None}, "or name each field")
     for name in file.topics:
         channel = file.channel(name)
         known = channel.type.endswith(("/JointState", "/DynamicJointState"))
         known |= channel.encoding == "json" or any(map(channel.definition.__contains__, _TELLING))
         if name != profile.topic and (profile.topic or not known):
             continue
-        why, held, twice = "", "", list[str]()
+        why = held = ""
         try:
             for layout in layouts_of(file, name):
-                fields, names = fields_in(name, layout), names_in(layout)
-                if twice := repeated(names) or twice:
-                    continue
-                whole = _of_whole_joints(fields, () if profile.passive else needed)
                 try:
-                    choice = choose(whole, profile.joints, given, profile.passive, profile.needed)
+                    fields = fields_in(name, layout)
+                    choice = _choice(fields, profile, given)
                 except LookupError as error:
-                    why = f"{file.path}: {name!r}: {error}; choose: {Remedy({'joints': None})}"
+                    why = f"{file.path}: {name!r}: {error}; {choose_two}; {by_place} …"
                     continue
-                if set(needed) <= choice.columns.keys():
+                if choice.columns.keys() >= set(needed):
                     fitting[name] = JointTopic(name, fields, choice)
                     break
-                if names:
+                if names := names_in(layout):
                     held = f"{name!r} with {', '.join(list(_paths(layout, names))[:12])}"
         except LogError as error:  # another topic may still hold the joints
             refused.append(str(error))
-        if name in fitting:
-            continue
-        if twice:
-            by_place = Remedy({"theta1.source": "position[0]"}, "name the fields by their places")
-            text = f"messages on {name!r} name the joint {twice[0]!r} twice; {by_place} …"
-            refused.append(f"{file.path}: {text}")
-        crowded += [why] if why else []
-        lacking += [held] if held else []
+        if name not in fitting:
+            refused[:0] = [why] if why else []
+            lacking += [held] if held else []
     if _USUAL in fitting or len(fitting) == 1:
         found = fitting.pop(_USUAL, None) or fitting.popitem()[1]
         return found._replace(beside=tuple(fitting))
     if fitting:
         raise LogError(f"{file.path}: joint states on {', '.join(fitting)}; choose: {TOPIC}")
-    for refusal in crowded + refused:
+    for refusal in refused:
         raise LogError(refusal)
     if all(profile.channel(name).source for name in profile.needed):
         return None
@@ -152,37 +148,44 @@ def find_joint_topic(
     raise LogError(file.lacking(f"{text}; name topics and fields: {both}; {each}"))
 
 
+def _choice(
+    fields: Mapping[str, TopicField], profile: Profile, given: Collection[str]
+) -> ChannelChoice:
+    """The fields that are chosen, of joints with a torque where some have none (grippers)."""
+    names, tau = list(fields), STEMS["tau"]
+    driven = {one.joint for name, one in fields.items() if name.rpartition("/")[2] in tau}
+    if "tau1" in profile.needed and not ("tau1" in given or profile.passive):
+        names = [name for name, one in fields.items() if not one.joint or one.joint in driven]
+    return choose(names, profile.joints, given, profile.passive, profile.needed)
+
+
 def fields_in(topic: str, layout: MessageLayout) -> dict[str, TopicField]:
-    """The numbers of a message by names that tell: ``/joint_states/elbow/position``, ``tau1``."""
+    """The numbers of a message by names that tell: ``/joint_states/elbow/position``, ``tau1``.
+
+    Raises
+    ------
+    LookupError
+        If a joint is named twice.
+    """
     names, fields = names_in(layout), dict[str, TopicField]()
+    if twice := repeated(names):
+        raise LookupError(f"its messages name the joint {twice[0]!r} twice")
     paths = list(_paths(layout, ()))
     lists = {path.partition("[")[0] for path in paths}
+    known = [stem for stem in chain.from_iterable(STEMS.values()) if stem in lists]
+    beside = [(stem, f"{stem}[{{}}]") for stem in known]
+    if _INTERFACES in lists:
+        words = ("position", "velocity", "effort")
+        beside += [(word, f"{_INTERFACES}[{{}}].values[{word}]") for word in words]
     for joint in names:
-        for stem in chain.from_iterable(STEMS.values()):
-            beside = f"{stem}[{joint}]" if stem in lists else ""
-            for path in (beside, f"interface_values[{joint}].values[{stem}]"):
-                if path and layout.find(path):
-                    fields[f"{topic}/{joint}/{stem}"] = TopicField(path, topic, joint)
+        for stem, form in beside:
+            if layout.find(path := form.format(joint)):
+                fields[f"{topic}/{joint}/{stem}"] = TopicField(path, topic, joint)
     used = {field.column.partition("[")[0] for field in fields.values()}
     for path in paths:
         if path.partition("[")[0] not in used and layout.find(path):
             fields[path] = TopicField(path, topic)
     return fields
-
-
-def _of_whole_joints(fields: Mapping[str, TopicField], needed: Collection[str]) -> list[str]:
-    """Names of the fields but those of joints that lack one of the `needed` quantities."""
-    held: dict[str, set[str]] = {}
-    for name, field in fields.items():
-        for quantity, stems in STEMS.items():
-            if name.rpartition("/")[2] in stems:
-                held.setdefault(field.joint, set()).add(quantity)
-    wanted = {channel[:-1] for channel in needed}
-    return [
-        name
-        for name, field in fields.items()
-        if not field.joint or wanted <= held.get(field.joint, set())
-    ]
 
 
 def names_in(layout: MessageLayout) -> tuple[str, ...]:
