@@ -282,8 +282,8 @@ class Profile(_Strict):
         return tuple(name for name in self._channels if name.startswith(("theta", "tau")))
 
     def half(self, *quantities: str) -> Profile:
-        """The same for a file that holds only these quantities, as ``"tau"``, and is read whole."""
-        half = self.model_copy(update=dict.fromkeys(("torque_file", "start", "end", "segment")))
+        """The same for a file that holds only these quantities, as ``"tau"``."""
+        half = self.model_copy()
         half._channels = tuple(name for name in ALL_CHANNELS if name[:-1] in quantities)
         return half
 

@@ -53,7 +53,7 @@ def open_with_torque_file(log: Any, profile: Profile, open_one: Opener) -> Table
         main = in_order(path, angles.tables(told), told)
         return aligned(_overlap(main, torque_series, told), [torque_series], told)
 
-    origin = _joined(angles.origin, torques.origin, other, profile)
+    origin = _joined(angles.origin, torques.origin, other)
     notices = angles.notices + torques.notices
     return TableReader(origin, tables, notices, angles.rows, laws=angles.laws)
 
@@ -88,7 +88,7 @@ def _torques(other: Path, profile: Profile, angles: Origin, open_one: Opener) ->
     return reader
 
 
-def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> Origin:
+def _joined(angles: Origin, torques: Origin, other: Path) -> Origin:
     """Where each channel of both files comes from, and how it was read."""
     sources = {name: f"{other.name}: {one}" for name, one in torques.mapping.items() if name != "t"}
     channels = dict(angles.reading.channels)
@@ -100,9 +100,6 @@ def _joined(angles: Origin, torques: Origin, other: Path, profile: Profile) -> O
         channels=channels,
         topics=angles.reading.topics + torques.reading.topics,
         torque_file=str(other),
-        start=profile.start,
-        end=profile.end,
-        segment=profile.segment,
     )
     return replace(angles, mapping=angles.mapping | sources, reading=reading)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 from algid.base.errors import LogError
@@ -20,7 +20,7 @@ from algid.readers.messages.joint_topic import (
 )
 from algid.readers.messages.layout import MessageLayout
 from algid.readers.messages.message_file import MessageFile
-from algid.readers.messages.topic import Topic
+from algid.readers.messages.topic import topic_tables
 from algid.readers.offered import Clock, Offered, TopicField
 from algid.readers.table import REFERENCES, ROWS, SampleTable
 
@@ -73,7 +73,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         chosen[name] = f"{one.topic}/{one.column}/"  # a name in which nothing is a unit
         fields[chosen[name]] = one
     units, said = dict[str, str](), list[str]()
-    topics = dict[str, Topic]()
+    stamps = dict[str, tuple[str, str] | None]()
     for home in dict.fromkeys(fields[one].topic for one in chosen.values()):
         paths = {name: one.column for name, one in fields.items() if one.topic == home}
         wanted = {name: fields[one].column for name, one in chosen.items() if one in paths}
@@ -82,41 +82,41 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
             layouts.append(layout)
             if layout.has(wanted.values()) and stamp_in(layout):
                 break  # later messages tell nothing more
-        topics[home] = _topic(file, home, wanted, layouts, profile)
+        stamps[home] = _stamp(file, home, wanted, layouts, profile)
         stated, lines = stated_of(file, home, paths, layouts)
         units |= stated
         said += lines
     # the main topic has the clock
-    main = next(iter(topics.values()))
+    main, stamp = next(iter(stamps.items()))
     chosen["t"], time = "log time", TopicField("", is_clock=True)
-    if stamped := main.clock != "log" and main.stamp is not None:
-        chosen["t"] = main.stamp[0].rpartition(".")[0]
-        time = TopicField(chosen["t"], main.name, is_clock=True)
+    if stamped := profile.clock != "log" and stamp is not None:
+        chosen["t"] = stamp[0].rpartition(".")[0]
+        time = TopicField(chosen["t"], main, is_clock=True)
     fields[chosen["t"]] = time
     return Offered(
         log.path,
         log.kind,
         fields,
         chosen,
-        partial(_tables, log, topics, fields),
+        partial(_tables, log, stamps, profile.clock, fields),
         file.truth,
         "header" if stamped else "log",
         joints,
-        file.count(main.name),
+        file.count(main),
         units,
         tuple(notices),
         tuple(said),
     )
 
 
-def _topic(
+def _stamp(
     file: MessageFile,
     name: str,
-    paths: dict[str, str],
+    paths: Mapping[str, str],
     layouts: Sequence[MessageLayout],
     profile: Profile,
-) -> Topic:
-    """A topic to read, of whose first messages one has each of the `paths`."""
+) -> tuple[str, str] | None:
+    """Where a topic's messages have their stamp, if one of the first has each of the `paths`."""
     if not layouts:
         each = Remedy({"tau1.topic": None}, "for one channel")
         text = f"there is no message on topic {name!r}; found {file.listed()}; name another"
@@ -132,12 +132,13 @@ def _topic(
     if profile.clock == "header" and stamp is None:
         log_clock = Remedy({"clock": "log"})
         raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
-    return Topic(name, paths, stamp, profile.clock)
+    return stamp
 
 
 def _tables(
     log: MessageLog,
-    topics: Mapping[str, Topic],
+    stamps: Mapping[str, tuple[str, str] | None],
+    chosen_clock: str | None,
     fields: Mapping[str, TopicField],
     sources: Mapping[str, str],
     _clock: Clock,
@@ -155,9 +156,8 @@ def _tables(
     """
 
     def read(name: str, told: list[Notice]) -> Iterator[SampleTable]:
-        topic = replace(topics[name], paths=homes[name])
-        for opened in log.files:
-            yield from topic.tables(opened(), told, most)
+        own = log.files, name, homes[name], stamps[name], chosen_clock
+        return topic_tables(*own, told, most)
 
     homes: dict[str, dict[str, str]] = {}
     for channel, source in sources.items():
