@@ -73,16 +73,14 @@ def field(default: Any, bounds: Range) -> Any:
     return Field(default, ge=low, le=high)
 
 
-def _parts(text: object) -> object:
-    """The parts of ``one,two``."""
-    if not isinstance(text, str):
-        return text
-    return [part.strip() for part in text.split(",")]
+def parts_of(given: Any) -> Any:
+    """The parts of ``one,two``, or what comes in parts already."""
+    return [part.strip() for part in given.split(",")] if isinstance(given, str) else given
 
 
 def _two_names(given: object) -> object:
     """Two names, out of ``NAME,NAME`` too."""
-    parts = _parts(given)
+    parts = parts_of(given)
     pair = isinstance(parts, list | tuple) and len(parts) == 2 and all(parts)
     if given is not None and not pair:
         raise ValueError("expected two names like shoulder,elbow")
@@ -243,7 +241,7 @@ class Profile(_Strict):
     time: str | None = None
     time_unit: TimeUnit | None = None
     rate: float | None = field(None, PHYSICAL.rate)
-    columns: Annotated[tuple[str, ...] | None, BeforeValidator(_parts)] = None
+    columns: Annotated[tuple[str, ...] | None, BeforeValidator(parts_of)] = None
     zero: Literal["horizontal", "hanging", "upright"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"
     drive: Literal["joint", "base"] = "joint"
@@ -259,7 +257,7 @@ class Profile(_Strict):
     prior: PathText = None
     prior_error: float | None = field(None, PRIOR_ERROR)
     segment: int | None = Field(default=None, ge=1)
-    accept: Annotated[tuple[Check, ...], BeforeValidator(_parts)] = ()
+    accept: Annotated[tuple[Check, ...], BeforeValidator(parts_of)] = ()
     theta1: Angle = Angle()
     theta2: Angle = Angle()
     tau1: Torque = Torque()
@@ -308,19 +306,18 @@ class Profile(_Strict):
         return channel
 
 
-def with_settings(profile: Profile, settings: Mapping[str, Any], *, typed: bool = False) -> Profile:
+def with_settings(profile: Profile, settings: Mapping[str, Any]) -> Profile:
     """The profile with settings over it, channel by channel.
 
     Raises
     ------
     SettingError
-        If a setting or its value is not known; it names the flag where settings are `typed`.
+        If a setting or its value is not known.
     """
     merged = profile.model_dump(exclude_unset=True)
     for name, value in settings.items():
         if isinstance(value, Mapping):  # settings of one channel
-            merged[name] = merged.get(name, {}) | dict(value)
-            continue
+            value = merged.get(name, {}) | dict(value)
         for channel in CHANNELS_OF.get(name, ()):
             merged.get(channel, {}).pop("unit", None)
         merged[name] = value
@@ -328,11 +325,9 @@ def with_settings(profile: Profile, settings: Mapping[str, Any], *, typed: bool 
         return Profile.model_validate(merged)
     except ValidationError as error:
         place, why = misfit(error)
-        name, where = place.partition(".")[0], f"setting {place}"
-        if typed:
-            typed_as = flag("set" if isinstance(settings.get(name), Mapping) else name)
-            where = f"{typed_as.partition(' ')[0]} (profile: {place})"
-        raise SettingError(f"{where}: {why}") from error
+        name = place.partition(".")[0]
+        of_channel = isinstance(settings.get(name), Mapping)
+        raise SettingError(f"{flag(place if of_channel else name)}: {why}") from error
 
 
 def over(profile: Profile | None, earlier: Mapping[str, Any]) -> Profile | None:

@@ -6,8 +6,7 @@ keywords and the guide read them off it.
 
 from __future__ import annotations
 
-import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
@@ -17,7 +16,7 @@ from algid.base.files import misfit
 from algid.base.limits import PHYSICAL, PRIOR_ERROR
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 from algid.options import Option, flag
-from algid.profile import Effort, PathText, field
+from algid.profile import Effort, PathText, field, parts_of
 
 if TYPE_CHECKING:
     from algid.signals.shift import TorqueShift
@@ -32,23 +31,15 @@ OF_PRIOR = ("prior", "prior_error")
 
 
 def _poles(given: Any) -> object:
-    """Six poles out of text or a list; complex ones like -80+20j."""
-    if given is None:
+    """Six poles out of text or numbers, complex ones like -80+20j."""
+    if not isinstance(given, Iterable):
         return given
     from algid.signals.observers import observer_gain
 
-    low, high = PHYSICAL.pole
-    try:
-        parts = given.split(",") if isinstance(given, str) else given
-        poles = tuple(complex(str(part).strip()) for part in parts)
-        if not all(low <= abs(pole) <= high for pole in poles):
-            raise ValueError(f"each must be from {low:g} to {high:g} rad/s in size")
-        observer_gain(poles)
-    except (TypeError, ValueError) as error:
-        raise SettingError(
-            f"{flag('poles')}: expected six numbers like -80,-390,-391,-392,-393,-394, found "
-            f"{reprlib.repr(given)} ({error!s:.120})"
-        ) from None
+    poles, (low, high) = tuple(complex(str(one)) for one in parts_of(given)), PHYSICAL.pole
+    if not all(low <= abs(pole) <= high for pole in poles):
+        raise ValueError(f"expected each from {low:g} to {high:g} rad/s in size")
+    observer_gain(poles)
     return poles
 
 
@@ -183,8 +174,7 @@ class Settings(BaseModel):
     @property
     def lengths(self) -> dict[str, float]:
         """The link lengths that are known, in m."""
-        both = {"l1": self.l1, "l2": self.l2}
-        return {name: length for name, length in both.items() if length is not None}
+        return {name: length for name in ("l1", "l2") if (length := getattr(self, name))}
 
     def torque_shift(self, delay: float | None = None) -> TorqueShift:
         """After how long a logged torque acts: its hold, and the `delay` in s, or the one set."""
@@ -233,17 +223,15 @@ class Settings(BaseModel):
     def _refuse_what_it_lacks(self, estimator: Estimator) -> None:
         for name in estimator.lacks:
             value = getattr(self, name)
-            others = [one.name for one in ESTIMATORS if name not in one.lacks]
-            use = f"use {flag('estimator')} {' or '.join(others[:2])}"
-            if name == "model" and value not in ("auto", "plain"):
-                what = f"{flag('model')} {value}: {estimator.title} has no such terms"
-            elif name == "gravity" and value == 0:
-                what = f"{flag('gravity')} 0: without gravity {estimator.title} has no payload"
-            elif name not in ("model", "gravity") and value != DEFAULTS[name]:
-                what = f"{flag(name)}: {estimator.title} has no such term"
-            else:
-                continue
-            raise SettingError(f"{what}; {use}")
+            lacking = value not in (DEFAULTS[name], "plain")
+            if name == "gravity":  # without it there is no payload
+                lacking = value == 0
+            if lacking:
+                others = [one.name for one in ESTIMATORS if name not in one.lacks]
+                raise SettingError(
+                    f"{flag(name)} {value}: {estimator.title} cannot take that; use "
+                    f"{flag('estimator')} {' or '.join(others[:2])}"
+                )
 
 
 DEFAULTS: Mapping[str, Any] = {name: field.default for name, field in Settings.model_fields.items()}

@@ -333,7 +333,7 @@ def test_a_frame_that_is_no_log_is_refused(
         ),
         (
             {"t": [0.0, 0.1, 0.2], "q1": [1.0, 2.0]},
-            r"the log also holds, of another length: q1 \(2\)$",
+            r"the log also holds, of another length: q1 \(2\);",
         ),
         (
             {"t": [0.0, 0.1]},

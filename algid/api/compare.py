@@ -65,25 +65,21 @@ def compare(
     True
     """
     from algid.report.comparison import compare as compared
+    from algid.report.comparison import write_comparison
 
-    several = (
-        one if isinstance(one, Sequence) and not isinstance(one, str) else [one] for one in results
-    )
-    given: list[Any] = [one for part in several for one in part]
+    given = list[Any]()
+    for one in results:
+        given += one if isinstance(one, list | tuple) else [one]
     if len(given) < 2:
         raise SettingError(
             f"compare: expected two results or more, found {len(given)}; name another one"
         )
     if labels is not None and len(labels) != len(given):
         raise SettingError(f"labels: expected {len(given)}, found {len(labels)}")
-    read = [opened(one) for one in given]
-    paths = [Path(one) for one in given if not isinstance(one, Result)]
-    if labels is None and len(paths) == len(read):
-        labels = labels_of(paths)
-    comparison = compared(read, labels)
+    if labels is None and not any(isinstance(one, Result) for one in given):
+        labels = labels_of(list(map(Path, given)))
+    comparison = compared(list(map(opened, given)), labels)
     if out is not None:
-        from algid.report.comparison import write_comparison
-
         write_comparison(comparison, page_of(Path(out)), force)
     return comparison
 

@@ -21,22 +21,23 @@ from algid.api.options import (
     bounded,
     called,
     opened,
-    parts_of,
     within,
 )
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.files import whole_file, whole_folder
 from algid.options import Option, flag
+from algid.profile import parts_of
 
 if TYPE_CHECKING:
     from algid.notices import Notice
 
 
-_Size = Annotated[float, within((-1e3, 1e3))]
+_Place = Annotated[float, within((-1e3, 1e3))]
+_Degrees = Annotated[float, within((-360, 360))]
 Flange = Annotated[
     Sequence[float] | str,
-    Option(check=Annotated[tuple[_Size, _Size, _Size], BeforeValidator(parts_of)]),
+    Option(check=Annotated[tuple[_Place, _Place, _Degrees], BeforeValidator(parts_of)]),
 ]
 
 
@@ -48,16 +49,11 @@ class Exported:
     Of a payload `call` sets it on a controller of Universal Robots.
     """
 
-    text: str
+    text: str = field(repr=False)
     warnings: tuple[Notice, ...]
     path: Path | None = None
-    files: Mapping[str, bytes] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
     call: str = ""
-
-    def __repr__(self) -> str:
-        codes = ", ".join(one.code for one in self.warnings) or "none"
-        lines = self.text.count("\n")
-        return f"Exported(lines of text: {lines}, warnings: {codes}, path={self.path!r})"
 
 
 @verb
@@ -143,21 +139,20 @@ def export(
     if flange is not None and to != "payload":
         raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
     path = None if out is None else Path(out)
-    if path is not None and (path == Path() or (path.is_dir() and draws is None)):
+    if path == Path() or (path is not None and path.is_dir() and draws is None):
         path /= file_of(Path(called(result)), to, draws)
+    read, file = opened(result), called(result)
     if draws is not None:
         from algid.exports.draws import drawn_files
 
-        files, warnings = drawn_files(opened(result), called(result), to, knowns, draws, seed)
+        files, warnings = drawn_files(read, file, to, knowns, draws, seed)
         if path is not None:
             with whole_folder(path, force) as folder:
                 for name, content in files.items():
                     (folder / name).write_bytes(content)
         return Exported(files["manifest.json"].decode(), warnings, path, files)
-    read, file, call = opened(result), called(result), ""
     text, warnings = exported(read, file, to, knowns)
-    if to == "payload":
-        call = controller_call(read, file, knowns, flange)  # type: ignore[arg-type]  # numbers
+    call = "" if to != "payload" else controller_call(read, file, knowns, flange)  # type: ignore[arg-type]  # numbers
     if path is not None:
         with whole_file(path, force=force) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -171,8 +166,7 @@ def file_of(result: Path, to: str, draws: int | None = None) -> str:
     """
     from algid.exports.formats import FORMATS
 
-    folder = result.resolve().parent if result.name == "result.json" else result
-    stem = folder.stem or "arm"
+    stem = (result.resolve().parent if result.name == "result.json" else result).stem or "arm"
     if draws is not None:
         return f"{stem}-draws"
     if to == "payload":

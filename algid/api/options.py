@@ -169,7 +169,7 @@ def meant(profile: ProfileLike | None, options: Mapping[str, Any], *logs: Any) -
             f"profile: expected a path, a dict or a Profile, found {type(profile).__name__}"
         )
     if options:
-        own = with_settings(own or Profile(), options, typed=True)
+        own = with_settings(own or Profile(), options)
     if not logs:
         return own
     return own, *(_in_memory(one, own) for one in logs)
@@ -211,11 +211,6 @@ def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
             ) from error
         refuse_unknown(found, known)
     return found
-
-
-def parts_of(given: Any) -> Any:
-    """The parts of text between commas, or what comes in parts already."""
-    return given.split(",") if isinstance(given, str) else given
 
 
 def opened(given: Result | str | Path) -> Result:

@@ -9,12 +9,12 @@ import builtins
 import inspect
 import re
 import sys
-import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, wraps
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from algid.base.errors import SettingError
 from algid.base.files import misfit
@@ -41,7 +41,7 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
     Of ``**options`` nothing is said; `of` is a channel, whose fields are the profile's.
     """
     module, is_model = vars(sys.modules[taker.__module__]), hasattr(taker, "model_fields")
-    helps, found = _described(taker), dict[str, Option]()
+    helps, found = described(taker)[1], dict[str, Option]()
     for own, one in inspect.signature(taker).parameters.items():
         if own in CALLERS or one.kind is one.VAR_KEYWORD:
             continue
@@ -51,12 +51,15 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
         if hasattr(hint, "model_fields"):
             found |= options_of(hint, f"{name}.")
             continue
-        parts, words = _parts(hint), _words(hint)
+        parts = list(_parts(hint))
         stated = next((part for part in parts if isinstance(part, Option)), Option())
-        kinds, kind = [part for part in parts if not isinstance(part, Option)], stated.kind
+        literals = (get_args(part) for part in parts if get_origin(part) is Literal)
+        words = list(dict.fromkeys(map(str, chain.from_iterable(literals))))
+        kinds, kind = {part for part in parts if isinstance(part, type)}, stated.kind
         if kind is None:  # text where Python takes several forms
-            kind = kinds[0] if len(kinds) == 1 and get_origin(kinds[0]) is None else str
-            kind = Path if Path in kinds else kind
+            kind = Path if Path in kinds else str
+            if len(kinds) == 1 and not words:
+                (kind,) = kinds
         argument = one.kind is not one.KEYWORD_ONLY and not stated.flag
         panel, default = EVERYDAY, stated.default if one.default is None else one.default
         if is_model:  # a field that is not typed is not said
@@ -76,6 +79,14 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
             or_file=Path in kinds,
         )
     return found
+
+
+def _parts(hint: Any) -> Iterator[Any]:
+    """All that a type is made of."""
+    yield hint
+    for part in get_args(hint):
+        if part is not type(None):
+            yield from _parts(part)
 
 
 def verb(function: Verb) -> Verb:
@@ -98,50 +109,24 @@ def verb(function: Verb) -> Verb:
             try:
                 bound.arguments[name] = TypeAdapter(one.check).validate_python(value)
             except ValidationError as error:
-                raise SettingError(f"{one.flag}: {misfit(error)[1]}") from None
+                why = f"{misfit(error)[1]} ({one.help.rstrip('.')})"
+                raise SettingError(f"{one.flag}: {why}") from None
         return function(*bound.args, **bound.kwargs)
 
     return called  # type: ignore[return-value]  # it takes and gives the same
 
 
-def head(verb: Callable[..., Any]) -> list[str]:
-    """The paragraphs of a docstring above its sections, and the example of its command."""
-    text = inspect.cleandoc(verb.__doc__ or "")
-    above = re.split(r"\n\n[A-Z]\w+\n-+\n", text)[0]
-    paragraphs = [" ".join(one.split()) for one in above.split("\n\n")]
-    example = re.search(r"^\$ (algid .*?)\n\n", f"{text}\n\n", re.M | re.S)
-    if example:
-        paragraphs.append(f"Example: {' '.join(example[1].split())}")
-    return paragraphs
+def described(taker: Callable[..., Any]) -> tuple[list[str], dict[str, str]]:
+    """What a docstring says: paragraphs, the example of a command the last, and of each parameter.
 
-
-def _described(verb: Callable[..., Any]) -> dict[str, str]:
-    """By parameter the first sentence of what the docstring says of it."""
-    text = inspect.cleandoc(verb.__doc__ or "")
-    found = re.search(r"Parameters\n-+\n(.*?)(?:\n\n[A-Z]\w+\n-+|\Z)", text, re.S)
-    helps: dict[str, str] = {}
-    for entry in re.split(r"\n(?=\S)", found[1] if found else ""):
+    Of a parameter that is the first sentence.
+    """
+    above, *rest = re.split(r"\n\n([A-Z]\w+)\n-+\n", inspect.cleandoc(taker.__doc__ or ""))
+    sections, helps = dict(zip(rest[::2], rest[1::2], strict=True)), dict[str, str]()
+    for entry in re.split(r"\n(?=\S)", sections.get("Parameters", "")):
         names, _, body = entry.partition("\n")
         first = re.split(r"(?<=\.)\s", " ".join(body.split()))[0]
         for name in names.partition(" : ")[0].split(", "):
             helps[name.strip("*")] = first
-    return helps
-
-
-def _parts(hint: Any) -> list[Any]:
-    """The alternatives of a union, and what is said beside them."""
-    if hint is type(None):
-        return []
-    if get_origin(hint) is Annotated:
-        base, *beside = get_args(hint)
-        return [*(one for one in beside if isinstance(one, Option)), *_parts(base)]
-    if get_origin(hint) in (Union, types.UnionType):
-        return [part for inner in get_args(hint) for part in _parts(inner)]
-    return [hint]
-
-
-def _words(hint: Any) -> list[str]:
-    """The words that a type states, anywhere in it."""
-    if get_origin(hint) is Literal:
-        return [str(word) for word in get_args(hint)]
-    return list(dict.fromkeys(word for part in get_args(hint) for word in _words(part)))
+    example = sections.get("Examples", "").partition("\n\n")[0].replace("$", "Example:")
+    return [" ".join(one.split()) for one in (*above.split("\n\n"), example)], helps

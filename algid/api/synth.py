@@ -12,13 +12,14 @@ from pydantic import AfterValidator, BeforeValidator
 
 from algid.api import example
 from algid.api.answer import Answer
-from algid.api.options import CASES, Folder, Force, Seed, bounded, parts_of, within
+from algid.api.options import CASES, Folder, Force, Seed, bounded, within
 from algid.api.signature import options_of, verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file
 from algid.base.limits import PHYSICAL
 from algid.log import Log
 from algid.options import Option, flag
+from algid.profile import parts_of
 from algid.synth import run
 from algid.synth.cases import load_case
 from algid.synth.sensors import Sensors

@@ -20,30 +20,22 @@ STARTS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ".config/fish/config.fish"
 """By shell the file that it reads as it starts, below the home folder."""
 
 
-def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
-    if wanted:
-        say(f"algid {__version__}")
-        ctx.exit()
-
-
 def _completion(ctx: click.Context, option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
     shell = Path(os.environ.get("SHELL", "")).name
-    kind = get_completion_class(shell)
-    if kind is None:
+    if shell not in STARTS:
         raise SettingError(f"{option.opts[0]}: expected bash, zsh or fish, found {shell!r:.60}")
-    if option.name == "show_completion":
-        say(kind(app, {}, "algid", COMPLETE).source())
-        ctx.exit()
-    start = Path.home() / STARTS[shell]
-    line = f'eval "$({COMPLETE}={shell}_source algid)"'
-    if shell == "fish":
-        line = f"{COMPLETE}=fish_source algid | source"
-    start.parent.mkdir(parents=True, exist_ok=True)
-    with start.open("a", encoding="utf-8") as file:
-        file.write(f"{line}\n")
-    say(f"added to {start}: {line}")
+    script = get_completion_class(shell)(app, {}, "algid", COMPLETE).source()  # type: ignore[misc]
+    if option.name == "install_completion":
+        start, script = Path.home() / STARTS[shell], f'eval "$({COMPLETE}={shell}_source algid)"'
+        if shell == "fish":
+            script = f"{COMPLETE}=fish_source algid | source"
+        start.parent.mkdir(parents=True, exist_ok=True)
+        with start.open("a", encoding="utf-8") as file:
+            file.write(f"{script}\n")
+        script = f"added to {start}: {script}"
+    say(script)
     ctx.exit()
 
 
@@ -64,23 +56,19 @@ class Algid(click.Group):
             formatter.write_dl([(name, listed(name)) for name in COMMANDS])
 
 
-def _option(name: str, text: str, callback: object) -> click.Option:
-    return click.Option(
-        [name], is_flag=True, is_eager=True, expose_value=False, help=text, callback=callback
-    )
-
-
 app = Algid(
     "algid",
     help="Parameters and payload of a two-link arm, with honest error bars, from its torque and "
     "angle logs.",
-    params=[
-        _option("--version", "Print the version.", _version),
-        _option("--install-completion", "Install completion for the current shell.", _completion),
-        _option("--show-completion", "Print the script of that.", _completion),
-    ],
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+click.version_option(__version__, message="%(prog)s %(version)s", help="Print the version.")(app)
+for name, text in (
+    ("--install-completion", "Install completion for the current shell."),
+    ("--show-completion", "Print the script of that."),
+):
+    eager = {"is_flag": True, "is_eager": True, "expose_value": False}
+    app.params.append(click.Option([name], help=text, callback=_completion, **eager))
 
 
 def called(arguments: Sequence[str]) -> int:

@@ -21,7 +21,7 @@ from typing import Annotated, Any, get_args, get_origin
 import click
 from click.shell_completion import CompletionItem
 
-from algid.api.signature import EMPTY, head, options_of
+from algid.api.signature import EMPTY, described, options_of
 from algid.base.exits import epilog
 from algid.base.text import lines_of
 from algid.cli.output import complain, shown
@@ -145,7 +145,7 @@ def command(name: str) -> Command:
             shown(one, as_json, quiet)
         click.get_current_context().exit(max(one.exit for one in answers))
 
-    *above, example = head(verb)
+    *above, example = described(verb)[0]
     text = "\n\n".join((*above, "\b\n" + "\n".join(lines_of(example, 76, rest="  "))))
     made = Command(name, params=list(map(_parameter, taken)), help=text, callback=run)
     made.epilog, made.taken = epilog(name), {one.name: one for one in taken}
@@ -154,29 +154,27 @@ def command(name: str) -> Command:
 
 def _parameter(one: Option) -> click.Parameter:
     """An option as click takes it."""
-    many = get_origin(one.kind) is list
-    kind = get_args(one.kind)[0] if many else one.kind
-    text: dict[str, Any] = {
+    many, off = get_origin(one.kind) is list, one.default is True
+    kind, name = get_args(one.kind)[0] if many else one.kind, one.name.upper()
+    value = VALUES.get(one.name, {Path: "PATH", float: "X", int: "N"}.get(kind, "TEXT"))
+    value = "WORD" if one.words or isinstance(kind, click.Choice) else value
+    said: dict[str, Any] = {
         "type": click.Path(path_type=Path) if kind is Path else kind,
+        "metavar": value if isinstance(value, str) else ",".join(value),
         "required": one.default is EMPTY,
         "shell_complete": _completion(one) if one.suggested or one.words else None,
     }
     if not many and one.default not in (EMPTY, None, False):
-        text["default"] = one.default
-    name = one.name.upper()
+        said["default"] = one.default
     if one.argument:
-        metavar = f"{name.removesuffix('S')}..." if many else name
-        return click.Argument([one.name], metavar=metavar, nargs=-1 if many else 1, **text)
-    names = [LETTERS[one.name]] if one.name in LETTERS else []
-    names += [one.flag if one.flag.startswith("--") else f"--{one.name}", one.name]
-    if kind is bool:
-        off = one.default is True  # what is given switches it off
-        return click.Option(names, help=one.help, flag_value=not off, default=off, is_flag=True)
-    value = VALUES.get(one.name, {Path: "PATH", float: "X", int: "N"}.get(kind, "TEXT"))
-    if one.words or isinstance(kind, click.Choice):
-        value = "WORD"
-    metavar = value if isinstance(value, str) else ",".join(value)
-    return click.Option(names, help=one.help, metavar=metavar, multiple=many, **text)
+        said["metavar"] = f"{name.removesuffix('S')}..." if many else name
+        return click.Argument([one.name], nargs=-1 if many else 1, **said)
+    if kind is bool:  # what is given switches it off
+        said = {"flag_value": not off, "default": off, "is_flag": True}
+    names = [one.flag if one.flag.startswith("--") else f"--{one.name}", one.name]
+    if one.name in LETTERS:
+        names.insert(0, LETTERS[one.name])
+    return click.Option(names, help=one.help, multiple=many, **said)
 
 
 def _completion(one: Option) -> Callable[..., list[CompletionItem]]:

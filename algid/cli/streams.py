@@ -42,13 +42,11 @@ def _to_nowhere(handle: int) -> None:
 
 def harden_streams() -> None:
     """Let this process print to a reader that leaves, and to a terminal that lacks characters."""
-    for name, handle, told_as in (("stdout", 1, "standard output"), ("stderr", 2, None)):
-        if (
-            getattr(sys, name) is None
-        ):  # closed: else the next file to be opened would be taken for it
-            _to_nowhere(handle)
-            setattr(sys, name, open(handle, "w", encoding="utf-8", closefd=False))  # noqa: SIM115
+    for handle, name, told_as in ((1, "stdout", "standard output"), (2, "stderr", None)):
         stream = getattr(sys, name)
+        if stream is None:  # closed: else the next file to be opened would be taken for it
+            _to_nowhere(handle)
+            stream = open(handle, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
         try:
             handle = stream.fileno()
         except (AttributeError, OSError, ValueError):  # not of this process
@@ -56,7 +54,6 @@ def harden_streams() -> None:
         stream.flush()
         if name == "stderr":  # libraries write to the descriptor itself: see `algid.guard.begin`
             handle = os.dup(handle)
-        raw = io.BufferedWriter(_Pipe(handle, told_as))
-        lines = name == "stderr" or stream.isatty()
+        raw, lines = io.BufferedWriter(_Pipe(handle, told_as)), name == "stderr" or stream.isatty()
         text = io.TextIOWrapper(raw, stream.encoding, "backslashreplace", line_buffering=lines)
         setattr(sys, name, text)

@@ -135,11 +135,14 @@ def identify(
     stated: dict[str, Any] = {}
     if meaning is not None:
         stated = meaning.model_dump(mode="json", exclude_unset=True)
-    alone = earlier is not None or settings.effort == "external"
-    if not survey.unloaded and not (alone and survey.loaded):
+    usable, external = survey.unloaded, settings.effort == "external"
+    if external or earlier is not None:  # an external torque has nothing of the arm
+        usable = survey.loaded if external else list(survey.logs)
+    if not usable:
+        alone = "none" if not survey.logs else f"{survey.logs[0].role} ones alone"
         raise SettingError(
-            f"identify: expected an unloaded log, or a loaded one with {flag('parameters')}, found "
-            f"{'a loaded one alone' if survey.loaded else 'none'}"
+            f"identify: expected an unloaded log, or a loaded one with {flag('parameters')} or "
+            f"{flag('effort')} external, found {alone}"
         )
     if settings.cross_validate:
         for kind, logs in (("unloaded", survey.unloaded), ("loaded", survey.loaded)):

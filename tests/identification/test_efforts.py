@@ -165,13 +165,14 @@ def test_a_result_of_compensated_torque_predicts_weighs_and_serves_later_payload
 def test_contradictions_have_one_line() -> None:
     for call in (
         lambda: Settings(effort="external", gravity=1.62),
-        lambda: identify(logs("raw")[0], effort="external", gravity=9.81),
-        lambda: identify(logs("raw")[0], profile={"effort": "external", "gravity": 9.81}),
+        lambda: identify(logs("raw")[0], profile={"effort": "external", "gravity": 9.7}),
         lambda: Settings(effort="friction-compensated", model="coulomb"),
     ):
         with pytest.raises(SettingError, match=r"^--(effort external|model): ") as raised:
             call()
         assert "\n" not in str(raised.value)
+    with pytest.raises(SettingError, match=r"or --effort external, found unloaded ones alone$"):
+        identify(logs("raw")[0], effort="external")
 
 
 def test_a_current_is_in_amperes() -> None:
