@@ -164,7 +164,7 @@ def file_of(result: Path, to: str, draws: int | None = None) -> str:
 
     Of draws it is a folder.
     """
-    from algid.exports.formats import FORMATS
+    from algid.exports.formats import SUFFIXES
 
     stem = (result.resolve().parent if result.name == "result.json" else result).stem or "arm"
     if draws is not None:
@@ -173,7 +173,7 @@ def file_of(result: Path, to: str, draws: int | None = None) -> str:
         return f"{stem}-payload.yaml"
     if to == "python":
         stem = re.sub(r"\W", "_", stem)
-    return f"{stem}{FORMATS[to].suffix}"
+    return f"{stem}{SUFFIXES[to]}"
 
 
 def answer(made: Exported, _given: Mapping[str, Any]) -> Answer:

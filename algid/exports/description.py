@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.errors import ResultError, SettingError
+from algid.base.errors import ResultError
 from algid.exports.links import Knowns, Link, links_of, turn_of
 from algid.identification.known import (
     contradictions,
@@ -44,16 +44,17 @@ def _conditioned(
 
     Without sine parts one is enough.
     """
-    a = np.zeros(c.size)  # the gradient of g |K1| - l1 |K2|
+    place, a = model.compiled.place, np.zeros(c.size)  # the gradient of g |K1| - l1 |K2|
     for _ in range(_STEPS):
         wrong = 0.0
         for name, factor in ((K1, model.gravity), (K2, -l1)):
-            at = [model.names.index(one) for one in (name, SINE_OF.get(name)) if one in model.names]
-            unit: FloatArray = np.ones(1)  # a straight arm's moment has its sign
-            if len(at) > 1:
-                unit = c[at] / max(float(np.linalg.norm(c[at])), 1e-300)
-            wrong += factor * float(unit @ c[at])
-            a[at] = factor * unit
+            K, sine = phasor(model, c, name), place.get(SINE_OF[name])
+            size = K.real if sine is None else abs(K)  # a straight arm's moment has its sign
+            wrong += factor * size
+            unit = K / size if size else 1
+            a[place[name]] = factor * unit.real
+            if sine is not None:
+                a[sine] = factor * unit.imag
         if abs(wrong) <= _ROUNDING * l1 * abs(phasor(model, c, K2)):
             break
         toward = C @ a
@@ -61,9 +62,7 @@ def _conditioned(
             toward = c**2 * a
         c = c - toward * wrong / (a @ toward)
     spread = a @ C @ a
-    if spread > 0:
-        C = C - np.outer(C @ a, a @ C) / spread
-    return c, C
+    return c, C - np.outer(C @ a, a @ C) / spread if spread > 0 else C
 
 
 _STEPS, _ROUNDING = 20, 1e-15
@@ -109,11 +108,6 @@ class Description:
     from_prior: tuple[str, ...] = ()
     word: str = "identified"
 
-    @property
-    def rotor1(self) -> float:
-        """Of joint 1, kg m^2: zero where it is not known."""
-        return self.known.rotor1 or 0.0
-
 
 def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Description:
     """The arm of the result in `file`; with `links`, its links chosen from what is known.
@@ -129,12 +123,11 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     l1, told, second = known.l1, ", g k1 / k2", result.payload.get("l2")
     weighed = second is not None and second.usable and bool(second.estimate)
     if links and l1 is None:
-        by_payload, by_constants = payload_length(result), first_length(result)
+        by_payload = payload_length(result)
         if by_payload is not None:
             l1, told = by_payload[0], " with the payload"
-        by = by_payload or by_constants
-        if by is not None:
-            told += f", ± {result.quantile * by[1]:.2g} (95 %)"
+        by = by_payload or first_length(result)
+        told += "" if by is None else f", ± {result.quantile * by[1]:.2g} (95 %)"
     c = torque_constants(result, model, "unloaded", file)
     sure = [name for name in model.names if has_error_bar(result, name)]
     C = covariance_of(result, model.names, sure)
@@ -143,28 +136,29 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         c, C = _conditioned(model, c, C, l1)
     value = model.values(c)
     half = result.quantile * np.sqrt(np.maximum(np.diag(C), 0.0))
-    halves = dict(zip(model.names, half.tolist(), strict=True))
     wrong = wrong_inertia(value)
     if wrong is not None:
         mend = f"check {flag('l1')}" if conditioned else "identify it from more informative logs"
         raise ResultError(f"{file}: {wrong}, so that masses would come out negative; {mend}")
     chosen = None
     if links:
-        full = known
-        if known.l2 is None and second is not None and second.usable:
-            full = replace(known, l2=second.estimate)
-        l1 = l1 or _first_length(value, model.gravity, file)
+        l1 = l1 or length_by_coupling(value, model.gravity) or 0.0
+        if l1 <= 0:
+            raise ResultError(
+                f"{file}: k1 {value[K1]:.4g}, k2 {value[K2]:.4g} and g {model.gravity:g} make "
+                f"l1 = g k1 / k2 no positive length; give {flag('l1')}"
+            )
+        l2 = second.estimate if second is not None and weighed else None
+        full = replace(known, l2=known.l2 or l2)
         chosen = links_of(value, model.gravity, l1, full, file)
     path = Path(file)
-    if path.name == "result.json":
-        path = path.parent
     found, lengths = result.parameters.items(), {"l1": known.l1, "l2": known.l2}
     return Description(
-        name=re.sub(r"\W|^(?=\d)", "_", path.stem),
+        name=re.sub(r"\W|^(?=\d)", "_", (path.parent if path.name == "result.json" else path).stem),
         source=f"{file}, estimator {result.estimator}",
         model=model,
         value=value,
-        half={name: halves[name] for name in sure},
+        half={name: half[model.names.index(name)] for name in sure},
         conditioned=conditioned,
         known=known,
         delay=None if result.delay is None else result.delay.estimate,
@@ -175,18 +169,3 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         warnings=contradictions(result, {name: one for name, one in lengths.items() if one}),
         from_prior=tuple(name for name, one in found if one.status == "FROM_PRIOR"),
     )
-
-
-def _first_length(value: Mapping[str, float], gravity: float, file: str) -> float:
-    if gravity == 0:
-        raise SettingError(
-            f"{flag('l1')}: {file}: an arm in a horizontal plane does not tell its length; give "
-            f"{flag('l1')}"
-        )
-    l1 = length_by_coupling(value, gravity)
-    if l1 is None or l1 <= 0:
-        raise ResultError(
-            f"{file}: k1 {value[K1]:.4g} and k2 {value[K2]:.4g} make l1 = g k1 / k2 no positive "
-            f"length; give {flag('l1')}, or identify it from more informative logs"
-        )
-    return l1

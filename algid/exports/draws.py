@@ -28,9 +28,9 @@ from algid.base.names import within
 from algid.estimators.diagnostics import bounds
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
 from algid.exports.description import Description, describe
-from algid.exports.formats import FORMATS, takes, written
+from algid.exports.formats import ROBOTS, SUFFIXES, takes, written
 from algid.exports.links import Knowns
-from algid.identification.known import given_lengths, model_of, prior_of, with_error_bar
+from algid.identification.known import model_of, prior_of, with_error_bar
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
@@ -42,12 +42,11 @@ _HOPELESS = 100
 
 def freedom_of(quantile: float) -> float:
     """Degrees of freedom of Student's t whose 95 % interval is ± `quantile`; inf if normal."""
-    most = 1e6
-    if quantile <= student_quantile(most):
+    least = 1e-6  # of 1 / ν, in which the quantile is all but a line
+    if quantile <= student_quantile(1 / least):
         return inf
-    if quantile >= student_quantile(2.0):
-        return 2.0
-    return float(brentq(lambda nu: student_quantile(nu) - quantile, 2.0, most, rtol=1e-10))
+    widest = min(quantile, student_quantile(2.0))
+    return 1 / float(brentq(lambda of: student_quantile(1 / of) - widest, least, 0.5, rtol=1e-10))
 
 
 def draws_of(
@@ -74,15 +73,8 @@ def draws_of(
     size[size == 0] = 1.0
     still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
     freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
-    shared = Shared(
-        model,
-        payload="m_p" in names,
-        lengths=given_lengths(result),
-        body=within(BODY_PARAMETERS, names),
-    )
-    limits = bounds(shared) if set(shared.names) <= set(names) else bounds(Shared(model))
-    refused = 0
-    why: str | None = ""
+    shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
+    refused, why = 0, ""
     while refused < _HOPELESS:
         wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
         one_each = random.multivariate_normal(
@@ -91,13 +83,19 @@ def draws_of(
         drawn = mean + size * one_each * wide
         numbers = dict(zip(names, drawn.tolist(), strict=True))
         beta = np.array([numbers.get(name, 0.0) for name in shared.names])
-        why = next((name for name, limit in limits.items() if limit(beta) < 0), None)
+        broken = [name for name, limit in bounds(shared).items() if limit(beta) < 0]
+        moved = {}
+        for kind, given in (("parameters", result.parameters), ("payload", result.payload)):
+            moved[kind] = {
+                name: one.model_copy(update={"estimate": numbers.get(name, one.estimate)})
+                for name, one in given.items()
+            }
         try:
-            one = describe(_with(result, numbers), file, knowns, links=links)
+            one = describe(result.model_copy(update=moved), file, knowns, links=links)
         except (ResultError, SettingError) as error:
-            why = str(error)
-        if why is not None:
-            refused += 1
+            broken.append(str(error))
+        if broken:
+            refused, why = refused + 1, broken[-1]
             continue
         numbers |= {name: one.value[name] for name in arm}  # as l1 moved them
         yield numbers, replace(one, word="drawn", warnings=best.warnings), refused
@@ -108,17 +106,6 @@ def draws_of(
     )
 
 
-def _with(result: Result, numbers: dict[str, float]) -> Result:
-    """The result with these numbers as its estimates."""
-    moved = {}
-    for kind in ("parameters", "payload"):
-        estimates = dict(getattr(result, kind))
-        for name in within(estimates, numbers):
-            estimates[name] = estimates[name].model_copy(update={"estimate": numbers[name]})
-        moved[kind] = estimates
-    return result.model_copy(update=moved)
-
-
 def drawn_files(
     result: Result, file: str, to: str, knowns: Knowns, count: int, seed: int
 ) -> tuple[dict[str, bytes], tuple[Notice, ...]]:
@@ -127,7 +114,7 @@ def drawn_files(
     Parameters
     ----------
     to : str
-        A name in `FORMATS`, which gives a file a draw, or in `TABLES`, which gives a row.
+        A name in `SUFFIXES`, which gives a file a draw, or in `TABLES`, which gives a row.
 
     Raises
     ------
@@ -136,20 +123,17 @@ def drawn_files(
     SettingError
         If the format has no draws or no place for what is known, or that leaves no possible arm.
     """
-    if to not in (*FORMATS, *TABLES):
+    if to not in (*SUFFIXES, *TABLES):
         raise SettingError(f"{flag('draws')}: {to} has no draws; leave it out")
-    table = to in TABLES
     takes(to, knowns)
     files: dict[str, bytes] = {"manifest.json": b""}
     rows: list[dict[str, Any]] = []
     refused, warnings = 0, tuple[Notice, ...]()
-    links = not table and FORMATS[to].links
-    several = draws_of(result, file, seed, knowns, links=links)
+    several = draws_of(result, file, seed, knowns, links=to in ROBOTS)
     for place, (numbers, arm, before) in zip(range(1, count + 1), several, strict=False):
-        refused, warnings = refused + before, arm.warnings
-        row: dict[str, Any] = {"draw": place}
-        if not table:
-            row["file"] = f"draw-{place:0{len(str(count))}d}{FORMATS[to].suffix}"
+        refused, warnings, row = refused + before, arm.warnings, dict[str, Any](draw=place)
+        if to not in TABLES:
+            row["file"] = f"draw-{place:0{len(str(count))}d}{SUFFIXES[to]}"
             said = f"{arm.source}, draw {place} of seed {seed}"
             files[row["file"]] = written(replace(arm, source=said), to).encode()
         rows.append(row | numbers)
@@ -171,7 +155,7 @@ def drawn_files(
         "draws": rows,
     }
     files["manifest.json"] = (json.dumps(manifest, indent=1, ensure_ascii=False) + "\n").encode()
-    if table:
+    if to in TABLES:
         import polars as pl
 
         content = io.BytesIO()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,41 +18,19 @@ import numpy as np
 
 from algid.base.errors import ResultError, SettingError
 from algid.exports.description import Description, describe
-from algid.exports.links import Knowns, Link
+from algid.exports.links import Knowns
 from algid.exports.programs import program
-from algid.exports.templating import numbers, template
+from algid.exports.templating import template
 from algid.identification.known import contradictions, covariance_of
-from algid.model import EVERY_TERM, SINES, TERMS, UNITS
+from algid.model import EVERY_TERM, SINES, UNITS
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
 
-TIMESTEP = 5e-4  # s: Runge-Kutta of fourth order errs far below 1e-5 rad a second with it
-LOSSES = ("damping", "friction")
-
-
-@dataclass(frozen=True)
-class Format:
-    """A format: its template, and of links whether their joints have rotors; a program has none."""
-
-    template: str
-    links: bool = False
-    rotors: bool = False
-
-    @property
-    def suffix(self) -> str:
-        """What names of its files end in."""
-        return Path(self.template).suffix
-
-
-FORMATS = {
-    "urdf": Format("arm.urdf", links=True),
-    "mjcf": Format("arm.xml", links=True, rotors=True),
-    "sdf": Format("arm.sdf", links=True),
-    "python": Format("arm.py"),
-    "c": Format("arm.c"),
-}
-PAYLOAD = "payload"
+SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "python": ".py", "c": ".c"}
+"""Of an arm's formats."""
+ROBOTS = ("urdf", "mjcf", "sdf")
+"""Formats made of links; MJCF alone has rotors."""
 TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -65,7 +43,7 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     file : str
         What the result's file is called.
     to : str
-        A name in `FORMATS`, or "payload".
+        A name in `SUFFIXES`, or "payload".
     knowns : Knowns
 
     Raises
@@ -76,29 +54,24 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
         If what is known leaves no positive mass or inertia, or has no place in the format.
     """
     takes(to, knowns)
-    if to == PAYLOAD:
+    if to == "payload":
         content = _payload(result, file, knowns)
-        return template(TEMPLATES / "payload.yaml.j2").render(content), contradictions(
-            result, knowns.given
-        )
-    arm = describe(result, file, knowns, links=FORMATS[to].links)
+        text = template(TEMPLATES / "payload.yaml.j2").render(content)
+        return text, contradictions(result, knowns.given)
+    arm = describe(result, file, knowns, links=to in ROBOTS)
     return written(arm, to), arm.warnings
 
 
 def takes(to: str, knowns: Knowns) -> None:
     """Raise `SettingError` where what is known has no place in `to`."""
-    taken = {"l2" if to == PAYLOAD else "l1"}
-    if to in FORMATS and FORMATS[to].links:
-        taken = set(vars(knowns))
     for name in knowns.given:
-        if name not in taken:
+        if to not in ROBOTS and name != ("l2" if to == "payload" else "l1"):
             raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
 
 
 def written(arm: Description, to: str) -> str:
     """The text of an arm in the format `to`."""
-    form = FORMATS[to]
-    content = _robot(arm, rotors=form.rotors) if form.links else program(arm)
+    content = _robot(arm, rotors=to == "mjcf") if to in ROBOTS else program(arm)
     content |= {"arm": arm, "units": UNITS, "bent": set(SINES) & set(arm.model.names)}
     header = template(TEMPLATES / "header.j2").render(content).rstrip()
     # nothing in it ends a comment of C or a string of Python
@@ -108,7 +81,8 @@ def written(arm: Description, to: str) -> str:
         """What a file says of itself, with something before each line."""
         return "\n".join(f"{before}{line}".rstrip() for line in header.split("\n"))
 
-    return template(TEMPLATES / f"{form.template}.j2").render(content | {"comment": comment})
+    filled = content | {"comment": comment}
+    return str(template(TEMPLATES / f"arm{SUFFIXES[to]}.j2").render(filled))
 
 
 def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
@@ -117,43 +91,29 @@ def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
     Without `rotors` that of joint 1 is in link 1's inertia, which turns about the same axis.
     """
     assert arm.links is not None
-    (first, second), value = arm.links, arm.value
-    model, rotor_within = arm.model, bool(arm.rotor1 and not rotors)
-    if rotor_within:
-        first = replace(first, inertia=first.inertia + arm.rotor1)
-    kinds = (*LOSSES, "rotor") if rotors else LOSSES
+    (first, second), value, rotor = arm.links, arm.value, arm.known.rotor1 or 0.0
+    if not rotors:
+        first = replace(first, inertia=first.inertia + rotor)
     # of a joint damping N m s/rad, Coulomb friction N m, rotor inertia kg m^2; none is negative
-    joints = [
-        {"name": f"joint{joint}"} | dict.fromkeys((*LOSSES, "rotor"), 0.0) for joint in (1, 2)
-    ]
+    kinds = ("damping", "friction", "rotor")
+    joints = [dict.fromkeys(kinds, 0.0) for _ in range(2)]
     lacking, negative = [], []
     for term in EVERY_TERM.values():
-        held = [(kind, *one) for kind in kinds for one in getattr(term, kind)]
+        held = [(kind, *one) for kind in kinds[: 2 + rotors] for one in getattr(term, kind)]
         for kind, name, joint in held:
-            if value[name] < 0:
-                negative.append(name)
+            negative += [name] if value[name] < 0 else []
             joints[joint][kind] = max(value[name], 0.0)
-        if term.name in model.terms and not (held or term.sines):  # sines: the links' centres
+        if term.name in arm.model.terms and not (held or term.sines):  # sines: the links' centres
             lacking.append(term)
-    joints[0]["rotor"] = arm.rotor1
-
-    def centre(link: Link) -> str:
-        """A link's centre of mass in its frame: to the left of its line is up, or on the plane."""
-        x, y = link.centre, link.aside
-        return numbers((x, 0, y) if model.gravity else (x, y, 0))
-
+    joints[0]["rotor"] = rotor
     return {
-        "axis": "0 -1 0" if model.gravity else "0 0 1",
-        "centre": centre,
+        "axis": "0 -1 0" if arm.model.gravity else "0 0 1",
         "first": first,
-        "gravity": model.gravity,
         "joints": joints,
-        "jump": any(TERMS[name].friction for name in model.terms),
         "lacking": lacking,
         "negative": negative,
-        "rotor_within": rotor_within,
+        "rotor_within": bool(rotor and not rotors),
         "second": second,
-        "timestep": TIMESTEP,
         "turned": (math.cos(0.5 * arm.turn), 0, -math.sin(0.5 * arm.turn), 0),
     }
 
@@ -174,33 +134,29 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
             f"{file}: no load explains a payload of {mass.estimate:.4g} kg; check which log is "
             "the loaded one"
         )
-    given = knowns.l2 or result.settings.get("l2")
-    identified = result.payload.get("l2")
-    length = given or (None if identified is None else identified.estimate)
-    if length is None:
+    # y and inertia are of its body: zero without one
+    names, given = ("m_p", "l2", "y_p", "J_p"), knowns.l2 or result.settings.get("l2")
+    value: dict[str, float] = dict.fromkeys(names, 0.0)
+    std: dict[str, float | None] = dict.fromkeys(names, 0.0)
+    for name, one in result.payload.items():
+        if name in names and one.estimate is not None:
+            value[name], std[name] = one.estimate, one.std
+    if given:
+        value["l2"], std["l2"] = given, 0.0
+    if not value["l2"]:
         raise ResultError(
             f"{file}: the result does not tell where the payload hangs; give {flag('l2')}"
         )
-
     # nothing is shared with what is given or not determined
-    shared = ("m_p", "y_p", "J_p") if given else ("m_p", "l2", "y_p", "J_p")
-    covariance = np.nan_to_num(covariance_of(result, ("m_p", "l2", "y_p", "J_p"), shared))
-    content: dict[str, Any] = {
+    covariance = covariance_of(result, names, [name for name in names if std[name] != 0.0])
+    return {
         "file": json.dumps(file),
         "estimator": result.estimator,
         "given": bool(given),
-        "mass": mass.estimate,
-        "mass_std": mass.std,
-        "x": length,
-        "x_std": 0.0 if given or identified is None else identified.std,
-        "covariance": covariance.tolist(),
+        "value": value,
+        "std": std,
+        "covariance": np.nan_to_num(covariance).tolist(),
     }
-    for symbol, name in (("y", "y_p"), ("J", "J_p")):  # of its body: zero without one
-        found = result.payload.get(name)
-        known = found is not None and found.estimate is not None
-        content[symbol] = found.estimate if found and known else 0.0
-        content[f"{symbol}_std"] = found.std if found and known else 0.0
-    return content
 
 
 def controller_call(
@@ -222,11 +178,11 @@ def controller_call(
     ResultError
         If the result has no payload, or one that no load explains.
     """
-    payload = _payload(result, file, knowns)
+    value = _payload(result, file, knowns)["value"]
     x, y = "FLANGE_X", "FLANGE_Y"
     if flange is not None:
-        apart = complex(payload["x"] - flange[0], payload["y"] - flange[1])
+        apart = complex(value["l2"] - flange[0], value["y_p"] - flange[1])
         centre = apart * cmath.exp(-1j * math.radians(flange[2]))
         x, y = (f"{round(one, 5) + 0.0:.5f}" for one in (centre.real, centre.imag))
-    filled = {"mass": f"{payload['mass']:.5f}", "x": x, "y": y, "flag": flag("flange")}
+    filled = {"mass": f"{value['m_p']:.5f}", "x": x, "y": y, "flag": flag("flange")}
     return str(template(TEMPLATES / "controller.txt.j2").render(filled))

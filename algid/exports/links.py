@@ -33,7 +33,6 @@ import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NoReturn
 
 from scipy.optimize import minimize_scalar
 from scipy.special import expit
@@ -111,46 +110,37 @@ def links_of(
     h, s = k[K5] - (knowns.rotor1 or 0.0), K4 * level / gravity if gravity else 0j  # at m2 = 0
 
     def first(m2: float) -> Link:
-        left, m1 = h - m2 * l1**2, knowns.m1
+        left, own = h - m2 * l1**2, s - m2 * l1 if gravity else 0j
+        m1 = knowns.m1 or 3 * left / l1**2 - 3 * own.real / l1 + 2 * abs(own) ** 2 / left
         if not gravity:  # nothing tells link 1's first moment
-            m1 = m1 or 3 * left / l1**2
-            return _link(l1, m1, complex(l1 * left * m1 / (left + m1 * l1**2 / 3)), left)
-        own = s - m2 * l1
-        m1 = m1 or 3 * left / l1**2 - 3 * own.real / l1 + 2 * abs(own) ** 2 / left
+            own = complex(l1 * left * m1 / (left + m1 * l1**2 / 3))
         return _link(l1, m1, own, left)
 
     def second(m2: float) -> Link:
         return _link(knowns.l2 or math.sqrt(3 * h2 / m2), m2, s2, h2)
 
-    def refuse(name: str, why: str) -> NoReturn:
-        others = [one for one in knowns.given if one != name]
-        checked = " or ".join(map(flag, (name, *others)))
-        raise SettingError(f"{flag(name)}: {file}: {why}; check {checked}, or leave it out")
-
     low, high, m1, m2 = abs(s2) ** 2 / h2, h / l1**2, knowns.m1, knowns.m2
-    if not low < high:
-        refuse("rotor1", f"the rotor leaves link 1 no inertia: k5 - rotor1 is {h:.4g} kg m²")
     if m1 is not None and gravity:  # possible is link 1 where left m1 > |own|²
         middle = s.real / l1 - 0.5 * m1
         square = middle**2 - (abs(s) ** 2 - h * m1) / l1**2
-        half = math.sqrt(max(square, 0.0))
+        half = math.sqrt(square) if square > 0 else -math.inf
         low, high = max(low, middle - half), min(high, middle + half)
-        if square <= 0 or low >= high:
-            refuse("m1", f"with link 1 of {m1:g} kg a mass or an inertia comes out negative")
-    if m2 is not None and not low < m2 < high:
-        bounds = f"between {low:.4g} and {high:.4g} kg"
-        refuse("m2", f"with link 2 of {m2:g} kg an inertia comes out negative; {bounds}")
+    if not (low < high and (m2 is None or low < m2 < high)):
+        given = ", ".join(f"{flag(name)} {value:g}" for name, value in knowns.given.items())
+        left = f"{low:.4g} to {high:.4g} kg are left" if low < high else "none is left"
+        raise SettingError(
+            f"{file}: with {given} a mass or an inertia comes out negative; of link 2's masses "
+            f"{left}: change one of them, or leave it out"
+        )
     if m2 is None:  # the least D of both links together
 
-        def mass(logit: float) -> float:
-            return low + (high - low) * float(expit(logit))
-
         def distance(logit: float) -> float:
-            return _distance(first(mass(logit))) + _distance(second(mass(logit)))
+            mass = low + (high - low) * float(expit(logit))
+            return _distance(first(mass)) + _distance(second(mass))
 
         ends = (-_ENDS, _ENDS)
         minimum = minimize_scalar(distance, bounds=ends, method="bounded", options={"xatol": 1e-10})
-        m2 = mass(minimum.x)
+        m2 = low + (high - low) * float(expit(minimum.x))
     return first(m2), second(m2)
 
 

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 import algid
 from algid.arm import Arm
 from algid.base.errors import AlgidError
-from algid.exports.formats import FORMATS, exported
+from algid.exports.formats import SUFFIXES, exported
 from algid.exports.links import Knowns
 from algid.model import Model
 from algid.results import Status
@@ -74,7 +74,7 @@ def test_losses_that_are_negative_are_left_out_and_said(to: str) -> None:
 
 def test_what_a_comment_may_not_hold_is_written_otherwise() -> None:
     name = 'a--b */ """ \\n.algid'
-    for to in FORMATS:
+    for to in SUFFIXES:
         text, _ = exported(result_of(values_of(ODD)), name, to, Knowns())
         if to in XML:
             ET.fromstring(text)
