@@ -68,8 +68,8 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "inspection": room("arm criteria errors estimators faults files log model notices profile "
                        "quantiles readers signals text units", "numpy pydantic"),
     "report": room(
-        "arm arrow blocks criteria errors files inspection log methods model notices options "
-        "progress quantiles results ros2 significance text verdict words writers",
+        "arm arrow blocks criteria errors files inspection methods model notices options "
+        "progress quantiles results ros2 significance text verdict words",
         "jinja2 markupsafe mcap numpy plotly pyarrow pydantic_core rich"
     ),
     "check": room("errors files options results", "pydantic"),

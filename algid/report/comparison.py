@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from pydantic_core import to_json
 
 from algid import __version__
+from algid.arm import FloatArray
 from algid.base.files import whole_file
 from algid.base.significance import NORMAL, sigmas
-from algid.base.text import ABSENT, file_name, formatted, joined, percent, visible
-from algid.base.verdict import Verdict
+from algid.base.text import ABSENT, file_name, joined, percent, visible
+from algid.base.verdict import Grade, Verdict
 from algid.base.words import counted
 from algid.report.document import Document, Section, Table
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, Plot, names_down
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Plot, down
 from algid.report.render import page
 from algid.report.tables import settings_of
 from algid.results import Result
@@ -42,22 +42,39 @@ class Comparison:
         return f"Comparison({', '.join(self.labels)}: {verdict(self).headline})"
 
     @cached_property
-    def sigma(self) -> dict[str, list[float | None]]:
-        """By parameter of any result the distance of each from the first one, in σ."""
-        names = dict.fromkeys(name for one in self.results for name in one.estimates)
-        return {
-            name: [distance(self.results[0], one, name) for one in self.results] for name in names
-        }
+    def names(self) -> list[str]:
+        """The parameters that any of the results has."""
+        return list(dict.fromkeys(name for one in self.results for name in one.estimates))
+
+    def numbers(self, key: str) -> FloatArray:
+        """What each result's estimates have under `key` (R, P), NaN where they have none."""
+        of = [
+            [getattr(one.estimates.get(name), key, None) for name in self.names]
+            for one in self.results
+        ]
+        return np.array(of, dtype=np.float64)
+
+    @cached_property
+    def sigma(self) -> FloatArray:
+        """Signed distances (R, P) from the first result over combined half intervals, in σ.
+
+        Of normal intervals that is their combined standard deviation. Of Student's it is larger,
+        so that 95 % of the differences that chance makes lie within 1.96 of either. NaN where one
+        is not known, and of the first result itself.
+        """
+        value, half = self.numbers("estimate"), self.numbers("half")
+        combined = np.hypot(half, half[0])
+        combined[0] = np.nan
+        return NORMAL * (value - value[0]) / np.where(combined > 0, combined, np.nan)
 
     @cached_property
     def far(self) -> list[tuple[float, str]]:
         """The size of each distance that is known, the largest first, and what it is of."""
         found = []
-        for name, row in self.sigma.items():
-            for label, far in zip(self.labels, row, strict=True):
-                if far is not None:
-                    found.append((abs(far), f"{visible(name)} of {label} ({far:+.1f} σ)"))
-        return sorted(found, reverse=True)
+        for label, row in zip(self.labels, self.sigma.tolist(), strict=True):
+            for name, far in zip(self.names, row, strict=True):
+                found.append((abs(far), f"{visible(name)} of {label} ({far:+.1f} σ)"))
+        return sorted((one for one in found if one[0] >= 0), reverse=True)
 
     @property
     def largest_sigma(self) -> float | None:
@@ -81,18 +98,15 @@ class Comparison:
 
     def tables(self) -> tuple[Table, Table]:
         """The estimates one below the other, as wide for many results as for two; the settings."""
-        estimates, settings = [], []
-        for name, row in self.sigma.items():
-            first = self.results[0].estimates.get(name)
-            for label, result, far in zip(self.labels, self.results, row, strict=True):
-                one, change = result.estimates.get(name), ABSENT
-                if one is None:
-                    continue
-                if far is not None and first and first.estimate and one.estimate is not None:
-                    change = percent(one.estimate - first.estimate, first.estimate, 3)
-                of = row_of(name, one)
-                number = (of.with_half, of.unit, of.status)
-                estimates.append((of.name, label, *number, formatted(far, "+.1f"), change))
+        estimates, settings, numbers = [], [], self.numbers("estimate")
+        for place, name in enumerate(self.names):
+            for log, (label, result) in enumerate(zip(self.labels, self.results, strict=True)):
+                if name in result.estimates:
+                    row, far = row_of(name, result.estimates[name]), self.sigma[log, place]
+                    off = percent(numbers[log, place] - numbers[0, place], numbers[0, place], 3)
+                    change = ("" if np.isnan(far) else f"{far:+.1f}", off if log else "")
+                    known = (row.with_half, row.unit, row.status)
+                    estimates.append((row.name, label, *known, *change))
         for name, values in self.settings.items():
             for label, value in zip(self.labels, values, strict=True):
                 settings.append((visible(name), label, visible(value)))
@@ -112,13 +126,13 @@ class Comparison:
     def as_json(self) -> str:
         """Estimates, 95 % intervals and distances in σ as the text of a JSON file."""
         parameters = {}
-        for name, row in self.sigma.items():
+        for name, far in zip(self.names, self.sigma.T.tolist(), strict=True):
             several = [one.estimates.get(name) for one in self.results]
             keys = ("estimate", "std", "ci95")
             numbers = {key: [getattr(one, key, None) for one in several] for key in keys}
-            parameters[name] = numbers | {"sigma": row}
+            parameters[name] = numbers | {"sigma": far}
         content = {"labels": self.labels, "parameters": parameters, "settings": self.settings}
-        return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        return to_json(content, indent=2, inf_nan_mode="null").decode() + "\n"
 
 
 def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> Comparison:
@@ -130,21 +144,6 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     if len(set(shown)) < len(shown):
         shown = [f"{number} {label}" for number, label in enumerate(shown, start=1)]
     return Comparison(shown, results)
-
-
-def distance(first: Result, other: Result, name: str) -> float | None:
-    """Signed distance of a parameter of `other` from `first` over combined half intervals, in σ.
-
-    Of normal intervals that is their combined standard deviation. Of Student's it is larger, so
-    that 95 % of the differences that chance makes lie within 1.96 of either.
-    """
-    values, halves = [], []
-    for one in (first.estimates.get(name), other.estimates.get(name)):
-        if first is not other and one and one.estimate is not None and one.half is not None:
-            values.append(one.estimate)
-            halves.append(one.half)
-    combined = math.hypot(*halves) / NORMAL
-    return (values[1] - values[0]) / combined if len(values) == 2 and combined else None
 
 
 def write_comparison(found: Comparison, path: Path, force: bool) -> None:
@@ -174,27 +173,23 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
 
 
 def verdict(found: Comparison) -> Verdict:
-    """Whether the results agree: distances beyond `FAR` are named, the largest first."""
+    """Whether the results agree: the largest distance, and whether chance explains it."""
     if not found.far:
         return Verdict("reservations", "no parameter has error bars in two results")
-    beyond = [words for size, words in found.far if size > FAR]
-    if beyond:
-        headline = f"more than {FAR:.2g} σ apart: {joined(beyond, 3)}"
-        return Verdict("reservations", headline, title="Different")
-    inside = sum(size <= NORMAL for size, _ in found.far)
-    within = f"{inside} of {counted(len(found.far), 'difference')} within {NORMAL:.2f} σ"
-    return Verdict("good", f"{within}; the largest is {found.far[0][1]}")
+    size, words = found.far[0]
+    grade: Grade = "good" if size <= FAR else "reservations"
+    return Verdict(grade, f"the largest of {counted(len(found.far), 'difference')} is {words}")
 
 
 def _distances(found: Comparison) -> Plot:
     """How far each result is from the first, in σ of both intervals."""
-    rows = {name: row for name, row in found.sigma.items() if any(far is not None for far in row)}
-    panels = Panels([f"Distance from {found.labels[0]}, σ"], height=70 + 24 * len(rows))
-    for place, far in enumerate(np.array(list(rows.values()), dtype=np.float64).T[1:]):
-        look = COLOURS[place % len(COLOURS)], 8, SYMBOLS[place % len(SYMBOLS)]
-        panels.dots(0, far, list(rows), found.labels[place + 1], *look)
+    known = np.flatnonzero(~np.isnan(found.sigma).all(axis=0)).tolist()
+    names = [found.names[place] for place in known]
     reach = max(1.1 * found.far[0][0], 4.0)
-    panels.axes(0, {"range": [-reach, reach]}, names_down(list(rows)))
+    panels = down(f"Distance from {found.labels[0]}, σ", names, reach)
+    for place, label in enumerate(found.labels[1:]):
+        look = COLOURS[place % len(COLOURS)], 8, SYMBOLS[place % len(SYMBOLS)]
+        panels.dots(0, found.sigma[place + 1, known], names, label, *look)
     panels.mark(0, -NORMAL, NORMAL, colour=BLUE)
     reading = f"Within the band, ± {NORMAL:.2f} σ, chance alone puts 19 of 20 differences."
     return Plot("distances", "Distances in σ", panels, reading)

@@ -17,7 +17,7 @@ from algid.base.blocks import rows_of
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
 from algid.model import K1, K3, K5
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, Plot, names_down
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, Plot, down
 from algid.report.series import POINTS, Drawn, drawn, table
 from algid.results import Result
 from algid.results.rows import known_truth
@@ -93,21 +93,21 @@ def torque(folder: Path, result: Result, raw: Drawn) -> Plot:
 
 def closeup(result: Result, raw: Drawn) -> Plot | None:
     """One second about the largest residual of each joint, every sample."""
-    if not raw.worst:
-        return None
     titles = []
     for joint, (size, t, log, _) in raw.worst.items():
         of = f" of {file_name(result.logs[log].path)}" if len(raw.starts) > 1 else ""
         titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
     panels = Panels(titles, 2)
-    for place, (joint, (*_, rows)) in enumerate(raw.worst.items()):
-        _prediction(panels, place, place, rows["t"], rows, joint)
-        panels.axes(place, "time, s", "N m")
+    for place, (joint, (_, t, _, rows)) in enumerate(raw.worst.items()):
+        _prediction(panels, place, place, rows["t"] - t, rows, joint)
+        panels.axes(place, "time from there, s", "N m")
     reading = (
         "A residual that stands out once is an event, such as a knock; one like the rest is "
         "the model's limit."
     )
-    return Plot("closeup", "The largest residual, every sample", panels, reading)
+    return (
+        Plot("closeup", "The largest residual, every sample", panels, reading) if titles else None
+    )
 
 
 def residual(folder: Path) -> Plot | None:
@@ -126,7 +126,8 @@ def residual(folder: Path) -> Plot | None:
         x, y, low, high = own["x"], own["value"], own["low"], own["high"]
         panels.band(place, x, low, high, "95 % band of white noise")
         if kind == "autocorrelation":
-            panels.add(place, x, y, "residual", type="bar", marker={"color": ORANGE})
+            stems = np.stack([0 * y, y, np.nan * y], axis=1).ravel()
+            panels.curve(place, np.repeat(x, 3), stems, "residual", ORANGE, 4)
             panels.axes(place, "lag, s")
             inside.append(f"{np.count_nonzero((y >= low) & (y <= high))} of {y.size}")
             continue
@@ -150,28 +151,27 @@ def over_time(folder: Path, result: Result, name: str) -> Plot | None:
     if rows is None:
         return None
     known = result.estimates | (result.paper_payload if name == "loaded" else {})
-    names = []
-    for one, series in rows.columns.items():
-        aside = one in ("log", "t", "x", "k7_condition") or one.endswith("_half")
-        names += [one] if not aside and np.isfinite(series).any() else []
+    names = [one for one in rows.columns if one in known and np.isfinite(rows[one]).any()]
+    names += ["condition"] if "condition" in rows.columns else []
     titles = [f"{one}, {unit_text(known[one].unit)}" if one in known else one for one in names]
     panels, (title, reading) = Panels(titles, 2, 210, together=True), OVER_TIME[name]
     for place, one in enumerate(names):
         value = np.where(np.isfinite(rows[one]), rows[one], np.nan)
-        half = rows.columns.get(f"{one}_half", 0.0 * value)
-        if f"{one}_half" in rows.columns:
-            panels.band(place, rows["x"], value - half, value + half, "its 95 % interval")
+        half = rows.columns.get(f"{one}_half", np.zeros(1))
+        low, high = value - half, value + half
+        if half.any():
+            panels.band(place, rows["x"], low, high, "its 95 % interval")
         panels.curve(place, rows["x"], value, "estimate from all samples so far")
         if one == "condition":
             panels.axes(place, y={"type": "log"})
             continue
         # what comes first, and spikes near singular instants, start outside the view
-        ends = []
-        for edge, share in ((value - half, 0.05), (value + half, 0.95)):
-            edge = edge[np.isfinite(edge)]
-            ends += [quantile(edge[edge.size // 4 :], share)] if edge.size else []
-        final = known[one].estimate if one in known else None
-        for mark, colour, dash in (final, GREEN, "solid"), (truth.get(one), ORANGE, "dash"):
+        late = np.stack([low, high])[:, value.size // 4 :]
+        ends = [quantile(late[np.isfinite(late)], share) for share in (0.05, 0.95)]
+        for mark, colour, dash in (
+            (known[one].estimate, GREEN, "solid"),
+            (truth.get(one), ORANGE, "dash"),
+        ):
             if mark is not None:
                 ends.append(mark)
                 panels.mark(place, mark, way="y", colour=colour, dash=dash)
@@ -237,9 +237,10 @@ def information(folder: Path) -> Plot | None:
 
 def inertia(result: Result, raw: Drawn | None) -> Plot | None:
     """M11, M12 and M22 over one turn of joint 2, with their 95 % bands."""
-    names, known = (K1, K3, K5), result.parameters.items()
-    k = [one.estimate for name, one in known if name in names and one.estimate is not None]
-    if len(k) < len(names):
+    names = K1, K3, K5
+    several = [getattr(result.parameters.get(name), "estimate", None) for name in names]
+    k = np.array(several, dtype=np.float64)
+    if np.isnan(k).any():
         return None
     C = np.full((3, 3), np.nan) if result.fit is None else result.fit.covariance_of(names)
     degrees = np.linspace(-180.0, 180.0, 181)
@@ -273,7 +274,8 @@ def intervals(result: Result) -> Plot:
         if one.estimate and one.half is not None:
             known[name] = one.estimate
             shares.append(100 * one.half / abs(one.estimate))
-    panels = Panels(["95 % interval, % of the estimate"], height=60 + 20 * len(known))
+    widest = min(max(shares, default=1.0), USUAL * median(shares or [1.0]), WIDEST)
+    panels = down("95 % interval, % of the estimate", list(known), 1.15 * max(widest, 1e-6))
 
     def dots(pairs: Iterable[tuple[str, float | None]], name: str, *look: Any, **more: Any) -> None:
         at = [(of, value) for of, value in pairs if of in known and value is not None]
@@ -291,9 +293,6 @@ def intervals(result: Result) -> Plot:
                 by_log += [(n, one.estimate) for n, one in own.items() if n in result.parameters]
     dots(by_log, "each log by itself", GREY, 5)
     dots(known_truth(result).items(), "truth", ORANGE, 10, "circle-open")
-    widest = min(max(shares, default=1.0), USUAL * median(shares or [1.0]), WIDEST)
-    limit = 1.15 * max(widest, 1e-6)
-    panels.axes(0, {"range": [-limit, limit]}, names_down(list(known)))
     reading = "An interval that leaves the frame is far wider than most."
     return Plot("intervals", "95 % intervals", panels, reading)
 

@@ -16,11 +16,10 @@ from algid.report.plot import Plot
 from algid.report.render import markdown, page, write_library, write_texts
 from algid.report.series import drawn
 from algid.report.tables import (
-    arm_tables,
     fit_tables,
     log_tables,
-    nuisance_tables,
     paper_tables,
+    parameter_tables,
     prediction_table,
     provenance_table,
     result_settings,
@@ -66,18 +65,17 @@ def result_document(
     """The report of an identification; with its `folder` also the figures and its samples."""
     fit, leads, raw = result.fit, settles(result.estimator), None
     names = [file_name(log.path) for log in result.logs]
-    plots, first = list[Plot](), list[Content](arm_tables(result))
-    fitted, terms, paper = list[Content](), list[Content](), list[Content]()
+    plots, paper = list[Plot](), list[Content]()
+    arm, other, zero = parameter_tables(result)
+    first = list[Content](arm)
     if folder is not None:
         raw = drawn(folder / "torque.parquet", progress=progress)
         plots = figures(folder, result, raw)
         paper += [over_time(folder, result, name) for name in ("estimates", "loaded")]
+        first.append(intervals(result) if fit is not None else None)
     if fit is not None:
         tried = {"logs used": fit.residual, "each log by the others": fit.cross_validation}
-        known = {name: one for name, one in tried.items() if one is not None}
-        first += [intervals(result) if folder is not None else None, prediction_table(known)]
-        fitted, terms = [*fit_tables(fit)], [terms_table(fit)]
-    other, zero = nuisance_tables(result)
+        first.append(prediction_table({name: one for name, one in tried.items() if one}))
     parts = [Section(plot.key, plot.title, [plot]) for plot in plots]
     notes, asked = [one.sentence for one in result.verdict.notes], replaced_estimator(result)
     estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
@@ -90,10 +88,14 @@ def result_document(
         Section("numbers", "Numbers", first),
         *([of_paper] if leads else []),
         *parts[:1],
-        Section("terms", "Other terms of the torque", [other, *terms]),
+        Section(
+            "terms",
+            "Other terms of the torque",
+            [other, terms_table(fit) if fit is not None else None],
+        ),
         Section("zero", may_be, [zero], folded=True),
         *parts[1:],
-        Section("fit", "Noise, whiteness and bounds", fitted, folded=True),
+        Section("fit", "Noise, whiteness and bounds", fit_tables(fit), folded=True),
         Section("data", "Data quality", [notes, *log_tables(result.logs)], folded=True),
         Section("settings", "Settings and provenance", made_by, folded=True),
         *([] if leads else [of_paper]),

@@ -73,7 +73,7 @@ class Panels:
     def add(self, place: int, x: Any, y: Any, name: str, **more: Any) -> None:
         """Add a trace; the first of a name stands in the legend."""
         shown = label(name)
-        trace = {"type": "scatter", "x": packed(x, exact=True), "y": packed(y), "name": shown}
+        trace = {"type": "scatter", "x": packed(x), "y": packed(y), "name": shown}
         trace |= {"legendgroup": shown, "showlegend": all(o["name"] != shown for o in self.data)}
         self.data.append(trace | {"xaxis": ref("x", place), "yaxis": ref("y", place)} | more)
 
@@ -156,9 +156,12 @@ class Panels:
         self.layout["annotations"].append(at)
 
 
-def names_down(names: Sequence[str]) -> dict[str, Any]:
-    """An axis of names, the first one at the top."""
-    return {"type": "category", "categoryarray": list(names), "autorange": "reversed"}
+def down(title: str, names: Sequence[str], limit: float) -> Panels:
+    """A panel for points beside names, the first one at the top, within ± `limit`."""
+    panels = Panels([title], height=60 + 22 * len(names))
+    rows = {"type": "category", "categoryarray": names, "autorange": "reversed"}
+    panels.axes(0, {"range": [-limit, limit]}, rows)
+    return panels
 
 
 def ref(name: str, place: int) -> str:
@@ -173,21 +176,17 @@ def label(text: str) -> str:
     return html.escape(shown, quote=False)
 
 
-def packed(values: Any, exact: bool = False) -> Any:
+def packed(values: Any) -> Any:
     """Numbers as plotly's typed array.
 
-    In single precision, unless they are integers, such as dates, or beyond it, or are to be
-    `exact` and their steps are not, as those of times in a long log.
+    In single precision, unless they are integers, such as dates, or beyond it.
     """
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         return values
-    whole = values.astype("<f8")
     with np.errstate(over="ignore"):
-        short = whole.astype("<f4")
-    kept = values.dtype.kind == "f" and np.array_equal(np.isinf(short), np.isinf(whole))
-    if exact and kept:
-        kept = np.allclose(np.diff(short), np.diff(whole), 0.01, 0.0, equal_nan=True)
-    made = short if kept else whole
+        made = values.astype("<f4")
+    if values.dtype.kind != "f" or np.isinf(made).any():
+        made = values.astype("<f8")
     shape = {} if values.ndim == 1 else {"shape": ", ".join(map(str, values.shape))}
     return {
         "dtype": made.dtype.str[1:],

@@ -39,20 +39,13 @@ def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
 
         def shown(stage: str, done: int, total: int) -> None:
             known = total if total >= done else 0
-            counts = (
-                f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" if done else ""
-            )
-            task = next(iter(bar.tasks), None)
-            if (
-                task
-                and task.description == stage
-                and task.completed <= done
-                and task.total == (known or None)
-            ):
+            counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" * (done > 0)
+            task = bar.tasks[0] if bar.tasks else None
+            if task is None or (task.description, task.total) != (stage, known or None):
+                for before in bar.task_ids:
+                    bar.remove_task(before)
+                bar.add_task(stage, total=known or None, completed=done, counts=counts)
+            else:
                 bar.update(task.id, completed=done, counts=counts)
-                return
-            if task:
-                bar.remove_task(task.id)
-            bar.add_task(stage, total=known or None, completed=done, counts=counts)
 
         yield shown

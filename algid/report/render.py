@@ -66,10 +66,9 @@ def markdown(document: Document) -> str:
     """`document` as GitHub's Markdown: title, verdict, tables, and what is folded."""
     from markupsafe import Markup
 
+    # indented, it is code whatever it holds
     command = document.verdict.command or ""
-    # a block of code that no row of backticks in it can end
-    fence = "`" * (1 + max(map(len, re.findall("`+", command)), default=2))
-    code = Markup(f"{fence}sh\n{visible(command, len(command))}\n{fence}")
+    code = Markup("    " + visible(command, len(command)))
     return _environment(_escaped).get_template("report.md").render(document=document, code=code)
 
 

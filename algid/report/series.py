@@ -69,13 +69,16 @@ def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[
 
 
 def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
-    """Split blocks where their column ``log`` changes: pairs of log and its stretch."""
+    """Pairs of a log and its stretch of a block, with what a prediction leaves of the torque."""
     for block in found:
+        for joint in (1, 2):
+            if f"tau{joint}_predicted" in block:
+                left = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
+                block[f"residual{joint}"] = left
         log = block.setdefault("log", np.zeros(block["t"].size))
-        edges = [0, *(np.flatnonzero(np.diff(log)) + 1).tolist(), log.size]
-        for first, last in pairwise(edges):
-            if last > first:
-                yield int(log[first]), rows_of(block, slice(first, last))
+        firsts = np.flatnonzero(np.diff(log, prepend=-1)).tolist()
+        for first, last in pairwise([*firsts, log.size]):
+            yield int(log[first]), rows_of(block, slice(first, last))
 
 
 def table(path: Path) -> dict[str, NDArray[Any]]:
@@ -103,24 +106,18 @@ class Drawn:
     Parameters
     ----------
     columns : with `x`, the time that runs on from log to log, s, and NaN rows where a line breaks
+    starts : where each log begins on the axis `x`
     samples : whole rows spread evenly over the logs
     worst : by joint the largest residual, when in s, in which log, and its block's samples about it
     """
 
     columns: Block
+    starts: dict[int, float]
     samples: Block
     worst: dict[int, tuple[float, float, int, Block]]
 
     def __getitem__(self, name: str) -> FloatArray:
         return self.columns[name]
-
-    @property
-    def starts(self) -> dict[int, float]:
-        """Where each log begins on the axis `x`."""
-        places = np.flatnonzero(np.diff(self["log"], prepend=-1))
-        return dict(
-            zip(self["log"][places].astype(int).tolist(), self["x"][places].tolist(), strict=True)
-        )
 
 
 def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) -> Drawn | None:
@@ -138,21 +135,20 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     total = facts_of(path)[1]
     bucket, step = max(1, -(-2 * total // points)), max(1, total // SAMPLES)
     parts, samples, worst = list[Block](), list[Block](), dict[int, Any]()
-    period, done, last, shift = 0.0, 0, 0, 0.0
+    period, done, starts = 0.0, 0, dict[int, float]()
     for log, part in by_log(blocks(path)):
         t = part["t"]
-        if log != last:  # a hundredth is left between logs
-            last, shift = log, 1.01 * parts[-1]["x"][-1] - t[0]
+        if log not in starts:  # a hundredth is left between logs
+            starts[log] = 1.01 * float(parts[-1]["x"][-1]) if parts else float(t[0])
+            shift = starts[log] - t[0]
         part["x"] = t + shift
         period = max(period, median(np.diff(t)))  # NaN, of one sample, is not larger
         for joint in (1, 2):
-            if f"tau{joint}_predicted" in part:
-                left = part[f"tau{joint}"] - part[f"tau{joint}_predicted"]
-                part[f"residual{joint}"], size = left, np.abs(np.nan_to_num(left))
-                place = int(size.argmax())
-                if size[place] > worst.get(joint, (0.0,))[0]:
-                    near = rows_of(part, np.abs(t - t[place]) <= HALF)
-                    worst[joint] = float(size[place]), float(t[place]), log, near
+            size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
+            place = int(size.argmax())
+            if size[place] > worst.get(joint, (0.0,))[0]:
+                near = rows_of(part, np.abs(t - t[place]) <= HALF)
+                worst[joint] = float(size[place]), float(t[place]), log, near
         # which sample of a stretch moves by the golden ratio: never in step with the motion
         at = np.arange(0, t.size, step)
         at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), t.size - 1)
@@ -169,7 +165,7 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     for name, values in columns.items():
         nothing = values[broken - 1] if name in ("log", "x") else np.nan
         columns[name] = np.insert(values, broken, nothing)
-    return Drawn(columns, concatenated(samples), worst)
+    return Drawn(columns, starts, concatenated(samples), worst)
 
 
 def reduced(part: Block, size: int) -> Block:

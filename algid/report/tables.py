@@ -7,7 +7,7 @@ shows a table makes its text visible.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, astuple
 from typing import Any
 
 from algid.arm import CONSTANT_NAMES
@@ -37,36 +37,26 @@ INTERVALS_REST_ON = {
 
 def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Result) -> Table:
     """Estimates with their intervals, the truth where it is known, and what they are."""
-    rows = []
-    for one in rows_of(result, estimates):
-        known = (one.status, one.share, one.truth, one.error, one.meaning)
-        rows.append((one.name, one.value, one.half, one.unit, *known))
     return Table(
         title,
         "Parameter | Estimate | ± 95 % | Unit | Status | ±, % | Truth | Error, % | Meaning",
-        rows,
+        [astuple(one) for one in rows_of(result, estimates)],
     )
 
 
-def arm_tables(result: Result) -> tuple[Table, ...]:
-    """The arm first: its constants, its payload and the stiffness of its joints."""
-    constants = {name: one for name, one in result.parameters.items() if name in CONSTANT_NAMES}
-    return (
-        estimates_table("Constants", constants, result),
-        estimates_table("Payload", result.payload, result),
-        estimates_table(
-            "Stiffness of elastic joints", result.fit.stiffness if result.fit else {}, result
-        ),
-    )
+def parameter_tables(result: Result) -> tuple[list[Table], Table, Table]:
+    """The arm; the terms beside eq. (1) that differ from zero; and those that may be zero.
 
-
-def nuisance_tables(result: Result) -> tuple[Table, Table]:
-    """The terms beside eq. (1): those that differ from zero, and those that may be zero."""
-    other, zero = dict[str, Estimate](), dict[str, Estimate]()
+    The arm is its constants, its payload and the stiffness of its joints.
+    """
+    arm, other, zero = dict[str, Estimate](), dict[str, Estimate](), dict[str, Estimate]()
     for name, one in result.parameters.items():
-        if name not in CONSTANT_NAMES:
-            (zero if one.status is Status.NOT_SIGNIFICANT else other)[name] = one
+        may_be = one.status is Status.NOT_SIGNIFICANT
+        (arm if name in CONSTANT_NAMES else zero if may_be else other)[name] = one
+    parts = {"Constants": arm, "Payload": result.payload}
+    parts["Stiffness of elastic joints"] = result.fit.stiffness if result.fit else {}
     return (
+        [estimates_table(title, of, result) for title, of in parts.items()],
         estimates_table("Other terms of the torque", other, result),
         estimates_table("Terms whose interval holds zero", zero, result),
     )
@@ -104,19 +94,19 @@ def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
             rows.append((where, "too short", *[ABSENT] * 6))
             continue
         filters.append(f"Filter: {one.filter}.")
-        rests = one.rmse_rest not in (None, (None, None))
-        for joint in range(2):
-            states = []
-            for state in (one.rmse_moving, one.rmse_rest, one.rmse_held):
-                states.append(significant(state[joint], 3) if state and rests else ABSENT)
-            numbers = (significant(one.rmse[joint], 3), significant(100 * one.nrmse[joint], 3))
-            rows.append((where, str(joint + 1), *numbers, f"{one.r2[joint]:.5f}", *states))
+        states: list[tuple[float | None, float | None]] = [(None, None)] * 3
+        if any(one.rmse_rest or ()):
+            known = (one.rmse_moving, one.rmse_rest, one.rmse_held)
+            states = [state or (None, None) for state in known]
+        for joint, rmse, nrmse, r2, *of in zip(
+            "12", one.rmse, one.nrmse, one.r2, *states, strict=True
+        ):
+            numbers = (significant(rmse, 3), significant(100 * nrmse, 3), f"{r2:.5f}")
+            rows.append((where, joint, *numbers, *(significant(value, 3) for value in of)))
     note = " ".join(dict.fromkeys(filters))
-    if any(row[-1] != ABSENT for row in rows):
-        note += " Beyond ± f: at rest, less what dry friction may be."
     return Table(
         "Torque prediction",
-        "Torque of | Joint | RMSE, N m | RMSE / RMS, % | R² | Moving | At rest | Beyond ± f",
+        "Torque of | Joint | RMSE, N m | RMSE / RMS, % | R² | Moving | At rest | Beyond ± f there",
         rows,
         note,
     )
@@ -130,15 +120,11 @@ def terms_table(fit: FitSummary) -> Table:
         numbers = ((term.delta_bic, "+.1f"), (change, "+.2f"), (term.evidence, "+.1f"))
         cells = (formatted(value, form) for value, form in numbers)
         rows.append((term.term, *cells, yes_or_no(term.kept), term.why))
-    note = ""
-    if any(term.delta_bic is not None for term in fit.terms):
-        note = "A negative change of BIC favours the term."
-    if fit.model is not None and fit.model.held_out is not None:
-        note = (
-            f"Held-out error: squared, of whole {fit.model.held_out}, each predicted from the "
-            "others; negative: the term lowers it. A term is kept if it does and its log odds are "
-            "positive."
-        )
+    note = (
+        "A negative change favours the term: of BIC, or of the squared error of whole logs or "
+        "blocks, each predicted from the others. Of these a term is kept if its log odds are "
+        "positive too."
+    )
     return Table(
         "Terms tried",
         "Term | Change of BIC | Held-out error, % | Log odds | Kept | Why",
@@ -147,9 +133,11 @@ def terms_table(fit: FitSummary) -> Table:
     )
 
 
-def fit_tables(fit: FitSummary) -> tuple[Table, ...]:
+def fit_tables(fit: FitSummary | None) -> tuple[Table, ...]:
     """Noise of the logs, whiteness of the residual, and bounds of physics that are broken."""
     noise, tests, bounds = [], [], []
+    if fit is None:
+        return ()
     for name, std in fit.noise.items():
         noise.append((name, significant(std, 3), "N m" if name.startswith("tau") else "rad"))
     for name, test in fit.whiteness.items():
@@ -194,13 +182,11 @@ def settings_table(settings: Mapping[str, Any]) -> Table:
 
 def settings_of(result: Result) -> dict[str, str]:
     """What was asked for, how the first log of each kind was read, and what the logs decided."""
-    used, model, delay, fit = dict[str, Any](), result.torque_model, result.delay, result.fit
+    used, model, fit = dict[str, Any](), result.torque_model, result.fit
     if model is not None:
         used["terms"] = ", ".join(model.terms) or "plain"
         if "coulomb" in model.terms:
             used["Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
-    if delay is not None and delay.estimate is not None:
-        used["delay"] = f"{1e3 * delay.estimate:.3g} ms".replace("-", "−")
     if fit is not None and fit.torque_hold is not None:
         used["torque_hold"] = fit.torque_hold.used
     read = {

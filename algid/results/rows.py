@@ -27,9 +27,9 @@ class EstimateRow:
     name: str
     value: str
     half: str
-    share: str
     unit: str
     status: str
+    share: str
     truth: str
     error: str
     meaning: str

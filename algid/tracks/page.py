@@ -97,7 +97,7 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
         with whole_file(written[-1]) as temporary, temporary.open("wb") as stream:
             writer = Writer(stream, compression=CompressionType.ZSTD)
             writer.start(profile="ros2", library=f"algid {result.version}")
-            write_series(writer, folder / CURVE, "/algid/payload")
+            write_series(writer, folder / CURVE, "payload")
             writer.finish()  # type: ignore[no-untyped-call]
     return written
 

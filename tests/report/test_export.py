@@ -34,59 +34,30 @@ def read(path: Path) -> dict[str, list[Any]]:
     return found
 
 
-def test_the_log_holds_predicted_torque_residual_and_estimates(
-    messages: dict[str, list[Any]],
-) -> None:
-    assert set(messages) == {
-        "/algid/measured",
-        "/algid/log2/measured",
-        "/algid/predicted",
-        "/algid/residual",
-        "/algid/log2/predicted",
-        "/algid/log2/residual",
-        "/algid/estimates",
-        "/algid/loaded",
-    }
-
-
-def test_torques_are_bit_for_bit_those_of_the_parquet(
+def test_topics_hold_every_column_bit_for_bit(
     messages: dict[str, list[Any]], case_folder: Path
 ) -> None:
-    rows = pl.read_parquet(case_folder / "torque.parquet").filter(pl.col("log") == 0)
-    predicted = np.array(
-        [message.decoded_message.effort for message in messages["/algid/predicted"]]
-    )
-    residual = np.array([message.decoded_message.effort for message in messages["/algid/residual"]])
-    np.testing.assert_array_equal(
-        predicted, rows.select("tau1_predicted", "tau2_predicted").to_numpy()
-    )
-    measured = rows.select("tau1", "tau2").to_numpy()
-    np.testing.assert_array_equal(residual, measured - predicted)
-    assert messages["/algid/predicted"][0].decoded_message.name == ["joint1", "joint2"]
-
-
-def test_what_was_measured_stands_beside_it_bit_for_bit(
-    messages: dict[str, list[Any]], case_folder: Path
-) -> None:
+    topics = ("torque", "log2/torque", "estimates", "loaded")
+    assert set(messages) == {f"/algid/{topic}" for topic in topics}
     rows = pl.read_parquet(case_folder / "torque.parquet")
-    for log, topic in ((0, "/algid/measured"), (1, "/algid/log2/measured")):
-        own = rows.filter(pl.col("log") == log)
-        for field, name in (("position", "theta"), ("velocity", "omega"), ("effort", "tau")):
-            found = np.array(
-                [getattr(message.decoded_message, field) for message in messages[topic]]
-            )
-            np.testing.assert_array_equal(found, own.select(f"{name}1", f"{name}2").to_numpy())
+    for log, topic in ((0, "torque"), (1, "log2/torque")):
+        own = rows.filter(pl.col("log") == log).drop("log", "t")
+        found = [message.decoded_message for message in messages[f"/algid/{topic}"]]
+        for name in own.columns:
+            np.testing.assert_array_equal([getattr(one, name) for one in found], own[name])
+        left = own["tau2"] - own["tau2_predicted"]
+        np.testing.assert_array_equal([one.residual2 for one in found], left)
+    paper = pl.read_parquet(case_folder / "loaded.parquet")
+    of = [one.decoded_message.k5_k3_z1_z2 for one in messages["/algid/loaded"]]
+    np.testing.assert_array_equal(of, paper["k5+k3+z1+z2"])
 
 
 def test_stamps_are_those_of_the_original_log(messages: dict[str, list[Any]]) -> None:
-    found = messages["/algid/residual"]
-    assert [message.message.log_time for message in found[:3]] == [
-        START_NS,
-        START_NS + 1_000_000,
-        START_NS + 2_000_000,
-    ]
+    found = messages["/algid/torque"]
+    stamps = [START_NS + 1_000_000 * place for place in range(3)]
+    assert [message.message.log_time for message in found[:3]] == stamps
     stamp = found[1].decoded_message.header.stamp
-    assert stamp.sec * 1_000_000_000 + stamp.nanosec == START_NS + 1_000_000
+    assert stamp.sec * 1_000_000_000 + stamp.nanosec == stamps[1]
     assert messages["/algid/loaded"][0].message.log_time == START_NS
 
 

@@ -87,7 +87,7 @@ def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
         moment = float(rows["t"][int(left.arg_max() or 0)])
         assert np.nanmax(np.abs(y)) == pytest.approx(left.max(), rel=1e-6)
         assert np.median(np.diff(t)) == pytest.approx(1e-3, rel=1e-2)
-        ends = max(moment - 0.5, 0.0), min(moment + 0.5, 4.0)
+        ends = max(-0.5, -moment), min(0.5, 4.0 - moment)
         assert (t[0], t[-1]) == pytest.approx(ends, abs=2e-3)
 
 
@@ -97,7 +97,7 @@ def test_residuals_stand_against_the_band_of_white_noise(case_folder: Path) -> N
     assert plot is not None
     one = rows.filter((pl.col("quantity") == "autocorrelation") & (pl.col("joint") == 1))
     stems = traces(plot, "residual")[1]
-    assert typed(stems["y"]) == pytest.approx(one["value"].to_numpy(), rel=1e-5)
+    assert finite(typed(stems["y"])[1::3]) == pytest.approx(one["value"].to_numpy(), rel=1e-5)
     inside = one.filter(pl.col("value").is_between(pl.col("low"), pl.col("high"))).height
     assert f"inside the band: {inside} of {one.height} and " in plot.note
     white = rows.filter((pl.col("quantity") == "whitened spectrum") & (pl.col("joint") == 1))
@@ -170,11 +170,10 @@ def test_what_is_absent_is_not_drawn_and_what_is_broken_is_refused(
         figures(folder, result, raw)
 
 
-def test_numbers_travel_in_single_precision_unless_steps_would_be_lost() -> None:
-    short, long = np.arange(10.0) * 1e-3, 1e5 + np.arange(10.0) * 1e-3
-    assert [packed(x, exact=True)["dtype"] for x in (short, long)] == ["f4", "f8"]
-    assert [packed(x)["dtype"] for x in (long, 1e40 * long, np.arange(3))] == ["f4", "f8", "f8"]
-    np.testing.assert_array_equal(typed(packed(long, exact=True)), long)
+def test_numbers_travel_in_single_precision_unless_they_are_beyond_it() -> None:
+    x = np.arange(10.0) * 1e-3
+    assert [packed(of)["dtype"] for of in (x, 1e42 * x, np.arange(3))] == ["f4", "f8", "f8"]
+    np.testing.assert_array_equal(typed(packed(1e42 * x)), 1e42 * x)
     assert typed(packed(np.ones((2, 3)))).shape == (2, 3)
 
 
