@@ -17,7 +17,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
-from typing import Any, Literal
+from itertools import groupby
+from typing import Any
 
 from algid.base.text import joined
 from algid.base.words import counted
@@ -70,7 +71,10 @@ class Remedy:
     @property
     def words(self) -> str:
         """Its flags as a shell takes them."""
-        return " ".join(map(_quoted, self.flags))
+        # what stands in plain quotation marks stays as it reads best
+        return " ".join(
+            word if _IN_MARKS.fullmatch(word) else shlex.quote(word) for word in self.flags
+        )
 
     def __str__(self) -> str:
         return f"{self.when}: {self.words}" if self.when else self.words
@@ -80,13 +84,6 @@ class Remedy:
         return text.replace("'", '"')
 
 
-def _quoted(word: str) -> str:
-    """A word as a shell takes it; what stands in plain quotation marks stays as it reads best."""
-    if _IN_MARKS.fullmatch(word):
-        return word
-    return shlex.quote(word)
-
-
 _IN_MARKS = re.compile(r'[\w.]+="[\w ]+"')
 
 
@@ -94,53 +91,20 @@ class _Words(string.Formatter):
     """Format strings: ``{count:# sample has|samples have}`` takes its number, lists are joined."""
 
     def format_field(self, value: Any, spec: str) -> str:
-        """One value as `spec` has it."""
+        """One value as `spec` has it; behind ``~``, # is the value, empty for 0, None or empty."""
+        several = isinstance(value, list | tuple)
         if spec[:1] == "~":
-            return self._where_there_is_one(value, spec[1:])
+            if not value or "|" not in spec:
+                return spec[1:].replace("#", str(value)) if value else ""
+            spec = spec[1:]
         if "|" in spec:
             shown, _, words = spec.rpartition("# ")
             one, many = words.split("|")
-            count = value
-            if isinstance(value, list | tuple):
-                count = len(value)
-            if words != spec:
-                return shown + counted(count, one, many)
-            if count == 1:
-                return one
-            return many
-        if isinstance(value, list | tuple):
-            return joined(list(map(str, value)))
-        return str(format(value, spec))
-
-    def _where_there_is_one(self, value: Any, spec: str) -> str:
-        """What stands behind ``~``, # for the value; empty where that is 0, None or empty."""
-        if not value:
-            return ""
-        if "|" in spec:
-            return self.format_field(value, spec)
-        return spec.replace("#", str(value))
-
-
-@dataclass(frozen=True)
-class Message:
-    """What `messages.toml` holds of a code: see its head.
-
-    `note` and `lossy` are True, or the cases in which they hold.
-    """
-
-    code: str
-    group: str = ""
-    was: tuple[str, ...] = ()
-    note: bool | tuple[str, ...] = False
-    lossy: bool | tuple[str, ...] = False
-    cause: str = ""
-    do: str = ""
-    text: str | Mapping[str, str] = ""
-
-    def holds(self, kind: Literal["note", "lossy"], case: str) -> bool:
-        """Whether it says how things were done, or that samples are missing, in this case."""
-        cases: bool | tuple[str, ...] = getattr(self, kind)
-        return cases if isinstance(cases, bool) else case in cases
+            count = len(value) if several else value
+            return (
+                shown + counted(count, one, many) if words != spec else one if count == 1 else many
+            )
+        return joined(list(map(str, value))) if several else str(format(value, spec))
 
 
 @cache
@@ -152,8 +116,8 @@ def _entries() -> Mapping[str, str]:
 
 
 @cache
-def message(code: str) -> Message:
-    """What stands in `messages.toml` under a code.
+def message(code: str) -> Mapping[str, Any]:
+    """What stands in `messages.toml` under a code, with its `code`.
 
     Raises
     ------
@@ -161,36 +125,24 @@ def message(code: str) -> Message:
         If no such code stands there.
     """
     entry = tomllib.loads(f"[{code}]{_entries()[code]}")[code]
-    lists = {key: tuple(value) for key, value in entry.items() if isinstance(value, list)}
-    return Message(code, **entry | lists)
+    usual = {"code": code, "group": "", "was": [], "note": False, "lossy": False, "do": ""}
+    return usual | entry
 
 
 def code_of_now(code: str) -> str:
     """The code that stands for one of an earlier version; any other as it is."""
     if code in _entries():
         return code
-    for one in messages():
-        if code in one.was:
-            return one.code
-    return code
+    return next((one["code"] for one in messages() if code in one["was"]), code)
 
 
-def messages() -> list[Message]:
+def messages() -> list[Mapping[str, Any]]:
     """All that algid can say, in the order of the guide."""
     return [message(code) for code in _entries()]
 
 
 _ANYWHERE = "{accepted:~ (accepted by {flag[accept]})}{looked_at:~ (in its first # s)}"
 """What may stand behind the text of every code."""
-
-
-def _text(code: str, numbers: Mapping[str, Any]) -> str:
-    """What a notice says."""
-    form = message(code).text
-    if not isinstance(form, str):
-        form = form[numbers["case"]]
-    values = {"flag": FLAGS, "accepted": False, "looked_at": 0, "record": ""} | dict(numbers)
-    return _Words().vformat(form + _ANYWHERE, (), values)
 
 
 @dataclass(frozen=True)
@@ -221,15 +173,22 @@ class Notice:
     def __post_init__(self) -> None:
         if self.text:
             return
+        values = {"flag": FLAGS, "accepted": False, "looked_at": 0, "record": "", **self.numbers}
         try:
             entry = message(self.code)
-            object.__setattr__(self, "note", self.note or entry.holds("note", self.case))
-            object.__setattr__(self, "lossy", self.lossy or entry.holds("lossy", self.case))
-            object.__setattr__(self, "text", _text(self.code, self.numbers))
+            form = (
+                entry["text"] if isinstance(entry["text"], str) else entry["text"][values["case"]]
+            )
+            made: dict[str, Any] = {"text": _Words().vformat(form + _ANYWHERE, (), values)}
         except (LookupError, TypeError, ValueError) as error:
             raise ValueError(
                 f"code {self.code!r:.60}: it has no text for the numbers {sorted(self.numbers)}"
             ) from error
+        for kind in ("note", "lossy"):  # True, or the cases in which it holds
+            cases = entry[kind]
+            made[kind] = getattr(self, kind) or cases is True or self.case in (cases or ())
+        for name, value in made.items():
+            object.__setattr__(self, name, value)
 
     @property
     def case(self) -> str:
@@ -244,19 +203,14 @@ class Notice:
     @property
     def remedy(self) -> Remedy | None:
         """The first remedy that can be applied as it stands."""
-        for one in self.remedies:
-            if one.complete:
-                return one
-        return None
+        return next((one for one in self.remedies if one.complete), None)
 
     @property
     def advice(self) -> str:
         """What mends it, in flags, those of one case side by side; empty where nothing is known."""
-        cases: dict[str, list[str]] = {}
-        for one in self.remedies:
-            cases.setdefault(one.when, []).append(one.words)
         return "; ".join(
-            f"{case}: {' or '.join(of)}" if case else " or ".join(of) for case, of in cases.items()
+            (f"{when}: " if when else "") + " or ".join(one.words for one in several)
+            for when, several in groupby(self.remedies, key=lambda one: one.when)
         )
 
     @property
@@ -294,13 +248,9 @@ def merged(notices: Iterable[Notice]) -> list[Notice]:
     """
     together: dict[object, Notice] = {}
     for place, one in enumerate(notices):
-        key: object = (one.key, one.note)
-        if one.lossy:
-            key = place
-        if key in together:
-            first = together[key]
-            one = replace(first, logs=tuple(dict.fromkeys(first.logs + one.logs)))
-        together[key] = one
+        key = place if one.lossy else (one.key, one.note)
+        first = together.get(key, one)
+        together[key] = replace(first, logs=tuple(dict.fromkeys(first.logs + one.logs)))
     return list(together.values())
 
 
