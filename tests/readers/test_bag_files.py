@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sqlite3
 import struct
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -198,15 +197,6 @@ def test_a_type_whose_definition_the_file_lacks(tmp_path: Path) -> None:
     found = read_log(file, Profile.model_validate(profile))
     assert np.array_equal(found.theta, log.theta)
     assert np.array_equal(found.tau, log.tau)
-
-
-def test_a_type_of_every_file_needs_no_package(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, log = database(tmp_path)
-    changed(file, "DROP TABLE message_definitions")
-    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
-    assert same(read_log(file), log)
 
 
 OPENERS: list[Callable[[Path], Path]] = [

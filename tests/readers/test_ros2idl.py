@@ -1,4 +1,4 @@
-"""Definitions in IDL, with ros2msg and rosbags as oracles."""
+"""Definitions of messages, in IDL and as .msg."""
 
 from __future__ import annotations
 
@@ -6,68 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores, get_typestore
 
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages.definitions import DefinitionError, Field, parse
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import Cdr, write_mcap
-
-LINE = "=" * 80 + "\n"
-STORE = get_typestore(Stores.ROS2_HUMBLE)
-IDL_NAMES = {
-    "bool": "boolean",
-    "byte": "octet",
-    "char": "uint8",
-    "float32": "float",
-    "float64": "double",
-}
-
-
-def idl_of(name: str) -> str:
-    """The sections of a type of the store and of all it is made of, built from its ros2msg text."""
-    definition, _ = STORE.generate_msgdef(name, ros_version=2)
-    types = parse_msg(name, definition)
-    sections = []
-    for owner, fields in types.items():
-        package, _, last = owner.replace("/msg/", "/").partition("/")
-        lines, typedefs = [], []
-        for one in fields:
-            kind = IDL_NAMES.get(one.type, "::".join(_full(one.type)))
-            if one.count == -1:
-                kind = f"sequence<{kind}>"
-            elif one.count is not None:
-                alias = f"{kind.replace('::', '__')}__{one.count}"
-                typedefs.append(f"typedef {kind} {alias}[{one.count}];")
-                kind = alias
-            lines.append(f"{kind} {one.name};")
-        text = (
-            f"module {package} {{ module msg {{ {' '.join(typedefs)} struct {last} {{ "
-            f"{' '.join(lines)} }}; }}; }};"
-        )
-        sections.append(f"{LINE}IDL: {package}/msg/{last}\n{text}\n")
-    return "".join(sections)
-
-
-def _full(kind: str) -> list[str]:
-    package, _, last = kind.replace("/msg/", "/").partition("/")
-    return [package, "msg", last] if last else [package]
-
-
-@pytest.mark.parametrize("package", ["geometry_msgs", "sensor_msgs", "std_msgs", "trajectory_msgs"])
-def test_every_type_has_the_same_fields_as_in_ros2msg(package: str) -> None:
-    names = [name for name in STORE.fielddefs if name.startswith(f"{package}/msg/")]
-    assert len(names) > 3
-    for name in names:
-        definition, _ = STORE.generate_msgdef(name, ros_version=2)
-        wanted = parse_msg(name, definition)
-        found = parse_idl(name, idl_of(name))
-        for owner, fields in wanted.items():
-            other = found["/".join(_full(owner))]
-            for one, another in zip(fields, other, strict=True):
-                kind = {"char": "uint8"}.get(one.type, "/".join(_full(one.type)))
-                assert (another.name, another.type, another.count) == (one.name, kind, one.count)
 
 
 def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
@@ -132,5 +76,16 @@ def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_read_is_refused_in_one_line(body: str, told: str) -> None:
     with pytest.raises(DefinitionError, match=told) as refused:
-        parse_idl("a/msg/T", f"module a {{ module msg {{ {body} }}; }};")
+        parse("a/msg/T", f"module a {{ module msg {{ {body} }}; }};", idl=True)
     assert "\n" not in str(refused.value)
+
+
+def test_a_text_of_another_recorder_is_read_as_ros_writes_it() -> None:
+    """Constants of any name, other line ends and lines between types; types in the same package."""
+    text = "int8 debug=1\r\nB[2] b # of two\r\nstring<=5 s\r\n===\r\nMSG: a/B\r\nfloat64[<=3] x\n"
+    root, types = parse("a/T", text)
+    two = Field("b", "a/msg/B", 2), Field("s", "string", None)
+    assert types == {root: two, "a/msg/B": (Field("x", "float64", -1),)}
+    assert parse("a/T", "int8 debug=1")[1]["a/msg/T"][0].type == "uint8"  # nothing is a byte
+    with pytest.raises(DefinitionError, match=r"Could not parse: int8 9x\)$"):
+        parse("a/T", "int8 y\nint8 9x\n")

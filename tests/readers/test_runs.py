@@ -104,7 +104,7 @@ def test_a_file_of_two_runs_and_each_alone(tmp_path: Path) -> None:
         LogError, match=r"no segment 3: its time makes 2 runs; the last one: --set segment=2"
     ):
         read_log(path, Profile(segment=3))
-    with pytest.raises(SettingError, match=r"segment\): expected greater than or equal to 1"):
+    with pytest.raises(SettingError, match="segment: expected greater than or equal to 1"):
         inspect(path, segment=0)
 
 

@@ -6,7 +6,7 @@ from functools import partial
 
 from algid.base.errors import LogError
 from algid.readers.messages import cdr, protobuf
-from algid.readers.messages.definitions import DefinitionError, parse_idl, parse_msg
+from algid.readers.messages.definitions import DefinitionError, parse
 from algid.readers.messages.json import JsonRecords
 from algid.readers.messages.layout import Codec
 from algid.readers.messages.message_file import MessageChannel
@@ -24,12 +24,10 @@ def codec_for(path: str, channel: MessageChannel) -> Codec:
     root, text = channel.type, channel.definition.decode("utf-8", errors="replace")
     form = channel.encoding, channel.definition_encoding
     try:
-        if form in (("cdr", "ros2msg"), ("ros1", "ros1msg")):
+        if form in (("cdr", "ros2msg"), ("cdr", "ros2idl"), ("ros1", "ros1msg")):
             ros1 = channel.encoding == "ros1"
-            types = parse_msg(root, text, ros1=ros1)
+            root, types = parse(root, text, idl=form[1] == "ros2idl", ros1=ros1)
             return Codec(partial(cdr.parse_layout, root=root, types=types, ros1=ros1))
-        if form == ("cdr", "ros2idl"):
-            return Codec(partial(cdr.parse_layout, root=root, types=parse_idl(root, text)))
         if form == ("protobuf", "protobuf"):
             messages = protobuf.parse(root, channel.definition)
             return Codec(partial(protobuf.parse_layout, root=root, types=messages))

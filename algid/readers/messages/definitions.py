@@ -1,7 +1,4 @@
-"""ROS message definitions as recorded: one text, nested types separated by lines of ``=``.
-
-.msg text is read by hand, in a twentieth of the time that rosbags takes; IDL by rosbags.
-"""
+"""ROS message definitions as recorded, .msg or IDL: one text, read by rosbags."""
 
 from __future__ import annotations
 
@@ -16,14 +13,6 @@ PRIMITIVES = {
 }  # fmt: skip
 TEXTS = ("string", "wstring")
 SEQUENCE = -1
-_SHORT = {
-    "time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration",
-    "Header": "std_msgs/Header",
-}  # fmt: skip
-_FIELD = re.compile(
-    r"^(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?P<array>\[(?P<size>(?:<=)?\d{0,10})\])?"
-    r"\s+(?P<name>[A-Za-z]\w*)\s*(?P<rest>.*)$"
-)
 
 
 class DefinitionError(Exception):
@@ -43,87 +32,59 @@ Types = dict[str, tuple[Field, ...]]
 _NOTHING = Field("structure_needs_at_least_one_member", "uint8", None)
 """An empty structure takes one byte in ROS 2, since IDL has none."""
 _TIMES_OF_ROS1: Types = {
-    "builtin_interfaces/Time": (Field("secs", "uint32", None), Field("nsecs", "uint32", None)),
-    "builtin_interfaces/Duration": (Field("secs", "int32", None), Field("nsecs", "int32", None)),
-}
-
-
-def parse_msg(root: str, text: str, *, ros1: bool = False) -> Types:
-    """Fields by type name, `root` under its full name; in ROS 1 times are primitive.
-
-    Raises
-    ------
-    DefinitionError
-        If a line cannot be read, or a nested type is missing.
-    """
-    types: Types = dict(_TIMES_OF_ROS1) if ros1 else {}
-    for place, section in enumerate(re.split(r"^=+[ \t]*\r?$", text, flags=re.MULTILINE)):
-        head, _, body = section.strip().partition("\n")
-        heading = re.match(r"^MSG:\s*(\S+)$", head.strip())
-        if place and heading is None:
-            raise DefinitionError(f"{root}: expected 'MSG: package/Type', found {head[:60]!r}")
-        name, body = (heading[1], body) if place and heading else (root, section)
-        fields = []
-        for line in body.splitlines():
-            plain = line.split("#", 1)[0].strip()
-            match = _FIELD.match(plain)
-            if match is None and plain:
-                raise DefinitionError(f"{name}: cannot read the line {line.strip()[:60]!r}")
-            if match is None or match["rest"].startswith("="):  # a comment, a constant
-                continue
-            size = match["size"] or ""
-            many = int(size) if size.isdigit() else SEQUENCE
-            fields.append(Field(match["name"], match["type"], many if match["array"] else None))
-        types[name] = tuple(fields) or (() if ros1 else (_NOTHING,))
-    for name, own in types.items():
-        types[name] = tuple(_resolved(field, name, types) for field in own)
-    return types
-
-
-def _resolved(field: Field, owner: str, types: Types) -> Field:
-    """A field with its type's name in `types`: short, in the owner's package, or with ``msg``."""
-    if field.type in PRIMITIVES or field.type in TEXTS:
-        return field
-    wanted = field.type if "/" in field.type else f"{owner.split('/')[0]}/{field.type}"
-    long, short = wanted.replace("/", "/msg/", 1), wanted.replace("/msg/", "/")
-    for name in (wanted, short, long, _SHORT.get(field.type)):
-        if name in types:
-            return Field(field.name, str(name), field.count)
-    raise DefinitionError(f"{owner}: the type {field.type!r} of {field.name!r} is not defined")
-
-
-_SECTION = re.compile(r"^=+[ \t]*\r?\nIDL:[^\n]*\n", re.MULTILINE)
+    "builtin_interfaces/msg/Time": (Field("secs", "uint32", None), Field("nsecs", "uint32", None)),
+    "builtin_interfaces/msg/Duration": (
+        Field("secs", "int32", None), Field("nsecs", "int32", None)
+    ),
+}  # fmt: skip
+_LINE = re.compile(r"^=+[ \t]*\n", re.MULTILINE)
+"""Between the types of one text."""
+_CONSTANT = re.compile(r"^[ \t]*\w+(?:<=\d+)?[ \t]+\w+[ \t]*=.*$", re.MULTILINE)
+"""No field; rosbags reads those in capitals alone."""
+_SECTION = re.compile(r"^=+[ \t]*\nIDL:[^\n]*\n", re.MULTILINE)
 _INCLUDE = re.compile(r"^[ \t]*#[^\n]*$", re.MULTILINE)
 """What rosidl begins every file with, and rosbags does not read."""
 _MISREAD = re.compile(r"sequence\s*<\s*sequence|@optional")
 """What rosbags takes for something else, and rosidl never writes."""
 
 
-def parse_idl(root: str, text: str) -> Types:
-    """Fields by type name, `root` (``package/msg/Type``) among them, as rosbags reads IDL.
+def parse(root: str, text: str, *, idl: bool = False, ros1: bool = False) -> tuple[str, Types]:
+    """The full name of `root` (``package/msg/Type``), and fields by type name.
+
+    In ROS 1 times are primitive.
 
     Raises
     ------
     DefinitionError
         If the text cannot be read, or a type is missing.
     """
-    from rosbags.typesys import get_types_from_idl
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
+    from rosbags.typesys.msg import normalize_msgtype
 
-    if odd := _MISREAD.search(text):
+    text, root = text.replace("\r\n", "\n"), normalize_msgtype(root)
+    if idl and (odd := _MISREAD.search(text)):
         raise DefinitionError(f"{root}: {odd[0]!r} is not what ROS 2 writes")
-    types: Types = {}
+    types: Types = dict(_TIMES_OF_ROS1) if ros1 else {}
+    found: dict[str, Any] = {}
     try:
-        for section in filter(str.strip, _SECTION.split(_INCLUDE.sub("", text))):
-            for owner, (_, members) in get_types_from_idl(section).items():
-                types[owner] = tuple(_member(name, *kind) for name, kind in members)
+        if idl:
+            for section in filter(str.strip, _SECTION.split(_INCLUDE.sub("", text))):
+                found |= get_types_from_idl(section)
+        else:
+            plain = _CONSTANT.sub("", _LINE.sub(f"{'=' * 80}\n", text))
+            found |= get_types_from_msg(plain, root)
+        for owner, (_, members) in found.items():
+            fields = tuple(_member(name, *kind) for name, kind in members)
+            types[owner] = fields or (() if ros1 else (_NOTHING,))
     except Exception as error:  # what the parser raises, a RecursionError too
-        reason = " ".join(str(error).split())[:200]
-        raise DefinitionError(f"{root}: its IDL cannot be read ({reason})") from error
+        said = str(error).split("\n")  # what, the text, how far it was read, what follows
+        reason = " ".join((said[0][:100], *said[3:4])).strip()[:200]
+        raise DefinitionError(f"{root}: its text cannot be read ({reason})") from error
     known = {*types, *PRIMITIVES, *TEXTS}
     used = {field.type for fields in types.values() for field in fields}
     for missing in sorted((used | {root}) - known):
         raise DefinitionError(f"{root}: the type {missing!r} is not defined")
-    return types
+    return root, types
 
 
 def _member(name: str, form: Any, what: Any) -> Field:
