@@ -11,10 +11,11 @@ import logging
 import pickle
 import socket
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from algid import __version__
@@ -24,29 +25,6 @@ from algid.batches.workers import Workers
 from algid.options import flag
 
 SECONDS = 10  # for a scheduler to answer
-
-
-class Cluster(Executor):
-    """Calls run on a cluster; if a worker dies, Dask runs its calls on others.
-
-    A future gives an exception as its answer: see `job_of`.
-
-    Parameters
-    ----------
-    client : Dask's
-    out : folder that all workers must see, if any
-    timeout : s that a call may take; None for any
-    """
-
-    def __init__(self, client: Any, out: Path | None, timeout: float | None) -> None:
-        self._executor = client.get_executor(pure=False)
-        self._job, self._terms = job_of(__version__), (out, timeout)
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **_none: Any) -> Future[Any]:
-        """Run ``fn(*args)`` on a worker."""
-        call = pickle.dumps((*self._terms, fn, args))
-        answer: Future[Any] = self._executor.submit(self._job, call)
-        return answer
 
 
 def job_of(version: str) -> Callable[[bytes], Any]:
@@ -93,10 +71,8 @@ def _slots(timeout: float | None) -> Workers:
 
 
 @contextmanager
-def cluster(
-    address: str, out: Path | None, timeout: float | None
-) -> Iterator[tuple[Executor, int]]:
-    """The workers of a Dask cluster, and how many jobs to hand out at once.
+def cluster(address: str, out: Path | None, timeout: float | None) -> Iterator[tuple[Any, int]]:
+    """What hands jobs to a Dask cluster by its `submit`, and how many at once.
 
     Raises
     ------
@@ -131,7 +107,13 @@ def cluster(
             raise SettingError(
                 f"{flag('scheduler')} {address}: it has no workers; start dask worker {address}"
             )
-        yield Cluster(client, out, timeout), 2 * threads
+        executor, job = client.get_executor(pure=False), job_of(__version__)
+
+        def submit(fn: Callable[..., Any], *args: Any) -> Future[Any]:
+            future: Future[Any] = executor.submit(job, pickle.dumps((out, timeout, fn, args)))
+            return future
+
+        yield SimpleNamespace(submit=submit), 2 * threads
     finally:
         with suppress(Exception):  # of a scheduler that is gone
             client.close(timeout=SECONDS)

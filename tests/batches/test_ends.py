@@ -5,52 +5,26 @@ nothing can be written.
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import polars as pl
 import pytest
 
 import algid
-from algid.synth.sensors import Sensors
 from pipelines.fuzz_files import sound_files
 from pipelines.hostile import corpus
+from tests.batches.commands import QUICK, Started, left, start, write_logs
 
 pytestmark = pytest.mark.slow
 
-QUICK = ("--no-report", "--estimator", "weak", "--model", "plain", "--workers", "1", "-q")
+ALONE = (*QUICK, "--workers", "1", "-q")
 
 
-def started(*arguments: str | Path) -> subprocess.Popen[str]:
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    return subprocess.Popen(
-        [sys.executable, "-m", "algid", *map(str, arguments)],
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
-
-
-def ended(running: subprocess.Popen[str]) -> tuple[int, str]:
+def ended(running: Started) -> tuple[int, str]:
     """The exit code and what was told."""
     _, told = running.communicate(timeout=120)
     assert "Traceback" not in told
     return running.returncode, told
-
-
-def left(folder: Path) -> list[str]:
-    """What stands in a folder under a temporary name."""
-    return [path.name for path in folder.rglob(".*") if path.name != ".jobs"]
-
-
-def write_logs(folder: Path, count: int) -> Path:
-    folder.mkdir()
-    log, _ = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
-    for number in range(count):
-        algid.write_log(folder / f"d{number}-unloaded.csv", log)
-    return folder
 
 
 def test_a_folder_of_hostile_logs_of_every_format_ends_with_a_row_a_log(tmp_path: Path) -> None:
@@ -61,7 +35,7 @@ def test_a_folder_of_hostile_logs_of_every_format_ends_with_a_row_a_log(tmp_path
         path.write_bytes(path.read_bytes()[: path.stat().st_size // 10])
         names.add(path.rename(logs / f"o{number}-{path.name}").name)  # a job is named by its stem
     write_logs(logs / "sound", 1)
-    code, told = ended(started("batch", logs, "-o", out, *QUICK))
+    code, told = ended(start("batch", logs, "-o", out, *ALONE))
     jobs = pl.read_parquet(out / "jobs.parquet")
     assert (code, jobs.height) == (1, len(names) + 1), told
     assert jobs.filter(pl.col("status") == "ok")["job"].to_list() == ["sound/d0"]
@@ -77,14 +51,14 @@ def test_where_nothing_can_be_written_every_command_says_so_in_a_line(tmp_path: 
     elif not place.parent.is_dir():
         pytest.skip("no folder in which the superuser cannot write")
     logs = write_logs(tmp_path / "logs", 1)
-    log = next(logs.iterdir())
+    log = next(logs.glob("*.csv"))
     for arguments in (
-        ("batch", logs, "-o", place / "out", *QUICK),
+        ("batch", logs, "-o", place / "out", *ALONE),
         ("identify", log, "-o", place / "out", "--estimator", "weak", "--model", "plain"),
         ("convert", log, "-o", place / "a.mcap"),
         ("synth", "case1", "-o", place / "out"),
     ):
-        code, told = ended(started(*arguments))
+        code, told = ended(start(*arguments))
         assert code == 2, told
         last = told.strip().splitlines()[-1]
         assert last.startswith("algid: "), told
@@ -108,7 +82,7 @@ WRITERS = {
 def arm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A log and its result."""
     place = tmp_path_factory.mktemp("arm")
-    log = next(write_logs(place / "logs", 1).iterdir())
+    log = next(write_logs(place / "logs", 1).glob("*.csv"))
     algid.identify([log], estimator="weak", model="plain", out=place, report=False)
     return {"LOG": log, "RESULT": place / "d0-unloaded.algid"}
 
@@ -124,11 +98,11 @@ def test_of_two_processes_that_write_one_output_one_is_refused(
     command = [writer, *arguments, "-o"]
     for place in (out, alone):
         place.mkdir()
-    ends = [ended(one) for one in [started(*command, out / name) for _ in range(2)]]
+    ends = [ended(one) for one in [start(*command, out / name) for _ in range(2)]]
     assert sorted(code for code, _ in ends) in ([0, 2], [2, 3]), ends
     assert all("exists already" in told for code, told in ends if code == 2)
     assert {path.name for path in out.iterdir()} == wanted
-    ended(started(*command, alone / name))
+    ended(start(*command, alone / name))
     assert files(out) == files(alone)
 
 

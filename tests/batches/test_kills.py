@@ -11,16 +11,15 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 import pytest
 
 import algid
-from algid.synth.sensors import Sensors
 from tests.batches.clusters import Dask, dask
+from tests.batches.commands import QUICK, ROOT, Started, left, start, wait_for_records, write_logs
 
 __all__ = ["dask"]
 
@@ -31,13 +30,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("logs")
-    exact, _ = algid.synthesise("case1", duration=2.0, torque="wide", sensors=Sensors(1e-4, 1e-3))
-    rng = np.random.default_rng(0)
-    for number in range(JOBS):
-        noisy = replace(exact, theta=exact.theta + rng.normal(0, 1e-3, exact.theta.shape))
-        algid.write_log(folder / f"d{number}-unloaded.mcap", noisy)
-    return folder
+    return write_logs(tmp_path_factory.mktemp("made") / "logs", JOBS, ".mcap")
 
 
 @dataclass(frozen=True)
@@ -71,19 +64,9 @@ readers.open_log = open_log
 """In every interpreter a reader that never ends on what is named so."""
 
 
-def _start(logs: Path, out: Path, *flags: str, site: Path | None = None) -> subprocess.Popen[str]:
-    """The command; what stands in ``site/sitecustomize.py`` runs in it and in its workers."""
+def _start(logs: Path, out: Path, *flags: str, site: Path = ROOT) -> Started:
     where = flags or ("--workers", "2")
-    quick = ("--no-report", "--estimator", "weak", "--model", "plain")
-    command = [sys.executable, "-m", "algid", "batch", str(logs), "-o", str(out), *quick, *where]
-    paths = [str(Path(__file__).parents[2]), *([str(site)] if site else [])]
-    return subprocess.Popen(
-        command,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    return start("batch", logs, "-o", out, *QUICK, *where, site=site)
 
 
 def _digest(out: Path) -> dict[str, str]:
@@ -91,17 +74,10 @@ def _digest(out: Path) -> dict[str, str]:
         str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest()
         for p in out.rglob("result.json")
     }
-    left = [str(p) for p in out.rglob(".*") if p.name != ".jobs"]
     return files | {
-        "left": str(left),
+        "left": str(left(out)),
         "jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json(),
     }
-
-
-def _wait_for_records(out: Path, count: int) -> None:
-    end = time.monotonic() + 60
-    while len(list((out / ".jobs").glob("*.json"))) < count and time.monotonic() < end:
-        time.sleep(0.005)
 
 
 FORKING = """
@@ -129,7 +105,7 @@ def test_batches_killed_sixty_times_at_random_end_as_undisturbed_ones(
 ) -> None:
     """Forks of a process that has imported everything: a kill costs no second of imports."""
     command = [sys.executable, "-W", "ignore", "-c", FORKING]
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         command, env=env, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as server:
@@ -160,7 +136,7 @@ def test_the_started_process_is_killed_and_the_batch_resumed_at_once(
 ) -> None:
     """Its child and the workers go with it; nothing waits for them but the next run itself."""
     running = _start(logs, tmp_path / "out")
-    _wait_for_records(tmp_path / "out", 1)
+    wait_for_records(tmp_path / "out", 1)
     running.kill()
     running.wait()
     last = _start(logs, tmp_path / "out")
@@ -180,13 +156,13 @@ def test_a_stop_ends_at_once_even_where_a_job_hangs_and_keeps_what_is_finished(
     (tmp_path / "logs/hangs.csv").write_text("t,theta1,theta2,tau1,tau2\n")
     (tmp_path / "sitecustomize.py").write_text(HANGING)
     running = _start(tmp_path / "logs", tmp_path / "out", "--workers", "2", site=tmp_path)
-    _wait_for_records(tmp_path / "out", 1)
+    wait_for_records(tmp_path / "out", 1)
     running.send_signal(sent)
     told, errors = running.communicate(timeout=60)
     assert (running.returncode, errors) == (128 + sent, "")
     assert "1 ok; 1 run now, 1 left" in told
     assert pl.read_parquet(tmp_path / "out/jobs.parquet")["job"].to_list() == ["d0"]
-    assert not [path for path in (tmp_path / "out").rglob(".*") if path.name != ".jobs"]
+    assert left(tmp_path / "out") == []
 
 
 def test_a_job_past_its_time_fails_until_its_log_changes(tmp_path: Path) -> None:
@@ -242,7 +218,7 @@ def test_a_full_disk_stops_a_batch_that_ends_as_undisturbed_once_there_is_room(
     finished = [path.parent.stem for path in out.rglob("result.json")]
     assert 0 < len(finished) < JOBS
     assert "failed" not in told
-    assert not [path for path in out.rglob(".*") if path.name != ".jobs"]
+    assert left(out) == []
     assert _mounts("-o", "remount,size=16m", str(small_disk))
     second = _start(logs, out)
     told, errors = second.communicate()
@@ -256,7 +232,7 @@ def test_on_dask_the_death_of_a_worker_changes_no_result(
 ) -> None:
     victim, _ = dask.worker(), dask.worker()
     first = _start(logs, tmp_path / "out", "--scheduler", dask.address)
-    _wait_for_records(tmp_path / "out", 1)
+    wait_for_records(tmp_path / "out", 1)
     victim.kill()
     told, errors = first.communicate()
     assert first.returncode == 0, errors
@@ -269,7 +245,7 @@ def test_on_dask_the_death_of_the_batch_changes_no_result(
 ) -> None:
     dask.worker()
     second = _start(logs, tmp_path / "again", "--scheduler", dask.address)
-    _wait_for_records(tmp_path / "again", 2)
+    wait_for_records(tmp_path / "again", 2)
     second.kill()
     second.communicate()
     last = _start(logs, tmp_path / "again", "--scheduler", dask.address)

@@ -60,18 +60,13 @@ def served(server: Served) -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def log() -> bytes:
+def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A second at 200 Hz as CSV."""
-    unloaded, _ = algid.synthesise(
-        "case1", rate=200.0, duration=1.0, torque="wide", sensors=Sensors(1e-4, 1e-3)
-    )
-    columns = {"t": unloaded.stamp_ns * 1e-9}
-    columns |= {
-        f"{name}{n + 1}": row[n]
-        for name, row in (("theta", unloaded.theta), ("tau", unloaded.tau))
-        for n in (0, 1)
-    }
-    return pl.DataFrame(columns).write_csv().encode()
+    path = tmp_path_factory.mktemp("made") / "log.csv"
+    sensors = Sensors(1e-4, 1e-3)
+    unloaded, _ = algid.synthesise("case1", rate=200, duration=1, torque="wide", sensors=sensors)
+    algid.write_log(path, unloaded)
+    return path.read_bytes()
 
 
 CONFIG = BatchConfig(

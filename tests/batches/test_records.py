@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -25,44 +24,27 @@ from algid.batches.records import (
     JobStatus,
     read_records,
     record_name,
-    stat_of,
     write_record,
 )
 from algid.batches.run import Batch, BatchConfig, Batched, sweep
+from algid.batches.workers import CallFailedError
 from algid.settings import Settings
+from tests.batches.test_run import Here
 
 
-class Failing(Executor):
-    """Ends every job at once, as one that failed."""
-
-    def __init__(self) -> None:
-        self.ran = list[str]()
-
-    def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        (task,) = args
-        self.ran.append(task.job.name)
-        inputs = tuple(map(stat_of, task.job.logs))
-        future.set_result(
-            JobRecord(task.job, JobStatus.FAILED, "as asked", task.basis, inputs, {}, "")
-        )
-        return future
+def _fail(_name: str) -> None:
+    raise CallFailedError("as asked")
 
 
 CONFIG = BatchConfig("", Settings(), lambda _file: None)
 
 
-def _batch(out: Path, executor: Executor | None = None) -> Batch:
-    return Batch(
-        open_store(str(out)),
-        replace(CONFIG, out=str(out)),
-        executor or Failing(),
-        1,
-        lambda *_: None,
-    )
+def _batch(out: Path, executor: Here | None = None) -> Batch:
+    config = replace(CONFIG, out=str(out))
+    return Batch(open_store(str(out)), config, executor or Here(_fail), 1, lambda *_: None)
 
 
-def _run(logs: Path, out: Path, executor: Executor | None = None) -> Batched:
+def _run(logs: Path, out: Path, executor: Here | None = None) -> Batched:
     return _batch(out, executor).run(jobs_of([str(logs)], str(out)))
 
 
@@ -198,14 +180,8 @@ def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
     shutil.copy(logs / "a.csv", logs / "r1/c.csv")
     (out / "r1").symlink_to(elsewhere)
 
-    class Real(Executor):
-        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-            future: Future[Any] = Future()
-            future.set_result(fn(*args, **kwargs))
-            return future
-
     sweep(open_store(str(out)))
-    reasons = {record.job.name: record.reason for record in _run(logs, out, Real()).records}
+    reasons = {record.job.name: record.reason for record in _run(logs, out, Here()).records}
     assert (
         reasons["r1/c"]
         == f"{out}/r1: a link, which is not followed; make it a folder, or choose another one "
@@ -240,7 +216,7 @@ def test_an_estimate_of_a_foreign_name_harms_no_other_column(logs: Path) -> None
 
 def test_the_table_is_written_for_changes_alone_and_touched_logs_run_again(logs: Path) -> None:
     out = logs.parent / "out"
-    executor = Failing()
+    executor = Here(_fail)
     batch = _batch(out, executor)
     jobs = jobs_of([str(logs)], str(out))
     batch.run(jobs)

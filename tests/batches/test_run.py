@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import json
 import shutil
 from collections.abc import Callable
@@ -23,7 +22,7 @@ from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
 from algid.batches.lock import locked
 from algid.batches.records import JobStatus
-from algid.batches.run import Batch, BatchConfig, Batched, sweep
+from algid.batches.run import Batch, BatchConfig, Batched
 from algid.batches.workers import WorkerDiedError
 from algid.identification.identify import identify
 from algid.notices import Notice
@@ -82,15 +81,6 @@ def _run(
     store = open_store(str(out))
     batch = Batch(store, replace(recipe, out=str(out)), executor or Here(), 1, lambda *_: None)
     return batch.run(jobs_of([str(logs)], str(out)), **more)
-
-
-def _digest(out: Path) -> dict[str, str]:
-    """Hashes of all results; jobs.parquet without its durations."""
-    files = {
-        str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in out.rglob("result.json")
-    }
-    return files | {"jobs": pl.read_parquet(out / "jobs.parquet").drop("seconds").write_json()}
 
 
 def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None:
@@ -157,24 +147,6 @@ def test_a_job_that_kills_its_workers_is_set_aside(logs: Path) -> None:
     ]
 
 
-def test_an_interrupted_batch_ends_as_an_undisturbed_one(logs: Path) -> None:
-    _run(logs)
-    undisturbed = _digest(logs.parent / "out")
-    shutil.rmtree(logs.parent / "out")
-
-    def vanish(name: str) -> None:
-        if name == "r1/b":
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        _run(logs, Here(vanish))
-    (logs.parent / "out/r1/.b.algid.algid-0123abcd").mkdir()
-    sweep(open_store(str(logs.parent / "out")))
-    _run(logs)
-    assert _digest(logs.parent / "out") == undisturbed
-    assert not list((logs.parent / "out").rglob(".b.algid*"))
-
-
 def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
     logs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -192,25 +164,6 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
     assert ended.stopped is not None
     monkeypatch.undo()
     assert _run(logs).ran == 2
-
-
-def test_a_stopped_batch_hands_out_no_more_jobs(logs: Path) -> None:
-    out = logs.parent / "out"
-    store = open_store(str(out))
-    batch = Batch(store, replace(CONFIG, out=str(out)), Here(), 1, lambda *_: batch.stop.set())
-    ended = batch.run(jobs_of([str(logs)], str(out)))
-    assert (ended.ran, ended.left) == (1, 2)
-
-
-def test_two_batches_on_one_folder(tmp_path: Path) -> None:
-    with (
-        locked(str(tmp_path)),
-        pytest.raises(OutputError, match="another batch is at work"),
-        locked(str(tmp_path)),
-    ):
-        pass
-    with locked(str(tmp_path)):
-        pass
 
 
 def test_parts_share_an_output_and_its_table_is_of_all(

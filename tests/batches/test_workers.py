@@ -8,9 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from algid.base.errors import SettingError
 from algid.batches.cluster import cluster
 from algid.batches.workers import CallFailedError, WorkerDiedError, Workers
 from tests.batches import calls
+from tests.batches.commands import ROOT, start, wait_until
 from tests.test_guard import lives
 
 
@@ -82,7 +81,7 @@ def test_workers_that_are_ended_leave_no_process(tmp_path: Path) -> None:
     idle = executor.submit(os.getpid).result()
     running = [executor.submit(calls.linger, str(told)), executor.submit(calls.spin)]
     waiting = executor.submit(calls.add, 1, 1)
-    _wait_until(lambda: told.exists() and told.read_text() != "")
+    wait_until(lambda: told.exists() and told.read_text() != "")
     executor.shutdown()
     assert not lives(int(told.read_text()))
     assert not lives(idle)
@@ -142,6 +141,7 @@ SCRIPT = """
 import threading
 from algid.batches.workers import Workers
 from tests.batches import calls
+from tests.batches.commands import ROOT, start, wait_until
 print("imported", flush=True)
 
 def work():
@@ -157,22 +157,15 @@ def test_workers_start_from_any_thread_import_no_main_and_die_with_their_parent(
 ) -> None:
     told, script = tmp_path / "pid", tmp_path / "parent.py"
     script.write_text(SCRIPT.format(told=str(told)))
-    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, str(script)]
     with subprocess.Popen(command, env=env, text=True, stdout=subprocess.PIPE) as parent:
-        _wait_until(lambda: told.exists() and told.read_text() != "")
+        wait_until(lambda: told.exists() and told.read_text() != "")
         assert lives(int(told.read_text()))
         parent.kill()
         assert parent.stdout is not None
         assert parent.stdout.read() == "imported\n"
-    _wait_until(lambda: not lives(int(told.read_text())))
-
-
-def _wait_until(condition: Callable[[], object]) -> None:
-    end = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    wait_until(lambda: not lives(int(told.read_text())))
 
 
 @pytest.mark.parametrize("address", [".", "", "x", "inproc://a"])
@@ -189,26 +182,18 @@ def test_what_is_no_address_of_a_scheduler_is_refused_at_once(address: str) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["silent", "other"])
-def test_a_scheduler_that_does_not_answer_as_one_gets_one_line(kind: str) -> None:
+def test_a_scheduler_that_does_not_answer_as_one_gets_one_line(kind: str, tmp_path: Path) -> None:
     pytest.importorskip("distributed", reason="distributed is absent")
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         if kind == "other":
             threading.Thread(target=_greet_as_another, args=(server,), daemon=True).start()
-        command = [sys.executable, "-m", "algid", "batch", __file__, "-o", "out", "--scheduler"]
-        with tempfile.TemporaryDirectory() as place:
-            done = subprocess.run(
-                [*command, f"tcp://127.0.0.1:{port}"],
-                cwd=place,
-                env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
-                capture_output=True,
-                text=True,
-                timeout=60,
-                check=False,
-            )
-    assert (done.returncode, done.stdout) == (2, "")
+        command = ("batch", __file__, "-o", tmp_path / "out", "--scheduler")
+        running = start(*command, f"tcp://127.0.0.1:{port}")
+        told, errors = running.communicate(timeout=60)
+    assert (running.returncode, told) == (2, "")
     assert re.fullmatch(
-        r"algid: --scheduler tcp://127.0.0.1:\d+: no scheduler answers \(.+\); .*\n", done.stderr
+        r"algid: --scheduler tcp://127.0.0.1:\d+: no scheduler answers \(.+\); .*\n", errors
     )
 
 
