@@ -68,8 +68,6 @@ class Option:
         The words that it may be; none where it may be others.
     argument : bool
         Whether it is typed without a flag.
-    or_file : bool
-        Whether it may be the path of a file.
     """
 
     kind: Any = None
@@ -82,7 +80,6 @@ class Option:
     help: str = ""
     words: Sequence[str] = ()
     argument: bool = False
-    or_file: bool = False
 
     @property
     def by_set(self) -> bool:

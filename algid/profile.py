@@ -102,12 +102,17 @@ class _Strict(BaseModel):
 
 
 class Channel(_Strict):
-    """The source of one channel: a column, or a topic and a field's path in its messages."""
+    """The source of one channel: a column, or a topic and a field's path in its messages.
+
+    `gear_ratio` is how often the encoder, or the motor, turns while the joint turns once: 1 for one
+    at the joint.
+    """
 
     topic: str | None = None
     source: str | None = None
     sign: Literal[1, -1] = 1
     offset: float = 0.0
+    gear_ratio: float = Field(default=1.0, gt=0)
 
     @property
     def column(self) -> str | None:
@@ -119,35 +124,29 @@ class Angle(Channel):
     """An angle: `offset` in rad is added after unit and sign.
 
     `counts` are encoder counts in one turn.
-
-    `gear_ratio` is how often the encoder turns while the joint turns once: 1 for one at the joint.
     """
 
     unit: AngleUnit | None = None
     counts: float | None = Field(default=None, gt=0)
-    gear_ratio: float = Field(default=1.0, gt=0)
     unwrap: bool = False
 
 
 class Velocity(Channel):
-    """A velocity: its unit a second (rpm: turns a minute), `gear_ratio` as of an angle."""
+    """A velocity: its unit a second (rpm: turns a minute)."""
 
     unit: VelocityUnit | None = None
     counts: float | None = Field(default=None, gt=0)
-    gear_ratio: float = Field(default=1.0, gt=0)
 
 
 class Torque(Channel):
     """A torque: `offset` in N m. Amperes need `torque_constant` in N m/A at the motor.
 
-    `gear_ratio` is how often the motor turns while the joint turns once: 1 for a torque at the
-    joint. Where none is logged, a PD law makes it: `kp` in N m/rad and `kd` in N m s/rad of the
-    desired angle in the column `q_des`, recorded as the angle is.
+    Where none is logged, a PD law makes it: `kp` in N m/rad and `kd` in N m s/rad of the desired
+    angle in the column `q_des`, recorded as the angle is.
     """
 
     unit: TorqueUnit | None = None
     torque_constant: float | None = Field(default=None, gt=0)
-    gear_ratio: float = Field(default=1.0, gt=0)
     kp: float | None = Field(default=None, gt=0)
     kd: float | None = Field(default=None, ge=0)
     q_des: str | None = None

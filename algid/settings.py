@@ -159,7 +159,7 @@ class Settings(BaseModel):
         """Terms asked for, by name; "delay" where it is to be estimated."""
         if self.model in ("auto", "plain"):
             return ()
-        return tuple(dict.fromkeys(name.strip() for name in self.model.split(",")))
+        return tuple(dict.fromkeys(parts_of(self.model)))
 
     @property
     def chooses(self) -> bool:
@@ -209,7 +209,7 @@ class Settings(BaseModel):
                     f"{flag('model')}: {term} has no meaning without {needed}; add {needed} to the "
                     "list"
                 )
-        gone = set(self.terms) - set(without_terms(self.effort, self.terms))
+        gone = set(self.terms).difference(without_terms(self.effort, self.terms))
         if gone:
             raise SettingError(
                 f"{flag('model')}: torque that is {self.effort} has no {min(gone)}; leave it out, "

@@ -136,8 +136,7 @@ def identify(
 def typed(given: dict[str, Any]) -> dict[str, Any]:
     """What a command gives: beside the parameters of an arm its logs are of the loaded one."""
     if "parameters" in given:
-        loaded = [*given["unloaded"], *given.get("loaded", ())]
-        return given | {"unloaded": [], "loaded": loaded}
+        given["loaded"] = [*given.pop("unloaded"), *given.get("loaded", ())]
     return given
 
 

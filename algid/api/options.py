@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 from pydantic import Field
 
 from algid.base.errors import SettingError
-from algid.base.files import as_toml, parsed_toml, whole_folder
+from algid.base.files import parsed_toml, whole_folder
 from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, Range
 from algid.options import ADVANCED, Option, flag
 from algid.profile import Effort, Profile, load_profile, over, with_settings
@@ -57,7 +57,7 @@ Channel = Mapping[str, Any]
 
 
 class LogOptions(TypedDict, total=False):
-    """Keywords of a verb that reads logs: the fields of `Profile`."""
+    """Keywords of a verb that reads logs: the fields of `Profile` but for the arm's prior."""
 
     topic: str | None
     joints: Sequence[str] | None
@@ -80,8 +80,6 @@ class LogOptions(TypedDict, total=False):
     start: float | None
     end: float | None
     torque_file: str | Path | None
-    prior: str | Path | None
-    prior_error: float | None
     segment: int | None
     accept: Iterable[str]
     theta1: Channel
@@ -102,6 +100,8 @@ class Options(LogOptions, total=False):
     poles: Iterable[complex] | str | None
     window: float | None
     bandwidth: float
+    prior: str | Path | None
+    prior_error: float | None
     model: str
     torque_hold: Literal["auto", "foh", "zoh"]
     delay: float
@@ -195,21 +195,20 @@ def set_by(lines: Iterable[str], known: Collection[str]) -> dict[str, Any]:
     SettingError
         If a line is none, or sets what is not known.
     """
-    document, found = "", dict[str, Any]()
+    found = dict[str, Any]()
     for line in lines:
         name, equals, text = line.partition("=")
-        try:
-            parsed_toml(f"value = {text}")
-        except (ValueError, RecursionError):
-            text = as_toml(text.strip())
-        document += f"{name}{equals}{text}\n"
-        try:
-            found = parsed_toml(document)
-        except (ValueError, RecursionError) as error:
-            raise SettingError(
-                f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1, each key once"
-            ) from error
-        refuse_unknown(found, known)
+        channel, dot, key = map(str.strip, name.partition("."))
+        if not (equals and channel):
+            raise SettingError(f"{flag('set')} {line}: expected KEY=VALUE like tau1.sign=-1")
+        value: Any = text.strip()
+        with suppress(ValueError, RecursionError):
+            value = parsed_toml(f"value = {text}")["value"]
+        if dot:
+            before = found.get(channel)
+            value = (before if isinstance(before, dict) else {}) | {key: value}
+        found[channel] = value
+    refuse_unknown(found, known)
     return found
 
 

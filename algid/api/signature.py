@@ -76,7 +76,6 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
             words=words,
             check=stated.check or (Literal[*words] if words else None),
             argument=argument,
-            or_file=Path in kinds,
         )
     return found
 

@@ -21,7 +21,7 @@ from algid.api.options import (
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
-from algid.check import Judged, judge
+from algid.check import judge
 from algid.options import Option, flag
 from algid.results import Result
 
@@ -100,40 +100,35 @@ def validate(
     from algid.identification.identify import reused
     from algid.identification.open_logs import open_sources, read_otherwise
     from algid.identification.recordings import Recordings
+    from algid.identification.urdf import read_urdf
     from algid.identification.validate import predictor_of
     from algid.identification.validate import simulate as roll
     from algid.identification.validate import validate as predicted
     from algid.identification.validated import Validated
 
-    known, file = None, called(result)
     own, logs, loaded = meant(profile, options, logs, loaded)
-    judged: tuple[Judged, ...] = ()
-    if max_error is not None:
-        judged = tuple(judge(opened(result), max_error))
+    judged = () if max_error is None else tuple(judge(opened(result), max_error))
     if logs is None and loaded is None:
         if max_error is None:
             raise SettingError(
                 f"validate: expected a log, found none; give one, or {flag('max_error')}"
             )
         return Validated({}, None, judged=judged)
+    known, file = None, called(result)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
-        from algid.identification.urdf import read_urdf
-
         model = read_urdf(Path(result))
     else:
         known = opened(result)
         model, own = predictor_of(known, file), reused(own, known)
     gravity = model.model.gravity
     sources = open_sources(logs, "unloaded", own, gravity)
-    sources += open_sources(loaded, "loaded", own, gravity)
-    survey = Recordings(sources, progress)
+    survey = Recordings(sources + open_sources(loaded, "loaded", own, gravity), progress)
     survey.begin("prediction")
     validation = predicted(model, survey)
-    rolled, warnings = None, []
-    if simulate:
-        rolled = roll(model, survey)
+    rolled = roll(model, survey) if simulate else None
+    warnings = list[str]()
     if known is not None:
-        summaries = [survey.summary(log) for log in survey.logs]
+        summaries = list(map(survey.summary, survey.logs))
         warnings = [one.sentence for one in read_otherwise(summaries, known, file)]
     return Validated(validation.logs, validation.total, rolled, tuple(warnings), max_nrmse, judged)
 

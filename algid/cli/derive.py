@@ -178,15 +178,16 @@ def _parameter(one: Option) -> click.Parameter:
 
 
 def _completion(one: Option) -> Callable[..., list[CompletionItem]]:
-    """Completes the last of several words, separated by commas and each used once."""
+    """Completes the last of several words, separated by commas and each used once; else a file."""
 
     def complete(_ctx: object, _parameter: object, incomplete: str) -> list[CompletionItem]:
         before, comma, last = incomplete.rpartition(",")
-        used = before.split(",")
-        words = one.suggested() if one.suggested else one.words
-        found = [word for word in words if word.startswith(last) and word not in used]
-        files = [CompletionItem(incomplete, type="file")] if one.or_file else []
-        return files + [CompletionItem(before + comma + word) for word in found]
+        found = [
+            CompletionItem(before + comma + word)
+            for word in (one.suggested() if one.suggested else one.words)
+            if word.startswith(last) and word not in before.split(",")
+        ]
+        return found or [CompletionItem(incomplete, type="file")]
 
     return complete
 
@@ -196,12 +197,10 @@ def _of_logs(verb: Callable[..., Any]) -> dict[str, Option]:
     *_, last = inspect.signature(verb).parameters.values()
     if last.kind is not last.VAR_KEYWORD:
         return {}
+    from algid.api import options
     from algid.profile import Profile
-    from algid.settings import OF_PRIOR, Settings
+    from algid.settings import Settings
 
-    found = dict(options_of(Profile))
-    if "Unpack[Options]" in str(last.annotation):
-        return {**found, **options_of(Settings)}
-    for name in OF_PRIOR:  # what an arm is said to be is no log's
-        del found[name]
-    return found
+    taken = vars(options)[last.annotation.removeprefix("Unpack[")[:-1]].__annotations__
+    every = {**options_of(Profile), **options_of(Settings)}
+    return {name: one for name, one in every.items() if name.partition(".")[0] in taken}
