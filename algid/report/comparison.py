@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,6 +26,8 @@ from algid.results import Result
 from algid.results.rows import row_of
 
 NAME = "compare.html"
+ASIDE = re.compile(r"command|used\..*|.*told")
+"""Settings that are no difference: a command names the logs and says again what is set."""
 FAR = sigmas()
 """σ, beyond which chance does not explain a difference."""
 COLOURS = (BLUE, ORANGE, GREEN, RED, GREY)
@@ -84,15 +87,12 @@ class Comparison:
     @cached_property
     def settings(self) -> dict[str, list[str]]:
         """What was set otherwise, and how the first log of each kind was read otherwise."""
-        every = []
+        every, differ = list[dict[str, str]](), dict[str, list[str]]()
         for one in self.results:
             every.append(settings_of(one) | {"estimator": one.estimator, "algid": one.version})
-        differ = dict[str, list[str]]()
         for name in dict.fromkeys(name for settings in every for name in settings):
             values = [settings.get(name, ABSENT) for settings in every]
-            # a command names the logs and says again what is set; who told is no difference
-            aside = name == "command" or name.startswith("used.") or name.endswith("told")
-            if not aside and len(set(values)) > 1:
+            if len(set(values)) > 1 and not ASIDE.fullmatch(name):
                 differ[name] = values
         return differ
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from algid.arm import CONSTANT_NAMES
 from algid.base.progress import Progress
 from algid.base.text import file_name, joined, significant
 from algid.base.words import counted
@@ -22,10 +21,11 @@ from algid.report.tables import (
     parameter_tables,
     prediction_table,
     provenance_table,
-    result_settings,
+    settings_of,
+    settings_table,
     terms_table,
 )
-from algid.results import Result, Status, read_result
+from algid.results import Result, read_result
 from algid.results.verdict import replaced_estimator
 
 
@@ -80,7 +80,7 @@ def result_document(
     notes, asked = [one.sentence for one in result.verdict.notes], replaced_estimator(result)
     estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
     origin = [("algid", result.version), ("estimator", estimator)]
-    made_by = [result_settings(result), provenance_table(origin, result.logs)]
+    made_by = [settings_table(settings_of(result)), provenance_table(origin, result.logs)]
     title = "The paper's figure and tables"
     of_paper = Section("paper", title, [*paper, *paper_tables(result)], not leads)
     may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
@@ -100,7 +100,7 @@ def result_document(
         Section("settings", "Settings and provenance", made_by, folded=True),
         *([] if leads else [of_paper]),
     ]
-    constants = [one.status for name, one in result.parameters.items() if name in CONSTANT_NAMES]
+    constants = [row[4] for row in arm[0].rows]
     seconds = significant(sum(log.duration for log in result.logs), 4)
     return Document(
         title=f"Identification of {names[0]}",
@@ -108,7 +108,7 @@ def result_document(
         sections=sections,
         kicker="identification of a two-link arm",
         name=joined(names, 1),
-        facts=f"{constants.count(Status.OK)} of {counted(len(constants), 'constant')} identified · "
+        facts=f"{constants.count('OK')} of {counted(len(constants), 'constant')} identified · "
         f"{result.estimator} estimator · {seconds} s of log at "
         f"{significant(result.log.rate, 4)} Hz · "
         f"{counted(sum(log.rows for log in result.logs), 'sample')}",

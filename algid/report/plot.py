@@ -141,8 +141,7 @@ class Panels:
     def heat(self, names: Sequence[str], x: Any, z: FloatArray, **more: Any) -> None:
         """Fill the only panel with a map of numbers, a row a name."""
         rows = list(map(label, names))
-        self.add(0, x, rows, "map", type="heatmap", z=packed(z), ygap=3, **more)
-        self.data[-1]["showlegend"] = False
+        self.add(0, x, rows, "map", type="heatmap", z=packed(z), ygap=3, showlegend=False, **more)
         self.axes(0, y={"autorange": "reversed", "type": "category"})
         self.layout["height"] = 110 + 30 * len(rows)
 

@@ -25,6 +25,7 @@ from algid.base.progress import Progress
 from algid.base.quantiles import median
 
 Block = dict[str, FloatArray]
+AGAIN = "identify again with this version"
 ROWS = 1 << 18
 POINTS = 2_400
 """Of a series: twice what a page is wide."""
@@ -45,8 +46,7 @@ def _parquet(path: Path) -> Iterator[Any]:
             yield file
     except (OSError, pyarrow.lib.ArrowException) as error:
         reason = str(error).partition("\n")[0]
-        text = f"{path}: cannot read it as Parquet ({reason}); identify again with this version"
-        raise ResultError(text) from error
+        raise ResultError(f"{path}: cannot read it as Parquet ({reason}); {AGAIN}") from error
 
 
 def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[Block]:
@@ -60,10 +60,9 @@ def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[
         If the file cannot be read, or lacks a column.
     """
     with _parquet(path) as file:
-        missing = [name for name in names if name not in file.schema_arrow.names]
+        missing = set(names) - set(file.schema_arrow.names)
         if missing:
-            again = "identify again with this version"
-            raise ResultError(f"{path}: it has no column {missing[0]!r}; {again}")
+            raise ResultError(f"{path}: it has no column {min(missing)!r}; {AGAIN}")
         for batch in file.iter_batches(batch_size=rows, columns=list(names) or None):
             yield {name: numbers_of(batch.column(name)) for name in batch.schema.names}
 
@@ -150,15 +149,15 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
                 near = rows_of(part, np.abs(t - t[place]) <= HALF)
                 worst[joint] = float(size[place]), float(t[place]), log, near
         # which sample of a stretch moves by the golden ratio: never in step with the motion
-        at = np.arange(0, t.size, step)
-        at = np.minimum(at + (step * np.mod(at / step * GOLDEN, 1)).astype(int), t.size - 1)
+        at = np.arange(-(-t.size // step))
+        at = np.minimum((step * (at + np.mod(at * GOLDEN, 1))).astype(int), t.size - 1)
         samples.append(rows_of(part, at))
         parts.append(reduced(part, bucket))
         done += t.size
         if progress is not None:
             progress("report", done, total)
     if not parts:
-        raise ResultError(f"{path}: it holds no rows; identify again with this version")
+        raise ResultError(f"{path}: it holds no rows; {AGAIN}")
     columns = concatenated(parts)
     apart = np.diff(columns["t"]) > CUT * bucket * period
     broken = np.flatnonzero(apart | (np.diff(columns["log"]) > 0)) + 1

@@ -176,8 +176,12 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
 
 
 def settings_table(settings: Mapping[str, Any]) -> Table:
-    """Settings by dotted name."""
-    return Table("Settings", "Setting | Value", list(flat_settings(settings).items()))
+    """The settings that are set by dotted name, less those of channels."""
+    rows = []
+    for name, text in flat_settings(settings).items():
+        if text != ABSENT and ".channels." not in name:
+            rows.append((name, text))
+    return Table("Settings", "Setting | Value", rows)
 
 
 def settings_of(result: Result) -> dict[str, str]:
@@ -195,16 +199,6 @@ def settings_of(result: Result) -> dict[str, str]:
         if log.reading is not None
     }
     return flat_settings(result.settings | read | {"used": used})
-
-
-def result_settings(result: Result) -> Table:
-    """The settings that are set, less those of channels."""
-    rows = settings_of(result).items()
-    return Table(
-        "Settings",
-        "Setting | Value",
-        [row for row in rows if row[1] != ABSENT and ".channels." not in row[0]],
-    )
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:

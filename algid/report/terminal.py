@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from algid.base.text import visible
-from algid.base.verdict import Grade, Verdict
+from algid.base.verdict import Grade
 from algid.report.brief import verdict_lines
 from algid.report.document import Document, Kind, Table
 from algid.results import Status
@@ -27,19 +27,15 @@ LONGEST = 4_000  # characters of a cell: a command that names many logs is there
 
 def print_document(document: Document, console: Console) -> None:
     """Print the verdict, what was found, and what is known against it, to `console`."""
-    print_verdict(document.verdict, console)
-    for table in document.tables():
-        console.print()
-        print_table(table, console, failed=document.verdict.failed)
-
-
-def print_verdict(judged: Verdict, console: Console) -> None:
-    """Print grade and headline, every reason, and what to run first."""
     from rich.text import Text
 
+    judged = document.verdict
     shown = Text("\n".join(verdict_lines(judged, console.width)))
     shown.stylize(GRADE_STYLES[judged.grade], 0, len(judged.word))
     console.print(shown, soft_wrap=True)
+    for table in document.tables():
+        console.print()
+        print_table(table, console, failed=judged.failed)
 
 
 def print_table(table: Table, console: Console, *, failed: bool = False) -> None:
