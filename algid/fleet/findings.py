@@ -50,7 +50,7 @@ FINDING = (
     *("kind", "robot", "job", "parameter", "time", "before"),
     *("value", "half", "expected", "sigmas"),
 )
-TINY = 1e-300  # no information
+ROUNDING = 1e-9  # of all information: less is none
 MAD = 1.4826  # from the median of absolute deviations to a standard deviation
 
 
@@ -167,7 +167,7 @@ def line(own: pl.DataFrame, *by: str) -> pl.DataFrame:
     total, logs = w.sum(), pl.len().cast(pl.Int64)
     mean, off = (w * y).sum() / total, t - (w * t).sum() / total
     spread = (w * off**2).sum()
-    slope = pl.when(spread > 1e-9 * total).then((w * off * y).sum() / spread)
+    slope = pl.when(spread > ROUNDING * total).then((w * off * y).sum() / spread)
     residual = y - mean - slope.fill_null(0.0) * off
     scale = ((w * residual**2).sum() / (logs - 2).clip(1)).clip(1.0)
     return own.group_by(*by, "parameter", maintain_order=True).agg(
@@ -210,18 +210,19 @@ def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list
     start : int
         The place of the first log.
     """
-    n = t.size
-    if n < 2 * BESIDE:
+    n, known = t.size, w.any(axis=1)
+    if n < 2 * BESIDE or not known.any():
         return []
-    middle = _medians(y)
-    reach = OUTLYING * MAD * _medians(abs(y - middle))
-    calm = np.where(w > 0, np.clip(y, middle - reach, middle + reach), 0.0)
+    y, w = y[known], w[known]
+    off = y - np.nanmedian(y, axis=1, keepdims=True)
+    reach = OUTLYING * MAD * np.nanmedian(abs(off), axis=1, keepdims=True)
+    calm = np.clip(np.nan_to_num(off), -reach, reach)
     total = w.sum(axis=1, keepdims=True)
-    calm -= (w * calm).sum(axis=1, keepdims=True) / np.maximum(total, TINY)
+    calm -= (w * calm).sum(axis=1, keepdims=True) / total
     # what the difference of the two means is known by: of information left and right, both needed
     left, sums = np.cumsum(w, axis=1)[:, :-1], np.cumsum(w * calm, axis=1)[:, :-1]
-    pooled = left * (total - left) / np.maximum(total, TINY)
-    explained = sums**2 / np.maximum(pooled, TINY)
+    pooled = left * (total - left) / total
+    explained = sums**2 / np.maximum(pooled, ROUNDING * total)
     squares = (w * calm**2).sum(axis=1, keepdims=True)
     freedom = np.maximum(np.count_nonzero(w, axis=1, keepdims=True) - 2, 1)
     scale = np.maximum((squares - explained) / freedom, 1.0)
@@ -229,8 +230,9 @@ def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list
     at = BESIDE - 1 + int(gain[BESIDE - 1 : n - BESIDE].argmax())
     p = (n - 1) * float(gammaincc(len(y) / 2, gain[at] / 2))
     # what a line explains of the same scatter
-    off = t - w @ t[:, None] / np.maximum(total, TINY)
-    sloped = (w * off * calm).sum(axis=1) ** 2 / np.maximum((w * off**2).sum(axis=1), TINY)
+    off = t - w @ t[:, None] / total
+    spread = np.maximum((w * off**2).sum(axis=1), ROUNDING * total[:, 0])
+    sloped = (w * off * calm).sum(axis=1) ** 2 / spread
     if p >= CHANGED or (sloped / scale[:, at]).sum() > gain[at]:
         return []
     cut = at + 1
@@ -239,9 +241,3 @@ def changes(t: FloatArray, y: FloatArray, w: FloatArray, start: int = 0) -> list
         start + cut,
         *changes(t[cut:], y[:, cut:], w[:, cut:], start + cut),
     ]
-
-
-def _medians(known: FloatArray) -> FloatArray:
-    """The median (P, 1) of each row, 0 of one without a number."""
-    empty = np.isnan(known).all(axis=1, keepdims=True)
-    return np.asarray(np.nanmedian(np.where(empty, 0.0, known), axis=1, keepdims=True))

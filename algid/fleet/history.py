@@ -34,30 +34,30 @@ def read_jobs(path: Path) -> pl.DataFrame:
     """
     expected = "expected jobs.parquet of algid batch"
     try:
-        names = list(pl.read_parquet_schema(path))
-        missing = [name for name in ("job", "robot", "status", "time") if name not in names]
+        jobs = pl.read_parquet(path)
+        told = ("job", "robot", "status", "time")
+        missing = [name for name in told if name not in jobs.columns]
         if missing:
             raise ResultError(f"{path}: no column {', '.join(missing)}; {expected}")
-        pairs = [(name, f"{name}_std") for name in (*PARAMETERS, "m_p")]
-        numbers = [name for pair in pairs if {*pair} <= {*names} for name in pair]
-        numbers += ["label_payload"] if "label_payload" in names else []
-        jobs = pl.read_parquet(path, columns=["job", "robot", "status", "time", *numbers])
+        payload = ("label_payload", "m_p", "m_p_std")
+        none = {name: pl.lit(None) for name in payload if name not in jobs.columns}
+        followed = [name for name in PARAMETERS if {name, f"{name}_std"} <= {*jobs.columns}]
         # a manifest's labels may be words: then they are no numbers
-        number = pl.col(numbers).cast(pl.Float64, strict=False)
-        jobs = jobs.with_columns(
+        number = pl.col(*payload, *followed, *(f"{name}_std" for name in followed))
+        number = number.cast(pl.Float64, strict=False)
+        age = pl.col("time") - pl.col("time").min().over("robot")
+        t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
+        jobs = jobs.with_columns(pl.col("time").cast(pl.Datetime("us", "UTC")), **none).select(
             pl.col("job", "robot", "status").cast(pl.String),
-            pl.col("time").cast(pl.Datetime("us", "UTC")),
+            "time",
             pl.when(number.abs() <= LIMITS.largest_value).then(number),
+            t=t,
+            month=t.floor().cast(pl.Int32),
         )
     # a panic of polars is no Exception
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
         raise ResultError(f"{path}: cannot read it ({reason}); {expected}") from error
-    lacking = {*("label_payload", "m_p", "m_p_std")} - {*numbers}
-    age = pl.col("time") - pl.col("time").min().over("robot")
-    t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
-    none = {name: pl.lit(None, pl.Float64) for name in lacking}
-    jobs = jobs.with_columns(t=t, month=t.floor().cast(pl.Int32), **none)
     return jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
 
 

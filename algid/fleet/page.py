@@ -58,7 +58,6 @@ def write_history(history: History, out: Path, batch: Path) -> tuple[Document, l
         ),
         kicker="a fleet's history",
         name="Fleet",
-        facts=_size(history, " · "),
         made=f"Made by algid {__version__}.",
     )
     with whole_file(out / "fleet.html") as temporary:
@@ -78,14 +77,9 @@ def verdict(history: History) -> Verdict:
             names += [f"{len(found) - MOST_NAMED} more"] if len(found) > MOST_NAMED else []
             numbers = {"case": kind, "count": len(found), "names": names}
             reasons.append(Notice("FLEET_CHANGE", numbers=numbers))
-    headline = f"{_size(history, ', ')}: {joined(counts) or 'no findings'}"
+    fleet = f"{counted(history.roster.height, 'robot')}, {counted(history.jobs.height, 'log')}"
+    headline = f"{fleet}: {joined(counts) or 'no findings'}"
     return graded(headline, reasons + history.untested)
-
-
-def _size(history: History, between: str) -> str:
-    """How many robots and logs there are."""
-    robots = counted(history.roster.height, "robot")
-    return f"{robots}{between}{counted(history.jobs.height, 'log')}"
 
 
 def robot_table(history: History, links: Links) -> Table:

@@ -169,3 +169,11 @@ def test_robots_of_a_log_each_may_be_sessions_of_one(tmp_path: Path) -> None:
     one = _history(_jobs(1, 15, seed=24).with_columns(robot=pl.col("job")), tmp_path)
     (alone,) = verdict(one).reasons
     assert alone.numbers["count"] == 15
+
+
+def test_estimates_that_end_are_no_change(tmp_path: Path) -> None:
+    """Of their information nothing is left behind the last one, but for rounding."""
+    jobs = _jobs(50, 40, seed=25)
+    day = pl.col("time").rank("dense").over("robot")
+    ended = jobs.with_columns(pl.when(day <= 17).then(pl.col("k1", "k1_std")))
+    assert not _history(ended, tmp_path).findings.filter(kind="step").height
