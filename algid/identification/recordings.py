@@ -284,7 +284,7 @@ class Recordings:
             alone=len(alike) == 1,
             known=self._known[log.role],
         )
-        notices = admitted(begin, found, whole=whole)
+        notices = admitted(begin, found)
         if len(alike) == 1 and any(one.code in CONTRADICTIONS for one in notices):
             self._limits[log.role] = ()  # of an arm that is not this one
         return notices

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 
@@ -31,7 +31,8 @@ def examine(
 ) -> tuple[Notice, ...]:
     """Everything that the checks find in a log.
 
-    Conventions are not sought in one that a check refuses.
+    Conventions are not sought in one that a check refuses. A refusal names what overrides it, and
+    warns where that is accepted, or where the log goes on.
 
     Parameters
     ----------
@@ -67,41 +68,35 @@ def examine(
         *sampling(log),
         *rests(log, whole),
     ]
-    notices = tuple(yielding(notice, log.origin.reading.accepted) for notice in every)
-    if effort == "external" or not alone or any(notice.refuse for notice in notices):
-        return notices
-    found = mend(log.origin, tried()) or doubted(log.origin, tried())
-    return (*notices, found) if found else notices
+    notices = []
+    for one in every:
+        if one.refuse and one.code in log.origin.reading.accepted:
+            numbers = {**one.numbers, "accepted": True}
+            one = replace(one, refuse=False, remedies=(), text="", numbers=numbers)
+        elif one.refuse:
+            override = Remedy({"accept": one.code}, "to use it nevertheless")
+            one = replace(one, remedies=(*one.remedies, override))
+        notices.append(one)
+    if effort != "external" and alone and not any(one.refuse for one in notices):
+        found = mend(log.origin, tried()) or doubted(log.origin, tried())
+        notices += [found] if found else []
+    if whole:
+        return tuple(notices)
+    place = {"looked_at": round(log.duration)}
+    return tuple(
+        replace(one, refuse=False, text="", numbers={**one.numbers, **place}) for one in notices
+    )
 
 
-def admitted(log: Log, found: Iterable[Notice], *, whole: bool = True) -> tuple[Notice, ...]:
-    """What `examine` finds in a log that is used nevertheless, or in its beginning.
+def admitted(log: Log, found: tuple[Notice, ...]) -> tuple[Notice, ...]:
+    """What `examine` finds in a log that is used nevertheless.
 
     Raises
     ------
     LogError
-        If a check forbids the use of a log that is all there.
+        If a check forbids the use of the log.
     """
-    notices, looked_at = [], 0 if whole else round(log.duration)
-    for notice in found:
-        if notice.refuse and whole:
-            raise LogError(f"{log.origin.path}: {notice.code}: {notice.clause}")
-        if looked_at:
-            numbers = dict(notice.numbers) | {"looked_at": looked_at}
-            notice = replace(notice, text="", numbers=numbers)
-        notices.append(replace(notice, refuse=False))
-    return tuple(notices)
-
-
-def yielding(notice: Notice, accepted: Collection[str]) -> Notice:
-    """A refusal with what overrides it, or as a warning where its code is in `accepted`.
-
-    Else the same.
-    """
-    if not notice.refuse:
-        return notice
-    if notice.code in accepted:
-        numbers = {**notice.numbers, "accepted": True}
-        return replace(notice, refuse=False, remedies=(), text="", numbers=numbers)
-    override = Remedy({"accept": notice.code}, "to use it nevertheless")
-    return replace(notice, remedies=(*notice.remedies, override))
+    for one in found:
+        if one.refuse:
+            raise LogError(f"{log.origin.path}: {one.code}: {one.clause}")
+    return found

@@ -10,7 +10,7 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.base.errors import LogError
-from algid.inspection.checks import admitted, examine, yielding
+from algid.inspection.checks import admitted, examine
 from algid.inspection.conventions import judged
 from algid.inspection.figures import dynamic_figures, signal_figures
 from algid.log import Log, Origin
@@ -24,7 +24,7 @@ from pipelines.accuracy_scenes import random_arm
 K = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3).constants()
 
 
-def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
+def moving_log(rows: int = 6000, pace: float = 1.0, k: FloatArray = K) -> Log:
     """Closed-form motion and the torque that eq. (1) gives for it, 1 kHz, with
     measurement noise.
     """
@@ -37,7 +37,7 @@ def moving_log(rows: int = 6000, pace: float = 1.0) -> Log:
             theta[joint] += size * np.sin(rate * t)
             omega[joint] += size * rate * np.cos(rate * t)
             alpha[joint] -= size * rate**2 * np.sin(rate * t)
-    tau = inverse_dynamics(K, theta, omega, alpha) + draw.normal(0, 0.02, (2, rows))
+    tau = inverse_dynamics(k, theta, omega, alpha) + draw.normal(0, 0.02, (2, rows))
     noisy = theta + draw.normal(0, 1e-4, theta.shape)
     return Log(np.arange(rows) * 1_000_000, noisy, tau, Origin("arm.csv", "csv", {}), omega)
 
@@ -50,7 +50,7 @@ def signals_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def noticed(log: Log, *, whole: bool = True) -> tuple[Notice, ...]:
     """What the checks find in a log that is used nevertheless."""
-    return admitted(log, examine(log, whole=whole), whole=whole)
+    return admitted(log, examine(log, whole=whole))
 
 
 def codes(log: Log) -> list[str]:
@@ -164,20 +164,12 @@ def test_encoders_and_rest_make_no_lost_samples() -> None:
         assert "LOST_SAMPLES" not in codes(replace(log, theta=theta))
 
 
-def test_a_refusal_alone_names_what_overrides_it_and_yields_to_that() -> None:
-    refusal, warning = (
-        Notice("EFFORT_ZERO", numbers={"case": "zero", "channel": "tau2"}, refuse=True),
-        Notice("RESTS", "the arm rests"),
-    )
-    assert yielding(warning, ()) == warning
-    assert yielding(warning, ("RESTS",)) == warning
-    named = yielding(refusal, ("RESTS",))
-    assert named.refuse
-    assert (
-        named.clause == "tau2 is zero in every sample: to use it nevertheless: --accept EFFORT_ZERO"
-    )
-    accepted = yielding(refusal, ("RESTS", "EFFORT_ZERO"))
-    assert not accepted.refuse
+def test_a_refusal_names_what_overrides_it_and_yields_to_that() -> None:
+    log = spoiled("EFFORT_ZERO")
+    (refused,) = examine(log)
+    assert refused.advice.endswith("to use it nevertheless: --accept EFFORT_ZERO")
+    reading = replace(log.origin.reading, accepted=("EFFORT_ZERO",))
+    accepted = noticed(replace(log, origin=replace(log.origin, reading=reading)))[0]
     assert accepted.text == "tau2 is zero in every sample (accepted by --accept)"
 
 

@@ -12,14 +12,12 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.inspection.checks import examine
 from algid.inspection.conventions import judged, mend
 from algid.log import Log
 from algid.notices import Notice
 from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
-from tests.cli.commands import profile_from
 from tests.inspection.test_checks import moving_log
 
 RIGHT = moving_log()
@@ -110,15 +108,3 @@ def test_settings_change_what_a_profile_said(
     assert found is not None
     log = read_log(path, with_settings(profile, found.remedies[0].keywords))
     assert mended(log) is None
-
-
-def test_a_finding_names_flags_that_the_command_line_takes(tmp_path: Path) -> None:
-    path = written(tmp_path / "arm.csv", *recorded("base, tau2 reversed"))
-    (finding,) = [one for one in examine(read_log(path)) if one.code == "WRONG_CONVENTION"]
-    assert "--set drive=base" in finding.clause
-    assert finding.remedies[0].flags == ("--set", "tau2.sign=-1", "--set", "drive=base")
-    profile = profile_from({"set": ["tau2.sign=-1", "drive=base"]})
-    assert profile is not None
-    log = read_log(path, profile)
-    assert log.tau == pytest.approx(RIGHT.tau)
-    assert "WRONG_CONVENTION" not in [one.code for one in examine(log)]

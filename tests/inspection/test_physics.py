@@ -13,7 +13,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.arm import Arm, inverse_dynamics
 from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.conventions import judged, mend
 from algid.inspection.draft import draft_profile
@@ -24,48 +23,16 @@ from algid.profile import load_profile
 from algid.readers import read_log
 from algid.readers.table import CHANNELS
 from tests.cli.commands import profile_from
-from tests.inspection.test_checks import moving_log, noticed
+from tests.inspection.test_checks import K, moving_log, noticed
 from tests.readers.logs import EPOCH_NS
 from tests.readers.mcaps import joint_state, write_mcap
-
-ARM = Arm(6, 3, 0.15, 0.1, 0.3, 0.2, 0.1, 0.02, 1.5, 0.3)
-K = ARM.constants()
-
-
-def swung(turn: float = 0.0, gain: float = 1.0, weight: bool = True, rate: float = 400.0) -> Log:
-    """Slow closed-form motion with eq. (1)'s torque.
-
-    θ1 is read `turn` too large, the torque `gain` times.
-    """
-    t = np.arange(round(20 * rate)) / rate
-    theta = np.stack(
-        [np.sin(0.9 * t) + 0.3 * np.sin(2.3 * t), 1.1 * np.sin(1.3 * t) + 0.4 * np.cos(1.9 * t)]
-    )
-    omega = np.stack(
-        [
-            0.9 * np.cos(0.9 * t) + 0.69 * np.cos(2.3 * t),
-            1.43 * np.cos(1.3 * t) - 0.76 * np.sin(1.9 * t),
-        ]
-    )
-    alpha = np.stack(
-        [
-            -0.81 * np.sin(0.9 * t) - 1.587 * np.sin(2.3 * t),
-            -1.859 * np.sin(1.3 * t) - 1.444 * np.cos(1.9 * t),
-        ]
-    )
-    k = K.copy()
-    if not weight:
-        k[[1, 3]] = 0
-    tau = gain * inverse_dynamics(k, theta, omega, alpha)
-    stamps = np.rint(t * 1e9).astype(np.int64)
-    return Log(stamps, theta + np.array([[turn], [0.0]]), tau, Origin("arm.csv", "csv", {}))
 
 
 def test_conventions_are_judged_over_all_stretches() -> None:
     """None of ten stretches of 1 s shows a convention by itself."""
-    log = swung()
+    log = moving_log(20_000)
     kept = (log.t % 2.0) > 1.0
-    log = replace(log, stamp_ns=log.stamp_ns[kept], theta=log.theta[:, kept], tau=log.tau[:, kept])
+    log = Log(log.stamp_ns[kept], log.theta[:, kept], log.tau[:, kept], log.origin)
     right = judged(log)
     assert right is not None
     assert (right.alone, right.best.convention) == (True, AS_READ)
@@ -109,7 +76,7 @@ def test_a_slow_log_tells_where_gravity_pulls(
 
 
 def test_torques_without_weight_and_of_noise() -> None:
-    light = swung(weight=False)
+    light = moving_log(20_000, 0.5, np.where([0, 1, 0, 1, 0, 0, 0], 0.0, K))
     (found,) = [one for one in noticed(light) if one.code in CONVENTIONAL]
     assert found.code == "GRAVITY_COMPENSATED"
     assert [one.settings for one in found.remedies] == [
@@ -120,7 +87,7 @@ def test_torques_without_weight_and_of_noise() -> None:
 
 
 def test_figures_of_a_log_are_those_of_its_arm() -> None:
-    log = swung()
+    log = moving_log()
     found = dynamic_figures(judged(log))
     assert found is not None
     assert (found.weight1, found.weight2) == pytest.approx((K[3], K[1]), rel=2e-3)
