@@ -131,11 +131,11 @@ def export(
     4
     """
     from algid.exports.formats import controller_call, exported
-    from algid.exports.links import Knowns
 
     if to in ("csv", "parquet") and draws is None:
         raise SettingError(f"{flag('to')} {to}: a table of draws; say how many by {flag('draws')}")
-    knowns = Knowns(l1, l2, m1, m2, rotor1)
+    said = {"l1": l1, "l2": l2, "m1": m1, "m2": m2, "rotor1": rotor1}
+    knowns = {name: value for name, value in said.items() if value is not None}
     if flange is not None and to != "payload":
         raise SettingError(f"{flag('flange')}: {to} holds no flange; leave it out")
     path = None if out is None else Path(out)

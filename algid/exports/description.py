@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -77,35 +77,33 @@ class Description:
     ----------
     name : str, a word of letters, digits and underscores
     source : str, the result's file and estimator
+    result : Result
     model : Model, of its torque
     value : its coefficients by name, zero for those that the model lacks
     half : half their 95 % intervals, where known
     conditioned : bool, whether l1 moved them
     known : Knowns, of the user and of the result's own call
-    delay : float or None, s, estimated between torque and angle
     links : two of Link, or None where the format needs none
     turn : float, rad, what is added to θ1 so that it counts from the horizontal
     told : str, what tells the length of link 1 where it is not known
     weighed : bool, whether the payload tells that of link 2
     warnings : what does not fit
-    from_prior : names of the coefficients that are a prior's
     word : str, what the numbers are: identified, or drawn
     """
 
     name: str
     source: str
+    result: Result
     model: Model
     value: Mapping[str, float]
     half: Mapping[str, float]
     conditioned: bool
     known: Knowns
-    delay: float | None
     links: tuple[Link, Link] | None
     turn: float
     told: str
     weighed: bool
     warnings: tuple[Notice, ...]
-    from_prior: tuple[str, ...] = ()
     word: str = "identified"
 
 
@@ -119,8 +117,8 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     SettingError
         If what is known leaves no positive mass or inertia.
     """
-    model, known = model_of(result), Knowns(**(given_lengths(result) | knowns.given))
-    l1, told, second = known.l1, ", g k1 / k2", result.payload.get("l2")
+    model, known = model_of(result), given_lengths(result) | {**knowns}
+    l1, told, second = known.get("l1"), ", g k1 / k2", result.payload.get("l2")
     weighed = second is not None and second.usable and bool(second.estimate)
     if links and l1 is None:
         by_payload = payload_length(result)
@@ -148,24 +146,23 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
                 f"{file}: k1 {value[K1]:.4g}, k2 {value[K2]:.4g} and g {model.gravity:g} make "
                 f"l1 = g k1 / k2 no positive length; give {flag('l1')}"
             )
-        l2 = second.estimate if second is not None and weighed else None
-        full = replace(known, l2=known.l2 or l2)
+        tied = {"l2": second.estimate} if second is not None and second.estimate else {}
+        full = (tied if weighed else {}) | known
         chosen = links_of(value, model.gravity, l1, full, file)
     path = Path(file)
-    found, lengths = result.parameters.items(), {"l1": known.l1, "l2": known.l2}
+    lengths = {name: one for name, one in known.items() if name in ("l1", "l2")}
     return Description(
         name=re.sub(r"\W|^(?=\d)", "_", (path.parent if path.name == "result.json" else path).stem),
         source=f"{file}, estimator {result.estimator}",
+        result=result,
         model=model,
         value=value,
         half={name: half[model.names.index(name)] for name in sure},
         conditioned=conditioned,
         known=known,
-        delay=None if result.delay is None else result.delay.estimate,
         links=chosen,
         turn=turn_of(value, model.gravity),
         told=told,
         weighed=weighed,
-        warnings=contradictions(result, {name: one for name, one in lengths.items() if one}),
-        from_prior=tuple(name for name, one in found if one.status == "FROM_PRIOR"),
+        warnings=contradictions(result, lengths),
     )

@@ -145,7 +145,7 @@ def drawn_files(
         "estimator": result.estimator,
         "seed": seed,
         "refused": refused,
-        "known": knowns.given,
+        "known": {**knowns},
         "distribution": "normal" if freedom == inf else "Student's t",
         "degrees_of_freedom": None if freedom == inf else freedom,
         "names": names,

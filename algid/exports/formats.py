@@ -57,14 +57,14 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     if to == "payload":
         content = _payload(result, file, knowns)
         text = template(TEMPLATES / "payload.yaml.j2").render(content)
-        return text, contradictions(result, knowns.given)
+        return text, contradictions(result, knowns)
     arm = describe(result, file, knowns, links=to in ROBOTS)
     return written(arm, to), arm.warnings
 
 
 def takes(to: str, knowns: Knowns) -> None:
     """Raise `SettingError` where what is known has no place in `to`."""
-    for name in knowns.given:
+    for name in knowns:
         if to not in ROBOTS and name != ("l2" if to == "payload" else "l1"):
             raise SettingError(f"{flag(name)}: {to} holds no such number; leave it out")
 
@@ -91,7 +91,7 @@ def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
     Without `rotors` that of joint 1 is in link 1's inertia, which turns about the same axis.
     """
     assert arm.links is not None
-    (first, second), value, rotor = arm.links, arm.value, arm.known.rotor1 or 0.0
+    (first, second), value, rotor = arm.links, arm.value, arm.known.get("rotor1", 0.0)
     if not rotors:
         first = replace(first, inertia=first.inertia + rotor)
     # of a joint damping N m s/rad, Coulomb friction N m, rotor inertia kg m^2; none is negative
@@ -135,7 +135,7 @@ def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
             "the loaded one"
         )
     # y and inertia are of its body: zero without one
-    names, given = ("m_p", "l2", "y_p", "J_p"), knowns.l2 or result.settings.get("l2")
+    names, given = ("m_p", "l2", "y_p", "J_p"), knowns.get("l2") or result.settings.get("l2")
     value: dict[str, float] = dict.fromkeys(names, 0.0)
     std: dict[str, float | None] = dict.fromkeys(names, 0.0)
     for name, one in result.payload.items():

@@ -45,23 +45,8 @@ ALONG = 0.05  # of a link's inertia across: that about its own line, as of a sto
 _ENDS = 25.0  # how near the ends of the masses' range the search goes, in logits
 
 
-@dataclass(frozen=True)
-class Knowns:
-    """What the user knows: lengths in m, masses in kg, the rotor of joint 1 in kg m^2.
-
-    None where not known.
-    """
-
-    l1: float | None = None
-    l2: float | None = None
-    m1: float | None = None
-    m2: float | None = None
-    rotor1: float | None = None
-
-    @property
-    def given(self) -> dict[str, float]:
-        """What is known, by name."""
-        return {name: value for name, value in vars(self).items() if value is not None}
+Knowns = Mapping[str, float]
+"""What the user knows: l1, l2 in m, m1, m2 in kg, rotor1 of joint 1 in kg m^2."""
 
 
 @dataclass(frozen=True)
@@ -107,26 +92,26 @@ def links_of(
     K1, K2, K4 = moments_of(k)
     level = cmath.exp(-1j * turn_of(k, gravity))
     s2, h2 = K2 * level / gravity if gravity else K1 / l1, k[K3]
-    h, s = k[K5] - (knowns.rotor1 or 0.0), K4 * level / gravity if gravity else 0j  # at m2 = 0
+    h, s = k[K5] - knowns.get("rotor1", 0.0), K4 * level / gravity if gravity else 0j  # at m2 = 0
 
     def first(m2: float) -> Link:
         left, own = h - m2 * l1**2, s - m2 * l1 if gravity else 0j
-        m1 = knowns.m1 or 3 * left / l1**2 - 3 * own.real / l1 + 2 * abs(own) ** 2 / left
+        m1 = knowns.get("m1") or 3 * left / l1**2 - 3 * own.real / l1 + 2 * abs(own) ** 2 / left
         if not gravity:  # nothing tells link 1's first moment
             own = complex(l1 * left * m1 / (left + m1 * l1**2 / 3))
         return _link(l1, m1, own, left)
 
     def second(m2: float) -> Link:
-        return _link(knowns.l2 or math.sqrt(3 * h2 / m2), m2, s2, h2)
+        return _link(knowns.get("l2") or math.sqrt(3 * h2 / m2), m2, s2, h2)
 
-    low, high, m1, m2 = abs(s2) ** 2 / h2, h / l1**2, knowns.m1, knowns.m2
+    low, high, m1, m2 = abs(s2) ** 2 / h2, h / l1**2, knowns.get("m1"), knowns.get("m2")
     if m1 is not None and gravity:  # possible is link 1 where left m1 > |own|²
         middle = s.real / l1 - 0.5 * m1
         square = middle**2 - (abs(s) ** 2 - h * m1) / l1**2
         half = math.sqrt(square) if square > 0 else -math.inf
         low, high = max(low, middle - half), min(high, middle + half)
     if not (low < high and (m2 is None or low < m2 < high)):
-        given = ", ".join(f"{flag(name)} {value:g}" for name, value in knowns.given.items())
+        given = ", ".join(f"{flag(name)} {value:g}" for name, value in knowns.items())
         left = f"{low:.4g} to {high:.4g} kg are left" if low < high else "none is left"
         raise SettingError(
             f"{file}: with {given} a mass or an inertia comes out negative; of link 2's masses "

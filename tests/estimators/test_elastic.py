@@ -7,7 +7,6 @@ import pytest
 
 from algid.estimators.elastic import flexed, turns
 from algid.exports.formats import exported
-from algid.exports.links import Knowns
 from algid.identification.identify import identify
 from algid.log import Log
 from algid.model import Model, Motion, link_motion, load, sensitivity, torque
@@ -42,7 +41,7 @@ def test_elastic_joints_are_chosen_and_their_stiffness_told(bench: Bench) -> Non
         assert one.std is not None
         assert abs(one.estimate - values[name]) < 5 * one.std
     for to in ("c", "python", "mjcf"):
-        text, _ = exported(result, "arm.algid", to, Knowns())
+        text, _ = exported(result, "arm.algid", to, {})
         assert "lacks elastic joints" in text
         assert "rad/(N m)" in text
 

@@ -16,7 +16,6 @@ from algid.arm import FloatArray, regressor
 from algid.base.compiled import student_quantile
 from algid.base.errors import ResultError, SettingError
 from algid.exports.draws import draws_of, freedom_of
-from algid.exports.links import Knowns
 from algid.model import Model
 from algid.results import Result
 from tests.exports.arms import ODD, result_of, states, values_of
@@ -46,7 +45,7 @@ def correlated(seed: int = 5, std: float = 0.01, value: dict[str, float] = VALUE
 
 def test_draws_are_students_with_the_estimates_covariance() -> None:
     result, count = correlated(std=1e-3), 3000
-    several = list(islice(draws_of(result, "arm", 1, Knowns(), links=False), count))
+    several = list(islice(draws_of(result, "arm", 1, {}, links=False), count))
     assert sum(refused for *_, refused in several) == 0
     assert result.fit is not None
     names, covariance = result.fit.covariance_names, result.covariance
@@ -73,7 +72,7 @@ def test_the_degrees_of_freedom_are_those_of_the_interval() -> None:
 def test_every_draw_is_a_possible_arm() -> None:
     """Errors of 60 %: every other arm of the distribution has a friction or an inertia below 0."""
     result = correlated(std=0.6)
-    several = list(islice(draws_of(result, "arm", 3, Knowns(), links=True), 50))
+    several = list(islice(draws_of(result, "arm", 3, {}, links=True), 50))
     assert sum(refused for *_, refused in several) > 10
     for numbers, arm, _ in several:
         assert min(numbers[name] for name in ("k3", "k5", "k6", "k7", "f1", "m_p", "l2")) >= 0
@@ -81,7 +80,7 @@ def test_every_draw_is_a_possible_arm() -> None:
         assert arm.links is not None
         assert min(min(link.mass, link.length, link.inertia) for link in arm.links) > 0
     with pytest.raises(ResultError, match=r"100 draws in a row are no arm .f1 >= 0.; identify"):
-        next(draws_of(correlated(value=VALUE | {"f1": -0.4}), "arm", 0, Knowns(), links=False))
+        next(draws_of(correlated(value=VALUE | {"f1": -0.4}), "arm", 0, {}, links=False))
 
 
 @pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf"])

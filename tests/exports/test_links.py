@@ -14,7 +14,7 @@ from algid.base.errors import AlgidError, ResultError, SettingError
 from algid.base.significance import NORMAL
 from algid.exports.description import describe
 from algid.exports.formats import exported
-from algid.exports.links import Knowns, Link, links_of
+from algid.exports.links import Link, links_of
 from algid.model import Model
 from algid.results import Result
 from tests.exports.arms import ODD, result_of, values_of
@@ -56,7 +56,7 @@ def test_every_possible_arm_gets_possible_links(
 ) -> None:
     assume(abs(lc2) > 0.01)
     arm = Arm(m1, m2, lc1, lc2, l1, 0.5, I1, I2, 0.1, 0.1)
-    links = links_of(values_of(arm), 9.81, l1, Knowns(l2=0.5 if long else None), "arm")
+    links = links_of(values_of(arm), 9.81, l1, {"l2": 0.5} if long else {}, "arm")
     for link in links:
         along, across, other = link.tensor
         assert min(link.mass, link.length, along) > 0
@@ -69,11 +69,11 @@ def test_every_possible_arm_gets_possible_links(
 @pytest.mark.parametrize("name", ["m1", "m2"])
 def test_what_is_given_stands_and_the_rest_still_moves_as_identified(name: str) -> None:
     given_mass = {"m1": 1.7, "m2": 0.75}[name]
-    links = links_of(values_of(ODD), 9.81, ODD.l1, Knowns(**{name: given_mass}, rotor1=0.01), "arm")
+    links = links_of(values_of(ODD), 9.81, ODD.l1, {name: given_mass} | {"rotor1": 0.01}, "arm")
     assert {"m1": links[0], "m2": links[1]}[name].mass == given_mass
     np.testing.assert_allclose(constants_of(links, 0.01, ODD), ODD.constants(), rtol=1e-12)
     (first, second), true = (
-        links_of(values_of(ODD), 9.81, ODD.l1, Knowns(m1=2.0, m2=0.7), "arm"),
+        links_of(values_of(ODD), 9.81, ODD.l1, {"m1": 2.0, "m2": 0.7}, "arm"),
         ODD,
     )
     np.testing.assert_allclose(
@@ -98,12 +98,12 @@ def test_nearest_is_nearest() -> None:
         return float(every.min())
 
     k = values_of(ODD)
-    chosen = sum(map(divergence, links_of(k, 9.81, ODD.l1, Knowns(l2=0.3), "arm")))
+    chosen = sum(map(divergence, links_of(k, 9.81, ODD.l1, {"l2": 0.3}, "arm")))
     others = []
     for m2 in np.linspace(0.4, 0.9, 26):
         for m1 in np.linspace(0.8, 4, 33):
             try:
-                pair = links_of(k, 9.81, ODD.l1, Knowns(l2=0.3, m1=m1, m2=m2), "arm")
+                pair = links_of(k, 9.81, ODD.l1, {"l2": 0.3, "m1": m1, "m2": m2}, "arm")
             except SettingError:
                 continue
             others.append(sum(map(divergence, pair)))
@@ -114,7 +114,7 @@ def test_nearest_is_nearest() -> None:
 def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
     result = result_of(values_of(ODD), std=1e-2)
     l1 = 0.405
-    found = describe(result, "arm", Knowns(l1=l1), links=False)
+    found = describe(result, "arm", {"l1": l1}, links=False)
     c = np.array([ODD.constants()[0], ODD.constants()[1]])
     assert found.value["k1"] * 9.81 / found.value["k2"] == pytest.approx(l1, rel=1e-12)
     weights = 1 / (1e-2 * c)
@@ -131,21 +131,23 @@ def test_a_given_length_moves_the_constants_as_their_covariance_says() -> None:
     [
         (
             "urdf",
-            Knowns(m2=5.0),
+            {"m2": 5.0},
             "arm: with --set m2 5 a mass or an inertia comes out negative; of link 2's masses 0.",
         ),
         (
             "urdf",
-            Knowns(m1=0.01),
+            {"m1": 0.01},
             "arm: with --set m1 0.01 a mass .* comes out negative; of link 2's masses none is left",
         ),
-        ("urdf", Knowns(rotor1=1.0), "arm: with --set rotor1 1 a mass .* none is left"),
-        ("python", Knowns(m1=1.0), "--set m1: python holds no such number; leave it out"),
-        ("payload", Knowns(l1=1.0), "--l1: payload holds no such number; leave it out"),
-        ("payload", Knowns(), "arm: the result has no payload; identify with --loaded LOG"),
+        ("urdf", {"rotor1": 1.0}, "arm: with --set rotor1 1 a mass .* none is left"),
+        ("python", {"m1": 1.0}, "--set m1: python holds no such number; leave it out"),
+        ("payload", {"l1": 1.0}, "--l1: payload holds no such number; leave it out"),
+        ("payload", {}, "arm: the result has no payload; identify with --loaded LOG"),
     ],
 )
-def test_what_contradicts_physics_is_refused(to: str, known: Knowns, message: str) -> None:
+def test_what_contradicts_physics_is_refused(
+    to: str, known: dict[str, float], message: str
+) -> None:
     with pytest.raises(AlgidError, match=message):
         exported(result_of(values_of(ODD)), "arm", to, known)
 
@@ -164,19 +166,19 @@ def test_results_that_no_arm_explains_are_refused() -> None:
     with pytest.raises(
         ResultError, match=r"k1 .* k2 .* make l1 = g k1 / k2 no positive length; give --l1"
     ):
-        exported(result_of({**values_of(ODD), "k2": -0.1}), "arm", "urdf", Knowns())
+        exported(result_of({**values_of(ODD), "k2": -0.1}), "arm", "urdf", {})
     with pytest.raises(ResultError, match="not positive definite"):
-        exported(result_of({**values_of(ODD), "k1": 3.0}), "arm", "c", Knowns())
+        exported(result_of({**values_of(ODD), "k1": 3.0}), "arm", "c", {})
     with pytest.raises(
         ResultError, match=r"not positive definite .* masses would come out negative; check --l1"
     ):
-        exported(sure_of_weights(result_of(values_of(ODD))), "arm", "urdf", Knowns(l1=1.6))
+        exported(sure_of_weights(result_of(values_of(ODD))), "arm", "urdf", {"l1": 1.6})
     with pytest.raises(ResultError, match="g 0 make l1 = g k1 / k2 no positive length; give --l1"):
-        exported(result_of(values_of(ODD), Model(gravity=0.0)), "arm", "mjcf", Knowns())
+        exported(result_of(values_of(ODD), Model(gravity=0.0)), "arm", "mjcf", {})
     with pytest.raises(ResultError, match=r"no load explains a payload of -0\.2 kg"):
         exported(
             result_of(values_of(ODD), payload={"m_p": -0.2, "l1": 0.4, "l2": 0.3}),
             "arm",
             "payload",
-            Knowns(),
+            {},
         )

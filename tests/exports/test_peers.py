@@ -15,7 +15,6 @@ import pytest
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.exports.description import describe
 from algid.exports.formats import exported
-from algid.exports.links import Knowns
 from algid.model import Model, Motion, acceleration, torque
 from tests.estimators.test_model import FULL, VALUES
 from tests.exports.arms import ODD, UNIFORM, result_of, states, values_of
@@ -29,7 +28,7 @@ ROTOR = values_of(ODD, j2=0.004)
 
 def text_of(to: str, value: dict[str, float], model: Model | None = None, **known: float) -> str:
     """What algid exports of an arm with these coefficients."""
-    return exported(result_of(value, model), "arm.algid", to, Knowns(**known))[0]
+    return exported(result_of(value, model), "arm.algid", to, known)[0]
 
 
 def wanted(value: dict[str, float], model: Model | None = None) -> FloatArray:
@@ -131,7 +130,7 @@ def test_bent_links_in_a_plane_and_of_a_length_that_is_given() -> None:
     assert_close(by_mujoco(text_of("mjcf", value, model, l1=0.4)), wanted(value, model), CLOSE)
     assert_close(by_pinocchio(text_of("urdf", value, model, l1=0.4)), wanted(value, model), CLOSE)
     value = bent(0.1)
-    found = describe(result_of(value, BENT), "arm", Knowns(l1=0.41), links=False)
+    found = describe(result_of(value, BENT), "arm", {"l1": 0.41}, links=False)
     K1, K2 = (complex(found.value[name], found.value[f"{name}s"]) for name in ("k1", "k2"))
     assert 9.81 * abs(K1) == pytest.approx(0.41 * abs(K2), rel=1e-14)
     text = text_of("mjcf", value, BENT, l1=0.41)

@@ -13,7 +13,6 @@ import algid
 from algid.arm import Arm
 from algid.base.errors import AlgidError
 from algid.exports.formats import SUFFIXES, exported
-from algid.exports.links import Knowns
 from algid.model import Model
 from algid.results import Status
 from tests.exports.arms import ODD, result_of, states, values_of
@@ -28,7 +27,7 @@ def text_of(
         result_of(values_of(ODD) if value is None else value, model),
         "arm.algid",
         to,
-        Knowns(**known),
+        known,
     )[0]
 
 
@@ -75,7 +74,7 @@ def test_losses_that_are_negative_are_left_out_and_said(to: str) -> None:
 def test_what_a_comment_may_not_hold_is_written_otherwise() -> None:
     name = 'a--b */ """ \\n.algid'
     for to in SUFFIXES:
-        text, _ = exported(result_of(values_of(ODD)), name, to, Knowns())
+        text, _ = exported(result_of(values_of(ODD)), name, to, {})
         if to in XML:
             ET.fromstring(text)
             assert "a‐‐b" in text
@@ -89,7 +88,7 @@ def test_what_a_comment_may_not_hold_is_written_otherwise() -> None:
 
 def test_the_payload_is_yaml_that_a_planner_reads() -> None:
     result = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4, "l2": 0.3}, std=0.01)
-    content = YAML(typ="safe").load(exported(result, 'a"b', "payload", Knowns())[0])["payload"]
+    content = YAML(typ="safe").load(exported(result, 'a"b', "payload", {})[0])["payload"]
     assert content == {
         "mass": 0.5,
         "mass_std": pytest.approx(0.005),
@@ -105,34 +104,32 @@ def test_the_payload_is_yaml_that_a_planner_reads() -> None:
             [0.0, 0.0, 0.0, 0.0],
         ],
     }
-    given = YAML(typ="safe").load(exported(result, "a", "payload", Knowns(l2=0.3))[0])["payload"]
+    given = YAML(typ="safe").load(exported(result, "a", "payload", {"l2": 0.3})[0])["payload"]
     assert given["covariance"][1] == [0.0] * 4
     bare = result.payload["m_p"].model_copy(update={"std": None})
     text = exported(
         result.model_copy(update={"payload": {**result.payload, "m_p": bare}}),
         "a",
         "payload",
-        Knowns(),
+        {},
     )[0]
     assert YAML(typ="safe").load(text)["payload"]["mass_std"] is None
     told = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4}, l2=0.25)
-    content = YAML(typ="safe").load(exported(told, "a", "payload", Knowns())[0])["payload"]
+    content = YAML(typ="safe").load(exported(told, "a", "payload", {})[0])["payload"]
     assert (content["centre_of_gravity"][0], content["centre_of_gravity_std"][0]) == (0.25, 0.0)
 
 
 def test_a_payload_without_a_length_or_a_sound_mass_is_refused() -> None:
     lost = result_of(values_of(ODD), payload={"m_p": 0.5, "l1": 0.4})
     with pytest.raises(AlgidError) as refused:
-        exported(lost, "arm", "payload", Knowns())
+        exported(lost, "arm", "payload", {})
     assert str(refused.value) == "arm: the result does not tell where the payload hangs; give --l2"
-    assert "[0.3, 0.0, 0.0]  # m" in exported(lost, "arm", "payload", Knowns(l2=0.3))[0]
+    assert "[0.3, 0.0, 0.0]  # m" in exported(lost, "arm", "payload", {"l2": 0.3})[0]
     vague = lost.payload["m_p"].model_copy(update={"status": Status.NOT_IDENTIFIABLE})
     with pytest.raises(
         AlgidError, match="arm: the result has no payload; identify with --loaded LOG"
     ):
-        exported(
-            lost.model_copy(update={"payload": {"m_p": vague}}), "arm", "payload", Knowns(l2=0.3)
-        )
+        exported(lost.model_copy(update={"payload": {"m_p": vague}}), "arm", "payload", {"l2": 0.3})
 
 
 @pytest.mark.parametrize("to", ["urdf", "sdf", "mjcf"])
@@ -158,7 +155,7 @@ def test_the_payloads_call_is_in_the_flanges_frame() -> None:
     assert request == {
         "mass": 0.5, "center_of_gravity": {"x": -0.02, "y": 0.2, "z": "FLANGE_Z"},
     }  # fmt: skip
-    assert made.text == exported(result, "result", "payload", Knowns())[0].replace(
+    assert made.text == exported(result, "result", "payload", {})[0].replace(
         '"result"', '"run--1.csv"'
     )
     blank = algid.export(result, "payload").call

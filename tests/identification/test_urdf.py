@@ -10,7 +10,6 @@ import pytest
 from algid.arm import inverse_dynamics
 from algid.base.errors import ResultError
 from algid.exports.formats import exported
-from algid.exports.links import Knowns
 from algid.identification.urdf import read_urdf
 from algid.model import Model, Motion, torque
 from tests.exports.arms import ODD, result_of, states, values_of
@@ -45,7 +44,7 @@ def test_what_algid_exports_it_reads(tmp_path: Path) -> None:
     value = values_of(ODD, f1=0.4, f2=0.3)
     file = tmp_path / "arm.urdf"
     file.write_text(
-        exported(result_of(value, Model(("coulomb",))), "arm", "urdf", Knowns(rotor1=0.02))[0]
+        exported(result_of(value, Model(("coulomb",))), "arm", "urdf", {"rotor1": 0.02})[0]
     )
     judged = read_urdf(file)
     assert judged.model == Model(("coulomb",))
@@ -111,7 +110,7 @@ def test_a_centre_beside_its_line_is_taken_over(tmp_path: Path) -> None:
     pin = pytest.importorskip("pinocchio")
     file = tmp_path / "cad.urdf"
     value = values_of(ODD) | {"k1s": 0.02, "k2s": 0.02 * 9.81 / 0.4, "k4s": -1.5}
-    text = exported(result_of(value, Model(("phases",))), "arm", "urdf", Knowns(l2=0.3))[0]
+    text = exported(result_of(value, Model(("phases",))), "arm", "urdf", {"l2": 0.3})[0]
     file.write_text(text)
     judged = read_urdf(file)
     theta, omega, alpha = states(50)

@@ -94,7 +94,6 @@ from algid.model import CHOICES
 from algid.api.guide import text_of
 from algid.base.errors import SettingError
 from algid.exports.formats import exported
-from algid.exports.links import Knowns
 from algid.identification.identify import identify
 from algid.model import Model, Motion, torque
 from algid.profile import Profile
@@ -129,10 +128,10 @@ assert "toy" in kept, result.fit.terms
 assert not {"stribeck", "gain", "asymmetry"} & {one.term for one in result.fit.terms}
 assert abs(result.parameters["g6"].estimate - 0.05) < 5 * result.parameters["g6"].std < 0.005
 for to in ("python", "c"):
-    text, _ = exported(result, "toy.algid", to, Knowns())
+    text, _ = exported(result, "toy.algid", to, {})
     assert "G6 * toy_s" in text and "sin(6 * q2)" in text, text
 module = {}
-exec(compile(exported(result, "toy.algid", "python", Knowns())[0], "arm.py", "exec"), module)
+exec(compile(exported(result, "toy.algid", "python", {})[0], "arm.py", "exec"), module)
 model = Model(tuple(result.fit.model.terms), 9.81, result.fit.model.coulomb_speed)
 c = np.array([result.parameters[name].estimate for name in model.names])
 one = np.array([[0.3], [0.4]])

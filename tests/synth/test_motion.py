@@ -9,7 +9,6 @@ import pytest
 
 from algid.arm import FloatArray, mass_matrix
 from algid.exports.formats import exported
-from algid.exports.links import Knowns
 from algid.model import Model
 from tests.exports.arms import ODD, result_of, values_of
 
@@ -27,7 +26,7 @@ def test_mujocos_inertia_and_acceleration_are_alike() -> None:
     mujoco = pytest.importorskip("mujoco")
     value = values_of(ODD, j2=0.004)
     model = mujoco.MjModel.from_xml_string(
-        exported(result_of(value, Model(("rotor",))), "arm", "mjcf", Knowns())[0]
+        exported(result_of(value, Model(("rotor",))), "arm", "mjcf", {})[0]
     )
     data, (theta, omega, tau) = mujoco.MjData(model), states()
     k = np.array(list(value.values()))[:7]

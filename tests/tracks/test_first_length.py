@@ -6,7 +6,6 @@ import pytest
 
 import algid
 from algid.exports.description import describe
-from algid.exports.links import Knowns
 from algid.identification.known import first_length, payload_length
 from algid.results import Result
 from algid.signals.segments import Segment
@@ -46,7 +45,7 @@ def test_the_better_of_constants_and_payload_is_taken(weighed: Result) -> None:
     assert arm_of(unsure, segment())[0].value("l1") == pytest.approx(by_constants[0])
     lengths = [
         found.links[0].length
-        for found in (describe(one, "arm", Knowns(), links=True) for one in (sure, unsure))
+        for found in (describe(one, "arm", {}, links=True) for one in (sure, unsure))
         if found.links
     ]
     assert lengths == [told, pytest.approx(by_constants[0])]
