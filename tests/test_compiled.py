@@ -68,11 +68,11 @@ def test_student_of_infinite_freedom_is_normal() -> None:
 ALONE = """
 import json, sys
 if {broken}:
-    class Refusing:
-        def find_spec(self, name, path=None, target=None):
-            if name.endswith("._flapack") and not hasattr(sys.modules["scipy.linalg"], "__file__"):
-                raise ImportError("not here")
-    sys.meta_path.insert(0, Refusing())
+    import importlib.machinery
+    importlib.machinery.PathFinder.find_spec = staticmethod(
+        lambda name, path=None, target=None, real=importlib.machinery.PathFinder.find_spec:
+        None if "._flapack" in name and "scipy.linalg" not in sys.modules else real(name, path)
+    )
 from algid.base import compiled
 packages = [name for name in ("scipy.linalg", "scipy.special") if name in sys.modules]
 found = [float(compiled.chi2_tail(4, 3.0)), compiled.student_quantile(5.0)]

@@ -10,53 +10,59 @@ imported.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
+from importlib.machinery import PathFinder
+from importlib.util import module_from_spec
 from statistics import NormalDist
 from sys import modules
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import scipy
 
 
-@contextmanager
-def _alone(package: str) -> Iterator[None]:
-    """Let modules of a package be imported within the block without the package itself."""
-    if package in modules:
-        yield
-        return
-    bare = modules[package] = ModuleType(package)
-    bare.__path__ = [f"{scipy.__path__[0]}/{package.partition('.')[2]}"]
-    try:
-        yield
-    finally:
-        del modules[package]
+def _alone(package: str, *names: str) -> Any:
+    """The last of some compiled modules of SciPy; None where it cannot be had by itself.
+
+    Those before it are what it imports: once they are known, it asks for no package.
+    """
+    for name in names:
+        full = f"scipy.{package}.{name}"
+        spec = PathFinder.find_spec(full, [f"{scipy.__path__[0]}/{package}"])
+        if full in modules or spec is None or spec.loader is None:
+            continue
+        module = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+        except ImportError:
+            return None
+        modules[full] = module
+    return modules.get(f"scipy.{package}.{names[-1]}")
 
 
-try:
-    with _alone("scipy.linalg"):
-        from scipy.linalg import _flapack as routines
-except ImportError:
-    from scipy.linalg import lapack as routines
-lapack: Any = routines
+def _lapack() -> Any:
+    module = _alone("linalg", "_flapack")
+    if module is not None:
+        return module
+    from scipy.linalg import lapack as packaged
+
+    return packaged
+
+
+lapack = _lapack()
 """LAPACK's routines by name, as `scipy.linalg.lapack` has them."""
 
 
 @cache
 def _special() -> Any:
     """The functions of `scipy.special` that are compiled."""
-    try:
-        with _alone("scipy.special"):
-            from scipy.special import _ufuncs
+    before = ("_special_ufuncs", "_ufuncs_cxx", "_ellip_harm_2", "_gufuncs")
+    module = _alone("special", *before, "_ufuncs")
+    if module is not None:
+        return module
+    from scipy import special as packaged
 
-        return _ufuncs
-    except ImportError:
-        from scipy import special
-
-        return special
+    return packaged
 
 
 def chi2_tail(freedom: Any, x: Any) -> Any:

@@ -61,7 +61,7 @@ class Task:
             name: one and one.model_dump(mode="json") for name, one in models.items()
         }
         content |= {"settings": self.settings.as_json(), "report": self.report}
-        content["version"] = __version__
+        content |= {"version": __version__}
         prior = self.settings.prior or (self.profile and self.profile.prior)
         if prior:
             content["prior"] = sha256_of(Path(prior))
@@ -90,7 +90,7 @@ def run_task(task: Task) -> JobRecord | str:
     try:
         result = _identified(task)
     except BaseException as error:
-        if is_full(error):
+        if any(is_full(text_of(one)) for one in chain_of(error)):
             return text_of(error)
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
         seconds = time.perf_counter() - start
@@ -126,9 +126,9 @@ def run_task(task: Task) -> JobRecord | str:
     )
 
 
-def is_full(error: BaseException) -> bool:
-    """Whether there was no space left, as an exception or what it came from says."""
-    return any(words in text_of(one) for one in chain_of(error) for words in FULL)
+def is_full(text: str) -> bool:
+    """Whether an exception's text says that there was no space left."""
+    return any(words in text for words in FULL)
 
 
 def redacted(job: Job) -> Job:
@@ -202,16 +202,13 @@ def fetched(url: str, folder: Path) -> Staged:
     """
     with reading(url) as (filesystem, path):
         folder.mkdir(parents=True, exist_ok=True)
-        copy, failure = folder / path.rpartition("/")[2], None
+        copy = folder / path.rpartition("/")[2]
         with filesystem.open_input_file(path) as source, copy.open("wb") as target:
             version = source.metadata()
             try:
                 shutil.copyfileobj(source, target, _PIECE)
-            except OSError as error:
-                failure = error
-        with filesystem.open_input_file(path) as again:
-            if again.metadata() != version:
-                raise LogError(f"{url}: it was replaced while it was read; run again") from failure
-        if failure is not None:
-            raise failure
+            finally:
+                with filesystem.open_input_file(path) as again:
+                    if again.metadata() != version:
+                        raise LogError(f"{url}: it was replaced while it was read; run again")
     return Staged(copy, public(url))

@@ -36,8 +36,6 @@ from algid.profile import Profile
 from algid.results import Result
 from algid.settings import Settings
 
-RUN_AGAIN = "run again: what is finished is kept"
-MAKE_ROOM = f"make room and {RUN_AGAIN}"
 LOOK_EVERY = 2.0  # s, for logs that have arrived
 _STOP_EVERY = 0.1  # s, for a stop
 
@@ -169,7 +167,7 @@ class Batch:
                 write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
                 self._written = True
         except OutputError as error:
-            self._cannot_go_on(error)
+            self._stop_because(str(error))
         now = {**self.records, **unreachable}
         records = [now[job.name] for job in jobs if job.name in now]
         return Batched(records, self._ran, left, self._stopped, self.unreadable, self.anew)
@@ -264,10 +262,10 @@ class Batch:
         if isinstance(ended, CallFailedError):
             return task.record(JobStatus.FAILED, str(ended))
         if isinstance(ended, str):
-            self._stop_because(f"{ended}; {MAKE_ROOM}")
+            self._stop_because(ended)
         else:  # no process can be started, a cluster is lost
             why = text_of(ended).removeprefix("Exception: ").partition("\n")[0]
-            self._stop_because(f"no worker can run jobs ({why}); {RUN_AGAIN}")
+            self._stop_because(f"no worker can run jobs ({why})")
         return None
 
     def _keep(self, record: JobRecord) -> bool:
@@ -283,18 +281,16 @@ class Batch:
         try:
             write_record(self._store, record)
         except OutputError as error:
-            self._cannot_go_on(error)
+            self._stop_because(str(error))
             return False
         self.records[name] = record
         self.unreadable.pop(record_name(name), None)
         self._written = False
         return True
 
-    def _cannot_go_on(self, error: OutputError) -> None:
-        self._stop_because(f"{error}; {MAKE_ROOM if is_full(error) else RUN_AGAIN}")
-
     def _stop_because(self, reason: str) -> None:
-        self._stopped = self._stopped or reason
+        remedy = "make room and run again" if is_full(reason) else "run again"
+        self._stopped = self._stopped or f"{reason}; {remedy}: what is finished is kept"
         self.stop.set()
 
 
