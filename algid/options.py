@@ -17,6 +17,10 @@ ARGUMENTS, EVERYDAY, ADVANCED = "Arguments", "Options", "Advanced"
 """Panels of a command's help."""
 EVERYDAY_FIELDS = ("angle_unit", "torque_unit", "joints", "zero", "cross_validate")
 """Of settings and profiles; the others are for seldom."""
+SELDOM = ("export", "force", "name")
+"""Of verbs; the others are for every day."""
+TYPED = ("loaded", "out", "parameters", "to")
+"""Keywords that a command line has by their flags, though Python takes them by their places too."""
 BY_SET = frozenset(
     {
         *("acceleration", "bandwidth", "clock", "columns", "constrain", "delay", "drive", "drop"),

@@ -14,7 +14,6 @@ from pydantic import ByteSize, Field
 
 from algid.api.answer import Answer
 from algid.api.options import (
-    OUT,
     AnyResult,
     Options,
     ProfileLike,
@@ -50,7 +49,7 @@ Complaint = Callable[[str], None]
 @verb
 def batch(
     sources: Annotated[str | Path | Sequence[str | Path], Option(kind=list[str])],
-    out: Annotated[str | Path, Option(kind=str, flag=OUT)],
+    out: Annotated[str | Path, Option(kind=str)],
     settings: Settings | None = None,
     *,
     parameters: AnyResult | None = None,
@@ -176,7 +175,6 @@ def batch(
         return jobs_of(names, place, "logs" if known is None else "loaded", links)
 
     recipe = BatchConfig(place, asked, cache(profile_of), known, report)  # each file once
-    recipe.profile(None)
     jobs = [] if watch else look()
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from algid.api.answer import Answer
-from algid.api.options import Force, opened
+from algid.api.options import opened
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.options import Option
@@ -25,7 +25,7 @@ def compare(
     ],
     labels: Sequence[str] | None = None,
     out: str | Path | None = None,
-    force: Force = False,
+    force: bool = False,
 ) -> Comparison:
     """Lay results side by side: differences in σ from the first one, and which settings differ.
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.options import OUT, Force, LogOptions, ProfileLike, meant
+from algid.api.options import LogOptions, ProfileLike, meant
 from algid.api.signature import verb
-from algid.base.errors import OutputError
 from algid.base.exits import exit_of
-from algid.options import Option
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
@@ -22,10 +20,10 @@ if TYPE_CHECKING:
 @verb
 def convert(
     source: str | Path,
-    out: Annotated[str | Path, Option(flag=OUT)],
+    out: str | Path,
     *,
     profile: ProfileLike | None = None,
-    force: Force = False,
+    force: bool = False,
     progress: Progress | None = None,
     **options: Unpack[LogOptions],
 ) -> list[Notice]:
@@ -73,11 +71,8 @@ def convert(
     []
     """
     from algid.readers import open_log
-    from algid.writers import FORMATS, write_log
+    from algid.writers import write_log
 
-    target = Path(out)
-    if target.suffix.lstrip(".").lower() not in FORMATS:
-        raise OutputError(f"{target}: expected a name that ends in .{', .'.join(FORMATS)}")
     reader = open_log(source, meant(profile, options))
     notices: list[Notice] = []
 
@@ -91,7 +86,7 @@ def convert(
             if progress is not None:
                 progress("writing", done, reader.rows)
 
-    write_log(target, noted(), truth=reader.origin.truth, force=force)
+    write_log(out, noted(), truth=reader.origin.truth, force=force)
     return notices
 
 

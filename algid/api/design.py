@@ -11,7 +11,6 @@ from algid.api.options import (
     CASES,
     AnyLog,
     Folder,
-    Force,
     Length,
     Mass,
     Seed,
@@ -63,7 +62,7 @@ def design(
     joints: tuple[str, str] | str = "joint1,joint2",
     seed: Seed = 0,
     out: Folder | None = None,
-    force: Force = False,
+    force: bool = False,
     command: str = "",
     progress: Progress | None = None,
 ) -> Planned:

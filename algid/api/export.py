@@ -14,7 +14,6 @@ from algid.api.answer import Answer
 from algid.api.options import (
     AnyResult,
     Folder,
-    Force,
     Length,
     Mass,
     Seed,
@@ -59,10 +58,7 @@ class Exported:
 @verb
 def export(
     result: AnyResult,
-    to: Annotated[
-        Literal["urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet"],
-        Option(flag="--to"),
-    ],
+    to: Literal["urdf", "mjcf", "sdf", "python", "c", "payload", "csv", "parquet"],
     *,
     l1: Length | None = None,
     l2: Length | None = None,
@@ -73,7 +69,7 @@ def export(
     seed: Seed = 0,
     flange: Flange | None = None,
     out: Folder | None = None,
-    force: Force = False,
+    force: bool = False,
 ) -> Exported:
     """Write the arm of a result as a model.
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.options import (
     AnyResult,
     Export,
     Folder,
-    Force,
-    Loaded,
     Logs,
     Options,
     ProfileLike,
@@ -21,7 +19,7 @@ from algid.api.options import (
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import exit_of
-from algid.options import ADVANCED, Option, flag
+from algid.options import flag
 
 if TYPE_CHECKING:
     from algid.api.result import Result
@@ -33,14 +31,14 @@ if TYPE_CHECKING:
 @verb
 def identify(
     unloaded: Logs | None,
-    loaded: Loaded | None = None,
+    loaded: Logs | None = None,
     settings: Settings | None = None,
     *,
     parameters: AnyResult | None = None,
     profile: ProfileLike | None = None,
     out: Folder | None = None,
-    name: Annotated[str, Option(panel=ADVANCED)] | None = None,
-    force: Force = False,
+    name: str | None = None,
+    force: bool = False,
     report: bool = True,
     export: Export = False,
     command: str | None = None,

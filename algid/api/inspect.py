@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api.answer import Answer
-from algid.api.options import AnyLog, Force, LogOptions, ProfileLike, meant
+from algid.api.options import AnyLog, LogOptions, ProfileLike, meant
 from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
@@ -32,7 +32,7 @@ def inspect(
     *,
     profile: ProfileLike | None = None,
     write_profile: str | Path | None = None,
-    force: Force = False,
+    force: bool = False,
     **options: Unpack[LogOptions],
 ) -> Inspection:
     """Show what a log holds, which channels would be used, and what is wrong with it.

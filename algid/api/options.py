@@ -13,7 +13,7 @@ from pydantic import Field
 from algid.base.errors import SettingError
 from algid.base.files import parsed_toml, whole_folder
 from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, Range
-from algid.options import ADVANCED, Option, flag
+from algid.options import Option, flag
 from algid.profile import Effort, Profile, load_profile, over, with_settings
 from algid.settings import OF_BOTH, Settings
 
@@ -37,17 +37,14 @@ ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=
 AnyLog = Annotated["LogLike", Option(kind=Path)]
 """A path, a `Log`, a pandas or polars frame, or a dict of arrays."""
 Logs = Annotated["LogLike | Iterable[LogLike]", Option(kind=list[Path])]
-Loaded = Annotated["LogLike | Iterable[LogLike]", Option(kind=list[Path], flag="--loaded")]
 AnyResult = Annotated["Result | str | Path", Option(kind=Path)]
 """A result, or the path of one."""
-OUT = "-o"
 Folder = Annotated[str | Path, Option(default=Path())]
 """Where a command writes: the working folder by default."""
 Length = Annotated[float, bounded(KNOWN_LENGTH)]
 Mass = Annotated[float, bounded(KNOWN_MASS)]
 Seed = Annotated[int, bounded((0, 2**63), int)]
-Force = Annotated[bool, Option(panel=ADVANCED)]
-Export = Annotated[bool | Literal["mcap"], Option(panel=ADVANCED)]
+Export = bool | Literal["mcap"]
 """Whether what is shown over time is also written as MCAP."""
 
 

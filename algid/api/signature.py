@@ -19,7 +19,16 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 from algid.base.errors import SettingError
 from algid.base.files import misfit
 from algid.moved import refuse_moved_keywords
-from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, EVERYDAY_FIELDS, Option, flag
+from algid.options import (
+    ADVANCED,
+    ARGUMENTS,
+    EVERYDAY,
+    EVERYDAY_FIELDS,
+    SELDOM,
+    TYPED,
+    Option,
+    flag,
+)
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
 """Keywords that no command line has."""
@@ -60,18 +69,19 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
             kind = Path if Path in kinds else str
             if len(kinds) == 1 and not words:
                 (kind,) = kinds
-        argument = one.kind is not one.KEYWORD_ONLY and not stated.flag
         panel, default = EVERYDAY, stated.default if one.default is None else one.default
+        argument = one.kind is not one.KEYWORD_ONLY and name not in TYPED
+        if name in SELDOM or (is_model and name not in EVERYDAY_FIELDS):
+            panel = ADVANCED
         if is_model:  # a field that is not typed is not said
-            panel = EVERYDAY if name in EVERYDAY_FIELDS else ADVANCED
             default = False if kind is bool else None
         found[name] = replace(
             stated,
             name=name,
             kind=kind,
             default=default,
-            panel=ARGUMENTS if argument else stated.panel or panel,
-            flag=stated.flag or flag(name, off=default is True),
+            panel=ARGUMENTS if argument else panel,
+            flag=flag(name, off=default is True),
             help=helps.get(own) or f"{', '.join(words)}.",
             words=words,
             check=stated.check or (Literal[*words] if words else None),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from datetime import UTC, date, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,7 +13,7 @@ from pydantic import AfterValidator, BeforeValidator
 
 from algid.api import example
 from algid.api.answer import Answer
-from algid.api.options import CASES, Folder, Force, Seed, bounded, within
+from algid.api.options import CASES, Folder, Seed, bounded, within
 from algid.api.signature import options_of, verb
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file
@@ -96,7 +97,7 @@ def synthesise(
     payload_schedule: Schedule | None = None,
     out: Folder | None = None,
     format: Literal["mcap", "parquet", "csv"] = "mcap",  # noqa: A002  # as the flag
-    force: Force = False,
+    force: bool = False,
     progress: Progress | None = None,
 ) -> tuple[Log, Log]:
     """Write CASE-unloaded and CASE-loaded logs of a simulated arm; the truth travels with them.
@@ -176,8 +177,8 @@ def synthesise(
         for name, one in options_of(synthesise).items():
             if name not in ("case", "out", "force") and own[name] not in (None, one.default):
                 raise SettingError(f"{one.flag}: the example is always the same; leave it out")
-        files = _files(out, [*(f"{name}.csv" for name in example.LOGS), example.PROFILE], force)
-        logs = example.example_logs()
+        names = [*(f"{name}.csv" for name in example.LOGS), example.PROFILE]
+        simulated = example.example_logs
     else:
         arm = load_case(str(case))
         of_sensors = {one.name: own.get(one.name) for one in fields(Sensors)}
@@ -192,7 +193,7 @@ def synthesise(
             for name in ("initial", "payload_schedule", "torque"):
                 if own[name] is not None:
                     raise SettingError(
-                        f"{flag(name)} {own[name]}: a motion starts where it was planned and "
+                        f"{flag(name)}: a motion starts where it was planned and "
                         "carries one payload; leave it out"
                     )
             plan = read_plan(Path(motion))
@@ -211,9 +212,13 @@ def synthesise(
         roles = ["unloaded", "loaded"][: 1 + bool(arm.payload)]
         if payload_schedule is not None:
             roles = ["schedule"]
-        files = _files(out, [f"{arm.name}-{role}.{format}" for role in roles], force)
-        schedule: Any = payload_schedule
-        logs = run.synthesise(arm, plan or drive, recording, progress, schedule)
+        names = [f"{arm.name}-{role}.{format}" for role in roles]
+        said: Any = (arm, plan or drive, recording, progress, payload_schedule)
+        simulated = partial(run.synthesise, *said)
+    files = [] if out is None else [Path(out) / name for name in names]
+    for file in files:
+        refuse_existing(file, force)
+    logs = simulated()
     for file, log in zip(files, logs, strict=False):
         write_log(file, log, truth=log.origin.truth, force=force)
     for file in files[len(logs) :]:
@@ -228,14 +233,6 @@ def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     if given["case"] == "example":
         names = [*(f"{log.origin.path}.csv" for log in logs), example.PROFILE]
     return Answer([str(Path(given["out"]) / name) for name in names])
-
-
-def _files(out: str | Path | None, names: Sequence[str], force: bool) -> list[Path]:
-    """What is to be written, of which nothing is there yet; nothing where there is no `out`."""
-    files = [] if out is None else [Path(out) / name for name in names]
-    for file in files:
-        refuse_existing(file, force)
-    return files
 
 
 def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquisition) -> Torque:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from algid.api.answer import Answer
 from algid.api.options import (
     AnyLog,
+    AnyResult,
     Export,
     Folder,
-    Force,
     Length,
     LogOptions,
     ProfileLike,
@@ -20,12 +20,10 @@ from algid.api.options import (
 )
 from algid.api.signature import verb
 from algid.base.exits import exit_of
-from algid.options import Option
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.identification.open_logs import LogLike
-    from algid.results import Result
     from algid.tracks.result import TrackResult
 
 
@@ -36,13 +34,13 @@ UNIT = "passes"
 @verb
 def track(
     log: AnyLog,
-    parameters: Annotated[Result | str | Path, Option(flag="--parameters")],
+    parameters: AnyResult,
     *,
     l1: Length | None = None,
     l2: Length | None = None,
     profile: ProfileLike | None = None,
     out: Folder | None = None,
-    force: Force = False,
+    force: bool = False,
     export: Export = False,
     command: str | None = None,
     progress: Progress | None = None,

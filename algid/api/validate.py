@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 from algid.api.answer import Answer
 from algid.api.options import (
     AnyResult,
-    Loaded,
     LogOptions,
     Logs,
     ProfileLike,
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 def validate(
     result: AnyResult,
     logs: Logs | None = None,
-    loaded: Loaded | None = None,
+    loaded: Logs | None = None,
     *,
     max_nrmse: Annotated[float, bounded((0, 1e9))] | None = None,
     max_error: Annotated[float | str | Path, Option(kind=str)] | None = None,

@@ -77,9 +77,9 @@ def listed(name: str) -> str:
 
 def every_command(
     *,
-    format: Annotated[Any, Option(kind=click.Choice(["table", "json"]), panel=ADVANCED)] = "table",  # noqa: A002
-    verbose: Annotated[bool, Option(panel=ADVANCED)] = False,
-    quiet: Annotated[bool, Option(panel=ADVANCED)] = False,
+    format: Annotated[Any, Option(click.Choice(["table", "json"]))] = "table",  # noqa: A002
+    verbose: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Take what a command takes beside its verb's keywords.
 
@@ -114,7 +114,7 @@ def command(name: str) -> Command:
         del own["format"]
     if name != "identify":
         del own["verbose"]
-    taken += own.values()
+    taken += (replace(one, panel=ADVANCED) for one in own.values())
     settable = [one.name.partition(".")[0] for one in (*of_logs.values(), *by_set)]
 
     def run(

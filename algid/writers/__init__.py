@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 
+from algid.base.errors import OutputError
 from algid.log import Log, Truth
 
 FORMATS = ("mcap", "parquet", "csv")
@@ -35,9 +36,8 @@ def write_log(
     Raises
     ------
     OutputError
-        If the file cannot be written there, or exists and `force` is not set.
-    ValueError
-        If the format is unknown.
+        If the format is unknown, or the file cannot be written there, or exists and `force` is not
+        set.
 
     Examples
     --------
@@ -52,6 +52,6 @@ def write_log(
     path = Path(path)
     name = format or path.suffix.lstrip(".").lower()
     if name not in FORMATS:
-        raise ValueError(f"format must be one of {', '.join(FORMATS)}, got {name!r}")
+        raise OutputError(f"{path}: expected a log of {', '.join(FORMATS)}, found {name!r:.60}")
     blocks = [log] if isinstance(log, Log) else log
     import_module(f"algid.writers.{name}").write(path, blocks, truth=truth, force=force)
