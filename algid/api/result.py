@@ -91,7 +91,7 @@ class Result(results.Result):  # noqa: D101
 
         from algid.report.figures import intervals
 
-        panels = intervals(self).figure
+        panels = intervals(self)
         return Figure({"data": panels.data, "layout": panels.layout})
 
     def __str__(self) -> str:

@@ -17,7 +17,7 @@ from algid.notices import Notice, Remedy
 from algid.report.arm import ArmDrawing
 from algid.report.document import Document, Section, Table
 from algid.report.figures import shares_of_time
-from algid.report.plot import BLUE, ORANGE, Panels, Plot
+from algid.report.plot import BLUE, ORANGE, Panels
 
 # of what the margin leaves: a limit that is used as far is what keeps the error bars from being
 # less
@@ -146,7 +146,7 @@ def verdict(design: Design, doubts: Sequence[Notice] = ()) -> Verdict:
     )
 
 
-def motion(design: Design) -> Plot:
+def motion(design: Design) -> Panels:
     """Angles, velocities and torques of both joints over time, with their limits."""
     limits, planned = design.campaign.limits, design.motion
     series = {
@@ -156,7 +156,7 @@ def motion(design: Design) -> Plot:
     for loaded, torque in design.torque.items():
         kind = {True: "loaded", False: "unloaded"}[loaded]
         series[f"Torques, {kind}, N m"] = (torque, -limits.torque, limits.torque)
-    panels = Panels(list(series), height=200, together=True)
+    panels = Panels("motion", list(series))
     every = max(1, design.t.size // POINTS)
     for place, (values, *sides) in enumerate(series.values()):
         size = float(np.abs(values).max())
@@ -167,8 +167,4 @@ def motion(design: Design) -> Plot:
                 if abs(side[joint]) < 3 * size:  # a limit far away would flatten the motion
                     panels.mark(place, float(side[joint]), way="y", colour=colour)
     panels.axes(len(series) - 1, "time, s")
-    reading = (
-        "The motion starts and ends at rest; torques are the believed arm's. Dashed lines are "
-        "limits, which hold for every arm that is believed possible."
-    )
-    return Plot("motion", "The motion", panels, reading)
+    return panels

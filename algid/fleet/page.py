@@ -22,7 +22,7 @@ from algid.fleet.history import History
 from algid.model import UNITS
 from algid.notices import Notice
 from algid.report.document import Document, Section, Table
-from algid.report.plot import GREY, RED, Panels, Plot
+from algid.report.plot import GREY, RED, Panels
 from algid.report.render import page
 
 Links = dict[str, str]
@@ -140,7 +140,7 @@ def _day(time: datetime | None) -> str:
     return ABSENT if time is None else time.date().isoformat()
 
 
-def overview(history: History) -> Plot | None:
+def overview(history: History) -> Panels | None:
     """A point a log on a dated axis: of what was found, the clearest of each kind first.
 
     Of a fleet without findings, its clearest trends. None without a log that has a time.
@@ -151,7 +151,7 @@ def overview(history: History) -> Plot | None:
     shown = found if found.height else history.windows.sort("p", nulls_last=True)
     pairs = shown.select("robot", "parameter").unique(maintain_order=True).head(MOST_PANELS).rows()
     titles = [f"{robot}: {name}, {unit_text(UNITS[name])}" for robot, name in pairs]
-    panels = Panels(titles, 2, 230)
+    panels = Panels("logs", titles)
     for place, (robot, name) in enumerate(pairs):
         logs = dated.filter(pl.col(f"{name}_std") > 0, robot=robot).head(MOST_POINTS)
         half = (NORMAL * logs[f"{name}_std"]).to_list()
@@ -168,12 +168,7 @@ def overview(history: History) -> Plot | None:
         for stint in windows.partition_by("stint", maintain_order=True):
             panels.curve(place, _dates(stint["end"]), stint["mean"].to_numpy(), "mean", GREY, 2)
         panels.axes(place, {"type": "date"})
-    reading = (
-        f"A dot is a log ± {NORMAL:.2f} standard deviations, grey the mean of the {SPAN} months "
-        "before. A ring is an outlier or the last log of a drift, at a red line the arm changed at "
-        "once."
-    )
-    return Plot("logs", "Log by log", panels, reading)
+    return panels
 
 
 def _dates(column: pl.Series) -> NDArray[np.int64]:

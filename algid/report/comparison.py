@@ -19,7 +19,7 @@ from algid.base.text import ABSENT, file_name, joined, percent, visible
 from algid.base.verdict import Grade, Verdict
 from algid.base.words import counted
 from algid.report.document import Document, Section, Table
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Plot, down
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, down
 from algid.report.render import page
 from algid.report.tables import settings_of
 from algid.results import Result
@@ -181,15 +181,14 @@ def verdict(found: Comparison) -> Verdict:
     return Verdict(grade, f"the largest of {counted(len(found.far), 'difference')} is {words}")
 
 
-def _distances(found: Comparison) -> Plot:
+def _distances(found: Comparison) -> Panels:
     """How far each result is from the first, in σ of both intervals."""
     known = np.flatnonzero(~np.isnan(found.sigma).all(axis=0)).tolist()
     names = [found.names[place] for place in known]
     reach = max(1.1 * found.far[0][0], 4.0)
-    panels = down(f"Distance from {found.labels[0]}, σ", names, reach)
+    panels = down("distances", f"Distance from {found.labels[0]}, σ", names, reach)
     for place, label in enumerate(found.labels[1:]):
         look = COLOURS[place % len(COLOURS)], 8, SYMBOLS[place % len(SYMBOLS)]
         panels.dots(0, found.sigma[place + 1, known], names, label, *look)
     panels.mark(0, -NORMAL, NORMAL, colour=BLUE)
-    reading = f"Within the band, ± {NORMAL:.2f} σ, chance alone puts 19 of 20 differences."
-    return Plot("distances", "Distances in σ", panels, reading)
+    return panels

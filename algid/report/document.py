@@ -14,7 +14,7 @@ from typing import Literal
 from algid.base.text import ABSENT
 from algid.base.verdict import Verdict
 from algid.report.arm import ArmDrawing
-from algid.report.plot import Plot
+from algid.report.plot import Panels
 
 Kind = Literal["name", "number", "text", "status"]
 _SIZE = r"\d[\d.,]*(?:e[+-]?\d+)?"
@@ -56,7 +56,7 @@ class Table:
         return heads
 
 
-Content = Table | Plot | str | Sequence[str] | None
+Content = Table | Panels | str | Sequence[str] | None
 """A sentence is text; where there is nothing to show it is None."""
 
 
@@ -111,9 +111,9 @@ class Document:
         return [one for one in self.sections if one.shown]
 
     @property
-    def plots(self) -> list[Plot]:
+    def plots(self) -> list[Panels]:
         """Its figures, from top to bottom."""
-        return [one for part in self.sections for one in part.content if isinstance(one, Plot)]
+        return [one for part in self.sections for one in part.content if isinstance(one, Panels)]
 
     def tables(self, folded: bool = False) -> list[Table]:
         """The tables of the sections that are folded, or of those that are not."""

@@ -17,7 +17,7 @@ from algid.base.blocks import rows_of
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
 from algid.model import K1, K3, K5
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, Plot, down
+from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, down
 from algid.report.series import POINTS, Drawn, drawn, table
 from algid.results import Result
 from algid.results.rows import known_truth
@@ -27,28 +27,11 @@ MOST_WRITTEN = 14
 USUAL = 4.0  # of the median interval: wider ones leave the frame, and do not hide the others
 WIDEST = 100.0  # percent: an interval beyond holds zero
 CLEAR, STRONGLY = "rgba(59,130,196,0)", "rgba(59,130,196,.75)"
-SETTLING = (
-    "From ε = 0.2 s on, blue should settle on the green line, the result; the dashed line is the "
-    "truth. Double-click shows the spikes that the frame cuts off."
-)
-SHRINKING = (
-    "The band must shrink and the line stay inside what the band was before; a line that leaves "
-    "it late shows a part of the logs that contradicts the rest."
-)
-OVER_TIME = {
-    "running": (
-        "Running estimate",
-        SHRINKING,
-    ),
-    "estimates": ("Convergence of the estimates (the paper's Figure 2)", SETTLING),
-    "loaded": ("Convergence, loaded log", SETTLING),
-}
-"""By file of estimates over time, the figure's title and how to read it."""
 
 
-def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Plot]:
+def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Panels]:
     """Every figure that the folder gives, in the page's order; `raw` are the torque's samples."""
-    made: list[Plot | None] = [residual(folder), over_time(folder, result, "running")]
+    made: list[Panels | None] = [residual(folder), over_time(folder, result, "running")]
     if raw is not None:
         made = [torque(folder, result, raw), closeup(result, raw), *made]
         made += [signals(result, raw), coverage(raw)]
@@ -73,10 +56,9 @@ def _prediction(panels: Panels, place: int, below: int, x: FloatArray, of: Any, 
     panels.curve(below, x, of[f"residual{joint}"], "residual", ORANGE)
 
 
-def torque(folder: Path, result: Result, raw: Drawn) -> Plot:
+def torque(folder: Path, result: Result, raw: Drawn) -> Panels:
     """Measured and predicted torque as scored, with the residual as recorded beside."""
-    titles = ("Joint 1: torque, N m", "residual, N m", "Joint 2: torque, N m", "residual, N m")
-    panels, band = Panels(titles, height=190, together=True), ""
+    panels = Panels("torque")
     shown = drawn(folder / "scored.parquet", POINTS // 2) or raw
     for place, joint in ((0, 1), (2, 2)):
         if shown is not raw:
@@ -86,38 +68,31 @@ def torque(folder: Path, result: Result, raw: Drawn) -> Plot:
     panels.axes(3, "time, s")
     _name_logs(panels, result, shown, 4)
     if result.fit is not None and result.fit.prediction is not None:
-        band = result.fit.prediction.band
-    reading = "Blue should cover grey; orange should look like noise, with no trace of the motion."
-    return Plot("torque", f"Measured and predicted torque{band}", panels, reading)
+        panels.title += result.fit.prediction.band
+    return panels
 
 
-def closeup(result: Result, raw: Drawn) -> Plot | None:
+def closeup(result: Result, raw: Drawn) -> Panels | None:
     """One second about the largest residual of each joint, every sample."""
     titles = []
     for joint, (size, t, log, _) in raw.worst.items():
         of = f" of {file_name(result.logs[log].path)}" if len(raw.starts) > 1 else ""
         titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
-    panels = Panels(titles, 2)
+    panels = Panels("closeup", titles)
     for place, (joint, (_, t, _, rows)) in enumerate(raw.worst.items()):
         _prediction(panels, place, place, rows["t"] - t, rows, joint)
         panels.axes(place, "time from there, s", "N m")
-    reading = (
-        "A residual that stands out once is an event, such as a knock; one like the rest is "
-        "the model's limit."
-    )
-    return (
-        Plot("closeup", "The largest residual, every sample", panels, reading) if titles else None
-    )
+    return panels if titles else None
 
 
-def residual(folder: Path) -> Plot | None:
+def residual(folder: Path) -> Panels | None:
     """Spectrum and autocorrelation of the residual, with the 95 % band of white noise."""
     rows = table(folder / "innovations.parquet")
     kinds = sorted(set(rows.get("quantity", ())) - {"torque spectrum"}, reverse=True)
     if "autocorrelation" not in kinds:
         return None
     each = [(joint, kind) for joint in (1, 2) for kind in kinds]
-    panels, inside = Panels([f"Joint {j}: {kind}" for j, kind in each], len(kinds)), []
+    panels, inside = Panels("residual", [f"Joint {j}: {kind}" for j, kind in each]), []
     for place, (joint, kind) in enumerate(each):
         own, measured = (
             rows_of(rows, (rows["quantity"] == what) & (rows["joint"] == joint))
@@ -137,15 +112,11 @@ def residual(folder: Path) -> Plot | None:
         unit = "share of white noise" if np.isfinite(low).any() else "(N m)²/Hz"
         frequency = {"type": "log", "dtick": 1, "title": {"text": "frequency, Hz"}}
         panels.axes(place, frequency, {"type": "log", "nticks": 5, "title": {"text": unit}})
-    note = f"Correlations of joints 1 and 2 inside the band: {joined(inside)}."
-    reading = (
-        "Of white noise 19 of 20 values lie in the blue band; a hump in the spectrum is motion "
-        "that the model misses, bars that start high and fall are slow errors."
-    )
-    return Plot("residual", "Residuals: spectrum and autocorrelation", panels, reading, note)
+    panels.note = f"Correlations of joints 1 and 2 inside the band: {joined(inside)}."
+    return panels
 
 
-def over_time(folder: Path, result: Result, name: str) -> Plot | None:
+def over_time(folder: Path, result: Result, name: str) -> Panels | None:
     """Estimates over time with their 95 % band, the result, and the truth where it is known."""
     rows, truth = drawn(folder / f"{name}.parquet", POINTS // 2), known_truth(result)
     if rows is None:
@@ -154,7 +125,7 @@ def over_time(folder: Path, result: Result, name: str) -> Plot | None:
     names = [one for one in rows.columns if one in known and np.isfinite(rows[one]).any()]
     names += ["condition"] if "condition" in rows.columns else []
     titles = [f"{one}, {unit_text(known[one].unit)}" if one in known else one for one in names]
-    panels, (title, reading) = Panels(titles, 2, 210, together=True), OVER_TIME[name]
+    panels = Panels(name, titles)
     for place, one in enumerate(names):
         value = np.where(np.isfinite(rows[one]), rows[one], np.nan)
         half = rows.columns.get(f"{one}_half", np.zeros(1))
@@ -178,55 +149,48 @@ def over_time(folder: Path, result: Result, name: str) -> Plot | None:
         space = 0.4 * (max(ends) - min(ends)) or 0.05 * abs(ends[0]) or 1.0
         panels.axes(place, y={"range": [min(ends) - space, max(ends) + space]})
     _name_logs(panels, result, rows, len(names))
-    return Plot(name, title, panels, reading) if names else None
+    return panels if names else None
 
 
-def signals(result: Result, raw: Drawn) -> Plot:
+def signals(result: Result, raw: Drawn) -> Panels:
     """Angles, velocities and torques of all logs."""
-    titles = ("Angle, rad", "Velocity, rad/s", "Measured torque, N m")
-    panels = Panels(titles, height=200, together=True)
+    panels = Panels("signals")
     for place, name in enumerate(("theta", "omega", "tau")):
         for joint, colour, dash in ((1, BLUE, "solid"), (2, ORANGE, "5px,2px")):
             y = raw[f"{name}{joint}"]
             panels.curve(place, raw["x"], y, f"joint {joint}", colour, 1.2, dash)
     panels.axes(2, "time, s")
     _name_logs(panels, result, raw, 3)
-    reading = "Look for jumps, flat stretches and clipped tops."
-    return Plot("signals", "Signals", panels, reading)
+    return panels
 
 
-def coverage(raw: Drawn) -> Plot:
+def coverage(raw: Drawn) -> Panels:
     """Where the motion went: angles and speeds."""
-    panels = Panels(("Angles, °", "Speeds, rad/s"), 2, 320)
+    panels = Panels("coverage")
     for place, (name, scale) in enumerate((("theta", 180 / np.pi), ("omega", 1.0))):
         x, y = scale * raw.samples[f"{name}1"], scale * raw.samples[f"{name}2"]
         panels.dots(place, x, y, "samples", BLUE, 4, opacity=0.5)
         panels.axes(place, "joint 1", "joint 2")
-    reading = (
-        "Dots spread over both planes inform; a line or a spot leaves parameters tied to each "
-        "other."
-    )
-    return Plot("coverage", "Coverage of the motion", panels, reading)
+    return panels
 
 
-def correlation(result: Result) -> Plot | None:
+def correlation(result: Result) -> Panels | None:
     """Which estimates err together; what is not identifiable has no correlation."""
     names = result.fit.covariance_names if result.fit is not None else []
     if not names:
         return None
     C = result.covariance
     scale = np.sqrt(np.where(np.diag(C) > 0, np.diag(C), np.nan))
-    panels = Panels([""])
+    panels = Panels("correlation")
     orange = [[0, "rgba(217,119,43,.5)"], [0.5, "rgba(217,119,43,0)"]]
     shades = [*orange, [0.5, CLEAR], [1, "rgba(59,130,196,.5)"]]  # pale enough to write on
     look = {"zmin": -1, "zmax": 1, "colorscale": shades, "xgap": 3}
     look |= {"texttemplate": "%{z:.2f}"} if len(names) <= MOST_WRITTEN else {}
     panels.heat(names, list(names), C / np.outer(scale, scale), **look)
-    reading = "Two estimates of a strong colour err together: trust their combination first."
-    return Plot("correlation", "Correlation of the estimates", panels, reading)
+    return panels
 
 
-def information(folder: Path) -> Plot | None:
+def information(folder: Path) -> Panels | None:
     """Which seconds determine each parameter."""
     rows = table(folder / "information.parquet")
     names = [name for name in rows if name not in ("log", "t")]
@@ -235,7 +199,7 @@ def information(folder: Path) -> Plot | None:
     return shares_of_time(names, np.nan_to_num([rows[name] for name in names]), 1.0)
 
 
-def inertia(result: Result, raw: Drawn | None) -> Plot | None:
+def inertia(result: Result, raw: Drawn | None) -> Panels | None:
     """M11, M12 and M22 over one turn of joint 2, with their 95 % bands."""
     names = K1, K3, K5
     several = [getattr(result.parameters.get(name), "estimate", None) for name in names]
@@ -245,7 +209,7 @@ def inertia(result: Result, raw: Drawn | None) -> Plot | None:
     C = np.full((3, 3), np.nan) if result.fit is None else result.fit.covariance_of(names)
     degrees = np.linspace(-180.0, 180.0, 181)
     c, one = np.cos(np.radians(degrees)), np.ones(degrees.size)
-    panels, m = Panels(["kg m² over θ2"], height=320), []
+    panels, m = Panels("inertia"), []
     # M is linear in k1, k3 and k5 (eq. (3)): these are its derivatives (3, n)
     for name, slopes, colour, dash in (
         ("M11", [2 * c, one, one], BLUE, "solid"),
@@ -262,12 +226,11 @@ def inertia(result: Result, raw: Drawn | None) -> Plot | None:
         panels.mark(0, max(np.nanmin(reached), -180.0), min(np.nanmax(reached), 180.0))
     panels.axes(0, {"range": [-180, 180], "dtick": 45, "title": {"text": "θ2, °"}})
     smallest = np.linalg.eigvalsh(np.array([m[:2], m[1:]]).T).min()
-    note = f"The smallest eigenvalue of M is {significant(float(smallest), 3)} kg m²."
-    reading = "M11 and M22 must stay above zero; outside the grey stretch the curves extrapolate."
-    return Plot("inertia", "Mass matrix M(θ)", panels, reading, note)
+    panels.note = f"The smallest eigenvalue of M is {significant(float(smallest), 3)} kg m²."
+    return panels
 
 
-def intervals(result: Result) -> Plot:
+def intervals(result: Result) -> Panels:
     """Every estimate's 95 % interval in percent of the estimate, each log's own, and the truth."""
     known, shares = dict[str, float](), list[float]()
     for name, one in (result.parameters | result.payload).items():
@@ -275,7 +238,12 @@ def intervals(result: Result) -> Plot:
             known[name] = one.estimate
             shares.append(100 * one.half / abs(one.estimate))
     widest = min(max(shares, default=1.0), USUAL * median(shares or [1.0]), WIDEST)
-    panels = down("95 % interval, % of the estimate", list(known), 1.15 * max(widest, 1e-6))
+    panels = down(
+        "intervals",
+        "95 % interval, % of the estimate",
+        list(known),
+        1.15 * max(widest, 1e-6),
+    )
 
     def dots(pairs: Iterable[tuple[str, float | None]], name: str, *look: Any, **more: Any) -> None:
         at = [(of, value) for of, value in pairs if of in known and value is not None]
@@ -293,23 +261,18 @@ def intervals(result: Result) -> Plot:
                 by_log += [(n, one.estimate) for n, one in own.items() if n in result.parameters]
     dots(by_log, "each log by itself", GREY, 5)
     dots(known_truth(result).items(), "truth", ORANGE, 10, "circle-open")
-    reading = "An interval that leaves the frame is far wider than most."
-    return Plot("intervals", "95 % intervals", panels, reading)
+    return panels
 
 
-def shares_of_time(names: Sequence[str], gained: FloatArray, width: float) -> Plot:
+def shares_of_time(names: Sequence[str], gained: FloatArray, width: float) -> Panels:
     """Information (Q, n) of stretches `width` s wide, in percent of each parameter's own."""
     # information adds up: the seconds of a long log are summed, not thinned
     step = -(-gained.shape[1] // MOST_CELLS)
     gained = np.add.reduceat(gained, np.arange(0, gained.shape[1], step), axis=1)
     total = gained.sum(axis=1, keepdims=True)
     shares = 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
-    panels = Panels([""])
+    panels = Panels("information")
     look = {"colorscale": [[0, CLEAR], [1, STRONGLY]], "colorbar": {"ticksuffix": " %"}}
     panels.heat(names, (np.arange(shares.shape[1]) + 0.5) * step * width, shares, **look)
     panels.axes(0, "time, s")
-    reading = (
-        "Strongly coloured seconds inform most; a row with colour in one place only rests on that "
-        "moment."
-    )
-    return Plot("information", "Information by time", panels, reading)
+    return panels

@@ -11,7 +11,7 @@ from algid.methods import settles
 from algid.report.arm import arm_of
 from algid.report.document import Content, Document, Section
 from algid.report.figures import figures, intervals, over_time
-from algid.report.plot import Plot
+from algid.report.plot import Panels
 from algid.report.render import markdown, page, write_library, write_texts
 from algid.report.series import drawn
 from algid.report.tables import (
@@ -65,7 +65,7 @@ def result_document(
     """The report of an identification; with its `folder` also the figures and its samples."""
     fit, leads, raw = result.fit, settles(result.estimator), None
     names = [file_name(log.path) for log in result.logs]
-    plots, paper = list[Plot](), list[Content]()
+    plots, paper = list[Panels](), list[Content]()
     arm, other, zero = parameter_tables(result)
     first = list[Content](arm)
     if folder is not None:

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import base64
 import html
+import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from typing import Any
 
 import numpy as np
@@ -24,34 +26,25 @@ FRAME, TICKS = 24, 55
 """Pixels of a figure around its panels, less those below the last; of a panel below its drawing."""
 
 
-@dataclass(frozen=True)
-class Plot:
-    """A figure: its panels, how to read them, and what they show in words."""
-
-    key: str
-    title: str
-    figure: Panels
-    reading: str
-    note: str = ""
-
-
 class Panels:
-    """A grid of panels with a common legend; panels are counted row by row from 0.
+    """A figure: a grid of panels with a common legend, counted row by row from 0.
 
     Parameters
     ----------
-    titles : one a panel
-    columns : int
+    key : by which `figures.toml` has the figure's title, how to read it, and its grid
+    titles : one a panel, where the file has none
     height : int
-        Pixels of a panel.
-    together : bool
-        Whether they zoom together along x.
+        Pixels of a panel, where the file has none.
     """
 
-    def __init__(
-        self, titles: Sequence[str], columns: int = 1, height: int = 240, together: bool = False
-    ) -> None:
-        rows = -(-len(titles) // columns)
+    note = ""
+    """What it shows in words."""
+
+    def __init__(self, key: str, titles: Sequence[str] = (), height: int = 240) -> None:
+        own = _figures()[key]
+        self.key, self.title, self.reading = key, own["title"], own["reading"]
+        titles, columns = titles or own["titles"], own.get("columns", 1)
+        height, rows = own.get("height", height), -(-len(titles) // columns)
         grid = {"rows": rows, "columns": columns, "pattern": "independent"}
         self.data: list[dict[str, Any]] = []
         self.layout: dict[str, Any] = {
@@ -60,9 +53,9 @@ class Panels:
             "annotations": [],
             "height": height * rows + FRAME,
         }
-        for place, title in enumerate(titles):
-            self.axes(place, {"matches": "x"} if together and place else "")
-            self.text(place, title)
+        for place, words in enumerate(titles):
+            self.axes(place, {"matches": "x"} if place and own.get("together") else "")
+            self.text(place, words)
 
     def axes(self, place: int, x: dict[str, Any] | str = "", y: dict[str, Any] | str = "") -> None:
         """Set titles of a panel's axes, or more of their settings."""
@@ -155,12 +148,19 @@ class Panels:
         self.layout["annotations"].append(at)
 
 
-def down(title: str, names: Sequence[str], limit: float) -> Panels:
+def down(key: str, over: str, names: Sequence[str], limit: float) -> Panels:
     """A panel for points beside names, the first one at the top, within ± `limit`."""
-    panels = Panels([title], height=60 + 22 * len(names))
+    panels = Panels(key, [over], 60 + 22 * len(names))
     rows = {"type": "category", "categoryarray": names, "autorange": "reversed"}
     panels.axes(0, {"range": [-limit, limit]}, rows)
     return panels
+
+
+@cache
+def _figures() -> dict[str, dict[str, Any]]:
+    """What is the same of a figure on every page, by its key."""
+    file = resources.files(__package__) / "templates/figures.toml"
+    return tomllib.loads(file.read_text("utf-8"))
 
 
 def ref(name: str, place: int) -> str:

@@ -42,7 +42,9 @@ def page(document: Document, shared_library: bool = False) -> str:
 
     It carries the plotting library; with `shared_library` it asks for the one beside the folder.
     """
-    drawn: dict[str, Any] = {plot.key: vars(plot.figure) for plot in document.plots}
+    drawn: dict[str, Any] = {}
+    for plot in document.plots:
+        drawn[plot.key] = {"data": plot.data, "layout": plot.layout}
     if document.arm is not None:
         drawn["arm"] = document.arm.frames
     place = secrets.token_hex(32)  # nobody who writes the content can predict it

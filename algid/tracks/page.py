@@ -20,7 +20,7 @@ from algid.base.words import counted
 from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
 from algid.report.export import write_series
-from algid.report.plot import BLUE, GREEN, ORANGE, Panels, Plot
+from algid.report.plot import BLUE, GREEN, ORANGE, Panels
 from algid.report.render import markdown, page, write_texts
 from algid.report.series import reduced
 from algid.report.tables import log_tables, provenance_table, settings_table
@@ -211,11 +211,12 @@ def verdict(result: TrackResult) -> Verdict:
     return graded(headline, reasons, notes, failure=failure, things="masses")
 
 
-def payload_figure(result: TrackResult) -> Plot:
+def payload_figure(result: TrackResult) -> Panels:
     """Payload and residual over time, with the stretches, the changes and the true schedule."""
     track, stretches = result.track, result.track.stretches
-    titles = ("payload, kg", f"residual over the sensors' noise, RMS of each {CELL:g} s")
-    panels = Panels(titles, height=320, together=True)
+    panels = Panels(
+        "payload", ("payload, kg", f"residual over the sensors' noise, RMS of each {CELL:g} s")
+    )
     half = NORMAL * track.std
     curve = {"t": track.t, "low": track.m_p - half, "m_p": track.m_p, "high": track.m_p + half}
     curve["left"] = track.left
@@ -255,10 +256,5 @@ def payload_figure(result: TrackResult) -> Plot:
     panels.curve(1, t, left, "residual", ORANGE, 1.0)
     panels.mark(1, 1.0, way="y")
     panels.axes(1, "time, s", {"rangemode": "tozero"})
-    reading = (
-        "Blue should run level, green within its band; the payload may step in the orange bands. "
-        "A band that opens wide shows that the arm moved too little. A residual about 1 is the "
-        "sensors' noise; more is torque that neither arm nor payload explains."
-    )
-    note = f"Median of the residual over the noise: {float(np.median(track.left)):.2f}."
-    return Plot("payload", "Payload in time", panels, reading, note)
+    panels.note = f"Median of the residual over the noise: {float(np.median(track.left)):.2f}."
+    return panels

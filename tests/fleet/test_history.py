@@ -141,11 +141,11 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert verdict(history).headline == "2 robots, 240 logs: 2 steps"
     plot = overview(history)
     assert plot is not None
-    panels = [one["text"] for one in plot.figure.layout["annotations"]]
+    panels = [one["text"] for one in plot.layout["annotations"]]
     assert panels == ["<b>r1: k1, kg m²</b>", "<b>r1: k3, kg m²</b>"]
-    lines = [one["x0"] for one in plot.figure.layout["shapes"]]
+    lines = [one["x0"] for one in plot.layout["shapes"]]
     assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 2
-    assert len(named(plot.figure.data, "mean")) == 4  # no line leads across the change
+    assert len(named(plot.data, "mean")) == 4  # no line leads across the change
 
 
 @pytest.mark.parametrize("scatter", [1.0, 3.0])

@@ -23,7 +23,7 @@ from algid.report.figures import (
     shares_of_time,
     torque,
 )
-from algid.report.plot import Plot, label, packed
+from algid.report.plot import Panels, label, packed
 from algid.report.series import Drawn, drawn
 from algid.results import Result
 from tests.report.folders import estimate
@@ -37,9 +37,9 @@ def raw(case_folder: Path) -> Drawn:
     return found
 
 
-def traces(plot: Plot | None, name: str) -> list[dict[str, Any]]:
+def traces(plot: Panels | None, name: str) -> list[dict[str, Any]]:
     assert plot is not None
-    return named(plot.figure.data, name)
+    return named(plot.data, name)
 
 
 def finite(values: np.ndarray) -> np.ndarray:
@@ -60,7 +60,7 @@ def test_intervals_are_in_percent_of_the_estimate(result: Result) -> None:
     assert (dots["x"], dots["y"]) == ([pytest.approx(10.0)], ["k1"])
     (ring,) = traces(plot, "truth")
     assert (ring["x"], ring["y"]) == ([pytest.approx(-10.0)], ["k2"])
-    low, high = plot.figure.layout["xaxis"]["range"]
+    low, high = plot.layout["xaxis"]["range"]
     assert high == -low == pytest.approx(1.15 * 4 * 5 * NORMAL)  # four times the median interval
     bare = intervals(result.model_copy(update={"parameters": {}, "payload": {}}))
     assert traces(bare, "truth") == []
@@ -78,7 +78,7 @@ def test_torque_stands_above_its_residual_and_the_worst_moment_has_every_sample(
         assert (y.min(), y.max()) == pytest.approx(ends, rel=1e-6)
     axes = [[trace["yaxis"] for trace in traces(plot, name)] for name in ("measured", "residual")]
     assert axes == [["y", "y3"], ["y2", "y4"]]
-    starts = sorted({shape["x0"] for shape in plot.figure.layout["shapes"]})
+    starts = sorted({shape["x0"] for shape in plot.layout["shapes"]})
     span = scored.filter(log=0)["t"]
     assert starts == pytest.approx([span[0], 1.01 * span[-1]])
     for joint, one in enumerate(traces(near, "residual"), start=1):
@@ -115,7 +115,7 @@ def test_the_running_estimate_ends_at_its_last_value(case_folder: Path, result: 
         name = names[place]
         assert finite(typed(one["y"]))[-1] == pytest.approx(rows[name][-1], rel=1e-6)
         axis = "yaxis" if place == 0 else f"yaxis{place + 1}"
-        low, high = plot.figure.layout[axis]["range"]
+        low, high = plot.layout[axis]["range"]
         assert low < rows[name][-1] - rows[f"{name}_half"][-1] < rows[name][-1] < high
 
 

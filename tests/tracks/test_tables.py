@@ -89,7 +89,7 @@ def test_a_long_track_keeps_its_extremes_and_breaks_at_holes() -> None:
     m_p[40], m_p[90] = 0.9, -0.4
     made = replace(made, track=replace(made.track, m_p=m_p))
     assert made.track.t.size > 2 * POINTS / 2
-    data = payload_figure(made).figure.data
+    data = payload_figure(made).data
     (curve,) = [one for one in data if one["name"].startswith("m_p(t)")]
     y = typed(curve["y"])
     assert y.size < made.track.t.size
@@ -108,7 +108,5 @@ def test_a_long_track_keeps_its_extremes_and_breaks_at_holes() -> None:
     still = track([0.1])
     t = still.track.t + np.where(still.track.t > 0.5, 3.0, 0.0)
     holey = replace(still, track=replace(still.track, t=t))
-    (curve,) = [
-        one for one in payload_figure(holey).figure.data if one["name"].startswith("m_p(t)")
-    ]
+    (curve,) = [one for one in payload_figure(holey).data if one["name"].startswith("m_p(t)")]
     assert np.count_nonzero(np.isnan(typed(curve["y"]))) == 2  # in the hole, and at the end
