@@ -17,7 +17,7 @@ from algid.notices import Notice, Remedy
 from algid.report.arm import ArmDrawing
 from algid.report.document import Document, Section, Table
 from algid.report.figures import shares_of_time
-from algid.report.plot import BLUE, ORANGE, Panels
+from algid.report.plot import Panels
 
 # of what the margin leaves: a limit that is used as far is what keeps the error bars from being
 # less
@@ -160,11 +160,11 @@ def motion(design: Design) -> Panels:
     every = max(1, design.t.size // POINTS)
     for place, (values, *sides) in enumerate(series.values()):
         size = float(np.abs(values).max())
-        for joint, colour, dash in ((0, BLUE, "solid"), (1, ORANGE, "5px,2px")):
-            y = values[joint, ::every]
-            panels.curve(place, design.t[::every], y, f"joint {joint + 1}", colour, 1.4, dash)
+        for joint in range(2):
+            name = f"joint {joint + 1}"
+            panels.add(place, design.t[::every], values[joint, ::every], name)
             for side in sides:
                 if abs(side[joint]) < 3 * size:  # a limit far away would flatten the motion
-                    panels.mark(place, float(side[joint]), way="y", colour=colour)
+                    panels.mark(place, name, float(side[joint]), way="y")
     panels.axes(len(series) - 1, "time, s")
     return panels

@@ -22,7 +22,7 @@ from algid.fleet.history import History
 from algid.model import UNITS
 from algid.notices import Notice
 from algid.report.document import Document, Section, Table
-from algid.report.plot import GREY, RED, Panels
+from algid.report.plot import Panels
 from algid.report.render import page
 
 Links = dict[str, str]
@@ -157,16 +157,16 @@ def overview(history: History) -> Panels | None:
         half = (NORMAL * logs[f"{name}_std"]).to_list()
         bars = {"type": "data", "array": half, "thickness": 1, "width": 0}
         times, y = _dates(logs["time"]), logs[name].to_numpy()
-        panels.dots(place, times, y, "log", size=5, error_y=bars)
+        panels.add(place, times, y, "log", error_y=bars)
         jobs = found.filter(pl.col("kind") != "step", robot=robot, parameter=name)["job"]
         marked = logs["job"].is_in(jobs.implode()).to_numpy()
         if marked.any():
-            panels.dots(place, times[marked], y[marked], "finding", RED, 13, "circle-open")
+            panels.add(place, times[marked], y[marked], "finding")
         for day in _dates(found.filter(robot=robot, kind="step")["time"].unique().sort()).tolist():
-            panels.mark(place, day, colour=RED)
+            panels.mark(place, "change", day)
         windows = history.windows.filter(robot=robot, parameter=name)
         for stint in windows.partition_by("stint", maintain_order=True):
-            panels.curve(place, _dates(stint["end"]), stint["mean"].to_numpy(), "mean", GREY, 2)
+            panels.add(place, _dates(stint["end"]), stint["mean"].to_numpy(), "mean")
         panels.axes(place, {"type": "date"})
     return panels
 

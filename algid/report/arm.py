@@ -56,7 +56,7 @@ class ArmDrawing:
         t = np.linspace(first, last, 2 + int(min((last - first) * FRAMES, MOST_FRAMES)))
         theta1, theta2 = (np.interp(t, self.t, row) for row in self.theta)
         rows = {"t": t, "theta1": theta1, "theta2": theta2}
-        return {name: values.round(4).tolist() for name, values in rows.items()}
+        return {name: values.round(3).tolist() for name, values in rows.items()}
 
 
 def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:

@@ -19,7 +19,7 @@ from algid.base.text import ABSENT, file_name, joined, percent, visible
 from algid.base.verdict import Grade, Verdict
 from algid.base.words import counted
 from algid.report.document import Document, Section, Table
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, RED, Panels, down
+from algid.report.plot import Panels, down
 from algid.report.render import page
 from algid.report.tables import settings_of
 from algid.results import Result
@@ -30,8 +30,6 @@ ASIDE = re.compile(r"command|used\..*|.*told")
 """Settings that are no difference: a command names the logs and says again what is set."""
 FAR = sigmas()
 """σ, beyond which chance does not explain a difference."""
-COLOURS = (BLUE, ORANGE, GREEN, RED, GREY)
-SYMBOLS = ("circle", "square", "diamond", "x", "cross")
 
 
 @dataclass(frozen=True, repr=False)
@@ -188,7 +186,6 @@ def _distances(found: Comparison) -> Panels:
     reach = max(1.1 * found.far[0][0], 4.0)
     panels = down("distances", f"Distance from {found.labels[0]}, σ", names, reach)
     for place, label in enumerate(found.labels[1:]):
-        look = COLOURS[place % len(COLOURS)], 8, SYMBOLS[place % len(SYMBOLS)]
-        panels.dots(0, found.sigma[place + 1, known], names, label, *look)
-    panels.mark(0, -NORMAL, NORMAL, colour=BLUE)
+        panels.add(0, found.sigma[place + 1, known], names, label, f"result {place % 5}")
+    panels.mark(0, "chance", -NORMAL, NORMAL)
     return panels

@@ -17,7 +17,7 @@ from algid.base.blocks import rows_of
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
 from algid.model import K1, K3, K5
-from algid.report.plot import BLUE, GREEN, GREY, ORANGE, Panels, down
+from algid.report.plot import Panels, down
 from algid.report.series import POINTS, Drawn, drawn, table
 from algid.results import Result
 from algid.results.rows import known_truth
@@ -26,7 +26,6 @@ MOST_CELLS = 600
 MOST_WRITTEN = 14
 USUAL = 4.0  # of the median interval: wider ones leave the frame, and do not hide the others
 WIDEST = 100.0  # percent: an interval beyond holds zero
-CLEAR, STRONGLY = "rgba(59,130,196,0)", "rgba(59,130,196,.75)"
 
 
 def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Panels]:
@@ -44,16 +43,16 @@ def _name_logs(panels: Panels, result: Result, rows: Drawn, count: int) -> None:
     starts = rows.starts
     for log, x in starts.items() if len(starts) > 1 else ():
         for place in range(count):
-            panels.mark(place, x, dash="dot")
+            panels.mark(place, "start", x)
         if len(starts) <= 6:  # more names would stand on one another
             panels.text(0, file_name(result.logs[log].path), x)
 
 
 def _prediction(panels: Panels, place: int, below: int, x: FloatArray, of: Any, joint: int) -> None:
     """Measured and predicted torque of a joint in one panel, what is left in that or another."""
-    panels.curve(place, x, of[f"tau{joint}"], "measured", GREY, 3.6)
-    panels.curve(place, x, of[f"tau{joint}_predicted"], "predicted by the model")
-    panels.curve(below, x, of[f"residual{joint}"], "residual", ORANGE)
+    panels.add(place, x, of[f"tau{joint}"], "measured")
+    panels.add(place, x, of[f"tau{joint}_predicted"], "predicted by the model")
+    panels.add(below, x, of[f"residual{joint}"], "residual")
 
 
 def torque(folder: Path, result: Result, raw: Drawn) -> Panels:
@@ -62,10 +61,8 @@ def torque(folder: Path, result: Result, raw: Drawn) -> Panels:
     shown = drawn(folder / "scored.parquet", POINTS // 2) or raw
     for place, joint in ((0, 1), (2, 2)):
         if shown is not raw:
-            recorded = raw["x"], raw[f"residual{joint}"], "residual as recorded"
-            panels.curve(place + 1, *recorded, "#e3a46f", 0.8, visible="legendonly")
+            panels.add(place + 1, raw["x"], raw[f"residual{joint}"], "residual as recorded")
         _prediction(panels, place, place + 1, shown["x"], shown, joint)
-    panels.axes(3, "time, s")
     _name_logs(panels, result, shown, 4)
     if result.fit is not None and result.fit.prediction is not None:
         panels.title += result.fit.prediction.band
@@ -102,13 +99,13 @@ def residual(folder: Path) -> Panels | None:
         panels.band(place, x, low, high, "95 % band of white noise")
         if kind == "autocorrelation":
             stems = np.stack([0 * y, y, np.nan * y], axis=1).ravel()
-            panels.curve(place, np.repeat(x, 3), stems, "residual", ORANGE, 4)
+            panels.add(place, np.repeat(x, 3), stems, "residual", "stems")
             panels.axes(place, "lag, s")
             inside.append(f"{np.count_nonzero((y >= low) & (y <= high))} of {y.size}")
             continue
         if measured["x"].size:
-            panels.curve(place, measured["x"], measured["value"], "measured torque", GREY, 2)
-        panels.curve(place, x, y, "residual", ORANGE)
+            panels.add(place, measured["x"], measured["value"], "measured torque")
+        panels.add(place, x, y, "residual")
         unit = "share of white noise" if np.isfinite(low).any() else "(N m)²/Hz"
         frequency = {"type": "log", "dtick": 1, "title": {"text": "frequency, Hz"}}
         panels.axes(place, frequency, {"type": "log", "nticks": 5, "title": {"text": unit}})
@@ -132,20 +129,17 @@ def over_time(folder: Path, result: Result, name: str) -> Panels | None:
         low, high = value - half, value + half
         if half.any():
             panels.band(place, rows["x"], low, high, "its 95 % interval")
-        panels.curve(place, rows["x"], value, "estimate from all samples so far")
+        panels.add(place, rows["x"], value, "estimate from all samples so far")
         if one == "condition":
             panels.axes(place, y={"type": "log"})
             continue
         # what comes first, and spikes near singular instants, start outside the view
         late = np.stack([low, high])[:, value.size // 4 :]
         ends = [quantile(late[np.isfinite(late)], share) for share in (0.05, 0.95)]
-        for mark, colour, dash in (
-            (known[one].estimate, GREEN, "solid"),
-            (truth.get(one), ORANGE, "dash"),
-        ):
+        for look, mark in ("result", known[one].estimate), ("truth", truth.get(one)):
             if mark is not None:
                 ends.append(mark)
-                panels.mark(place, mark, way="y", colour=colour, dash=dash)
+                panels.mark(place, look, mark, way="y")
         space = 0.4 * (max(ends) - min(ends)) or 0.05 * abs(ends[0]) or 1.0
         panels.axes(place, y={"range": [min(ends) - space, max(ends) + space]})
     _name_logs(panels, result, rows, len(names))
@@ -156,10 +150,8 @@ def signals(result: Result, raw: Drawn) -> Panels:
     """Angles, velocities and torques of all logs."""
     panels = Panels("signals")
     for place, name in enumerate(("theta", "omega", "tau")):
-        for joint, colour, dash in ((1, BLUE, "solid"), (2, ORANGE, "5px,2px")):
-            y = raw[f"{name}{joint}"]
-            panels.curve(place, raw["x"], y, f"joint {joint}", colour, 1.2, dash)
-    panels.axes(2, "time, s")
+        for joint in (1, 2):
+            panels.add(place, raw["x"], raw[f"{name}{joint}"], f"joint {joint}")
     _name_logs(panels, result, raw, 3)
     return panels
 
@@ -169,8 +161,7 @@ def coverage(raw: Drawn) -> Panels:
     panels = Panels("coverage")
     for place, (name, scale) in enumerate((("theta", 180 / np.pi), ("omega", 1.0))):
         x, y = scale * raw.samples[f"{name}1"], scale * raw.samples[f"{name}2"]
-        panels.dots(place, x, y, "samples", BLUE, 4, opacity=0.5)
-        panels.axes(place, "joint 1", "joint 2")
+        panels.add(place, x, y, "samples")
     return panels
 
 
@@ -182,11 +173,8 @@ def correlation(result: Result) -> Panels | None:
     C = result.covariance
     scale = np.sqrt(np.where(np.diag(C) > 0, np.diag(C), np.nan))
     panels = Panels("correlation")
-    orange = [[0, "rgba(217,119,43,.5)"], [0.5, "rgba(217,119,43,0)"]]
-    shades = [*orange, [0.5, CLEAR], [1, "rgba(59,130,196,.5)"]]  # pale enough to write on
-    look = {"zmin": -1, "zmax": 1, "colorscale": shades, "xgap": 3}
-    look |= {"texttemplate": "%{z:.2f}"} if len(names) <= MOST_WRITTEN else {}
-    panels.heat(names, list(names), C / np.outer(scale, scale), **look)
+    written = {"texttemplate": "%{z:.2f}"} if len(names) <= MOST_WRITTEN else {}
+    panels.heat(names, list(names), C / np.outer(scale, scale), **written)
     return panels
 
 
@@ -211,20 +199,17 @@ def inertia(result: Result, raw: Drawn | None) -> Panels | None:
     c, one = np.cos(np.radians(degrees)), np.ones(degrees.size)
     panels, m = Panels("inertia"), []
     # M is linear in k1, k3 and k5 (eq. (3)): these are its derivatives (3, n)
-    for name, slopes, colour, dash in (
-        ("M11", [2 * c, one, one], BLUE, "solid"),
-        ("M12 = M21", [c, one, 0 * c], ORANGE, "dash"),
-        ("M22", [0 * c, one, 0 * c], GREEN, "dot"),
-    ):
+    for name, slopes in (
+        ("M11", [2 * c, one, one]), ("M12 = M21", [c, one, 0 * c]), ("M22", [0 * c, one, 0 * c])
+    ):  # fmt: skip
         J = np.array(slopes)
         m.append(k @ J)
         half = result.quantile * np.sqrt(np.maximum((J * (C @ J)).sum(axis=0), 0))
         panels.band(0, degrees, m[-1] - half, m[-1] + half, "95 % interval")
-        panels.curve(0, degrees, m[-1], name, colour, 2, dash)
+        panels.add(0, degrees, m[-1], name)
     if raw is not None:
         reached = np.degrees(raw["theta2"])
-        panels.mark(0, max(np.nanmin(reached), -180.0), min(np.nanmax(reached), 180.0))
-    panels.axes(0, {"range": [-180, 180], "dtick": 45, "title": {"text": "θ2, °"}})
+        panels.mark(0, "reached", max(np.nanmin(reached), -180.0), min(np.nanmax(reached), 180.0))
     smallest = np.linalg.eigvalsh(np.array([m[:2], m[1:]]).T).min()
     panels.note = f"The smallest eigenvalue of M is {significant(float(smallest), 3)} kg m²."
     return panels
@@ -245,13 +230,13 @@ def intervals(result: Result) -> Panels:
         1.15 * max(widest, 1e-6),
     )
 
-    def dots(pairs: Iterable[tuple[str, float | None]], name: str, *look: Any, **more: Any) -> None:
+    def dots(pairs: Iterable[tuple[str, float | None]], name: str, **more: Any) -> None:
         at = [(of, value) for of, value in pairs if of in known and value is not None]
         x = [100 * (value - known[of]) / abs(known[of]) for of, value in at]
         if at:
-            panels.dots(0, x, [of for of, _ in at], name, *look, **more)
+            panels.add(0, x, [of for of, _ in at], name, **more)
 
-    bars = {"type": "data", "array": shares, "color": BLUE, "thickness": 2.5, "width": 0}
+    bars = {"type": "data", "array": shares, "thickness": 2.5, "width": 0}
     dots(known.items(), "estimate with its interval", error_x=bars)
     by_log = []
     if result.fit is not None and len(result.fit.by_log) == len(result.logs) > 1:
@@ -259,8 +244,8 @@ def intervals(result: Result) -> Panels:
             # a loaded log's constants hold its payload's share
             if log.role == "unloaded":
                 by_log += [(n, one.estimate) for n, one in own.items() if n in result.parameters]
-    dots(by_log, "each log by itself", GREY, 5)
-    dots(known_truth(result).items(), "truth", ORANGE, 10, "circle-open")
+    dots(by_log, "each log by itself")
+    dots(known_truth(result).items(), "truth")
     return panels
 
 
@@ -272,7 +257,5 @@ def shares_of_time(names: Sequence[str], gained: FloatArray, width: float) -> Pa
     total = gained.sum(axis=1, keepdims=True)
     shares = 100 * np.divide(gained, total, out=np.zeros_like(gained), where=total > 0)
     panels = Panels("information")
-    look = {"colorscale": [[0, CLEAR], [1, STRONGLY]], "colorbar": {"ticksuffix": " %"}}
-    panels.heat(names, (np.arange(shares.shape[1]) + 0.5) * step * width, shares, **look)
-    panels.axes(0, "time, s")
+    panels.heat(names, (np.arange(shares.shape[1]) + 0.5) * step * width, shares)
     return panels

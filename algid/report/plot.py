@@ -9,6 +9,7 @@ import base64
 import html
 import tomllib
 from collections.abc import Sequence
+from copy import deepcopy
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -18,9 +19,6 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.text import visible
 
-BLUE, ORANGE, GREEN, GREY, RED = "#3b82c4", "#d9772b", "#2e9c6a", "#8b95a4", "#d0453c"
-"""Legible on white and on the dark page."""
-PALE = "rgba(59,130,196,.25)"
 LONGEST = 56
 FRAME, TICKS = 24, 55
 """Pixels of a figure around its panels, less those below the last; of a panel below its drawing."""
@@ -41,13 +39,13 @@ class Panels:
     """What it shows in words."""
 
     def __init__(self, key: str, titles: Sequence[str] = (), height: int = 240) -> None:
-        own = _figures()[key]
+        own = _data()["figures"][key]
         self.key, self.title, self.reading = key, own["title"], own["reading"]
         titles, columns = titles or own["titles"], own.get("columns", 1)
         height, rows = own.get("height", height), -(-len(titles) // columns)
         grid = {"rows": rows, "columns": columns, "pattern": "independent"}
         self.data: list[dict[str, Any]] = []
-        self.layout: dict[str, Any] = {
+        self.layout: dict[str, Any] = deepcopy(own.get("layout", {})) | {
             "grid": grid | {"xgap": 0.12, "ygap": TICKS / height},
             "shapes": [],
             "annotations": [],
@@ -63,78 +61,36 @@ class Panels:
             axis = self.layout.setdefault(name, {})
             axis |= {"title": {"text": given}} if given and isinstance(given, str) else given or {}
 
-    def add(self, place: int, x: Any, y: Any, name: str, **more: Any) -> None:
-        """Add a trace; the first of a name stands in the legend."""
-        shown = label(name)
+    def add(self, place: int, x: Any, y: Any, name: str, look: str = "", **more: Any) -> None:
+        """Add a trace that looks as `look` or its name says, or is a plain curve.
+
+        The first one of a name stands in the legend.
+        """
+        shown, looks = label(name), _data()["looks"]
         trace = {"type": "scatter", "x": packed(x), "y": packed(y), "name": shown}
         trace |= {"legendgroup": shown, "showlegend": all(o["name"] != shown for o in self.data)}
-        self.data.append(trace | {"xaxis": ref("x", place), "yaxis": ref("y", place)} | more)
-
-    def curve(
-        self,
-        place: int,
-        x: Any,
-        y: Any,
-        name: str,
-        colour: str = BLUE,
-        width: float = 1.4,
-        dash: str = "solid",
-        **more: Any,
-    ) -> None:
-        """Add a line."""
-        look = {"color": colour, "width": width, "dash": dash}
-        self.add(place, x, y, name, mode="lines", line=look, **more)
-
-    def dots(
-        self,
-        place: int,
-        x: Any,
-        y: Any,
-        name: str,
-        colour: str = BLUE,
-        size: int = 6,
-        symbol: str = "circle",
-        **more: Any,
-    ) -> None:
-        """Add points; `more` may hold error bars."""
-        marker = {"color": colour, "size": size, "symbol": symbol}
-        self.add(place, x, y, name, mode="markers", marker=marker, **more)
+        trace |= {"xaxis": ref("x", place), "yaxis": ref("y", place)}
+        self.data.append(trace | looks.get(look or name, looks["curve"]) | more)
 
     def band(self, place: int, x: FloatArray, low: FloatArray, high: FloatArray, name: str) -> None:
         """Add the area between two series, an area for each stretch without a gap."""
         known = np.flatnonzero(np.isfinite(low) & np.isfinite(high))
         for part in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
             around = np.concatenate([x[part], x[part][::-1]])
-            edge = np.concatenate([high[part], low[part][::-1]])
-            fill = {"fill": "toself", "fillcolor": PALE, "hoverinfo": "skip"}
-            self.curve(place, around, edge, name, width=0, **fill)
+            self.add(place, around, np.concatenate([high[part], low[part][::-1]]), name, "band")
 
-    def mark(
-        self,
-        place: int,
-        low: Any,
-        high: Any = None,
-        way: str = "x",
-        colour: str = GREY,
-        dash: str = "dash",
-    ) -> None:
+    def mark(self, place: int, look: str, low: Any, high: Any = None, way: str = "x") -> None:
         """Add a line over the whole panel where an axis is `low`, or a band up to `high`."""
-        look: dict[str, Any] = {
-            "type": "line",
-            "line": {"color": colour, "width": 1.2, "dash": dash},
-        }
-        if high is not None:
-            look = {"type": "rect", "fillcolor": colour, "opacity": 0.16, "line": {"width": 0}}
-            look["layer"] = "below"
         over = "y" if way == "x" else "x"
-        ends = {f"{way}0": low, f"{way}1": low if high is None else high}
-        ends |= {f"{over}0": 0, f"{over}1": 1, f"{over}ref": f"{ref(over, place)} domain"}
-        self.layout["shapes"].append(look | ends | {f"{way}ref": ref(way, place)})
+        ends = {f"{way}0": low, f"{way}1": low if high is None else high, f"{over}0": 0}
+        ends |= {f"{over}1": 1, f"{over}ref": f"{ref(over, place)} domain"}
+        ends[f"{way}ref"] = ref(way, place)
+        self.layout["shapes"].append(_data()["marks"][look] | ends)
 
     def heat(self, names: Sequence[str], x: Any, z: FloatArray, **more: Any) -> None:
         """Fill the only panel with a map of numbers, a row a name."""
         rows = list(map(label, names))
-        self.add(0, x, rows, "map", type="heatmap", z=packed(z), ygap=3, showlegend=False, **more)
+        self.add(0, x, rows, "map", self.key, z=packed(z), ygap=3, showlegend=False, **more)
         self.axes(0, y={"autorange": "reversed", "type": "category"})
         self.layout["height"] = 110 + 30 * len(rows)
 
@@ -157,8 +113,8 @@ def down(key: str, over: str, names: Sequence[str], limit: float) -> Panels:
 
 
 @cache
-def _figures() -> dict[str, dict[str, Any]]:
-    """What is the same of a figure on every page, by its key."""
+def _data() -> dict[str, dict[str, Any]]:
+    """What is the same on every page: of figures by their keys, and looks of traces and marks."""
     file = resources.files(__package__) / "templates/figures.toml"
     return tomllib.loads(file.read_text("utf-8"))
 

@@ -20,7 +20,7 @@ from algid.base.words import counted
 from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
 from algid.report.export import write_series
-from algid.report.plot import BLUE, GREEN, ORANGE, Panels
+from algid.report.plot import Panels
 from algid.report.render import markdown, page, write_texts
 from algid.report.series import reduced
 from algid.report.tables import log_tables, provenance_table, settings_table
@@ -230,10 +230,10 @@ def payload_figure(result: TrackResult) -> Panels:
         parts[-1][0] = drawn[0, -1]
     t, low, m_p, high, left = np.concatenate(parts, axis=1)
     panels.band(0, t, low, high, "its 95 % band")
-    panels.curve(0, t, m_p, f"m_p(t) from ± {HALF_BAND:g} s around", BLUE, 1.2)
+    panels.add(0, t, m_p, f"m_p(t) from ± {HALF_BAND:g} s around")
     ends = np.array([[one.start, one.end] for one in stretches]).ravel()
     masses = np.repeat([one.m_p for one in stretches], 2)
-    panels.curve(0, ends, masses, "mass of each stretch", GREEN, 2.6)
+    panels.add(0, ends, masses, "mass of each stretch")
     # in view: masses, their intervals and the truth; m_p(t) where it is as certain as usual, but
     # for jolts
     certain = track.std <= 3 * np.median(track.std)
@@ -244,17 +244,15 @@ def payload_figure(result: TrackResult) -> Panels:
         steps = [(time, mass) for time, mass in result.schedule if time < ends[-1]]
         times, true = zip((-np.inf, 0.0), *steps, strict=True)
         x = np.clip([*times, np.inf], ends[0], ends[-1])
-        look = {"color": ORANGE, "width": 1.6, "dash": "dash", "shape": "hv"}
-        panels.add(0, x, np.array([*true, true[-1]]), "true schedule", mode="lines", line=look)
+        panels.add(0, x, np.array([*true, true[-1]]), "true schedule")
         reach += true
     if len(track.changes) <= MOST_MARKS:
         for _, start, end in track.changes.tolist():
             for place in (0, 1):
-                panels.mark(place, start, end, colour=ORANGE)
+                panels.mark(place, "step", start, end)
     space = SPACE * (max(reach) - min(reach)) or 0.05
     panels.axes(0, y={"range": [min(reach) - space, max(reach) + space]})
-    panels.curve(1, t, left, "residual", ORANGE, 1.0)
-    panels.mark(1, 1.0, way="y")
-    panels.axes(1, "time, s", {"rangemode": "tozero"})
+    panels.add(1, t, left, "residual")
+    panels.mark(1, "level", 1.0, way="y")
     panels.note = f"Median of the residual over the noise: {float(np.median(track.left)):.2f}."
     return panels
