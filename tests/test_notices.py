@@ -5,14 +5,10 @@ Remedies are written for a command line, a profile and Python alike.
 
 from __future__ import annotations
 
-import ast
 import json
-import re
-from pathlib import Path
 
 import pytest
 
-import algid
 from algid.notices import (
     Notice,
     Remedy,
@@ -83,7 +79,7 @@ def test_every_code_of_an_earlier_version_has_one_of_now() -> None:
     assert len(set(earlier)) == len(earlier)
     assert not set(earlier) & {one["code"] for one in messages()}
     assert code_of_now("CUT_OFF") == "CUT_OFF"
-    assert code_of_now("CUT_OFF") == "CUT_OFF"
+    assert code_of_now(earlier[0]) in {one["code"] for one in messages()}
 
 
 def test_every_entry_is_whole() -> None:
@@ -92,20 +88,6 @@ def test_every_entry_is_whole() -> None:
         assert one["cause"], one
         for cases in (one["note"], one["lossy"]):
             assert isinstance(cases, bool) or set(cases) <= set(one["text"]), one
-
-
-def test_numbers_agree_with_their_nouns() -> None:
-    assert Notice("LOST_SAMPLES", numbers={"count": 1}).text.startswith(
-        "1 step of the angles is twice"
-    )
-    assert Notice("LOST_SAMPLES", numbers={"count": 2000}).text.startswith(
-        "2,000 steps of the angles are twice"
-    )
-    assert Notice("NOT_IDENTIFIABLE", numbers={"names": ["k5"]}).text == "k5 is not identifiable"
-    assert (
-        Notice("NOT_IDENTIFIABLE", numbers={"names": ["k3", "k5"]}).text
-        == "k3 and k5 are not identifiable"
-    )
 
 
 def test_equal_notices_of_several_logs_become_one_and_each_loss_stays() -> None:
@@ -133,6 +115,9 @@ def test_a_notice_is_plain_data() -> None:
 @pytest.mark.parametrize(
     ("code", "numbers", "text"),
     [
+        ("FLEET_CHANGE", {"case": "drift", "count": 2000, "names": ["k6"]}, "2,000 drifts: k6"),
+        ("NOT_IDENTIFIABLE", {"names": ["k5"]}, "k5 is not identifiable"),
+        ("NOT_IDENTIFIABLE", {"names": ["k3", "k5"]}, "k3 and k5 are not identifiable"),
         ("CUT_OFF", {"case": "end"}, "the file breaks off behind its last whole record"),
         (
             "DAMAGED",
@@ -173,50 +158,3 @@ def test_cases_and_parts_of_a_text_follow_the_numbers(
 def test_an_unknown_case_is_refused() -> None:
     with pytest.raises(ValueError, match="CUT_OFF"):
         Notice("CUT_OFF", numbers={"case": "elsewhere"})
-
-
-def test_every_notice_of_the_code_is_made_of_numbers() -> None:
-    own = []
-    for path in sorted(Path(algid.__file__).parent.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Notice":
-                own += [ast.literal_eval(node.args[0])] if len(node.args) > 1 else []
-    assert own == []
-
-
-ASSERTED = {
-    ("identification/efforts.py", "effort"),  # unloaded logs have nothing of an arm
-    ("inspection/channels.py", "unwrap"),  # the same angle, whatever the log holds
-    ("readers/messages/reader.py", "clock"),  # the other of two
-    ("inspection/sampling.py", ""),  # the rest that the notice is of
-    ("inspection/conventions.py", ""),  # found by the search, or tried
-    ("readers/convert.py", ""),  # all the user's own
-    ("results/verdict.py", ""),  # the call as it was
-}
-"""By module the settings of remedies that name no case which they are for."""
-
-
-def test_a_remedy_is_tried_or_names_the_case_that_it_is_for() -> None:
-    """An untried remedy is a question: it says when it holds, or asks for the user's own value."""
-    found = set()
-    root = Path(algid.__file__).parent
-    for path in sorted(root.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Remedy":
-                module = path.relative_to(root).as_posix()
-                found |= {(module, name) for name in _asserted(node)}
-    assert found == ASSERTED
-
-
-def _asserted(call: ast.Call) -> set[str]:
-    """Last parts of the names of settings that a remedy states for no case; empty if unknown."""
-    settings = call.args[0]
-    if len(call.args) > 1:
-        return set()
-    if isinstance(settings, ast.DictComp):
-        return set() if getattr(settings.value, "value", "") is None else {""}
-    if not isinstance(settings, ast.Dict):
-        return {""}
-    pairs = zip(settings.keys, settings.values, strict=True)
-    known = [key for key, value in pairs if getattr(value, "value", value) is not None]
-    return {re.split(r"[.']", ast.unparse(key).strip("'"))[-1] for key in known if key is not None}
