@@ -12,7 +12,6 @@ import json
 import os
 import re
 import reprlib
-import shutil
 import stat
 import tempfile
 import tomllib
@@ -23,7 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from algid.base.errors import OutputError, SettingError
 from algid.base.limits import LIMITS
-from algid.base.staging import delete_leftovers, put, staged, temporary_name
+from algid.base.staging import delete, delete_leftovers, put, staged, temporary_name
 from algid.options import flag
 
 if TYPE_CHECKING:
@@ -258,14 +257,12 @@ def result_folder(first_log: str, parent: Path, name: str | None = None) -> Path
 
 def refuse_misleading(name: str | None) -> None:
     """Raise `SettingError` if the name of a result's folder is empty or leads elsewhere."""
-    if name == "":
+    odd = name is not None and ("/" in name or not name.isprintable())
+    if odd or name in ("", ".", ".."):
         raise SettingError(
-            f"{flag('name')}: expected a name for the result folder, found ''; leave it out for "
-            "the log's own"
+            f"{flag('name')}: expected a name for the result folder, without slashes, found "
+            f"{name!r:.60}; {flag('out')} names the folder around it"
         )
-    if name is not None and (name in (".", "..") or "/" in name or not name.isprintable()):
-        problem = f"found {name!r:.60}; {flag('out')} names the folder around it"
-        raise SettingError(f"{flag('name')}: expected a name without slashes, {problem}")
 
 
 def refuse_url(place: Path | str) -> None:
@@ -319,10 +316,7 @@ def remove_whole(place: Path) -> None:
     aside = temporary_name(place)
     with suppress(FileNotFoundError):
         place.rename(aside)
-        if aside.is_dir() and not aside.is_symlink():
-            shutil.rmtree(aside)
-        else:
-            aside.unlink()
+        delete(aside)
 
 
 @contextmanager

@@ -5,8 +5,8 @@ stores by their nature.
 
 A URL names an object by its key, percent-encoded: ``%3F`` for ``?``, ``%23`` for ``#``, ``%25``
 for ``%``. Whatever else no URL may hold, such as blanks, may stand as it is. URLs of objects that
-are found below a prefix are encoded and keep the prefix's credentials; what is printed and kept of
-them is `public`.
+are found below a prefix are encoded and keep the prefix's credentials, which are neither printed
+nor kept.
 """
 
 from __future__ import annotations
@@ -45,18 +45,11 @@ def absolute(place: str) -> str:
     return str(Path(place).absolute())
 
 
-def public(path: str) -> str:
-    """A path or URL as it is printed and kept: without credentials."""
-    if not is_url(path):
-        return path
-    return without_credentials(path)
-
-
 def shown(place: str) -> str:
     """A folder's path or URL for messages: without credentials and without the query."""
     if not is_url(place):
         return place
-    return public(place).partition("?")[0].rstrip("/")
+    return without_credentials(place).partition("?")[0].rstrip("/")
 
 
 @dataclass(frozen=True)

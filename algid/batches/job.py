@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
-from algid.base.errors import AlgidError, LogError, chain_of, text_of
+from algid.base.errors import AlgidError, LogError, chain_of, text_of, without_credentials
 from algid.base.files import refuse_links, sha256_of, temporary_folder
 from algid.base.runtime import keep_freed, keep_to_one_core
-from algid.base.stores import is_url, open_store, public, put_folder, reading
+from algid.base.stores import is_url, open_store, put_folder, reading
 from algid.batches.jobs import Job, redacted_path
 from algid.batches.records import Input, JobRecord, JobStatus, stat_of
 from algid.identification.identify import identify
@@ -211,4 +211,4 @@ def fetched(url: str, folder: Path) -> Staged:
                 with filesystem.open_input_file(path) as again:
                     if again.metadata() != version:
                         raise LogError(f"{url}: it was replaced while it was read; run again")
-    return Staged(copy, public(url))
+    return Staged(copy, without_credentials(url))

@@ -11,8 +11,8 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
+from algid.base.errors import without_credentials
 from algid.base.limits import LIMITS
-from algid.base.stores import public
 
 Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -79,7 +79,9 @@ def safe_name(name: str) -> str:
 
 def redacted_path(path: str) -> str:
     """A path or URL to print and keep: without credentials, in letters that any file can hold."""
-    return public(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
+    return (
+        without_credentials(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
+    )
 
 
 def utc_of(text: str) -> datetime:

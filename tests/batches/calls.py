@@ -60,16 +60,6 @@ def spin() -> NoReturn:
         pass
 
 
-def raise_a_long_chain() -> NoReturn:
-    """Raise an exception with thousands of causes."""
-    error = ValueError("0")
-    for number in range(1, 5001):
-        following = ValueError(str(number))
-        following.__cause__ = error
-        error = following
-    raise error
-
-
 class UnprintableError(Exception):
     """An exception that cannot be printed."""
 

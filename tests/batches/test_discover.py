@@ -69,9 +69,7 @@ def test_two_logs_of_one_name_fail_alone(tmp_path: Path) -> None:
     assert third.trouble.startswith("c: two jobs of one name")
 
 
-@pytest.mark.parametrize(
-    "name", ["bad\nname", "a\\b", "\x1b[2J", "caf\udce9", "a\u202eb", "x" * 201, "\x7f"]
-)
+@pytest.mark.parametrize("name", ["bad\nname", "caf\udce9", "a\u202eb", "x" * 201])
 def test_a_log_of_an_odd_name_fails_alone_and_is_told_in_visible_letters(
     tmp_path: Path, name: str
 ) -> None:
@@ -199,13 +197,9 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
         (f"more = 1\n{JOB}", r"expected tables \[\[job\]\] alone, found more"),
         ("[[job]]\nlogs = 'a.csv'", "job 1.name: field required"),
         ("[[job]]\nname = 'x'\nlogs = 5", "job 1.logs: expected a valid list, found 5"),
-        ("[[job]]\nname = 'x'\nlogs = ['a.csv', 5]", "job 1.logs.1: .*found 5"),
         ("[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']", "job 1.logs.1: .*found ' '"),
-        ("[[job]]\nname = 'x'\nloaded = \"a\\u0000.csv\"", "job 1.loaded.0: "),
         ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1.time: expected ISO 8601"),
         ("a = " + "[" * 5000 + "]" * 5000, r"not TOML \(maximum recursion depth"),
-        ("[[job", "not TOML"),
-        (f"{JOB}payload = 1{'0' * 400}", "job 1.payload: expected text, a date, .*, found "),
         (f"{JOB}payload = 0x1{'0' * 5000}", "job 1.payload: expected text, a date, .*, found "),
         (f"{JOB}payload = nan", "job 1.payload: .* number below"),
         (f"{JOB}payload = {{a = 1}}", "job 1.payload: .* found {'a': 1}"),
@@ -319,8 +313,10 @@ def test_a_source_that_is_given_twice_counts_once(tmp_path: Path) -> None:
         "a",
         "b",
     ]
-    _touch(tmp_path, "other/a.csv")
-    both, other = jobs_of([str(tmp_path / "*.csv"), str(tmp_path / "other/a.csv")], "out")
+    _touch(tmp_path, "other/a.csv", "other/p-loaded.csv", "p-unloaded.csv")
+    pair = Job("p", (f"{tmp_path}/p-unloaded.csv",), (f"{tmp_path}/other/p-loaded.csv",))
+    assert jobs_of([*pair.loaded, *pair.logs, *pair.logs], "out") == [pair]
+    both, other, _ = jobs_of([str(tmp_path / "*.csv"), str(tmp_path / "other/a.csv")], "out")
     assert both.trouble is not None
     assert both.trouble.startswith(
         f"a: two jobs of one name ({tmp_path}/a.csv, {tmp_path}/other/a.csv)"
