@@ -23,7 +23,7 @@ import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Metadata, MetadataIndex, Schema, Statistics
+from mcap.records import Channel, Chunk, Metadata, Schema, Statistics
 from numpy.typing import NDArray
 
 from algid.base.errors import LogError
@@ -55,7 +55,6 @@ _KINDS: dict[int, tuple[Any, str]] = {
     Opcode.SCHEMA: (Schema, "id"),
     Opcode.CHANNEL: (Channel, "id"),
     Opcode.METADATA: (Metadata, "name"),
-    Opcode.METADATA_INDEX: (MetadataIndex, "name"),
     Opcode.STATISTICS: (Statistics, ""),
 }
 """Records that define something, and what they are known by."""
@@ -162,8 +161,6 @@ def mcap_file(path: Path) -> MessageFile:
             undefined = any((Opcode.CHANNEL, number) not in records for number in promised)
             if undefined or (indexed and found.counts() != promised):
                 why = "its indexes and its statistics count different messages"
-        if (Opcode.METADATA_INDEX, KEY) in records and (Opcode.METADATA, KEY) not in records:
-            why = "its metadata stand elsewhere"
         if why or not statistics or all(part.loose for part in found.parts):
             numbers = {"case": "summary" if why else "none", "why": why}
             found.notices.insert(0, Notice("DAMAGED_INDEX", numbers=numbers))

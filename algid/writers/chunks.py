@@ -29,7 +29,6 @@ from mcap.records import (
     MetadataIndex,
     Schema,
     Statistics,
-    SummaryOffset,
 )
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
@@ -121,18 +120,12 @@ class ChunkedFile:
             metadata_count=len(listed),
             schema_count=1,
         )
-        start, summary, offsets = self.stream.tell(), b"", list[McapRecord]()
-        channels = list(self._channels.values())
-        for records in ([self.schema], channels, [statistics], self._chunks, listed):
-            if group := _bytes_of(*records):
-                offsets.append(SummaryOffset(Opcode(group[0]), start + len(summary), len(group)))
-                summary += group
-        offsets_start = start + len(summary)
-        summary += _bytes_of(*offsets)
+        channels = self._channels.values()
+        summary = _bytes_of(self.schema, *channels, statistics, *self._chunks, *listed)
         # the sum covers the footer up to itself
-        covered = summary + _bytes_of(Footer(start, offsets_start, 0))[:-4]
-        footer = _bytes_of(Footer(start, offsets_start, zlib.crc32(covered)))
-        self.stream.write(summary + footer + MCAP0_MAGIC)
+        start = self.stream.tell()
+        covered = summary + _bytes_of(Footer(start, 0, 0))[:-4]
+        self.stream.write(summary + _bytes_of(Footer(start, 0, zlib.crc32(covered))) + MCAP0_MAGIC)
 
 
 def _bytes_of(*records: McapRecord) -> bytes:
