@@ -243,8 +243,8 @@ def text_of(value: Any) -> str:
 def of_arrow(path: str, kind: str, table: pa.Table, **more: Any) -> TableFile:
     """A table in memory, with `more` of what a `TableFile` has."""
 
-    def batches(names: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
-        yield from table.select(list(names)).slice(0, most).to_batches(BATCH_ROWS)
+    def batches(names: Sequence[str], _most: int | None) -> Iterator[pa.RecordBatch]:
+        yield from table.select(list(names)).to_batches(BATCH_ROWS)
 
     return TableFile(path, kind, table.schema, table.num_rows, batches, **more)
 

@@ -43,17 +43,12 @@ def open_parquet(path: Path) -> TableFile:
     if not companion.sums and {"stamp_ns", *CANONICAL_COLUMNS} <= names:
         notices = (Notice("NO_CHECKSUM", numbers={"case": "values"}),)
 
-    def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
-        left = about.num_rows if most is None else most
+    def batches(columns: Sequence[str], _most: int | None) -> Iterator[pa.RecordBatch]:
         with (
             as_log_error(path, "Parquet"),
             pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file,
         ):
-            for batch in file.iter_batches(BATCH_ROWS, columns=list(columns), use_threads=False):
-                yield batch.slice(0, left)
-                left -= batch.num_rows
-                if left <= 0:
-                    return
+            yield from file.iter_batches(BATCH_ROWS, columns=list(columns), use_threads=False)
 
     return TableFile(str(path), "parquet", schema, about.num_rows, batches, companion, notices)
 
@@ -68,8 +63,7 @@ def open_feather(path: Path) -> TableFile:
     """
     import pyarrow as pa
 
-    def batches(columns: Sequence[str], most: int | None) -> Iterator[pa.RecordBatch]:
-        left = most
+    def batches(columns: Sequence[str], _most: int | None) -> Iterator[pa.RecordBatch]:
         with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
             places = [names.index(name) for name in columns]
             options = pa.ipc.IpcReadOptions(included_fields=places)
@@ -77,12 +71,8 @@ def open_feather(path: Path) -> TableFile:
             for number in range(reader.num_record_batches):
                 batch = reader.get_batch(number)
                 batch.validate(full=True)
-                end = batch.num_rows if left is None else min(left, batch.num_rows)
-                for first in range(0, end, BATCH_ROWS):
-                    yield batch.slice(first, min(BATCH_ROWS, end - first))
-                left = None if left is None else left - end
-                if left == 0:
-                    return
+                for first in range(0, batch.num_rows, BATCH_ROWS):
+                    yield batch.slice(first, BATCH_ROWS)
 
     with as_log_error(path, "Feather"), pa.memory_map(str(path)) as source:
         schema = pa.ipc.open_file(source).schema

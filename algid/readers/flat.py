@@ -34,18 +34,24 @@ from algid.readers.column_names import (
     time_among,
     units_in_names,
 )
-from algid.readers.joints import moving_joints, reading_of
+from algid.readers.joints import LOOKED, moving_joints, reading_of
 from algid.readers.log_reader import TableReader, make_reader
 from algid.readers.offered import Clock, Offered
 from algid.readers.stated import lines_of
 from algid.readers.table import JOINT_CHANNELS, REFERENCES, SampleTable, in_pairs
-from algid.readers.table_cells import TableCells, TableFile, cells_of, decoded, groups_in, units_of
+from algid.readers.table_cells import (
+    Cell,
+    TableFile,
+    cell_batches,
+    cells_of,
+    decoded,
+    groups_in,
+    units_of,
+)
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-_LOOKED = 1 << 14
-"""Samples in which the joints that are not read are looked at."""
 INDEX = "__index_level_0__"
 """What pandas calls an index without a name where a frame becomes Arrow or Parquet."""
 
@@ -83,9 +89,8 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
     LogError
         If a column is missing, or stands there for more joints than two.
     """
-    path, rows, sums = table.path, cells_of(table), table.companion.sums
-    cells = rows.by_name
-    gone = [name for name in sums if name not in cells]
+    path, cells = table.path, cells_of(table)
+    gone = [name for name in table.companion.sums if name not in cells]
     if gone:
         raise LogError(
             f"{path}: the columns {', '.join(gone)} that were written are not there: the file was "
@@ -102,10 +107,10 @@ def offer_table(table: TableFile, profile: Profile) -> Offered:
         table.kind,
         cells,
         named,
-        partial(samples, rows, sums),
+        partial(samples, table, cells),
         table.companion.truth,
         rows=table.rows or table.expected,
-        units=units_of(rows),
+        units=units_of(table, cells),
         notices=(*table.notices, *groups_in(table)),
         said=(*table.said, *lines_of(decoded(table.schema.metadata))),
         others=table.others,
@@ -173,7 +178,7 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     )
 
     def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
-        return offered.tables({"t": sources["t"], **others}, clock, [], _LOOKED)
+        return offered.tables({"t": sources["t"], **others}, clock, [], LOOKED)
 
     angles = [sources[name] for name in ("theta1", "theta2") if name in sources]
     others = dict[str, str]()
@@ -287,8 +292,8 @@ def _doubts(offered: Offered, sources: Mapping[str, str], profile: Profile) -> I
 
 
 def samples(
-    rows: TableCells,
-    sums: Mapping[str, int],
+    table: TableFile,
+    cells: Mapping[str, Cell],
     sources: Mapping[str, str],
     clock: Clock,
     told: list[Notice],
@@ -298,28 +303,28 @@ def samples(
 
     Parameters
     ----------
-    rows : TableCells
-    sums : mapping
-        Of the words of each column, as they were written.
+    table : TableFile
+    cells : mapping
+        By name; the words of each column have the sums that were written with them.
     sources : mapping
         Cells by channel, the time's as "t".
     clock : Clock
     told : list of Notice
         At the end it has what is to be said of the other rows, too.
     most : int, optional
-        Rows to read.
+        Rows that are needed.
 
     Raises
     ------
     LogError
         If no row has every value, a time is no time, or the values are not those written.
     """
-    path, unit, column = rows.table.path, clock.unit, sources["t"]
-    sources, time = {"t": column, **sources}, rows.by_name[column].type
+    path, unit, column, sums = table.path, clock.unit, sources["t"], table.companion.sums
+    sources, time = {"t": column, **sources}, cells[column].type
     left = {name: sums[source] for name, source in sources.items() if source in sums}
     count = lost = done = 0
     cut_off = False
-    for arrays in rows.batches(list(sources.values()), most):
+    for arrays in cell_batches(table, cells, list(sources.values()), most):
         import pyarrow as pa
 
         whole = batch = pa.RecordBatch.from_arrays(arrays, names=list(sources))

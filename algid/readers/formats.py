@@ -220,8 +220,8 @@ def entries_of(opened: TableFile | MessageLog) -> Entries:
     if not isinstance(opened, TableFile):
         return tuple(_topics(opened.files[0]()))
     rows = opened.rows or None
-    cells = cells_of(opened).by_name
-    entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells.items()]
+    cells = cells_of(opened).items()
+    entries = [Entry(name, str(cell.type)[:80], rows) for name, cell in cells]
     entries += [Entry(name, "of another length") for name in opened.others]
     return tuple(entries)
 

@@ -131,6 +131,8 @@ def _words(name: str) -> list[str]:
 
 
 _NAMED = 4
+LOOKED = 1 << 14
+"""Samples in which the joints that are not read are looked at."""
 Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
 """Tables of a topic's fields, whose paths are given by the columns' names."""
 
@@ -147,6 +149,7 @@ def moving_joints(
     places = dict(zip(names, positions.values(), strict=True))  # none is called as a stamp is
     try:
         table = next((one for one in tables(places) if len(one)), None) if places else None
+        table = table and table.part(0, LOOKED)
     except LogError:  # the joints that are read tell of what is wrong
         return ()
     moved: dict[str, float] = {}

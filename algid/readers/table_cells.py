@@ -52,8 +52,8 @@ class TableFile:
     rows : int
         0 where the file does not tell.
     batches : callable
-        A fresh pass over some columns in record batches; over the first rows only if a number is
-        given. Whatever way of missing a value the format has is a null.
+        A fresh pass over some columns in record batches, of which nobody takes more rows than a
+        number if one is given. Whatever way of missing a value the format has is a null.
     companion : Companion
         Truth and sums that algid wrote with the columns.
     notices : tuple of Notice
@@ -169,33 +169,34 @@ class Cell:
         return frame.select(number).to_series().to_arrow()
 
 
-@dataclass(frozen=True, eq=False)
-class TableCells:
-    """The cells of a table by name, and the columns of flags."""
+def cell_batches(
+    table: TableFile, cells: Mapping[str, Cell], names: Sequence[str], most: int | None
+) -> Iterator[list[pa.Array]]:
+    """Some cells of each batch of rows; of rows that a flag takes out each is null."""
+    import pyarrow as pa
 
-    table: TableFile
-    by_name: Mapping[str, Cell]
-    flags: tuple[str, ...]
+    chosen = [cells[name] for name in names]
+    columns = [one.column for one in chosen] + [one.label for one in chosen if one.label]
+    flags = []
+    for name, cell in cells.items():
+        kind = cell.type
+        is_flag = pa.types.is_boolean(kind) or _is_plain(kind) or is_text(kind)
+        if is_flag and name.lower() in GOOD | BAD:
+            flags.append(name)
+    for batch in table.batches(list(dict.fromkeys((*columns, *flags))), most):
+        arrays = [cell.of(batch) for cell in chosen]
+        flagged = np.zeros(batch.num_rows, np.bool_)
+        for name in flags:
+            flagged |= _flag(batch.column(name)) == (name.lower() not in GOOD)
+        if flagged.any():
+            import pyarrow.compute as pc
 
-    def batches(self, names: Sequence[str], most: int | None) -> Iterator[list[pa.Array]]:
-        """Some cells of each batch of rows; of rows that a flag takes out each is null."""
-        cells = [self.by_name[name] for name in names]
-        columns = [one.column for one in cells] + [one.label for one in cells if one.label]
-        for batch in self.table.batches(list(dict.fromkeys((*columns, *self.flags))), most):
-            arrays = [cell.of(batch) for cell in cells]
-            flagged = np.zeros(batch.num_rows, np.bool_)
-            for name in self.flags:
-                flagged |= _flag(batch.column(name)) == (name.lower() not in GOOD)
-            if flagged.any():
-                import pyarrow as pa
-                import pyarrow.compute as pc
-
-                mask = pa.array(flagged)
-                arrays = [pc.if_else(mask, pa.scalar(None, one.type), one) for one in arrays]
-            yield arrays
+            mask = pa.array(flagged)
+            arrays = [pc.if_else(mask, pa.scalar(None, one.type), one) for one in arrays]
+        yield arrays
 
 
-def cells_of(table: TableFile) -> TableCells:
+def cells_of(table: TableFile) -> dict[str, Cell]:
     """Every cell of a row by name; the first rows tell how many cells the lists have.
 
     Raises
@@ -239,12 +240,7 @@ def cells_of(table: TableFile) -> TableCells:
                 raise LogError(
                     f"{table.path}: more than {LIMITS.columns} columns; expected a log of an arm"
                 )
-    flags = []
-    for name, cell in cells.items():
-        is_flag = pa.types.is_boolean(cell.type) or _is_plain(cell.type) or is_text(cell.type)
-        if is_flag and name.lower() in GOOD | BAD:
-            flags.append(name)
-    return TableCells(table, cells, tuple(flags))
+    return cells
 
 
 def _within(
@@ -328,18 +324,17 @@ def _marked(path: str, cell: Cell, said: Mapping[str, str]) -> Cell:
     return replace(cell, type=pa.float64(), fills=fills, scale=scale, offset=offset)
 
 
-def units_of(cells: TableCells) -> dict[str, str]:
+def units_of(table: TableFile, cells: Mapping[str, Cell]) -> dict[str, str]:
     """By cell the unit that the file's metadata state of it, of its column, or of its quantity.
 
     A column of texts such as ``torque_unit`` states one too, in its first row.
     """
-    schema = cells.table.schema
-    metadata = decoded(schema.metadata)
-    for one in schema:
+    metadata = decoded(table.schema.metadata)
+    for one in table.schema:
         if one.name.lower().endswith(("_unit", "_units")) and is_text(one.type):
-            metadata[one.name] = next(_values(cells.table, one.name), "")
-    units = units_in(metadata, list(cells.by_name))
-    return units | {name: cell.unit for name, cell in cells.by_name.items() if cell.unit}
+            metadata[one.name] = next(_values(table, one.name), "")
+    units = units_in(metadata, list(cells))
+    return units | {name: cell.unit for name, cell in cells.items() if cell.unit}
 
 
 def groups_in(table: TableFile) -> Iterator[Notice]:
