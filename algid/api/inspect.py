@@ -79,14 +79,15 @@ def inspect(
     from algid.inspection.report import inspect_log
 
     own, log = meant(profile, options, log)
+    if write_profile is not None and not isinstance(log, str | Path):
+        raise SettingError(f"{flag('write_profile')}: expected the path of a log, found arrays")
+    found = inspect_log(log, own)
     if write_profile is not None:
         from algid.inspection.draft import draft_profile
 
-        if not isinstance(log, str | Path):
-            raise SettingError(f"{flag('write_profile')}: expected the path of a log, found arrays")
         with whole_file(profile_file(write_profile), force=force) as temporary:
-            temporary.write_text(draft_profile(Path(log)), encoding="utf-8")
-    return inspect_log(log, own)
+            temporary.write_text(draft_profile(found), encoding="utf-8")
+    return found
 
 
 def profile_file(place: str | Path) -> Path:

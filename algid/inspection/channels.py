@@ -215,12 +215,9 @@ def spikes(log: Log) -> Iterator[Notice]:
     if len(log) < 20:
         return
     for name, values in channels(log):
-        off = values[:-2] + values[2:]  # in place: a long log's arrays cost more than the sums
-        off *= -0.5
-        off += values[1:-1]
-        deviation = robust_deviation(off)
-        size = np.abs(off, out=off)
-        limit = _SPIKE * max(deviation, quantile(thinned(size), 0.9))
+        off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
+        size = np.abs(off)
+        limit = _SPIKE * max(robust_deviation(off), quantile(thinned(size), 0.9))
         if limit == 0:
             continue
         places = np.flatnonzero(size[1:-1] > limit) + 2

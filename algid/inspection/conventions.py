@@ -52,7 +52,6 @@ _WRONG = {
 _LEAST_PULL = 1.3
 _OF_WEIGHT = 0.01  # of a torque: what weight must explain to be there
 _TORQUES = Convention(torque_signs=(-1, -1))
-_ALL = Convention(signs=(-1, -1), torque_signs=(-1, -1))
 _SIDEWAYS = ((-pi / 2, 0.0), (pi / 2, 0.0))  # θ1 from the vertical
 
 
@@ -104,11 +103,7 @@ def mend(origin: Origin, judgement: Judgement | None) -> Notice | None:
     off_by = max(map(abs, convention.zero))
     if off_by < _SMALL and replace(convention, zero=AS_READ.zero) == AS_READ:
         return None
-    # of an arm and the same seen from behind what needs no number, then what needs fewer settings
-    settings = min(
-        (_settings(one, origin) for one in (convention, convention.mirrored())),
-        key=lambda one: ("offsets" in one, len(one)),
-    )
+    settings = _settings(convention, origin)
     if not settings:  # it is how the log was read
         return None
     wrong = []
@@ -157,8 +152,8 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
             level = Remedy({"gravity": 0}, "for a horizontal plane")
             numbers = {"case": "arm"}
             return Notice("GRAVITY_COMPENSATED", numbers=numbers, remedies=(driver, level))
-    named = trials.under(_TORQUES, AS_READ.zero) + trials.under(_ALL, AS_READ.zero)
-    named += trials.under(AS_READ, *_SIDEWAYS) + trials.under(_TORQUES, *_SIDEWAYS)
+    named = trials.under(AS_READ, (pi, 0.0), *_SIDEWAYS)
+    named += trials.under(_TORQUES, AS_READ.zero, *_SIDEWAYS)
     likely = []
     for one in (*named, trials.zeroed(AS_READ), trials.zeroed(_TORQUES)):
         pull = max(one.demands.get("k2 > 0", 0.0), one.demands.get("k4 > 0", 0.0))
@@ -173,7 +168,7 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     near = [one for one in near if one in named] or near
     offered = tuple(Remedy(_settings(one.convention, origin)) for one in near)
     turn = near[0].zero[0]
-    if turn:
+    if turn not in (0.0, pi):
         return Notice("WRONG_ZERO", numbers={"turn": -degrees(turn)}, remedies=offered)
     return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
 
@@ -185,6 +180,15 @@ def zeroed(origin: Origin, turn: float, half: float) -> Remedy:
 
 
 def _settings(convention: Convention, origin: Origin) -> dict[str, Any]:
+    """The settings that read a log by `convention`, or by the same arm seen from behind.
+
+    Those that need no number, then those that are fewer.
+    """
+    both = [_exactly(one, origin) for one in (convention, convention.mirrored())]
+    return min(both, key=lambda one: ("offsets" in one, len(one)))
+
+
+def _exactly(convention: Convention, origin: Origin) -> dict[str, Any]:
     """The settings, by dotted names, that read a log by `convention`."""
     reading = origin.reading
     settings: dict[str, Any] = {}

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from algid.base.files import as_toml
 from algid.base.text import visible
 from algid.base.units import names_of
-from algid.inspection.report import look
-from algid.log import Origin
-from algid.readers import open_log
+from algid.inspection.report import Inspection
 from algid.readers.formats import FORMATS
 from algid.readers.table import CHANNELS
 
@@ -74,31 +71,24 @@ _UNITS["q_des"] = _UNITS["theta"]
 _ON_TOPICS = tuple(form.name for form in FORMATS if form.messages)
 
 
-def draft_profile(path: Path) -> str:
+def draft_profile(found: Inspection) -> str:
     """The text of a profile for a log.
 
     For one that cannot be read yet, its names stand in comments.
-
-    Raises
-    ------
-    LogError
-        If there is no such log, or its format is unknown.
     """
-    kind, entries, origin, refused = look(path, lambda: open_log(path).origin)
-    origin = origin or Origin(str(path), kind, {})
-    reading, on_topics = origin.reading, kind in _ON_TOPICS
+    reading, mapping, on_topics = found.reading, found.mapping or {}, found.format in _ON_TOPICS
     known: dict[str, Any] = {"joints": reading.joints, "time_unit": reading.time_unit}
     if reading.topics:
         known["topic"] = reading.topics[0]
     if not on_topics:
-        known["time"] = origin.mapping.get("t")
+        known["time"] = mapping.get("t")
     text = _filled(_HEAD, known)
-    if refused:
-        text += f"# {visible(refused, 1000)}\n"
-    for one in entries[:64]:
+    if found.refused:
+        text += f"# {visible(found.refused, 1000)}\n"
+    for one in found.entries[:64]:
         text += f"# in the log: {visible(one.name, 80)} ({visible(one.type, 60)})\n"
     for name in CHANNELS:
-        own = {"source": origin.mapping.get(name, "")}
+        own = {"source": mapping.get(name, "")}
         if on_topics:
             own["topic"], _, own["source"] = own["source"].partition(": ")
             if own["topic"] == known.get("topic"):

@@ -17,7 +17,7 @@ from algid.log import Log, Origin
 from algid.model import K2, K3, K4, K5
 from algid.notices import of_codes
 from algid.readers.clock import PAUSE
-from algid.signals.spacing import near_stamps, spaced
+from algid.signals.spacing import spaced
 
 ENOUGH = 1 << 18
 """Values that give a quantile of any number of them: a median to 0.25 % of the deviation."""
@@ -162,10 +162,9 @@ def clock_figures(log: Log) -> ClockFigures:
     Gaps and jitter are those left once clusters are in their place; a pause that the reader put
     between two runs is no gap.
     """
-    period, stamp_ns = log.period, log.stamp_ns
-    if near_stamps(stamp_ns, period):
-        stamp_ns = np.concatenate([block.stamp_ns for block in spaced([log], period)])
-    steps = np.diff(stamp_ns).astype(np.float64) * 1e-9
+    period = log.period
+    stamp_ns = np.concatenate([block.stamp_ns for block in spaced([log], period)])
+    steps = np.diff(stamp_ns) * 1e-9
     wide = steps > GAP * period
     gaps = steps[wide]
     pauses = sum(one.numbers.get("joined", 0) for one in of_codes(log.notices, "GAPS"))

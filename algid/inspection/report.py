@@ -1,18 +1,12 @@
-"""What a file holds, by name: columns, or topics with their types.
-
-Also of a file that cannot be used.
-
-The whole look at a log that `algid inspect` prints.
-"""
+"""The whole look at a log that `algid inspect` prints, also at one that cannot be used."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter
 
@@ -30,50 +24,22 @@ from algid.inspection.figures import (
     dynamic_figures,
     signal_figures,
 )
-from algid.log import Log
+from algid.log import Log, Origin, Reading
 from algid.notices import Notice, has_code, lossy
-from algid.readers import read_log
+from algid.readers import open_log
 from algid.readers.formats import Entry, entries_at, entries_of, format_of
 from algid.readers.memory import NAME, open_columns
 
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-T = TypeVar("T")
-
-
-def look(log: Any, read: Callable[[], T]) -> tuple[str, tuple[Entry, ...], T | None, str | None]:
-    """A log's format and entries, and what `read` makes of it or why it is refused.
-
-    Raises
-    ------
-    LogError
-        If there is no such log, or not even its list of entries can be read.
-    """
-    with during("opening", _called(log)):
-        if isinstance(log, Log):
-            kind, entries = log.origin.format, tuple[Entry, ...]()
-        elif isinstance(log, str | Path):
-            kind, entries = format_of(Path(log)).name, entries_at(Path(log))
-        else:
-            table = open_columns(log)
-            kind, entries = table.kind, entries_of(table)
-    try:
-        return kind, entries, read(), None
-    except LogError as error:
-        return kind, entries, None, str(error)
-
-
-def _called(log: Any) -> str:
-    """A log's path, or what stands for one in memory."""
-    return str(log) if isinstance(log, str | Path) else NAME
-
 
 @dataclass(frozen=True)
 class Inspection:
     """What a log is and is worth.
 
-    Everything below `refused` is empty for a log that cannot be read.
+    `mapping` and `reading` are empty for a log that cannot be opened, what stands below them for
+    one that cannot be read.
     """
 
     path: str
@@ -81,6 +47,7 @@ class Inspection:
     entries: tuple[Entry, ...]
     refused: str | None = None
     mapping: dict[str, str] | None = None
+    reading: Reading = field(default_factory=Reading)
     synthetic: bool = False
     clock: ClockFigures | None = None
     signals: dict[str, SignalFigures] | None = None
@@ -120,11 +87,23 @@ def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
     from algid.profile import Profile
 
     own = profile or Profile()
-    kind, entries, content, refused = look(
-        log, lambda: log if isinstance(log, Log) else read_log(log, own)
-    )
-    if content is None:
-        return Inspection(_called(log), kind, entries, refused=refused)
+    name = str(log) if isinstance(log, str | Path) else NAME
+    with during("opening", name):
+        if isinstance(log, str | Path):
+            kind, entries = format_of(Path(log)).name, entries_at(Path(log))
+        elif isinstance(log, Log):
+            kind, entries = log.origin.format, ()
+        else:
+            table = open_columns(log)
+            kind, entries = table.kind, entries_of(table)
+    content, origin = log, Origin(name, kind, {})
+    try:
+        if not isinstance(log, Log):
+            reader = open_log(log, own)
+            origin = reader.origin
+            content = reader.whole()
+    except LogError as error:
+        return Inspection(name, kind, entries, str(error), origin.mapping, origin.reading)
     asked: dict[str, Any] = {"gravity": own.gravity, "effort": own.effort}
     known = saturation(content, **asked)
     tried = cache(partial(judged, content, gravity=own.gravity > 0))
@@ -139,6 +118,7 @@ def inspect_log(log: Any, profile: Profile | None = None) -> Inspection:
         entries=entries,
         refused="; ".join(reasons) or None,
         mapping=content.origin.mapping,
+        reading=content.origin.reading,
         synthetic=content.origin.truth is not None,
         clock=clock_figures(content),
         signals={name: signal_figures(values) for name, values in every},

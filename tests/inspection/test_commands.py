@@ -89,7 +89,7 @@ def test_convert_keeps_every_bit_and_the_truth(source: str, target: str, tmp_pat
 
 def test_convert_refuses_unknown_formats_and_settings(tmp_path: Path) -> None:
     write_log(tmp_path / "in.csv", noise_log())
-    with pytest.raises(OutputError, match="ends in"):
+    with pytest.raises(OutputError, match="found 'txt'"):
         run("convert", tmp_path / "in.csv", "-o", tmp_path / "out.txt")
     with pytest.raises(SettingError, match="zero"):
         run("convert", tmp_path / "in.csv", "-o", tmp_path / "out.csv", "--zero", "sideways")

@@ -17,6 +17,7 @@ from algid.estimators.conventions import AS_READ, Convention
 from algid.inspection.conventions import judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
+from algid.inspection.report import inspect_log
 from algid.log import Log, Origin, Reading
 from algid.notices import Notice
 from algid.profile import load_profile
@@ -231,7 +232,7 @@ def test_a_draft_reads_its_log_whatever_its_joints_are_called(name: str, tmp_pat
     write_mcap(
         tmp_path / "arm.mcap", [(f"/{name}", *one) for one in zip(stamps, states, strict=True)]
     )
-    text = draft_profile(tmp_path / "arm.mcap")
+    text = draft_profile(inspect_log(tmp_path / "arm.mcap"))
     content = tomllib.loads(text)
     assert (content["topic"], content["joints"]) == (f"/{name}", [name, "elbow"])
     (tmp_path / "algid.toml").write_text(text, encoding="utf-8")
@@ -244,7 +245,7 @@ def test_a_draft_of_a_log_that_cannot_be_read_says_why_and_names_what_is_there(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "arm.csv").write_text("when,angle \u200ba,angle b\n0,1,2\n1,2,3\n")
-    text = draft_profile(tmp_path / "arm.csv")
+    text = draft_profile(inspect_log(tmp_path / "arm.csv"))
     assert tomllib.loads(text) == {name: {} for name in CHANNELS}
     assert text.splitlines()[13].startswith("# ")
     assert str(tmp_path / "arm.csv") in text
