@@ -76,12 +76,7 @@ def written(arm: Description, to: str) -> str:
     header = template(TEMPLATES / "header.j2").render(content).rstrip()
     # nothing in it ends a comment of C or a string of Python
     header = header.replace("*/", "* /").replace("\\", "/").replace('"""', "'''")
-
-    def comment(before: str) -> str:
-        """What a file says of itself, with something before each line."""
-        return "\n".join(f"{before}{line}".rstrip() for line in header.split("\n"))
-
-    filled = content | {"comment": comment}
+    filled = content | {"header": header}
     return str(template(TEMPLATES / f"arm{SUFFIXES[to]}.j2").render(filled))
 
 
