@@ -167,7 +167,7 @@ def overview(history: History) -> Panels | None:
         windows = history.windows.filter(robot=robot, parameter=name)
         for stint in windows.partition_by("stint", maintain_order=True):
             panels.add(place, _dates(stint["end"]), stint["mean"].to_numpy(), "mean")
-        panels.axes(place, {"type": "date"})
+        panels.axes(place, "date")
     return panels
 
 

@@ -19,6 +19,7 @@ from algid.results.rows import rows_of
 from algid.results.verdict import share_text
 
 WIDTH = 80
+LINE = "{0.name:<4}{0.with_half:>19} {0.unit:<10}{1:>{2}} "
 
 
 def _short(text: str, lines: int, less: int = 0) -> str:
@@ -59,8 +60,7 @@ def brief(result: Result) -> list[str]:
     for row in rows_of(result, arm | result.payload):
         words = row.meaning.partition(", ")[0] if row.status == Status.OK else row.status
         error = "" if row.error == ABSENT else f"{row.error} %"
-        room = 8 if result.truth else 0
-        line = f"{row.name:<4}{row.with_half:>19} {row.unit:<10}{error:>{room}} "
+        line = LINE.format(row, error, 8 if result.truth else 0)
         lines += lines_of(line + words.strip(ABSENT), WIDTH, rest=" " * len(line))
     if result.torque_model is not None:
         others = {name: one for name, one in result.parameters.items() if name not in ARM}

@@ -107,8 +107,7 @@ def residual(folder: Path) -> Panels | None:
             panels.add(place, measured["x"], measured["value"], "measured torque")
         panels.add(place, x, y, "residual")
         unit = "share of white noise" if np.isfinite(low).any() else "(N m)²/Hz"
-        frequency = {"type": "log", "dtick": 1, "title": {"text": "frequency, Hz"}}
-        panels.axes(place, frequency, {"type": "log", "nticks": 5, "title": {"text": unit}})
+        panels.axes(place, "frequency, Hz", unit)
     panels.note = f"Correlations of joints 1 and 2 inside the band: {joined(inside)}."
     return panels
 
@@ -131,7 +130,7 @@ def over_time(folder: Path, result: Result, name: str) -> Panels | None:
             panels.band(place, rows["x"], low, high, "its 95 % interval")
         panels.add(place, rows["x"], value, "estimate from all samples so far")
         if one == "condition":
-            panels.axes(place, y={"type": "log"})
+            panels.axes(place, y="logarithm")
             continue
         # what comes first, and spikes near singular instants, start outside the view
         late = np.stack([low, high])[:, value.size // 4 :]

@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from algid.base.text import joined, visible
-from algid.base.words import counted
 from algid.inspection.report import Inspection
 from algid.report.document import Table
 
 MOST_SHOWN = 100
 """Entries of a log that are listed."""
 MOST_FIELDS = 12
-NAME, TYPE = 80, 60
-"""Letters of an entry's name and type that are shown."""
+CLOCK = (
+    "{rows:,} samples, {duration:.6g} s at {rate:.6g} Hz, jitter {jitter:.3g} s, gaps: {gaps}, the "
+    "longest {longest_gap:.3g} s"
+)
+SIGNAL = "{low:.4g} | {high:.4g} | {noise:.4g} | {step:.4g} | {saturated:.4g}"
+DYNAMICS = (
+    "excitation: condition number {condition:.4g}; as read, the equations of motion explain "
+    "{explained:.1%} of the torques: k4 {weight1:.3g} N m, k2 {weight2:.3g} N m"
+)
 
 
 def inspection_content(found: Inspection) -> Iterator[Table | str]:
@@ -22,9 +28,8 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
     yield f"{visible(found.path, 1000)}: {found.format}{synthetic}"
     rows, shown, left = [], found.entries[:MOST_SHOWN], len(found.entries) - MOST_SHOWN
     for one in shown:
-        rate = "" if one.rate is None else f"{one.rate:.4g}"
-        numbers = ("" if one.count is None else str(one.count), rate)
-        rows.append((visible(one.name, NAME), visible(one.type, TYPE), *numbers))
+        count = "" if one.count is None else f"{one.count}"
+        rows.append((one.name, one.type, count, "" if one.rate is None else f"{one.rate:.4g}"))
     if rows:
         note = f"and {left} more" if left > 0 else ""
         yield Table("Channels", "Name | Type | Samples | Hz", rows, note)
@@ -34,27 +39,16 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
             fields = joined(one.fields, MOST_FIELDS) or "without a number"
             yield visible(f"{one.name}: {joints}fields {fields}", 2000)
     if found.mapping:
-        taken = [(name, visible(source)) for name, source in sorted(found.mapping.items())]
-        yield Table("Taken as", "algid | log", taken)
-    clock, rough = found.clock, found.dynamics
-    if clock is not None:
-        longest = f", the longest {clock.longest_gap:.3g} s" if clock.gaps else ""
-        yield (
-            f"{counted(clock.rows, 'sample')}, {clock.duration:.6g} s at {clock.rate:.6g} Hz, "
-            f"jitter {clock.jitter * 1e3:.3g} ms, {counted(clock.gaps, 'gap')}{longest}"
-        )
-    figures = []
-    for name, of in (found.signals or {}).items():
-        values = (of.low, of.high, of.noise, of.step, 100 * of.saturated)
-        figures.append((name, *(f"{value:.4g}" for value in values)))
-    if figures:
-        yield Table("Signals", "Channel | Low | High | Noise | Step | Saturated, %", figures)
-    if rough is not None:
-        yield (
-            f"excitation: condition number {rough.condition:.4g}; as read, the equations of motion "
-            f"explain {100 * rough.explained:.3g} % of the torques: k4 {rough.weight1:.3g} N m, "
-            f"k2 {rough.weight2:.3g} N m"
-        )
+        yield Table("Taken as", "algid | log", sorted(found.mapping.items()))
+    if found.clock is not None:
+        yield CLOCK.format(**vars(found.clock))
+    if found.signals:
+        figures = [
+            (name, *SIGNAL.format(**vars(of)).split(" | ")) for name, of in found.signals.items()
+        ]
+        yield Table("Signals", "Channel | Low | High | Noise | Step | Saturated share", figures)
+    if found.dynamics is not None:
+        yield DYNAMICS.format(**vars(found.dynamics))
     for notice in (*found.notices, *found.findings):
         yield f"{notice.code}: {visible(notice.clause, 2000)}"
     refusing = joined(list(dict.fromkeys(one.code for one in found.findings if one.refuse)))

@@ -28,6 +28,8 @@ from algid.report.tables import (
 from algid.results import Result, read_result
 from algid.results.verdict import replaced_estimator
 
+FACTS = "{} of {} identified · {} estimator · {} s of log at {} Hz · {}"
+
 
 def write_pages(
     folder: Path, shared_library: bool = False, progress: Progress | None = None
@@ -86,32 +88,30 @@ def result_document(
     may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
     sections = [
         Section("numbers", "Numbers", first),
-        *([of_paper] if leads else []),
         *parts[:1],
-        Section(
-            "terms",
-            "Other terms of the torque",
-            [other, terms_table(fit) if fit is not None else None],
-        ),
+        Section("terms", "Other terms of the torque", [other, terms_table(fit)]),
         Section("zero", may_be, [zero], folded=True),
         *parts[1:],
         Section("fit", "Noise, whiteness and bounds", fit_tables(fit), folded=True),
         Section("data", "Data quality", [notes, *log_tables(result.logs)], folded=True),
         Section("settings", "Settings and provenance", made_by, folded=True),
-        *([] if leads else [of_paper]),
     ]
+    sections.insert(1 if leads else len(sections), of_paper)
     constants = [row[4] for row in arm[0].rows]
-    seconds = significant(sum(log.duration for log in result.logs), 4)
     return Document(
         title=f"Identification of {names[0]}",
         verdict=result.verdict,
         sections=sections,
         kicker="identification of a two-link arm",
         name=joined(names, 1),
-        facts=f"{constants.count('OK')} of {counted(len(constants), 'constant')} identified · "
-        f"{result.estimator} estimator · {seconds} s of log at "
-        f"{significant(result.log.rate, 4)} Hz · "
-        f"{counted(sum(log.rows for log in result.logs), 'sample')}",
+        facts=FACTS.format(
+            constants.count("OK"),
+            counted(len(constants), "constant"),
+            result.estimator,
+            significant(sum(log.duration for log in result.logs), 4),
+            significant(result.log.rate, 4),
+            counted(sum(log.rows for log in result.logs), "sample"),
+        ),
         made=f"Made by algid {result.version} from result.json.",
         arm=arm_of(result, raw),
     )

@@ -9,7 +9,6 @@ import base64
 import html
 import tomllib
 from collections.abc import Sequence
-from copy import deepcopy
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -45,7 +44,7 @@ class Panels:
         height, rows = own.get("height", height), -(-len(titles) // columns)
         grid = {"rows": rows, "columns": columns, "pattern": "independent"}
         self.data: list[dict[str, Any]] = []
-        self.layout: dict[str, Any] = deepcopy(own.get("layout", {})) | {
+        self.layout: dict[str, Any] = own.get("layout", {}) | {
             "grid": grid | {"xgap": 0.12, "ygap": TICKS / height},
             "shapes": [],
             "annotations": [],
@@ -56,10 +55,11 @@ class Panels:
             self.text(place, words)
 
     def axes(self, place: int, x: dict[str, Any] | str = "", y: dict[str, Any] | str = "") -> None:
-        """Set titles of a panel's axes, or more of their settings."""
+        """Set more of a panel's axes, their titles, or what `figures.toml` has of such a title."""
         for name, given in ((ref("xaxis", place), x), (ref("yaxis", place), y)):
-            axis = self.layout.setdefault(name, {})
-            axis |= {"title": {"text": given}} if given and isinstance(given, str) else given or {}
+            if isinstance(given, str):
+                given = _data()["axes"].get(given, {"title": {"text": given}})
+            self.layout[name] = self.layout.get(name, {}) | given
 
     def add(self, place: int, x: Any, y: Any, name: str, look: str = "", **more: Any) -> None:
         """Add a trace that looks as `look` or its name says, or is a plain curve.
@@ -91,7 +91,7 @@ class Panels:
         """Fill the only panel with a map of numbers, a row a name."""
         rows = list(map(label, names))
         self.add(0, x, rows, "map", self.key, z=packed(z), ygap=3, showlegend=False, **more)
-        self.axes(0, y={"autorange": "reversed", "type": "category"})
+        self.axes(0, y="names")
         self.layout["height"] = 110 + 30 * len(rows)
 
     def text(self, place: int, words: str, x: Any = None) -> None:
@@ -107,8 +107,8 @@ class Panels:
 def down(key: str, over: str, names: Sequence[str], limit: float) -> Panels:
     """A panel for points beside names, the first one at the top, within ± `limit`."""
     panels = Panels(key, [over], 60 + 22 * len(names))
-    rows = {"type": "category", "categoryarray": names, "autorange": "reversed"}
-    panels.axes(0, {"range": [-limit, limit]}, rows)
+    panels.axes(0, {"range": [-limit, limit]}, "names")
+    panels.axes(0, y={"categoryarray": names})
     return panels
 
 

@@ -35,6 +35,9 @@ INTERVALS_REST_ON = {
 }
 
 
+LOG = "{0.role} | {0.format} | {0.rows:,} | {0.duration:.6g} | {0.rate:.6g}"
+
+
 def estimates_table(title: str, estimates: Mapping[str, Estimate], result: Result) -> Table:
     """Estimates with their intervals, the truth where it is known, and what they are."""
     return Table(
@@ -112,10 +115,10 @@ def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
     )
 
 
-def terms_table(fit: FitSummary) -> Table:
+def terms_table(fit: FitSummary | None) -> Table:
     """Optional terms of the torque and their worth."""
     rows = []
-    for term in fit.terms:
+    for term in fit.terms if fit else ():
         change = None if term.gain_heldout is None else -100 * term.gain_heldout or 0.0  # no −0.00
         numbers = ((term.delta_bic, "+.1f"), (change, "+.2f"), (term.evidence, "+.1f"))
         cells = (formatted(value, form) for value, form in numbers)
@@ -162,8 +165,7 @@ def log_tables(logs: Sequence[LogSummary]) -> tuple[Table, Table]:
     """`logs`, and from which channel each signal was taken, once for all logs that share it."""
     rows, taken = [], dict[tuple[str, str], list[str]]()
     for log in logs:
-        numbers = (f"{log.rows:,}", f"{log.duration:.6g}", f"{log.rate:.6g}")
-        rows.append((file_name(log.path), log.role, log.format, *numbers))
+        rows.append((file_name(log.path), *LOG.format(log).split(" | ")))
         for pair in log.mapping.items():
             taken.setdefault(pair, []).append(file_name(log.path))
     channels = []
