@@ -98,6 +98,7 @@ _JOINT_FIRST = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})[_./ ]+(.+
 _NUMBERED = re.compile(r"^(?:joint|axis|motor|link|j)[_ ]?(\d{1,3})$")
 _COUNTED = re.compile(r"(?:^|_)(?:joint|axis|dof|actuator)(?=_|\d|$)")
 """Words that a joint's number stands beside, and that name no joint."""
+_LAST_NUMBER = re.compile(r"(?:_|\[)(\d+)\]?$")
 _JOINT_LAST = re.compile(r"^(.*?[^\W\d])[_./ ]*\[?(\d{1,3})\]?$")
 
 
@@ -244,7 +245,10 @@ def choose(
                     )
     quantity = "theta" if angles else "tau"
     columns_of_both = (chosen.get(f"{quantity}1"), chosen.get(f"{quantity}2"))
-    own = [name.own for column, name in parts.items() if column in columns_of_both]
+    both = [name for column, name in parts.items() if column in columns_of_both]
+    own = [name.own for name in both]
+    if len(set(own)) < len(own):  # /left/arm/q and /right/arm/q
+        own = [name.joint or "" for name in both]
     numbered = len(own) < 2 or all(name.isdecimal() for name in own)
     if time := time_among(parts):
         chosen["t"] = time
@@ -296,8 +300,8 @@ def _of_joint(of_stem: Mapping[str, str], joint: str) -> list[str]:
     columns = []
     for key, column in of_stem.items():
         own = key.rpartition("/")[2]
-        number = own.rpartition("_")[2] if name.isdecimal() else ""
-        if not names.isdisjoint((key, own, number)):
+        number = _LAST_NUMBER.search(own) if name.isdecimal() else None
+        if not names.isdisjoint((key, own, number and number[1])):
             columns.append(column)
     return columns
 

@@ -42,6 +42,12 @@ DRIVERS = {
         "low_state.motor_state[{}].dq",
         (),
     ),
+    "PlotJuggler": (
+        "/low_state/motor_state[{}]/q",
+        "/low_state/motor_state[{}]/tau_est",
+        "/low_state/motor_state[{}]/dq",
+        (),
+    ),
 }
 
 
