@@ -145,26 +145,34 @@ def moving_joints(
     Where they move, the two-link model lacks their torque. `positions` has by joint the path of
     its position, in `unit` rad.
     """
-    names = {f"joint {number}": joint for number, joint in enumerate(positions)}
-    places = dict(zip(names, positions.values(), strict=True))  # none is called as a stamp is
+    if not positions:
+        return ()
+    places = {place: place for place in positions.values()}
     try:
-        table = next((one for one in tables(places) if len(one)), None) if places else None
-        table = table and table.part(0, LOOKED)
+        table = next((one for one in tables(places) if len(one)), None)
     except LogError:  # the joints that are read tell of what is wrong
         return ()
+    if table is None:
+        return ()
     moved: dict[str, float] = {}
-    for name, values in table.columns.items() if table else ():
+    for joint, place in positions.items():
+        values = table.columns[place][:LOOKED]
         finite = values[np.isfinite(values)]
         if finite.size and unit * np.ptp(finite) > BESIDE_STILL:
-            moved[names[name]] = unit * float(np.ptp(finite))
-    if table is None or not moved:
+            moved[joint] = unit * float(np.ptp(finite))
+    if not moved:
         return ()
     furthest = sorted(moved, key=lambda joint: -moved[joint])
     listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
     if len(moved) > _NAMED:
         listed += f" and {len(moved) - _NAMED} more"
     swing = max(moved.values()) > SWINGING
-    numbers = {"count": len(moved), "joints": listed, "samples": len(table), "swing": swing}
+    numbers = {
+        "count": len(moved),
+        "joints": listed,
+        "samples": min(len(table), LOOKED),
+        "swing": swing,
+    }
     remedies: tuple[Remedy, ...] = ()
     if swing:
         remedies = (Remedy({"accept": "OTHER_JOINTS"}, "to use it nevertheless"),)
