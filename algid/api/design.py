@@ -33,8 +33,8 @@ UNIT = "steps"
 """What progress counts."""
 
 Noise = Annotated[float, bounded((1e-12, PHYSICAL.noise[1]))]
-Pair = float | tuple[float, float] | str
-Span = float | tuple[float, float] | str | tuple[tuple[float, float], tuple[float, float]]
+Pair = float | str | Sequence[float]
+Span = float | str | Sequence[float | Sequence[float]]
 
 
 @verb
@@ -49,7 +49,7 @@ def design(
     tip_height: Annotated[float, bounded(PLANNED["tip_height"])] | None = None,
     duration: float | None = None,
     rate: float | None = None,
-    runs: tuple[int, int] | str | None = None,
+    runs: Sequence[int] | str | None = None,
     for_: Sequence[str] | str | None = None,
     position_noise: Noise | None = None,
     torque_noise: Noise | None = None,
@@ -59,7 +59,7 @@ def design(
     l1: Length | None = None,
     l2: Length | None = None,
     margin: Annotated[float, bounded((0, 0.5))] = 0.05,
-    joints: tuple[str, str] | str = "joint1,joint2",
+    joints: Sequence[str] | str = "joint1,joint2",
     seed: Seed = 0,
     out: Folder | None = None,
     force: bool = False,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from algid.api.answer import Answer
 from algid.api.options import Export
@@ -97,9 +97,4 @@ def report(
                 written.append(export_mcap(folder, progress))
             shown, as_json = map(result_document, [result]), partial(result_json, result)
         made.append(Answer(shown, as_json, [f"wrote {path}" for path in written]))
-    return made
-
-
-def answer(made: list[Answer], _given: Mapping[str, Any]) -> list[Answer]:
-    """One after another."""
     return made

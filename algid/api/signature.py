@@ -9,6 +9,7 @@ import builtins
 import inspect
 import re
 import sys
+from collections import ChainMap, defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, wraps
@@ -36,27 +37,26 @@ EMPTY = inspect.Parameter.empty
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 
-class _Names(dict[str, Any]):
-    """A module's names; what is imported for type checkers alone is typed as a path."""
-
-    def __missing__(self, name: str) -> Any:
-        return vars(builtins).get(name, Path)
-
-
 @cache
 def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
     """What a verb, `Settings` or `Profile` takes that a command line has, by name.
 
     Of ``**options`` nothing is said; `of` is a channel, whose fields are the profile's.
     """
-    module, is_model = vars(sys.modules[taker.__module__]), hasattr(taker, "model_fields")
-    helps, found = described(taker)[1], dict[str, Option]()
+    # what is imported for type checkers alone is typed as a path
+    module = vars(sys.modules[taker.__module__])
+    names = ChainMap(module, vars(builtins), defaultdict[str, Any](lambda: Path))
+    helps, found, is_model = (
+        described(taker)[1],
+        dict[str, Option](),
+        hasattr(taker, "model_fields"),
+    )
     for own, one in inspect.signature(taker).parameters.items():
         if own in CALLERS or one.kind is one.VAR_KEYWORD:
             continue
         hint, name = one.annotation, of + own
         if isinstance(hint, str):
-            hint = eval(hint, module, _Names(module))  # our own source
+            hint = eval(hint, module, names)  # our own source
         if hasattr(hint, "model_fields"):
             found |= options_of(hint, f"{name}.")
             continue

@@ -14,13 +14,13 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
 import click
 from click.shell_completion import CompletionItem
 
+from algid import api
 from algid.api.signature import EMPTY, described, options_of
 from algid.base.exits import epilog
 from algid.base.text import lines_of
@@ -69,8 +69,7 @@ class Command(click.Command):
 
 def listed(name: str) -> str:
     """The first sentence of a command's docstring, without loading what it needs."""
-    spec = find_spec(f"algid.api.{name}")
-    text = spec.loader.get_source(spec.name) if spec is not None else ""  # type: ignore[union-attr]
+    text = (Path(api.__path__[0]) / f"{name}.py").read_text(encoding="utf-8")
     found = re.search(rf'^def {COMMANDS[name]}\(.*?"""(.+?)(?:\n\n|""")', text, re.M | re.S)
     return " ".join(found[1].split()) if found else ""
 
@@ -139,8 +138,9 @@ def command(name: str) -> Command:
             called = {key: value for key, value in callers.items() if key in parameters}
             called |= {key: value for key, value in given.items() if key not in arguments}
             value = verb(*map(given.get, arguments), **called)
-        made = module.answer(value, given | {"verbose": verbose})
-        answers = made if isinstance(made, list) else [made]
+        answers = value  # of a report
+        if hasattr(module, "answer"):
+            answers = [module.answer(value, given | {"verbose": verbose})]
         for one in answers:
             shown(one, as_json, quiet)
         click.get_current_context().exit(max(one.exit for one in answers))

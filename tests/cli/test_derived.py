@@ -331,7 +331,7 @@ def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
         (lambda: algid.export("none", "c", m1=float("nan")), "--set m1"),
         (lambda: algid.compare("none"), "compare"),
         (lambda: algid.design("case1", margin=0.9), "--set margin"),
-        (lambda: algid.design("case1", range=1, torque=1, speed=(1, 2, 3)), "--speed"),  # type: ignore[arg-type]
+        (lambda: algid.design("case1", range=1, torque=1, speed=(1, 2, 3)), "--speed"),
         (lambda: algid.synthesise("case1", drop=2.0), "--set drop"),
         (lambda: algid.synthesise("case1", rate=float("inf")), "--rate"),
         (lambda: algid.batch("x", "y", timeout=0), "--timeout"),
