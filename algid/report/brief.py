@@ -38,7 +38,7 @@ def verdict_lines(judged: Verdict, width: int = WIDTH, most: int | None = None) 
         if most is not None:  # in two lines, its code behind it
             text = _short(reason.text, 2, 12 + len(reason.code))
         lines += lines_of(f"{visible(text, 2_000)} [{reason.code}]", width, " • ", "   ")
-    left = judged.reasons[len(judged.reasons) if most is None else most :]
+    left = judged.reasons[most or len(judged.reasons) :]
     if left:
         more = f"{counted(len(left), 'more reason')}, with -v: {_codes(left)}"
         lines.append(f" • {_short(more, 1, 3)}")

@@ -68,19 +68,11 @@ class Comparison:
         combined[0] = np.nan
         return NORMAL * (value - value[0]) / np.where(combined > 0, combined, np.nan)
 
-    @cached_property
-    def far(self) -> list[tuple[float, str]]:
-        """The size of each distance that is known, the largest first, and what it is of."""
-        found = []
-        for label, row in zip(self.labels, self.sigma.tolist(), strict=True):
-            for name, far in zip(self.names, row, strict=True):
-                found.append((abs(far), f"{visible(name)} of {label} ({far:+.1f} σ)"))
-        return sorted((one for one in found if one[0] >= 0), reverse=True)
-
     @property
     def largest_sigma(self) -> float | None:
         """The largest distance, None where there is none."""
-        return self.far[0][0] if self.far else None
+        known = np.abs(self.sigma[~np.isnan(self.sigma)])
+        return float(known.max()) if known.size else None
 
     @cached_property
     def settings(self) -> dict[str, list[str]]:
@@ -153,7 +145,7 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
         If it cannot be written, or exists and `force` is not set.
     """
     names, (estimates, settings) = found.labels, found.tables()
-    figure = _distances(found) if found.far else None
+    figure = _distances(found) if found.largest_sigma is not None else None
     document = Document(
         title="Comparison",
         verdict=verdict(found),
@@ -172,18 +164,21 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
 
 def verdict(found: Comparison) -> Verdict:
     """Whether the results agree: the largest distance, and whether chance explains it."""
-    if not found.far:
+    size, count = found.largest_sigma, int(np.count_nonzero(~np.isnan(found.sigma)))
+    if size is None:
         return Verdict("reservations", "no parameter has error bars in two results")
-    size, words = found.far[0]
+    log, place = np.argwhere(np.abs(found.sigma) == size)[0].tolist()
+    words = f"{visible(found.names[place])} of {found.labels[log]}"
+    far = f"({found.sigma[log, place]:+.1f} σ)"
     grade: Grade = "good" if size <= FAR else "reservations"
-    return Verdict(grade, f"the largest of {counted(len(found.far), 'difference')} is {words}")
+    return Verdict(grade, f"the largest of {counted(count, 'difference')} is {words} {far}")
 
 
 def _distances(found: Comparison) -> Panels:
     """How far each result is from the first, in σ of both intervals."""
     known = np.flatnonzero(~np.isnan(found.sigma).all(axis=0)).tolist()
     names = [found.names[place] for place in known]
-    reach = max(1.1 * found.far[0][0], 4.0)
+    reach = max(1.1 * (found.largest_sigma or 0.0), 4.0)
     panels = down("distances", f"Distance from {found.labels[0]}, σ", names, reach)
     for place, label in enumerate(found.labels[1:]):
         panels.add(0, found.sigma[place + 1, known], names, label, f"result {place % 5}")

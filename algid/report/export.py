@@ -73,7 +73,7 @@ def write_series(writer: Writer, path: Path, name: str, progress: Progress | Non
     """
     if not path.is_file():
         return
-    _, total, metadata = facts_of(path)
+    total, metadata = facts_of(path)
     starts = json.loads(metadata.get(START_KEY, b"[]"))
     channels, done = dict[int, int](), 0
     for log, block in by_log(blocks(path, rows=ROWS)):

@@ -92,10 +92,10 @@ def table(path: Path) -> dict[str, NDArray[Any]]:
     return {name: np.array(of, None if str in map(type, of) else float) for name, of in columns}
 
 
-def facts_of(path: Path) -> tuple[list[str], int, dict[bytes, bytes]]:
-    """Names of the columns, rows, and metadata of `path`. Raises `ResultError`."""
+def facts_of(path: Path) -> tuple[int, dict[bytes, bytes]]:
+    """How many rows `path` has, and its metadata. Raises `ResultError`."""
     with _parquet(path) as file:
-        return file.schema_arrow.names, file.metadata.num_rows, file.schema_arrow.metadata or {}
+        return file.metadata.num_rows, file.schema_arrow.metadata or {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     """
     if not path.is_file():
         return None
-    total = facts_of(path)[1]
+    total, _ = facts_of(path)
     bucket, step = max(1, -(-2 * total // points)), max(1, total // SAMPLES)
     parts, samples, worst = list[Block](), list[Block](), dict[int, Any]()
     period, done, starts = 0.0, 0, dict[int, float]()
