@@ -21,6 +21,7 @@ from algid.base.files import read_start
 from algid.base.limits import LIMITS
 from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.notices import Notice
+from algid.readers.flat import as_log_error
 from algid.readers.mcap import mcap_file
 from algid.readers.messages.message_file import MessageChannel, MessageFile, Messages
 from algid.readers.messages.reader import MessageLog
@@ -93,21 +94,6 @@ def _files_of_folder(folder: Path) -> tuple[list[Path], tuple[Notice, ...]]:
     return there, notices
 
 
-@contextmanager
-def _as_log_error(path: Path, mend: str) -> Iterator[None]:
-    """Turn what a library raises about a bag into a `LogError` that names what to do."""
-    try:
-        yield
-    except LogError:
-        raise
-    except Exception as error:  # rosbags raises what its parts do
-        raise LogError(f"{path}: the bag cannot be read ({_reason(error)}); {mend}") from error
-
-
-def _reason(error: Exception) -> str:
-    return (str(error) or type(error).__name__).partition("\n")[0][:200]
-
-
 def ros1_file(path: Path) -> MessageFile:
     """A ROS 1 bag with an index.
 
@@ -120,7 +106,7 @@ def ros1_file(path: Path) -> MessageFile:
     from rosbags.typesys.msg import denormalize_msgtype
 
     reader = Reader(path)
-    with _as_log_error(path, f"rosbag reindex {path.name} may mend it, else copy it again"):
+    with as_log_error(path, "bag", f"rosbag reindex {path.name} may mend it, else copy it again"):
         reader.open()
     channels, counts = {}, Counter[int]()
     for one in reader.connections:
@@ -150,7 +136,7 @@ def database_file(path: Path) -> MessageFile:
     LogError
         If it is damaged, or holds no tables as rosbag2 writes them.
     """
-    with _as_log_error(path, "copy it again, or record it anew"), _connected(path) as base:
+    with as_log_error(path, "SQLite"), _connected(path) as base:
         query = "SELECT name FROM sqlite_master WHERE type = 'table'"  # a view may run for ever
         tables = {str(name) for (name,) in base.execute(query)}
         for needed in sorted({"messages", "topics"} - tables):
@@ -224,7 +210,8 @@ def _batches(
                 yield Messages.of(payloads, np.array(stamps, np.int64))
                 stamps, payloads, size = [], [], 0
     except Exception as error:  # rosbags raises what its parts do
-        broken = f"{_reason(error)}; of what follows nothing is read"
+        reason = (str(error) or type(error).__name__).partition("\n")[0][:200]
+        broken = f"{reason}; of what follows nothing is read"
     yield Messages.of(payloads, np.array(stamps, np.int64))
     if broken:
         yield broken

@@ -57,10 +57,10 @@ INDEX = "__index_level_0__"
 
 
 @contextmanager
-def as_log_error(path: object, kind: str) -> Iterator[None]:
-    """Turn what a library raises about a file into a `LogError`; its own errors pass.
+def as_log_error(path: object, kind: str, mend: str = "copy it again") -> Iterator[None]:
+    """Turn what a library raises about a file into a `LogError` that says how to `mend` it.
 
-    A panic of polars is no Exception.
+    A `LogError` passes. A panic of polars is no Exception.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def as_log_error(path: object, kind: str) -> Iterator[None]:
         reason = str(error).partition("\n")[0][:200]
         raise LogError(
             f"{path}: the {kind} file is damaged or not one that can be read "
-            f"({type(error).__name__}: {reason}); copy it again"
+            f"({type(error).__name__}: {reason}); {mend}"
         ) from error
 
 
