@@ -55,10 +55,8 @@ def guide(topic: Annotated[str, Option(suggested=lambda: TOPICS)] | None = None)
     try:
         return str(_tables().entry(message(code_of_now(topic.upper())), "#"))
     except KeyError:
-        known = ", ".join(TOPICS)
-        raise SettingError(
-            f"guide: expected one of {known}, or a message's code; found {topic!r:.60}"
-        ) from None
+        known = f"{', '.join(TOPICS)}, or a message's code"
+        raise SettingError(f"guide: expected one of {known}; found {topic!r:.60}") from None
 
 
 def answer(text: str, _given: Mapping[str, Any]) -> Answer:

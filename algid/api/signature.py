@@ -46,11 +46,8 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
     # what is imported for type checkers alone is typed as a path
     module = vars(sys.modules[taker.__module__])
     names = ChainMap(module, vars(builtins), defaultdict[str, Any](lambda: Path))
-    helps, found, is_model = (
-        described(taker)[1],
-        dict[str, Option](),
-        hasattr(taker, "model_fields"),
-    )
+    helps, found = described(taker)[1], dict[str, Option]()
+    is_model = hasattr(taker, "model_fields")
     for own, one in inspect.signature(taker).parameters.items():
         if own in CALLERS or one.kind is one.VAR_KEYWORD:
             continue

@@ -44,12 +44,7 @@ BAD, DEAD = (
     [
         (Batched([GOOD, GOOD], 2, 0), False, 0, ["2 ok; 2 run now, 0 left; out/jobs.parquet"]),
         (Batched([], 0, 0), False, 0, ["nothing done; 0 run now, 0 left; out/jobs.parquet"]),
-        (
-            Batched([GOOD, PART], 1, 0),
-            False,
-            3,
-            ["1 ok, 1 incomplete; 1 run now, 0 left; out/jobs.parquet"],
-        ),
+        (Batched([PART], 1, 0), False, 3, ["1 incomplete; 1 run now, 0 left; out/jobs.parquet"]),
         (
             Batched([GOOD, PART, BAD, DEAD], 4, 0),
             False,
@@ -61,24 +56,8 @@ BAD, DEAD = (
             ],
         ),
         (Batched([GOOD], 1, 3), False, 1, ["1 ok; 1 run now, 3 left; out/jobs.parquet"]),
-        (
-            Batched([GOOD, PART], 2, 3),
-            True,
-            130,
-            ["1 ok, 1 incomplete; 2 run now, 3 left; out/jobs.parquet"],
-        ),
-        (
-            Batched([GOOD], 1, 3, "out: the disk is full"),
-            True,
-            1,
-            ["1 ok; 1 run now, 3 left; out/jobs.parquet"],
-        ),
-        (
-            Batched([GOOD], 1, 0, "out: the disk is full"),
-            False,
-            1,
-            ["1 ok; 1 run now, 0 left; out/jobs.parquet"],
-        ),
+        (Batched([GOOD], 2, 3), True, 130, ["1 ok; 2 run now, 3 left; out/jobs.parquet"]),
+        (Batched([GOOD], 1, 0, "full"), True, 1, ["1 ok; 1 run now, 0 left; out/jobs.parquet"]),
     ],
 )
 def test_a_batch_says_what_became_of_its_jobs(
