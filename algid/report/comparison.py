@@ -94,15 +94,14 @@ class Comparison:
                 if name in result.estimates:
                     row, far = row_of(name, result.estimates[name]), self.sigma[log, place]
                     off = percent(numbers[log, place] - numbers[0, place], numbers[0, place], 3)
-                    change = ("" if np.isnan(far) else f"{far:+.1f}", off if log else "")
-                    known = (row.with_half, row.unit, row.status)
-                    estimates.append((row.name, label, *known, *change))
+                    change = ("" if np.isnan(far) else f"{far:+.1f}", row.unit, row.status)
+                    estimates.append((row.name, label, row.with_half, *change, off if log else ""))
         for name, values in self.settings.items():
             for label, value in zip(self.labels, values, strict=True):
                 settings.append((visible(name), label, visible(value)))
         note = f"Differences are against {self.labels[0]}; ± is 95 %, σ combines both intervals."
         same = "Every setting is the same, and every log was read the same way."
-        columns = "Parameter | Result | Estimate | Unit | Status | Δ/σ | Δ %"
+        columns = "Parameter | Result | Estimate | Δ/σ | Unit | Status | Δ %"
         return (
             Table("Estimates side by side", columns, estimates, note),
             Table(
