@@ -199,11 +199,15 @@ def test_what_is_no_torque_is_told_with_what_names_another() -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "unit", "name"),
-    [(DEGREE, "angle_unit", "theta1"), (1 / DEGREE, "omega1.unit", "omega1")],
+    ("log", "unit", "name"),
+    [
+        (turning(DEGREE, 1), "angle_unit", "theta1"),
+        (turning(1 / DEGREE, 1), "omega1.unit", "omega1"),
+        (logged(WIDE), "angle_unit", "theta2"),
+    ],
 )
-def test_what_is_in_degrees_is_told_with_its_flags(factor: float, unit: str, name: str) -> None:
-    (found,) = SPOKEN(turning(factor, 1))
+def test_what_is_in_degrees_is_told_with_its_flags(log: Log, unit: str, name: str) -> None:
+    (found,) = degrees(log, lambda: False)
     assert found.refuse
     assert [one.settings for one in found.remedies] == [
         {unit: "deg"}, {f"{name}.gear_ratio": None}, {f"{name}.unit": "rad"},
