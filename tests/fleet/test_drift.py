@@ -17,6 +17,7 @@ import pytest
 from scipy import stats
 
 from algid.base.errors import ResultError
+from algid.base.significance import CERTAIN
 from algid.fleet.history import history_of, read_jobs
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -246,3 +247,17 @@ def test_a_file_that_is_no_table_is_refused_in_one_line(tmp_path: Path) -> None:
     ) as raised:
         history_of(path)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.999, False), (1.001, True)])
+def test_a_step_is_what_two_means_explain_once_in_a_million_lives(
+    share: float, told: bool, tmp_path: Path
+) -> None:
+    """Ten logs on either side: the gain is 5 (step / std)², at one of 19 places."""
+    gain = stats.chi2.isf(CERTAIN / 19, 1)
+    step = 0.01 * math.sqrt(share * gain / 5)
+    found = standing_out(table([1.0] * 10 + [1.0 + step] * 10), tmp_path, "step")
+    assert found.height == told
+    if told:
+        assert found.select("job", "expected").row(0) == ("j10", pytest.approx(1.0))
+        assert found["value"][0] == pytest.approx(step, rel=1e-9)
