@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import sys
 import time
 from contextlib import nullcontext
@@ -31,6 +32,16 @@ def die(number: int, file: str, half: str) -> None:
     with staged(Path(half), Path.mkdir), reading(file) if file else nullcontext():
         os.kill(os.getpid(), number)
         time.sleep(60)
+
+
+def die_until(count: int, tries: str) -> int:
+    """Be killed but for the `count`-th try."""
+    with Path(tries).open("a+") as file:
+        file.write("x")
+    size = Path(tries).stat().st_size
+    if size < count:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return size
 
 
 def bound() -> int:

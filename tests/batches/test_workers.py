@@ -62,6 +62,15 @@ def test_what_cannot_travel_fails_its_own_call(workers: Workers) -> None:
     assert workers.submit(calls.add, 1, 1).result() == 2
 
 
+def test_a_call_whose_worker_is_killed_runs_in_three_at_most(
+    workers: Workers, tmp_path: Path
+) -> None:
+    assert workers.submit(calls.die_until, 3, str(tmp_path / "a")).result() == 3
+    with pytest.raises(WorkerDiedError, match="SIGKILL"):
+        workers.submit(calls.die_until, 4, str(tmp_path / "b")).result()
+    assert (tmp_path / "b").stat().st_size == 3
+
+
 @pytest.mark.slow
 def test_a_call_past_its_time_fails_alone_and_its_worker_is_replaced() -> None:
     with Workers(1, timeout=3.0) as executor:
