@@ -48,6 +48,7 @@ are not run."""
 USUAL = ("arm", "model", "check", "estimators", "signals", "tracks", "fleet", "inspection")
 COPIED = ("tests", "pipelines", "data", "README.md", "CHANGELOG.md", "LICENSE", "constraints.txt")
 BUDGET = 20.0  # s of tests for a mutant
+STATS = "mutants/mutmut-stats.json"  # which tests touch what, and how long they take
 LIMIT = 4  # times as much processor time as its tests took: a mutant that takes more never ends
 
 
@@ -118,7 +119,7 @@ def names_in(folder: Path) -> list[str]:
 
 def jobs(folder: Path, drawn: list[str]) -> Iterator[tuple[str, list[str], int]]:
     """Each mutant with its tests, by name, and the seconds of processor time that they may take."""
-    known = json.loads((folder / "mutants/mutmut-stats.json").read_text(encoding="utf-8"))
+    known = json.loads((folder / STATS).read_text(encoding="utf-8"))
     seconds = known["duration_by_test"]
     for name in drawn:
         touching = known["tests_by_mangled_function_name"].get(name.rpartition("__mutmut_")[0], [])
@@ -187,9 +188,11 @@ def main() -> None:
     if not options.again:
         prepare(options.folder, options.rooms)
         # A name that none has: the mutants are made and the tests timed, nothing more.
-        subprocess.run(
-            [*mutmut, "run", "none of them"], cwd=options.folder, check=False, capture_output=True
+        timed = subprocess.run(
+            [*mutmut, "run", "none of them"], cwd=options.folder, capture_output=True, text=True
         )
+        if not (options.folder / STATS).exists():
+            raise SystemExit(f"{timed.stdout[-3000:]}\nthe tests fail before a mutant is tried")
     drawn = sample(names_in(options.folder), options.count, options.seed)
     ends: dict[str, str] = {}
     for name, end in tried(options.folder, drawn):
