@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from algid.api.answer import Answer
 from algid.api.options import Export
 from algid.api.signature import verb
-from algid.base.errors import SettingError
+from algid.base.errors import ResultError, SettingError
 from algid.options import Option, flag
 
 if TYPE_CHECKING:
@@ -92,9 +92,15 @@ def report(
             from algid.results import read_result, result_json
 
             result = read_result(folder)
-            written = write_pages(folder, shared_library, progress)
-            if export:
-                written.append(export_mcap(folder, progress))
+            try:
+                written = write_pages(folder, shared_library, progress)
+                if export:
+                    written.append(export_mcap(folder, progress))
+            except (LookupError, TypeError, ValueError) as error:  # as a column that is not there
+                raise ResultError(
+                    f"{folder}: its series do not go with its result ({type(error).__name__}: "
+                    f"{error}); identify again with this version"
+                ) from error
             shown, as_json = map(result_document, [result]), partial(result_json, result)
         made.append(Answer(shown, as_json, [f"wrote {path}" for path in written]))
     return made

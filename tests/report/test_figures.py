@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from algid.api.report import report
 from algid.base.errors import ResultError
 from algid.base.significance import NORMAL
 from algid.report.figures import (
@@ -168,6 +169,14 @@ def test_what_is_absent_is_not_drawn_and_what_is_broken_is_refused(
     (folder / f"{name}.parquet").write_bytes(b"PAR1")
     with pytest.raises(ResultError, match=rf"{name}\.parquet: cannot read it as Parquet"):
         figures(folder, result, raw)
+
+
+def test_a_series_that_lacks_a_column_is_one_line(case_folder: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(case_folder, tmp_path / "a"))
+    file = folder / "torque.parquet"
+    pl.read_parquet(file).drop("tau2").write_parquet(file)
+    with pytest.raises(ResultError, match=r"a: its series do not go with its result .*'tau2'"):
+        report([folder])
 
 
 def test_numbers_travel_in_single_precision_unless_they_are_beyond_it() -> None:
