@@ -107,7 +107,10 @@ class Case:
 CASES = {
     "sound": Case(lambda r: r, "good", [], "all 9 parameters are identified"),
     "one lost": Case(lambda r: of(r, LOST, "k5"), codes=["NOT_IDENTIFIABLE"], words="8 of 9"),
-    "half lost": Case(lambda r: of(r, LOST, *NAMES[:4]), codes=["NOT_IDENTIFIABLE"]),
+    "half lost": Case(
+        lambda r: of(r, LOST, *NAMES[:4]),
+        codes=["NOT_IDENTIFIABLE"], words="record a run in which both joints move",
+    ),
     "most lost": Case(lambda r: of(r, LOST, *NAMES[:5]), "failed", ["NOT_IDENTIFIABLE"], "only 4"),
     "all weak": Case(lambda r: alone(r, WEAK), "failed", ["WEAK_EXCITATION"], "no parameter"),
     "all vague": Case(lambda r: alone(r, VAGUE), "failed", ["NOT_SIGNIFICANT"], "no parameter"),
