@@ -161,7 +161,7 @@ def test_a_profile_names_it(cad: Path) -> None:
             {"prior": "arm.urdf", "prior_error": 0.2},
             "--set prior_error: expected greater than or equal to 1, ",
         ),
-        ({"prior": "arm.urdf", "estimator": "paper"}, "--prior: the paper's method"),
+        ({"prior": "arm.urdf", "estimator": "paper"}, "--prior .*: the paper's method"),
         ({"prior": "arm.urdf", "parameters": "first.algid"}, "--prior: .* leave one of them out"),
         ({"prior": "first.algid", "prior_error": 20}, "first.algid is a result"),
     ],
