@@ -219,7 +219,7 @@ done = algid.identify(
 assert done.settings["toy_level"] == 2.0 and done.profile == {"toy_side": "right"}
 for wrong, message in (
     ({"toy_level": 9.0}, "--toy-level: expected less than or equal to 5, found 9.0"),
-    ({"toy_side": "up"}, "toy_side"),
+    ({"toy_side": "up"}, "--toy-side: expected 'left' or 'right', found 'up'"),
     ({"toy_sidee": "up"}, "did you mean toy_side?"),
 ):
     try:
@@ -280,7 +280,10 @@ def add_toys(package: Path) -> None:
 
 
 def add_options(package: Path) -> None:
-    """A field of how to identify and one of what a log means."""
+    """A field of how to identify and one of what a log means, with the types of their keywords."""
+    options = package / "api" / "options.py"
+    inserted(options, "    passive: Literal[1, 2]", '    toy_side: Literal["left", "right"]\n')
+    inserted(options, "    cross_validate: bool", "    toy_level: float\n")
     inserted(
         package / "settings.py",
         "    constrain: bool = False",
