@@ -220,7 +220,7 @@ assert done.settings["toy_level"] == 2.0 and done.profile == {"toy_side": "right
 for wrong, message in (
     ({"toy_level": 9.0}, "--toy-level: expected less than or equal to 5, found 9.0"),
     ({"toy_side": "up"}, "--toy-side: expected 'left' or 'right', found 'up'"),
-    ({"toy_sidee": "up"}, "did you mean toy_side?"),
+    ({"toy_sidee": "up"}, "no setting has this name; expected toy_side"),
 ):
     try:
         algid.identify("arm.csv", **wrong)
