@@ -48,7 +48,7 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
         ]
         yield Table("Signals", "Channel | Low | High | Noise | Step | Saturated share", figures)
     if found.dynamics is not None:
-        yield DYNAMICS.format(**vars(found.dynamics))
+        yield DYNAMICS.format(**vars(found.dynamics)).replace("%", " %")
     for notice in (*found.notices, *found.findings):
         yield f"{notice.code}: {visible(notice.clause, 2000)}"
     refusing = joined(list(dict.fromkeys(one.code for one in found.findings if one.refuse)))

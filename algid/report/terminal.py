@@ -58,21 +58,26 @@ def print_table(table: Table, console: Console, *, failed: bool = False) -> None
     )
     styles = {"name": "bold", "number": "", "text": "", "status": "bold yellow"}
     rows = [[visible(cell, LONGEST) for cell in row] for row in table.rows]
-    kinds, used = dict[int, Kind](), 0
+    shown, room = list[tuple[int, Kind]](), console.width + 2
+    widths = list[tuple[str, int, int]]()
     for place, heading, kind in table.heads:
-        # rich itself breaks words and cuts digits before it lets a column go
         cells = [heading, *(row[place] for row in rows)]
         words = cells if kind == "number" else " ".join(cells).split()
         least = max(min(cell_len(word), LONGEST_WORD) for word in words)
-        used += least + 2
-        if kinds and used - 2 > console.width:
+        if shown and room < least + 2:
             break
-        kinds[place] = kind
+        room -= least + 2
+        shown.append((place, kind))
+        widths.append((heading, least, max(map(cell_len, cells)) - least))
+    # rich itself narrows the widest columns first, and cuts their digits
+    for (_, kind), (heading, least, more) in zip(shown, widths, strict=True):
+        more = min(more, max(room, 0))
+        room -= more
         side: Literal["left", "right"] = "right" if kind == "number" else "left"
-        made.add_column(Text(heading), justify=side, overflow="fold", min_width=least)
+        made.add_column(Text(heading), justify=side, overflow="fold", width=least + more)
     for row in rows:
         line = []
-        for place, kind in kinds.items():
+        for place, kind in shown:
             good = kind == "status" and row[place] == Status.OK.value and not failed
             line.append(Text(row[place], "green" if good else styles[kind]))
         made.add_row(*line)

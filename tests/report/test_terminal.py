@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 
+import pytest
 from rich.console import Console
 
 from algid.report.document import Table
@@ -47,6 +48,15 @@ def test_the_interval_and_the_status_stay_at_eighty_columns() -> None:
         assert cell in text
     assert "Meaning" not in text  # the last ones go first
     assert "viscous" not in text
+
+
+@pytest.mark.parametrize("width", range(36, 52))
+def test_words_give_way_before_digits(width: int) -> None:
+    """The widest column is no narrower for the others' sake where all of it are numbers."""
+    rows = (("k6", "136010.4567 ± 2.7e-5", "N m s/rad", "-0.00439"),)
+    text = printed(Table("T", "Name | Estimate | Unit | Δ %", rows), width)
+    assert rows[0][1] in text
+    assert ("Δ" in text) == ("-0.00439" in text)
 
 
 def test_a_path_that_fits_nowhere_breaks_and_numbers_do_not() -> None:
