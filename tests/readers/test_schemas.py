@@ -5,6 +5,7 @@ much.
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -308,3 +309,55 @@ def test_a_protobuf_number_that_is_unset_is_no_zero(presence: str, tmp_path: Pat
         assert len(log) == 20
         assert log.tau[1].tolist() == [(row + 1) * 10.0 + 3 for row in range(0, 40, 2)]
         assert lost == [f"20 messages on '/arm' left out for want of {places['tau2']['source']}"]
+
+
+@pytest.mark.parametrize("encoding", ["cdr", "protobuf"])
+@pytest.mark.parametrize(("flag", "bad"), [("valid", 0), ("error_code", 17)])
+def test_messages_that_a_flag_calls_no_measurement_are_left_out(
+    encoding: str, flag: str, bad: int, tmp_path: Path
+) -> None:
+    log, wild = noise_log(200, start_ns=EPOCH_NS, velocity=False), range(50, 60)
+    definition = b"float64[2] q\nfloat64[2] tau\nuint8 other\nbool valid\nint32 error_code\n"
+    known: tuple[str, str, bytes] = ("arm_msgs/msg/State", "ros2msg", definition)
+    if encoding == "protobuf":
+        own = descriptor_pb2.FileDescriptorProto(name="state.proto", syntax="proto3")
+        kinds = (
+            ("q", 1, 3),
+            ("tau", 1, 3),
+            ("other", 13, 1),
+            ("valid", 8, 1),
+            ("error_code", 5, 1),
+        )
+        state = own.message_type.add(name="State")
+        for place, (name, kind, label) in enumerate(kinds, start=1):
+            state.field.add(name=name, number=place, type=kind, label=label)
+        pool = descriptor_pool.DescriptorPool()
+        pool.Add(own)
+        made = message_factory.GetMessageClass(pool.FindMessageTypeByName("State"))
+        known = (
+            "State",
+            "protobuf",
+            descriptor_pb2.FileDescriptorSet(file=[own]).SerializeToString(),
+        )
+    messages = []
+    for row, stamp in enumerate(log.stamp_ns.tolist()):
+        says = {"valid": 1, "error_code": 0} | ({flag: bad} if row in wild else {})
+        theta, tau = log.theta[:, row] + (row in wild), log.tau[:, row]
+        content = struct.pack("<4B4dBB2xi", 0, 1, 0, 0, *theta, *tau, row % 256, *says.values())
+        if encoding == "protobuf":
+            one = made(
+                q=theta, tau=tau, other=row, valid=says["valid"], error_code=says["error_code"]
+            )
+            content = one.SerializeToString()
+        messages.append((TOPIC, stamp, content))
+    write_mcap(tmp_path / "log.mcap", messages, {TOPIC: known}, encoding=encoding)
+    places = {"theta1": "q[0]", "theta2": "q[1]", "tau1": "tau[0]", "tau2": "tau[1]"}
+    sources = {name: {"source": path} for name, path in places.items()}
+    profile = Profile.model_validate({"topic": TOPIC, **sources})
+    found = read_log(tmp_path / "log.mcap", profile)
+    kept = np.delete(np.arange(200), wild)
+    np.testing.assert_array_equal(found.theta, log.theta[:, kept])
+    np.testing.assert_array_equal(found.tau, log.tau[:, kept])
+    (notice,) = (one for one in found.notices if one.key == "MESSAGES_LEFT_OUT:fields")
+    assert notice.numbers["count"] == 10
+    assert notice.numbers["fields"] == flag

@@ -70,8 +70,8 @@ class JsonRecords:
             for path, leaf in leaves.items()
             if type(leaf) is tuple or path.rpartition(".")[2] in groups
         }
-        flags = [one for one in GOOD | BAD if one in leaves]
-        lacks = tuple(one for one in flags if (one in GOOD) == (leaves[one] in (0, False)))
+        # flags that are numbers are looked at where those of every format are
+        lacks = tuple(one for one in GOOD | BAD if leaves.get(one) is (one in BAD))
         structure = tuple(numbers), tuple(told.items()), lacks
         if structure not in self._known:
             layout = MessageLayout(fixed=[(0, 8)], lacks=lacks)

@@ -19,7 +19,7 @@ from algid.base.blocks import concatenated, rows_of
 from algid.base.limits import LIMITS
 from algid.base.words import counted
 from algid.readers.messages.message_file import Messages, gather
-from algid.readers.stated import GROUPS
+from algid.readers.stated import BAD, GOOD, GROUPS
 
 _BRACKET = re.compile(r"(\[[^\]]*\])")
 _ELEMENT = re.compile(r"(.*)\[(\d{1,9})\]")
@@ -271,13 +271,20 @@ class Decoder:
         for start, end in layout.fixed:
             mask[lead + start : lead + end] = 0xFF
         mask[lead + np.array(layout.flags, np.intp)] |= 0x80
+        lacks = list(layout.lacks)
+        for name in sorted(GOOD | BAD):  # another value of a flag is another pattern
+            if (flag := layout.find(name)) is not None:
+                width = 0 if flag.kind == "zero" else flag.width or int(flag.kind[-1])
+                own = slice(lead + flag.offset, lead + flag.offset + width)
+                mask[own] = 0xFF
+                lacks += [name] * ((name in GOOD) != any(row[own]))
         masks = mask.view(np.uint64)
         words = np.flatnonzero(masks)
         values = np.frombuffer(row, np.uint64)[words] & masks[words]
         places = {name: layout.find(path) for name, path in self.wanted.items()}
         why = {"case": "joints"}
-        if lacks := [*layout.lacks] or layout.missing(self.wanted):
-            why = {"case": "fields", "fields": ", ".join(lacks)}
         found = {name: at for name, at in places.items() if at is not None}
-        whole = len(found) == len(places) and not layout.lacks
+        whole = len(found) == len(places) and not lacks
+        if lacks := lacks or layout.missing(self.wanted):
+            why = {"case": "fields", "fields": ", ".join(lacks)}
         return _Pattern(words, masks[words], values, found if whole else None, why)
