@@ -45,6 +45,8 @@ def _replaced_by_fit(outcome: Identified, settings: Settings) -> tuple[str, ...]
         codes.append("WRONG_ZERO:")
     if settings.effort is not None:
         codes.append("GRAVITY_COMPENSATED:arm")
+    if not _is_doubtful(outcome):  # in another unit no angle's sine would fit
+        codes.append("DEGREES:reach")
     return tuple(codes)
 
 

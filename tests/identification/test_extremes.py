@@ -17,6 +17,7 @@ from algid.log import Log, Origin
 from algid.profile import Profile
 from algid.settings import Settings
 from algid.writers import write_log
+from pipelines import false_alarms
 
 
 def moving(rate: float, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -62,6 +63,15 @@ def test_a_spike_in_an_angle_is_no_convention(spike: float, tmp_path: Path) -> N
     assert identify(
         path, settings=Settings(estimator="weak"), profile=profile, report=False
     ).parameters
+
+
+def test_turns_that_gaps_leave_open_are_no_degrees_where_the_likelihood_stands() -> None:
+    log = false_alarms.log_of(72398)[0]
+    assert np.ptp(log.theta) > 12 * np.pi
+    assert {one.code for one in identify(log, report=False).verdict.reasons} == {"GAPS"}
+    t, theta, tau = moving(500, 2)
+    wrong = identify(log_of(t, np.degrees(theta), tau), report=False)
+    assert "DEGREES:reach" in {one.key for one in wrong.verdict.reasons}
 
 
 def test_a_spike_in_a_torque_overflows_nothing() -> None:
