@@ -9,7 +9,9 @@ algebra. From no term on, the one whose evidence outweighs its price most is add
 
 with W what its n coefficients explain of the squares, s² the mean square that all terms leave (1 at
 least), N the samples (Schwarz 1978) and T the terms to choose from (Chen & Chen 2008, γ = 1); then
-those are dropped that are not worth it beside the others.
+those are dropped that are not worth it beside the others. A rotor is an exception, as every geared
+motor has one and k1, k3 and k5 take it up: it stays from W / s² > 3.84 on if they would move by
+more than two of the deviations that they had without it.
 
 ======  ==================================================================  ====================
 symbol  name                                                                shape
@@ -48,6 +50,7 @@ from algid.model import (
     FIRST_TERMS,
     LARGEST_PHASE,
     PARAMETERS,
+    RIGID,
     SINES,
     TERMS,
     Model,
@@ -79,6 +82,10 @@ _EXCESS = 4.0
 """Times what neighbouring samples differ by: what every term leaves of a torque is no more where
 the likelihood stands. Of 60 simulated logs with sound models none leaves 1.2 times, of real arms
 each leaves 4.8 times or more, which the likelihood's own noise level then takes beyond ten."""
+_SUSPECTED = 3.84
+"""W of a rotor, 5 %, from which it is not left out where that would move the arm's constants."""
+_MOVES = 2.0
+"""Standard deviations that k1 … k5 have without it: the least of such moves."""
 _STAMPS = 0.01
 """Of a period: what stamps leave open at least, also in the log of a simulator."""
 
@@ -399,6 +406,17 @@ class FirstPass:
         )
 
 
+def moves_arm(
+    names: Sequence[str], values: FloatArray, covariance: FloatArray, own: Collection[str]
+) -> bool:
+    """Whether k1 … k5 move beyond what they claim to be sure of where the parameters `own` go."""
+    gone, arm = (np.flatnonzero(np.isin(names, some)) for some in (list(own), RIGID))
+    gain = covariance[np.ix_(arm, gone)] @ scaled_pinv(covariance[np.ix_(gone, gone)])
+    left = np.diag(covariance)[arm] - np.sum(gain * covariance[np.ix_(arm, gone)], axis=1)
+    moves = np.abs(gain @ values[gone])
+    return bool(np.any(moves > _MOVES * np.sqrt(np.maximum(left, 0.0))))
+
+
 @dataclass(frozen=True, eq=False)
 class _Search:
     """Forward from the fixed terms by the most evident one, then backward."""
@@ -439,13 +457,24 @@ class _Search:
                 return False
         return plausible({name: value[name] for name in own})
 
+    def is_needed(self, term: str, beside: Sequence[str]) -> bool:
+        """Whether `term` is a rotor that the log suspects, and without which k1 … k5 move.
+
+        Every geared motor has one: the price of a term that few arms have is not its own.
+        """
+        suspected = self.explained(term, beside) > _SUSPECTED * self.scale
+        noisy = self.first.open_squares < self.first.samples  # more than the stamps leave open
+        if not (EVERY_TERM[term].rotor and suspected and noisy):
+            return False
+        columns = self.first.columns([*beside, term])
+        p, _, inverse = self.first.solve(columns)
+        names = [self.first.names[place] for place in columns[columns < len(self.first.names)]]
+        return moves_arm(names, p[columns], self.scale * inverse, EVERY_TERM[term].names)
+
     def supported(self, term: str, beside: Sequence[str]) -> bool:
-        """Whether `term` is evident, beyond sampling and plausible."""
-        return (
-            self.evidence(term, beside) > 0
-            and self.beyond_sampling(term, beside)
-            and self.plausible(term, beside)
-        )
+        """Whether `term` is plausible, and needed or evident beyond sampling."""
+        evident = self.evidence(term, beside) > 0 and self.beyond_sampling(term, beside)
+        return (evident or self.is_needed(term, beside)) and self.plausible(term, beside)
 
     def run(self) -> list[str]:
         """The terms that stay."""
@@ -480,8 +509,10 @@ class _Search:
         evidence = self.evidence(term, beside)
         if term in asked:
             reason = "asked for"
-        elif term in kept:
+        elif term in kept and evidence > 0:
             reason = "kept: evident in the first pass of the likelihood"
+        elif term in kept:
+            reason = "kept: hardly significant, but k1 … k5 would move without it"
         elif evidence <= 0:
             reason = "left out: not significant"
         elif not self.beyond_sampling(term, beside):

@@ -164,6 +164,8 @@ def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
     """Terms of the fit none of whose coefficients has t² > ln N + 2 ln T, N samples, T terms."""
     least = np.sqrt(price(1, max(2, fit.freedom), len(CHOICE)))
     size = dict(zip(fit.names, np.abs(fit.values) / np.maximum(fit.std, 1e-300), strict=True))
+    # the arm's constants would move without what was kept in spite of its price
+    needed = {trial.term for trial in chosen.trials if trial.kept and trial.evidence <= 0}
     terms = set()
     for name in CHOICES:
         term = EVERY_TERM[name]
@@ -174,6 +176,8 @@ def _insignificant(chosen: Selection, fit: Fit) -> set[str]:
         if term.sines and "y_p" in fit.shared.body:  # the payload's offset shows in them
             continue
         if any(EVERY_TERM[other].needs == name for other in chosen.model.terms):
+            continue
+        if name in needed:
             continue
         if max(size.get(parameter, 0.0) for parameter in term.names) < least:
             terms.add(name)
