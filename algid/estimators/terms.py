@@ -392,29 +392,23 @@ class FirstPass:
         rest = self.columns(without_delay(terms))
         delay = self.names.index(DELAYS[0])
         columns = np.append(rest, delay)
-        scale = np.sqrt(self.mean_square(columns))
+        scale = self.mean_square(columns)
         p, _, inverse = self.solve(columns)
-        # what a delay that is left out adds to the others, beside their deviations
-        _, _, beside = self.solve(rest)
-        slope = beside @ self.total[rest, delay]
-        size = scale * np.sqrt(np.maximum(np.diag(beside), 0.0))
         return Lateness(
             self._base + float(p[delay]),
-            float(scale * np.sqrt(max(inverse[-1, -1], 0.0))),
+            float(np.sqrt(scale * max(inverse[-1, -1], 0.0))),
             0.5 * self.dt,
-            float(np.max(np.abs(slope) / np.maximum(size, 1e-300))),
+            float(np.max(self.effect(delay, rest, scale))),
         )
 
+    def effect(self, place: int, rest: NDArray[np.int64], scale: float) -> FloatArray:
+        """By how many of its deviations each coefficient of `rest` (R,) moves without another one.
 
-def moves_arm(
-    names: Sequence[str], values: FloatArray, covariance: FloatArray, own: Collection[str]
-) -> bool:
-    """Whether k1 … k5 move beyond what they claim to be sure of where the parameters `own` go."""
-    gone, arm = (np.flatnonzero(np.isin(names, some)) for some in (list(own), RIGID))
-    gain = covariance[np.ix_(arm, gone)] @ scaled_pinv(covariance[np.ix_(gone, gone)])
-    left = np.diag(covariance)[arm] - np.sum(gain * covariance[np.ix_(arm, gone)], axis=1)
-    moves = np.abs(gain @ values[gone])
-    return bool(np.any(moves > _MOVES * np.sqrt(np.maximum(left, 0.0))))
+        For a unit of that at `place`; `scale` is the mean square of what is left.
+        """
+        _, _, inverse = self.solve(rest)
+        size = np.sqrt(scale * np.maximum(np.diag(inverse), 0.0))
+        return np.abs(inverse @ self.total[rest, place]) / np.maximum(size, 1e-300)
 
 
 @dataclass(frozen=True, eq=False)
@@ -466,10 +460,12 @@ class _Search:
         noisy = self.first.open_squares < self.first.samples  # more than the stamps leave open
         if not (EVERY_TERM[term].rotor and suspected and noisy):
             return False
-        columns = self.first.columns([*beside, term])
-        p, _, inverse = self.first.solve(columns)
-        names = [self.first.names[place] for place in columns[columns < len(self.first.names)]]
-        return moves_arm(names, p[columns], self.scale * inverse, EVERY_TERM[term].names)
+        first, rest = self.first, self.first.columns(beside)
+        (rotor,) = first.own(term)
+        p, _, _ = first.solve(np.append(rest, rotor))
+        moves = np.abs(p[rotor]) * first.effect(rotor, rest, self.scale)
+        arm = np.flatnonzero(np.isin(first.names, RIGID))
+        return bool(np.any(moves[np.isin(rest, arm)] > _MOVES))
 
     def supported(self, term: str, beside: Sequence[str]) -> bool:
         """Whether `term` is plausible, and needed or evident beyond sampling."""
