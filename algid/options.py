@@ -59,8 +59,6 @@ class Option:
         What pydantic holds a value against, and makes of text; its words where there are any.
     panel : str
         Where help shows it.
-    flag : str
-        How it is typed.
     default : object
         What a command takes where Python's default is None.
     suggested : callable
@@ -70,25 +68,31 @@ class Option:
         The first sentence of its entry in the docstring; its words where there is none.
     words : list of str
         The words that it may be; none where it may be others.
-    argument : bool
-        Whether it is typed without a flag.
     """
 
     kind: Any = None
     check: Any = None
     panel: str = ""
-    flag: str = ""
     default: Any = None
     suggested: Callable[[], Sequence[str]] | None = None
     name: str = ""
     help: str = ""
     words: Sequence[str] = ()
-    argument: bool = False
+
+    @property
+    def flag(self) -> str:
+        """How it is typed."""
+        return flag(self.name, off=self.default is True)
+
+    @property
+    def argument(self) -> bool:
+        """Whether it is typed without a flag."""
+        return self.panel == ARGUMENTS
 
     @property
     def by_set(self) -> bool:
         """Whether it has no flag of its own."""
-        return flag(self.name).startswith(SET)
+        return self.flag.startswith(SET)
 
 
 def flag(name: str, *, off: bool = False) -> str:

@@ -185,10 +185,8 @@ def design(
 
 def answer(planned: Planned, given: Mapping[str, Any]) -> Answer:
     """The plan; 3 where a parameter stays open."""
-    from algid.designs.write import Planned
-
     return Answer(
-        map(Planned.document, [planned]),
+        (one.document() for one in [planned]),
         planned.as_json,
         [f"wrote {folder_of(given['prior'], given['out'])}"],
         exit=exit_of(failed=bool(planned.open_parameters), lost=False),

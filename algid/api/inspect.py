@@ -6,7 +6,6 @@ import json
 import shlex
 import shutil
 from collections.abc import Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -113,4 +112,4 @@ def answer(found: Inspection, given: Mapping[str, Any]) -> Answer:
         file = profile_file(given["write_profile"])
         again = shlex.join(["algid", "inspect", str(given["log"]), flag("profile"), str(file)])
         ended, remarks = Exit.OK, [f"wrote {file}; edit it, then try: {again}"]
-    return Answer(shown(), partial(json.dumps, found.as_dict(), indent=2), remarks, exit=ended)
+    return Answer(shown(), lambda: json.dumps(found.as_dict(), indent=2), remarks, exit=ended)

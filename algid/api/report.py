@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -76,7 +75,7 @@ def report(
             history = history_of(folder / "jobs.parquet", progress)
             document, written = write_history(history, Path(out or folder), folder)
             shown: Iterable[Document] = [document]
-            as_json = partial(json.dumps, history.as_dict(), indent=2, allow_nan=False)
+            as_json = history.as_json
         elif out is not None:
             raise SettingError(f"{flag('out')}: {folder} is no batch, and keeps its pages itself")
         elif is_track(folder):

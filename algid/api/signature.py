@@ -28,7 +28,6 @@ from algid.options import (
     SELDOM,
     TYPED,
     Option,
-    flag,
 )
 
 CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
@@ -78,11 +77,9 @@ def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
             kind=kind,
             default=default,
             panel=ARGUMENTS if argument else panel,
-            flag=flag(name, off=default is True),
             help=helps.get(own) or f"{', '.join(words)}.",
             words=words,
             check=stated.check or (Literal[*words] if words else None),
-            argument=argument,
         )
     return found
 

@@ -106,8 +106,8 @@ def command(name: str) -> Command:
         text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
         if of_logs:
             text = "Any other setting, as tau1.sign=-1; may be repeated."
-        several = Option(list[str], panel=ADVANCED, suggested=lambda: lines)
-        taken.append(replace(several, name="set", flag="--set", help=text))
+        several = Option(list[str], panel=ADVANCED, suggested=lambda: lines, name="set", help=text)
+        taken.append(several)
     own = dict(options_of(every_command))
     if name not in PRINTED:
         del own["format"]

@@ -119,7 +119,7 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
     """
     model, known = model_of(result), given_lengths(result) | {**knowns}
     l1, told, second = known.get("l1"), ", g k1 / k2", result.payload.get("l2")
-    weighed = second is not None and second.usable and bool(second.estimate)
+    tied = {"l2": second.estimate} if second and second.usable and second.estimate else {}
     if links and l1 is None:
         by_payload = payload_length(result)
         if by_payload is not None:
@@ -146,11 +146,8 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
                 f"{file}: k1 {value[K1]:.4g}, k2 {value[K2]:.4g} and g {model.gravity:g} make "
                 f"l1 = g k1 / k2 no positive length; give {flag('l1')}"
             )
-        tied = {"l2": second.estimate} if second is not None and second.estimate else {}
-        full = (tied if weighed else {}) | known
-        chosen = links_of(value, model.gravity, l1, full, file)
+        chosen = links_of(value, model.gravity, l1, tied | known, file)
     path = Path(file)
-    lengths = {name: one for name, one in known.items() if name in ("l1", "l2")}
     return Description(
         name=re.sub(r"\W|^(?=\d)", "_", (path.parent if path.name == "result.json" else path).stem),
         source=f"{file}, estimator {result.estimator}",
@@ -163,6 +160,6 @@ def describe(result: Result, file: str, knowns: Knowns, *, links: bool) -> Descr
         links=chosen,
         turn=turn_of(value, model.gravity),
         told=told,
-        weighed=weighed,
-        warnings=contradictions(result, lengths),
+        weighed=bool(tied),
+        warnings=contradictions(result, known),
     )

@@ -74,7 +74,7 @@ def draws_of(
     still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
     freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
     shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
-    refused, why = 0, ""
+    refused, why, limits = 0, "", bounds(shared)
     while refused < _HOPELESS:
         wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
         one_each = random.multivariate_normal(
@@ -83,7 +83,7 @@ def draws_of(
         drawn = mean + size * one_each * wide
         numbers = dict(zip(names, drawn.tolist(), strict=True))
         beta = np.array([numbers.get(name, 0.0) for name in shared.names])
-        broken = [name for name, limit in bounds(shared).items() if limit(beta) < 0]
+        broken = [name for name, limit in limits.items() if limit(beta) < 0]
         moved = {}
         for kind, given in (("parameters", result.parameters), ("payload", result.payload)):
             moved[kind] = {

@@ -45,12 +45,13 @@ def read_jobs(path: Path) -> pl.DataFrame:
         # a manifest's labels may be words: then they are no numbers
         number = pl.col(*payload, *followed, *(f"{name}_std" for name in followed))
         number = number.cast(pl.Float64, strict=False)
+        size, most = number.abs(), LIMITS.largest_value
         age = pl.col("time") - pl.col("time").min().over("robot")
         t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
         jobs = jobs.with_columns(pl.col("time").cast(pl.Datetime("us", "UTC")), **none).select(
             pl.col("job", "robot", "status").cast(pl.String),
             "time",
-            pl.when(number.abs() <= LIMITS.largest_value).then(number),
+            pl.when((size <= most) & ((size == 0) | (size >= 1 / most))).then(number),
             t=t,
             month=t.floor().cast(pl.Int32),
         )
@@ -94,6 +95,10 @@ class History:
             for case, count in counts.items()
             if count
         ]
+
+    def as_json(self) -> str:
+        """All of it as the text of a JSON file."""
+        return json.dumps(self.as_dict(), indent=2, allow_nan=False)
 
     def as_dict(self) -> dict[str, Any]:
         """What was found, in JSON's own types."""

@@ -131,7 +131,7 @@ def test_what_is_not_finished_is_not_read(tmp_path: Path) -> None:
     assert found["t"].to_numpy() == pytest.approx([0, 2 / MONTH], rel=1e-12)
 
 
-@pytest.mark.parametrize("value", [1e308, math.nan])
+@pytest.mark.parametrize("value", [1e308, 1e-200, math.nan])
 @pytest.mark.parametrize("column", ["k1", "k1_std", "label_payload"])
 def test_numbers_beyond_all_bounds_are_no_estimates(
     column: str, value: float, tmp_path: Path
@@ -141,6 +141,7 @@ def test_numbers_beyond_all_bounds_are_no_estimates(
     jobs.with_columns(changed).write_parquet(tmp_path / "jobs.parquet")
     history = history_of(tmp_path / "jobs.parquet")
     assert history.jobs.height == 12
+    assert not history.findings.filter(kind="step").height
     json.dumps(history.as_dict(), allow_nan=False)
 
 
