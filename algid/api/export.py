@@ -19,12 +19,13 @@ from algid.api.options import (
     Seed,
     bounded,
     called,
+    folder_or_none,
     opened,
     within,
 )
 from algid.api.signature import verb
 from algid.base.errors import SettingError
-from algid.base.files import whole_file, whole_folder
+from algid.base.files import whole_file
 from algid.options import Option, flag
 from algid.profile import parts_of
 
@@ -141,9 +142,9 @@ def export(
     if draws is not None:
         from algid.exports.draws import drawn_files
 
-        files, warnings = drawn_files(read, file, to, knowns, draws, seed)
-        if path is not None:
-            with whole_folder(path, force) as folder:
+        with folder_or_none(path, force) as folder:
+            files, warnings = drawn_files(read, file, to, knowns, draws, seed)
+            if folder is not None:
                 for name, content in files.items():
                     (folder / name).write_bytes(content)
         return Exported(files["manifest.json"].decode(), warnings, path, files)

@@ -50,7 +50,7 @@ def _pairs(given: Any) -> Any:
 
 def _increasing(schedule: list[tuple[float, float]]) -> list[tuple[float, float]]:
     times = [time for time, _ in schedule]
-    if times != sorted(set(times)):
+    if not times or times != sorted(set(times)):
         raise ValueError("expected increasing times like 2=0.05,4=0")
     return schedule
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -58,10 +58,9 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
     apart = {limit.joint + 1 for limit in known.limits} | {log.origin.reading.passive}
     for joint, tau in enumerate(log.tau, start=1):
         name = f"tau{joint}"
-        seen, share = {"channel": source(log.origin, name)}, saturated_share(tau)
-        largest = float(np.abs(tau).max())
         if joint in apart:
             continue
+        seen, largest = {"channel": source(log.origin, name)}, float(np.abs(tau).max())
         if largest < _DENORMAL or tau.min() == tau.max():
             case = "constant" if largest >= _DENORMAL else "tiny" if largest else "zero"
             remedies = torques_beside(log, name)
@@ -70,7 +69,7 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
                 remedies.append(Remedy({"passive": joint}, "for a joint without a motor"))
             numbers = seen | {"case": case, "largest": largest, "value": float(tau[0])}
             yield Notice("EFFORT_ZERO", numbers=numbers, refuse=True, remedies=tuple(remedies))
-        elif share > 0.01:
+        elif (share := saturated_share(tau)) > 0.01:
             sound = joint - 1 in known.sound
             numbers = seen | {"percent": 100 * share, "case": "true" if sound else "open"}
             yield Notice("SATURATED_EFFORT", numbers=numbers, note=sound)
@@ -123,13 +122,13 @@ def held_efforts(log: Log) -> Iterator[Notice]:
             yield Notice("HELD_EFFORT", numbers=numbers)
 
 
-def stuck(log: Log) -> Iterator[Notice]:
+def stuck(log: Log, quantities: Sequence[str] = ("theta", "tau")) -> Iterator[Notice]:
     """Torques that keep one value far longer than elsewhere, angles that do so until they jump.
 
     A run at the largest or the smallest torque is a limit's, slow publishers repeat every value as
     often, and an angle that rests goes on by a usual step.
     """
-    for name, values in channels(log):
+    for name, values in channels(log, quantities):
         sizes = np.abs(np.diff(values))
         changes = np.flatnonzero(sizes)
         runs, case = np.diff(changes), "torque"
@@ -155,7 +154,7 @@ def angles(log: Log) -> Iterator[Notice]:
     """Angles that never change, or jump by a turn."""
     # over a gap that cuts the log, a joint may have turned round
     joined = np.diff(log.stamp_ns) <= CUT * log.period * 1e9
-    for name, theta in zip(("theta1", "theta2"), log.theta, strict=True):
+    for name, theta in channels(log, ("theta",)):
         what, sizes = source(log.origin, name), np.abs(np.diff(theta))
         if not sizes.any():
             numbers = {"case": "constant", "channel": what, "value": float(theta[0])}

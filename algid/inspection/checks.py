@@ -61,7 +61,7 @@ def examine(
     every = [
         *([] if effort == "external" else efforts(log, known)),
         *held_efforts(log),
-        *stuck(log),
+        *stuck(log, ("theta",) if effort == "external" else ("theta", "tau")),
         *angles(log),
         *degrees(log, lambda: is_to_scale(tried())),
         *spikes(log),

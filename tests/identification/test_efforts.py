@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +14,7 @@ from algid.arm import FloatArray, inverse_dynamics, passive_torque
 from algid.base.errors import LogError, SettingError
 from algid.identification.known import prior_of
 from algid.identification.validate import predictor_of
+from algid.inspection.checks import examine
 from algid.log import Log, Origin
 from algid.results import Result
 from algid.settings import Settings
@@ -142,6 +144,15 @@ def test_other_efforts_are_named_and_their_flag_gives_the_payload(effort: str, c
 def test_a_raw_torque_says_nothing_of_effort() -> None:
     assert codes(told("raw")) == set()
     assert told("raw").settings["effort"] is None
+
+
+def test_a_force_sensor_that_rests_is_no_fault() -> None:
+    log = logs("external")[1]
+    tau = log.tau.copy()
+    tau[:, len(log) // 3 : 2 * len(log) // 3] = 0.0
+    resting = replace(log, tau=tau)
+    assert "SENSOR_FAULT" not in {one.code for one in examine(resting, effort="external")}
+    assert "SENSOR_FAULT" in {one.code for one in examine(resting)}
 
 
 def test_external_torque_needs_no_unloaded_log() -> None:

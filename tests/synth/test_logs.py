@@ -70,7 +70,7 @@ def test_a_rehearsal_overwrites_no_log_either(tmp_path: Path) -> None:
     [
         *(
             (["case1", "--payload-schedule", text], "--payload-schedule: ")
-            for text in ("1=2=3", "2=1,1=0", "1=-1", "nan=1")
+            for text in ("1=2=3", "2=1,1=0", "1=-1", "nan=1", "")
         ),
         (
             ["nocase"],
