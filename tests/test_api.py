@@ -169,7 +169,6 @@ def test_a_log_is_made_of_arrays_either_way_round_and_gives_the_same_result() ->
     one = algid.identify(algid.Log.from_arrays(log.t, log.theta, log.tau), settings=weak)
     other = algid.identify(algid.Log.from_arrays(log.t, log.theta.T, log.tau.T), settings=weak)
     assert one.parameters == other.parameters
-    assert one.parameters["k1"].estimate == pytest.approx(one.parameters["k1"].estimate)
     with pytest.raises(LogError, match=r"^log: theta: expected the shape \(2, 2001\)"):
         algid.Log.from_arrays(log.t, log.theta[:, 1:], log.tau)
     with pytest.raises(LogError, match=r"^log: t: expected finite times in s that increase"):

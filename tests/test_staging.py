@@ -215,3 +215,25 @@ def test_what_the_system_says_is_told_whoever_raises_it(
     ):
         raise error
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("prepare", SYSTEMS)
+def test_of_two_writers_of_a_file_the_second_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, prepare: Prepare
+) -> None:
+    prepare(monkeypatch)
+    path = tmp_path / "a.csv"
+    with ExitStack() as stack:
+        early = stack.enter_context(whole_file(path, force=False))
+        early.write_text("early")
+        with whole_file(path, force=False) as late:
+            late.write_text("late")
+        with pytest.raises(OutputError, match=r"/a\.csv: exists already; choose another"):
+            stack.close()
+    assert path.read_text() == "late"
+    with pytest.raises(OutputError, match="exists already"), whole_file(path, force=False):
+        pass
+    with whole_file(path) as again:
+        again.write_text("again")
+    assert path.read_text() == "again"
+    assert [found.name for found in tmp_path.iterdir()] == ["a.csv"]

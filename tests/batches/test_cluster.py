@@ -123,9 +123,9 @@ def test_a_lost_scheduler_is_told_and_costs_no_job(logs: Path, tmp_path: Path, d
     told, errors = _start(logs, out, dask).communicate(timeout=120)
     assert f"{JOBS} ok" in told
     assert errors == ""
-    assert sorted(path.parent.name for path in out.rglob("result.json")) == [
-        *sorted(f"d{n}.algid" for n in range(JOBS))
-    ]
+    assert sorted(path.parent.name for path in out.rglob("result.json")) == sorted(
+        f"d{n}.algid" for n in range(JOBS)
+    )
     assert not list(ROOT.glob("out*"))
 
 

@@ -191,9 +191,15 @@ def test_a_link_in_the_output_is_not_followed(logs: Path) -> None:
     assert [path.name for path in elsewhere.iterdir()] == [".c.algid.algid-0123abcd"]
 
 
-@pytest.mark.parametrize("kind", ["link", "file"])
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("link", r"/out/\.jobs: a link, which is not followed"),
+        ("file", r"/out: cannot write there \("),
+    ],
+)
 def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
-    logs: Path, kind: str
+    logs: Path, kind: str, told: str
 ) -> None:
     out = logs.parent / "out"
     out.mkdir()
@@ -201,7 +207,7 @@ def test_an_output_where_no_record_can_be_kept_is_refused_before_any_work(
         (out / ".jobs").symlink_to(logs)
     else:
         (out / ".jobs").touch()
-    with pytest.raises(OutputError, match=r"\.jobs: a link|cannot write there"), locked(str(out)):
+    with pytest.raises(OutputError, match=told), locked(str(out)):
         pass
 
 

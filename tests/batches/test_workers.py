@@ -149,7 +149,6 @@ SCRIPT = """
 import threading
 from algid.batches.workers import Workers
 from tests.batches import calls
-from tests.batches.commands import ROOT, start, wait_until
 print("imported", flush=True)
 
 def work():

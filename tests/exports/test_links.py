@@ -164,7 +164,8 @@ def sure_of_weights(result: Result) -> Result:
 
 def test_results_that_no_arm_explains_are_refused() -> None:
     with pytest.raises(
-        ResultError, match=r"k1 .* k2 .* make l1 = g k1 / k2 no positive length; give --l1"
+        ResultError,
+        match=r"k1 .*, k2 .* and g 9\.81 make l1 = g k1 / k2 no positive length; give --l1",
     ):
         exported(result_of({**values_of(ODD), "k2": -0.1}), "arm", "urdf", {})
     with pytest.raises(ResultError, match="not positive definite"):

@@ -163,6 +163,10 @@ def test_the_payloads_call_is_in_the_flanges_frame() -> None:
     assert "FLANGE_X, FLANGE_Y: give --flange" in blank
     with pytest.raises(AlgidError, match="--flange: urdf holds no flange; leave it out"):
         algid.export(result, "urdf", flange=(0, 0, 0))
-    for wrong in ("1,2", (0, 0, 720), "0,nan,0"):
-        with pytest.raises(AlgidError, match=r"^--flange: .*X,Y,ANGLE in m, m, °"):
+    for wrong, why in (
+        ("1,2", "field required"),
+        ((0, 0, 720), "expected less than or equal to 360, found 720"),
+        ("0,nan,0", "expected less than or equal to 1000, found 'nan'"),
+    ):
+        with pytest.raises(AlgidError, match=rf"^--flange: {why}.*X,Y,ANGLE in m, m, °"):
             algid.export(result, "payload", flange=wrong)

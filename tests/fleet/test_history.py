@@ -145,6 +145,7 @@ def test_a_replaced_arm_is_one_change_and_neither_drift_nor_outliers(tmp_path: P
     assert panels == ["<b>r1: k1, kg m²</b>", "<b>r1: k3, kg m²</b>"]
     lines = [one["x0"] for one in plot.layout["shapes"]]
     assert lines == [pytest.approx((START + timedelta(days=80)).timestamp() * 1000)] * 2
+    assert {one["name"] for one in plot.data} == {"log", "mean"}
     assert len(named(plot.data, "mean")) == 4  # no line leads across the change
 
 
@@ -168,7 +169,7 @@ def test_neither_a_drift_nor_a_wild_log_is_a_change(tmp_path: Path) -> None:
 def test_robots_of_a_log_each_may_be_sessions_of_one(tmp_path: Path) -> None:
     one = _history(_jobs(1, 15, seed=24).with_columns(robot=pl.col("job")), tmp_path)
     (alone,) = verdict(one).reasons
-    assert alone.numbers["count"] == 15
+    assert (alone.key, alone.numbers["count"]) == ("NOT_TESTED:steady", 15)
 
 
 def test_estimates_that_end_are_no_change(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 import algid
 from algid.arm import CONSTANT_NAMES
-from algid.base.errors import LogError, ResultError
+from algid.base.errors import LogError
 from algid.identification.identify import identify
 from algid.identification.open_logs import open_source
 from algid.log import Log
@@ -91,14 +91,6 @@ def test_logs_of_two_arms_are_told() -> None:
     result = identify(first, second, Settings(model="plain"))
     assert any("another arm" in warning for warning in result.warnings)
     assert any("σ from belonging to one arm" in warning for warning in result.warnings)
-
-
-def test_other_schema_versions_are_refused(tmp_path: Path, wide: tuple[Log, Log]) -> None:
-    identify(wide[0], None, PAPER, out=tmp_path, report=False)
-    file = tmp_path / "case1-unloaded.algid" / "result.json"
-    file.write_text(file.read_text().replace('"schema_version": 4', '"schema_version": 7'))
-    with pytest.raises(ResultError, match="expected 4, found 7"):
-        read_result(file)
 
 
 def test_real_arm_is_identified(shared_data: Path) -> None:

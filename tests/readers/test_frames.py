@@ -119,7 +119,7 @@ def test_a_clock_too_slow_for_an_arm_is_told_once(slower: int, told: bool, tmp_p
     """
     path = tmp_path / "log.csv"
     arm(30, 2).with_columns(t=pl.col("t") * slower).rename(OWN).write_csv(path)
-    said = read_log(path).notices
+    said = [notice for block in open_log(path).blocks(10) for notice in block.notices]
     text = (
         f"times in 't' are taken for s, which makes {1000 / slower:.3g} Hz, too slow for an arm "
         "in motion: "

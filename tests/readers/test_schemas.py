@@ -224,9 +224,7 @@ def test_every_protobuf_number_is_read_as_protobuf_itself_wrote_it(
 ) -> None:
     file = descriptor_pb2.FileDescriptorProto(name="n.proto", package="n", syntax="proto3")
     file.message_type.add(name="N").field.add(name="value", number=1, type=kind, label=1)
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(file)
-    written = message_factory.GetMessageClass(pool.FindMessageTypeByName("n.N"))
+    written = proto_class(file, "n.N")
     messages = [written(value=value).SerializeToString() for value in values]
     types = protobuf.parse("n.N", descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString())
     codec = Codec(lambda data: protobuf.parse_layout(data, "n.N", types))
@@ -331,9 +329,7 @@ def test_messages_that_a_flag_calls_no_measurement_are_left_out(
         state = own.message_type.add(name="State")
         for place, (name, kind, label) in enumerate(kinds, start=1):
             state.field.add(name=name, number=place, type=kind, label=label)
-        pool = descriptor_pool.DescriptorPool()
-        pool.Add(own)
-        made = message_factory.GetMessageClass(pool.FindMessageTypeByName("State"))
+        made = proto_class(own, "State")
         known = (
             "State",
             "protobuf",
