@@ -145,6 +145,11 @@ _ANYWHERE = "{accepted:~ (accepted by {flag[accept]})}{looked_at:~ (in its first
 """What may stand behind the text of every code."""
 
 
+def nevertheless(code: str) -> Remedy:
+    """What has a log used although a check refuses it."""
+    return Remedy({"accept": code}, "to use it nevertheless")
+
+
 @dataclass(frozen=True)
 class Notice:
     """Something that a user should know of a log or of a result.
@@ -238,7 +243,7 @@ def _place(logs: Sequence[str]) -> str:
         return ""
     if len(logs) <= NAMED:
         return f"{', '.join(logs)}: "
-    return f"{', '.join(logs[:1])} and {len(logs) - 1} more: "
+    return f"{joined(logs, 1)}: "
 
 
 def merged(notices: Iterable[Notice]) -> list[Notice]:
@@ -264,6 +269,11 @@ def flat(settings: Mapping[str, Any]) -> dict[str, Any]:
         elif value is not None:
             by_name[name] = value
     return by_name
+
+
+def codes_of(notices: Iterable[Notice]) -> list[str]:
+    """Their codes, each once."""
+    return list(dict.fromkeys(one.code for one in notices))
 
 
 def of_codes(notices: Iterable[Notice], *codes: str) -> list[Notice]:

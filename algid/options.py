@@ -35,7 +35,7 @@ VALUES: Mapping[str, str | tuple[str, ...]] = {
     "joints": ("A", "B"),
     **dict.fromkeys(("l1", "l2"), "M"),
     **dict.fromkeys(("topic", "source", "q_des", "time"), "NAME"),
-    **dict.fromkeys(("rate",), "HZ"),
+    "rate": "HZ",
     **dict.fromkeys(("start", "end"), "S"),
     **dict.fromkeys(("torque_file", "prior"), "FILE"),
     **dict.fromkeys(("segment", "gear_ratio", "counts"), "N"),

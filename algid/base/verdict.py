@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from algid.notices import Notice
+from algid.notices import Notice, codes_of
 
 Grade = Literal["good", "reservations", "failed"]
 GRADE_WORDS: dict[Grade, str] = {
@@ -29,7 +29,6 @@ class Verdict:
     reasons : what makes it doubtful, the weightiest first
     notes : what was seen of the data and is no reason to doubt it
     command : what to run first, to mend it or to find out
-    title : what is said in place of the grade's word
     """
 
     grade: Grade
@@ -37,16 +36,15 @@ class Verdict:
     reasons: tuple[Notice, ...] = ()
     notes: tuple[Notice, ...] = ()
     command: str | None = None
-    title: str = ""
 
     def __repr__(self) -> str:
-        codes = ", ".join(dict.fromkeys(one.code for one in self.reasons)) or "none"
+        codes = ", ".join(codes_of(self.reasons)) or "none"
         return f"Verdict({self.grade!r}, {self.headline!r}, reasons: {codes})"
 
     @property
     def word(self) -> str:
-        """Its title, or the word of its grade."""
-        return self.title or GRADE_WORDS[self.grade]
+        """The word of its grade."""
+        return GRADE_WORDS[self.grade]
 
     @property
     def sentence(self) -> str:

@@ -70,9 +70,8 @@ def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
             numbers = seen | {"case": case, "largest": largest, "value": float(tau[0])}
             yield Notice("EFFORT_ZERO", numbers=numbers, refuse=True, remedies=tuple(remedies))
         elif (share := saturated_share(tau)) > 0.01:
-            sound = joint - 1 in known.sound
-            numbers = seen | {"percent": 100 * share, "case": "true" if sound else "open"}
-            yield Notice("SATURATED_EFFORT", numbers=numbers, note=sound)
+            case = "true" if joint - 1 in known.sound else "open"
+            yield Notice("SATURATED_EFFORT", numbers=seen | {"percent": 100 * share, "case": case})
 
 
 def torques_beside(log: Log, channel: str) -> list[Remedy]:

@@ -13,7 +13,7 @@ from algid.inspection.channels import angles, degrees, efforts, held_efforts, sp
 from algid.inspection.conventions import doubted, is_to_scale, judged, mend
 from algid.inspection.sampling import rests, sampling
 from algid.log import Log
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, nevertheless
 
 CONTRADICTIONS = ("WRONG_CONVENTION", "FLIPPED_SIGN", "WRONG_ZERO")
 """Findings that say that a log was read by a wrong convention."""
@@ -74,8 +74,7 @@ def examine(
             numbers = {**one.numbers, "accepted": True}
             one = replace(one, refuse=False, remedies=(), text="", numbers=numbers)
         elif one.refuse:
-            override = Remedy({"accept": one.code}, "to use it nevertheless")
-            one = replace(one, remedies=(*one.remedies, override))
+            one = replace(one, remedies=(*one.remedies, nevertheless(one.code)))
         notices.append(one)
     if effort != "external" and alone and not any(one.refuse for one in notices):
         found = mend(log.origin, tried()) or doubted(log.origin, tried())

@@ -58,5 +58,5 @@ def clipped(
         }
         if count:
             keep = Remedy({"accept": CODE}, "to use them nevertheless")
-            notices.append(Notice(CODE, numbers=numbers, lossy=True, remedies=(keep,)))
+            notices.append(Notice(CODE, numbers=numbers, remedies=(keep,)))
     return notices

@@ -25,7 +25,7 @@ from algid.inspection.figures import (
     signal_figures,
 )
 from algid.log import Log, Origin, Reading
-from algid.notices import Notice, has_code, lossy
+from algid.notices import Notice, codes_of, has_code, lossy
 from algid.readers import open_log
 from algid.readers.formats import Entry, entries_at, entries_of, format_of
 from algid.readers.memory import NAME, open_columns
@@ -56,7 +56,7 @@ class Inspection:
     findings: tuple[Notice, ...] = ()
 
     def __repr__(self) -> str:
-        codes = ", ".join(dict.fromkeys(one.code for one in (*self.notices, *self.findings)))
+        codes = ", ".join(codes_of((*self.notices, *self.findings)))
         return f"Inspection({self.path!r}, {self.refused or codes or 'nothing found'})"
 
     @property

@@ -11,7 +11,7 @@ from algid.arm import FloatArray
 from algid.base.quantiles import median, medians, quantile
 from algid.inspection.figures import clock_figures, differences, grid_step, noise_floor
 from algid.log import IntArray, Log
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, nevertheless
 from algid.signals.spacing import NEAR, near_stamps
 
 _LOST, _LOST_SHARE, _AGAINST = 0.3, 0.003, 5.0
@@ -37,8 +37,8 @@ def sampling(log: Log) -> Iterator[Notice]:
         yield Notice("UNEVEN_STAMPS", numbers=clusters)
     lost = lost_steps(log)
     if lost:
-        override = Remedy({"accept": "LOST_SAMPLES"}, "to use it nevertheless")
-        yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=(override,))
+        override = (nevertheless("LOST_SAMPLES"),)
+        yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=override)
     if clock.gaps:
         gaps = {"case": "gaps", "count": clock.gaps, "seconds": clock.longest_gap}
         yield Notice("GAPS", numbers=gaps)

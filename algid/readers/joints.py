@@ -15,7 +15,7 @@ import numpy as np
 from algid.base.criteria import BESIDE_STILL, SWINGING
 from algid.base.errors import LogError
 from algid.log import Reading
-from algid.notices import Notice, Remedy
+from algid.notices import Notice, Remedy, nevertheless
 from algid.readers.table import SampleTable
 
 if TYPE_CHECKING:
@@ -173,7 +173,5 @@ def moving_joints(
         "samples": min(len(table), LOOKED),
         "swing": swing,
     }
-    remedies: tuple[Remedy, ...] = ()
-    if swing:
-        remedies = (Remedy({"accept": "OTHER_JOINTS"}, "to use it nevertheless"),)
+    remedies = (nevertheless("OTHER_JOINTS"),) if swing else ()
     return (Notice("OTHER_JOINTS", numbers=numbers, remedies=remedies),)

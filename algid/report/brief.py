@@ -6,14 +6,13 @@ Foreign text never passes as it is.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
 
 from algid.arm import CONSTANT_NAMES as ARM
 from algid.base.text import ABSENT, lines_of, visible
 from algid.base.verdict import MOST_REASONS, Verdict
 from algid.base.words import counted
 from algid.model import DELAYS
-from algid.notices import Notice
+from algid.notices import codes_of
 from algid.results import Result, Status
 from algid.results.rows import rows_of
 from algid.results.verdict import share_text
@@ -40,16 +39,11 @@ def verdict_lines(judged: Verdict, width: int = WIDTH, most: int | None = None) 
         lines += lines_of(f"{visible(text, 2_000)} [{reason.code}]", width, " • ", "   ")
     left = judged.reasons[most or len(judged.reasons) :]
     if left:
-        more = f"{counted(len(left), 'more reason')}, with -v: {_codes(left)}"
+        more = f"{counted(len(left), 'more reason')}, with -v: {', '.join(codes_of(left))}"
         lines.append(f" • {_short(more, 1, 3)}")
     if judged.command:
         lines.append(f"Run first: {judged.command}")
     return lines
-
-
-def _codes(notices: Iterable[Notice]) -> str:
-    """Their codes, each once."""
-    return ", ".join(dict.fromkeys(one.code for one in notices))
 
 
 def brief(result: Result) -> list[str]:
@@ -73,5 +67,6 @@ def brief(result: Result) -> list[str]:
         first, second = map(share_text, fit.prediction.r2)
         lines.append(f"R² of the torque{fit.prediction.band}: joint 1 {first}, joint 2 {second}")
     if judged.notes:
-        lines.append(_short(f"Data notes ({len(judged.notes)}): {_codes(judged.notes)}", 1))
+        codes = ", ".join(codes_of(judged.notes))
+        lines.append(_short(f"Data notes ({len(judged.notes)}): {codes}", 1))
     return lines

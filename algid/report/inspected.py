@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from algid.base.text import joined, visible
 from algid.inspection.report import Inspection
+from algid.notices import codes_of
 from algid.report.document import Table
 
 MOST_SHOWN = 100
@@ -51,6 +52,6 @@ def inspection_content(found: Inspection) -> Iterator[Table | str]:
         yield DYNAMICS.format(**vars(found.dynamics)).replace("%", " %")
     for notice in (*found.notices, *found.findings):
         yield f"{notice.code}: {visible(notice.clause, 2000)}"
-    refusing = joined(list(dict.fromkeys(one.code for one in found.findings if one.refuse)))
+    refusing = joined(codes_of(one for one in found.findings if one.refuse))
     if refusing or found.refused:
         yield f"refused: {refusing or visible(found.refused or '', 2000)}"

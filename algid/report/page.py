@@ -79,7 +79,8 @@ def result_document(
         tried = {"logs used": fit.residual, "each log by the others": fit.cross_validation}
         first.append(prediction_table({name: one for name, one in tried.items() if one}))
     parts = [Section(plot.key, plot.title, [plot]) for plot in plots]
-    notes, asked = [one.sentence for one in result.verdict.notes], replaced_estimator(result)
+    judged, asked = result.verdict, replaced_estimator(result)
+    notes = [one.sentence for one in judged.notes]
     estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
     origin = [("algid", result.version), ("estimator", estimator)]
     made_by = [settings_table(settings_of(result)), provenance_table(origin, result.logs)]
@@ -100,7 +101,7 @@ def result_document(
     constants = [row[4] for row in arm[0].rows]
     return Document(
         title=f"Identification of {names[0]}",
-        verdict=result.verdict,
+        verdict=judged,
         sections=sections,
         kicker="identification of a two-link arm",
         name=joined(names, 1),

@@ -98,7 +98,6 @@ class LogSummary(_Model):
     """A log used: first stamp in ns, duration in s, rate in Hz, channels, and how it was read.
 
     `sha256` is null where only what was needed of a log was fetched from an object store.
-    `reading` is null in results of schema version 1.
     """
 
     path: str

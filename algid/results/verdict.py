@@ -68,13 +68,13 @@ def _failure(result: Result) -> str | None:
         return next((one.text for one in worse + broken), "physics forbids these estimates")
     if has_code(result.notices, "LENGTH_CONTRADICTED"):
         return "a link length contradicts the arm's result"
-    usable = [one for one in requested(result).values() if one.usable]
+    asked = requested(result).values()
+    usable = [one for one in asked if one.usable]
     # a number whose interval is merely around zero is none to use, nor has a prior measured one
     if {one.status for one in usable} <= {"NOT_SIGNIFICANT", "FROM_PRIOR"}:
         return "no parameter could be identified"
-    count = len(requested(result))
-    if len(usable) < LEAST_USABLE * count:
-        return f"only {len(usable)} of {counted(count, 'parameter')} could be identified"
+    if len(usable) < LEAST_USABLE * len(asked):
+        return f"only {len(usable)} of {counted(len(asked), 'parameter')} could be identified"
     return None
 
 
