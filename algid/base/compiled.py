@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from functools import cache
 from importlib.machinery import PathFinder
-from importlib.util import module_from_spec
+from importlib.util import find_spec, module_from_spec
 from statistics import NormalDist
 from sys import modules
 from typing import Any
 
 import numpy as np
-import scipy
 
 
 def _alone(package: str, *names: str) -> Any:
@@ -26,13 +25,17 @@ def _alone(package: str, *names: str) -> Any:
 
     Those before it are what it imports: once they are known, it asks for no package.
     """
+    home = find_spec("scipy")
+    places = [f"{one}/{package}" for one in (home and home.submodule_search_locations) or ()]
     for name in names:
         full = f"scipy.{package}.{name}"
-        spec = PathFinder.find_spec(full, [f"{scipy.__path__[0]}/{package}"])
-        if full in modules or spec is None or spec.loader is None:
+        if full in modules:
             continue
-        module = module_from_spec(spec)
+        spec = PathFinder.find_spec(full, places)
+        if spec is None or spec.loader is None:
+            continue
         try:
+            module = module_from_spec(spec)  # it is loaded here
             spec.loader.exec_module(module)
         except ImportError:
             return None

@@ -132,8 +132,9 @@ class Store:
             entries = self.filesystem.get_file_info(
                 FileSelector(path, recursive=True, allow_not_found=True)
             )
-            bucket = self.filesystem.get_file_info(self.root.partition("/")[0])
-        if bucket.type == FileType.NotFound:
+            bucket = self.root.partition("/")[0]
+            gone = not entries and self.filesystem.get_file_info(bucket).type == FileType.NotFound
+        if gone:
             raise OutputError(f"{self.place}: there is no such bucket; check its name, or make it")
         if len(entries) > MOST_LISTED:
             raise OutputError(

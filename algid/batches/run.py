@@ -9,7 +9,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from algid import __version__
 from algid.base.errors import AlgidError, OutputError, SettingError, text_of
 from algid.base.staging import TEMPORARY, delete_leftovers
 from algid.base.stores import Store
-from algid.batches.job import Task, inputs_of, is_full, redacted, run_task
+from algid.batches.job import Task, is_full, redacted, run_task
 from algid.batches.jobs import TABLE, Job
 from algid.batches.records import (
     FAILURES,
@@ -193,9 +193,11 @@ class Batch:
                 if str(error) != complaint and complain is not None:
                     complain(str(error))
                 complaint = str(error)
-            now = {job.name: inputs_of(job) for job in jobs}
-            settled = list[Job]()
+            now, settled = dict[str, tuple[Input, ...]](), list[Job]()
             for job in jobs:
+                now[job.name] = ()  # whoever reads it says why it cannot be looked at
+                with suppress(AlgidError):
+                    now[job.name] = tuple(map(stat_of, job.logs + job.loaded))
                 held = job.trouble or all(one.size for one in now[job.name])
                 if held and now[job.name] == before.get(job.name):
                     settled.append(job)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
 REFERENCES = ("q_des1", "q_des2")
 CHANNELS = JOINT_CHANNELS + VELOCITIES + REFERENCES
-Source = TypeVar("Source")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ def cut(tables: Iterator[SampleTable], rows: int) -> Iterator[SampleTable]:
             yield table.part(first, min(first + rows, len(table)))
 
 
-def in_pairs(sources: Mapping[str, Source], velocity: str | None) -> dict[str, Source]:
+def in_pairs(sources: Mapping[str, str], velocity: str | None) -> dict[str, str]:
     """Sources by channel; velocities and references of both joints where they are read, or none."""
     gone = set[str]()
     for pair in (VELOCITIES, REFERENCES):

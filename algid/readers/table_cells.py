@@ -178,10 +178,9 @@ def cell_batches(
     chosen = [cells[name] for name in names]
     columns = [one.column for one in chosen] + [one.label for one in chosen if one.label]
     flags = []
-    for name, cell in cells.items():
-        kind = cell.type
-        is_flag = pa.types.is_boolean(kind) or _is_plain(kind) or is_text(kind)
-        if is_flag and name.lower() in GOOD | BAD:
+    for name in [one for one in cells if one.lower() in GOOD or one.lower() in BAD]:
+        kind = cells[name].type
+        if pa.types.is_boolean(kind) or _is_plain(kind) or is_text(kind):
             flags.append(name)
     for batch in table.batches(list(dict.fromkeys((*columns, *flags))), most):
         arrays = [cell.of(batch) for cell in chosen]

@@ -94,7 +94,7 @@ class Watched:
 
 
 def logged(name: str) -> Any:
-    return SimpleNamespace(name=name, trouble="")
+    return SimpleNamespace(name=name, trouble="", logs=(name,), loaded=())
 
 
 def test_a_watch_complains_once_and_retries_what_failed_once(
@@ -116,7 +116,12 @@ def test_a_watch_complains_once_and_retries_what_failed_once(
             raise found
         return found
 
-    monkeypatch.setattr("algid.batches.run.inputs_of", lambda _job: (SimpleNamespace(size=1),))
+    def seen(path: str) -> Any:
+        if path == "b":  # whoever reads it says why
+            raise SettingError(f"{path}: it cannot be looked at")
+        return SimpleNamespace(size=1)
+
+    monkeypatch.setattr("algid.batches.run.stat_of", seen)
     running: Any = Watched(7)
     heard: list[str] = []
     ended = Batch.watch(running, look, True, heard.append)

@@ -89,3 +89,18 @@ def test_a_text_of_another_recorder_is_read_as_ros_writes_it() -> None:
     assert parse("a/T", "int8 debug=1")[1]["a/msg/T"][0].type == "uint8"  # nothing is a byte
     with pytest.raises(DefinitionError, match=r"Could not parse: int8 9x\)$"):
         parse("a/T", "int8 y\nint8 9x\n")
+
+
+def test_wide_texts_and_blanks_about_a_types_name_are_read_in_msg() -> None:
+    text = "wstring<=10 label\nwstring[] more\nb/Sub one\n\n=====\n\n MSG:  b/Sub\nint8 x\n"
+    assert parse("a/State", text) == (
+        "a/msg/State",
+        {
+            "a/msg/State": (
+                Field("label", "wstring", None),
+                Field("more", "wstring", -1),
+                Field("one", "b/msg/Sub", None),
+            ),
+            "b/msg/Sub": (Field("x", "int8", None),),
+        },
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 PRIMITIVES = {
@@ -37,8 +38,10 @@ _TIMES_OF_ROS1: Types = {
         Field("secs", "int32", None), Field("nsecs", "int32", None)
     ),
 }  # fmt: skip
-_LINE = re.compile(r"^=+[ \t]*\n", re.MULTILINE)
+_LINE = re.compile(r"^=+[ \t]*\n\s*MSG:\s*", re.MULTILINE)
 """Between the types of one text."""
+_WIDE = re.compile(r"^([ \t]*wstring)<=\d+", re.MULTILINE)
+"""Texts of a bounded length, whose kind rosbags does not know in .msg."""
 _CONSTANT = re.compile(r"^[ \t]*\w+(?:<=\d+)?[ \t]+\w+[ \t]*=.*$", re.MULTILINE)
 """No field; rosbags reads those in capitals alone."""
 _SECTION = re.compile(r"^=+[ \t]*\nIDL:[^\n]*\n", re.MULTILINE)
@@ -48,6 +51,7 @@ _MISREAD = re.compile(r"sequence\s*<\s*sequence|@optional")
 """What rosbags takes for something else, and rosidl never writes."""
 
 
+@lru_cache(maxsize=64)
 def parse(root: str, text: str, *, idl: bool = False, ros1: bool = False) -> tuple[str, Types]:
     """The full name of `root` (``package/msg/Type``), and fields by type name.
 
@@ -71,8 +75,8 @@ def parse(root: str, text: str, *, idl: bool = False, ros1: bool = False) -> tup
             for section in filter(str.strip, _SECTION.split(_INCLUDE.sub("", text))):
                 found |= get_types_from_idl(section)
         else:
-            plain = _CONSTANT.sub("", _LINE.sub(f"{'=' * 80}\n", text))
-            found |= get_types_from_msg(plain, root)
+            plain = _WIDE.sub(r"\1", _LINE.sub(f"{'=' * 80}\nMSG: ", text))
+            found |= get_types_from_msg(_CONSTANT.sub("", plain), root)
         for owner, (_, members) in found.items():
             fields = tuple(_member(name, *kind) for name, kind in members)
             types[owner] = fields or (() if ros1 else (_NOTHING,))
@@ -94,7 +98,8 @@ def _member(name: str, form: Any, what: Any) -> Field:
     if form == Nodetype.BASE:
         return Field(name, what[0], None)
     if form == Nodetype.NAME:
-        return Field(name, what, None)
+        plain = what.rpartition("/")[2]  # of .msg rosbags knows no wstring
+        return Field(name, plain if plain in TEXTS else what, None)
     inner, size = what
     one = _member(name, *inner)
     return Field(name, one.type, size if form == Nodetype.ARRAY else SEQUENCE)

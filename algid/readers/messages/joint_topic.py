@@ -114,7 +114,11 @@ def find_joint_topic(
             continue
         why = held = ""
         try:
+            before: object = None
             for layout in layouts_of(file, name):
+                if (layout.numbers, layout.texts) == before:
+                    continue  # it tells nothing more
+                before = layout.numbers, layout.texts
                 try:
                     fields = fields_in(name, layout)
                     choice = _choice(fields, profile, given)

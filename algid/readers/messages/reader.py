@@ -22,7 +22,7 @@ from algid.readers.messages.layout import MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import topic_tables
 from algid.readers.offered import Clock, Offered, TopicField
-from algid.readers.table import REFERENCES, ROWS, SampleTable
+from algid.readers.table import REFERENCES, ROWS, SampleTable, in_pairs
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
         If no topic holds the joints, several do, or a message cannot be read.
     """
     file = log.files[0]()
-    given = {name: profile.place(name) for name in profile.channels if profile.place(name)[1]}
+    given = {name: place for name in profile.channels if (place := profile.place(name))[1]}
     # where each channel comes from: the topic with joint states, then what the profile names
     fields, chosen = dict[str, TopicField](), dict[str, str]()
     notices, home, joints = [*log.notices], None, None
@@ -72,6 +72,7 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
     for name, one in named.items():
         chosen[name] = f"{one.topic}/{one.column}/"  # a name in which nothing is a unit
         fields[chosen[name]] = one
+    chosen = in_pairs(chosen, profile.velocity)
     units, said = dict[str, str](), list[str]()
     stamps = dict[str, tuple[str, str] | None]()
     for home in dict.fromkeys(fields[one].topic for one in chosen.values()):
