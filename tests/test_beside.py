@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 
 import pytest
 
-from algid.base.runtime import ahead, executor, keep_to_one_core
+from algid.base.runtime import ahead, beside, executor, keep_to_one_core
 
 
 def test_items_read_ahead_keep_their_order() -> None:
@@ -34,6 +36,14 @@ def test_no_thread_is_left_when_the_consumer_leaves() -> None:
     assert threading.active_count() == before
 
 
+def test_work_beside_gives_its_result_or_its_error_and_keeps_no_process_alive() -> None:
+    assert beside(lambda: 6 * 7).result() == 42
+    with pytest.raises(ZeroDivisionError):
+        beside(lambda: 1 // 0).result()
+    script = "import time; from algid.base.runtime import beside; beside(lambda: time.sleep(60))"
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=30)
+
+
 @pytest.fixture
 def one_core(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("algid.base.runtime._has_other_cores", True)  # to be put back
@@ -45,6 +55,7 @@ def test_a_process_that_keeps_to_one_core_starts_no_thread() -> None:
     before = threading.active_count()
     for item in ahead(iter(range(5))):
         assert threading.active_count() == before, item
+    assert beside(threading.current_thread).result() is threading.current_thread()
     assert executor(1).submit(threading.current_thread).result() is threading.current_thread()
     with pytest.raises(ZeroDivisionError):
         executor(1).submit(lambda: 1 // 0).result()

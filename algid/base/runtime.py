@@ -17,10 +17,11 @@ from __future__ import annotations
 
 import ctypes
 import os
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -102,11 +103,29 @@ class _AtOnce(Executor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         done: Future[Any] = Future()
-        try:
-            done.set_result(fn(*args, **kwargs))
-        except Exception as error:  # handed to whoever asks for the result
-            done.set_exception(error)
+        _settle(done, partial(fn, *args, **kwargs))
         return done
+
+
+def _settle(done: Future[T], work: Callable[[], T]) -> None:
+    """Let a future have what the work gives, or its exception."""
+    try:
+        done.set_result(work())
+    except Exception as error:  # handed to whoever asks for the result
+        done.set_exception(error)
+
+
+def beside(work: Callable[[], T]) -> Future[T]:
+    """A piece of work in a thread of its own, which does not keep the process alive.
+
+    Done at once on one core.
+    """
+    done: Future[T] = Future()
+    if _has_other_cores:
+        threading.Thread(target=_settle, args=(done, work), daemon=True).start()
+    else:
+        _settle(done, work)
+    return done
 
 
 def ahead(source: Iterator[T]) -> Iterator[T]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from algid.base.errors import LogError
 from algid.base.names import evenly_spread
 from algid.base.progress import Progress
-from algid.base.runtime import executor
+from algid.base.runtime import beside
 from algid.log import Log, Origin
 from algid.notices import Notice
 from algid.results import LogSummary
@@ -237,7 +237,7 @@ class Recordings:
         from algid.inspection.clipping import beyond, clipped
 
         if log.digest is not None and log._hash is None and not 0 < log.promised <= SHORT:
-            log._hash = executor(1).submit(log.digest)
+            log._hash = beside(log.digest)
         first_pass = log.rows is None
         rows, first_ns, last_ns = 0, 0, 0
         notices = list(log.notices)
