@@ -67,7 +67,7 @@ class Result(results.Result):  # noqa: D101
         >>> bool(left.std() < 0.01 * found["tau1"].std())
         True
         """
-        from algid.identification.predicting import predicted
+        from algid.identification.validate import predicted
 
         own, log = meant(profile, options, log)
         return predicted(self, log, "loaded" if loaded else "unloaded", own)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
@@ -26,7 +27,7 @@ from algid.results import Result
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
-    from algid.identification.validated import Validated
+    from algid.identification.validate import Validated
     from algid.report.document import Table
 
 
@@ -96,14 +97,12 @@ def validate(
     >>> algid.validate(result, log.part(2000, 4001)).total.r2[0] > 0.999
     True
     """
-    from algid.identification.identify import reused
+    from algid.identification.known import reused
     from algid.identification.open_logs import open_sources, read_otherwise
     from algid.identification.recordings import Recordings
     from algid.identification.urdf import read_urdf
-    from algid.identification.validate import predictor_of
-    from algid.identification.validate import simulate as roll
+    from algid.identification.validate import Validated, predictor_of
     from algid.identification.validate import validate as predicted
-    from algid.identification.validated import Validated
 
     own, logs, loaded = meant(profile, options, logs, loaded)
     judged = () if max_error is None else tuple(judge(opened(result), max_error))
@@ -112,7 +111,7 @@ def validate(
             raise SettingError(
                 f"validate: expected a log, found none; give one, or {flag('max_error')}"
             )
-        return Validated({}, None, judged=judged)
+        return Validated(judged=judged)
     known, file = None, called(result)
     if not isinstance(result, Result) and Path(result).suffix == ".urdf":
         model = read_urdf(Path(result))
@@ -123,13 +122,12 @@ def validate(
     sources = open_sources(logs, "unloaded", own, gravity)
     survey = Recordings(sources + open_sources(loaded, "loaded", own, gravity), progress)
     survey.begin("prediction")
-    validation = predicted(model, survey)
-    rolled = roll(model, survey) if simulate else None
+    found = predicted(model, survey, simulate=simulate)
     warnings = list[str]()
     if known is not None:
         summaries = list(map(survey.summary, survey.logs))
         warnings = [one.sentence for one in read_otherwise(summaries, known, file)]
-    return Validated(validation.logs, validation.total, rolled, tuple(warnings), max_nrmse, judged)
+    return replace(found, warnings=tuple(warnings), max_nrmse=max_nrmse, judged=judged)
 
 
 def answer(found: Validated, given: Mapping[str, Any]) -> Answer:

@@ -10,13 +10,12 @@ takes the log first; both ends of every stretch, where they ring, are dropped.
 symbol  name                                                            shape            unit
 ======  ==============================================================  ===============  ======
 X       filtered regressor of each joint, its torque last               (2, q + 1, n)    mixed
-gram    X Xᵀ by joint: the residual of any c is (−c, 1) gram (−c, 1)ᵀ   (2, q+1, q+1)    mixed
 ======  ==============================================================  ===============  ======
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,9 +25,9 @@ from algid.estimators.combine import left_out
 from algid.estimators.elastic import flexed
 from algid.estimators.fit import Fit
 from algid.estimators.problem import Source
-from algid.model import F1, F2, Model, Motion, regressor, torque
+from algid.model import F1, F2, Model, Motion, regressor
 from algid.signals.filters import butterworth, correlate, smoother
-from algid.signals.segments import Cutter, Segment, pieces_of
+from algid.signals.segments import Segment, pieces_of
 from algid.signals.shift import AT_ONCE, TorqueShift
 
 _PIECE_SECONDS = 60.0
@@ -51,8 +50,8 @@ FILTER = (
 class PredictionScore:
     """Samples, and sums (9, 2) over them by joint.
 
-    Of the torque; of squares of torque, of the model's parts and of the residual; and where one set
-    of coefficients is scored those of `at_rest`.
+    Of the torque; of squares of torque, of the model's parts and of the residual; then samples and
+    squares of the residual of joints that move, the same of those that stand, and d²: `sums_of`.
     """
 
     count: float = 0.0
@@ -109,78 +108,8 @@ class PredictionScore:
         return np.where(self.sums[1] > 0, power, power[::-1])
 
 
-class PredictionSums:
-    """What scores any coefficients on a log, gathered segment by segment.
-
-    Parameters
-    ----------
-    model : Model
-    shift : TorqueShift
-        After how long a logged torque acts.
-    at : (q,)
-        The coefficients that are to be scored, and no others, where the model is not linear in
-        them.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        shift: TorqueShift = AT_ONCE,
-        at: FloatArray | None = None,
-    ) -> None:
-        self._model = model
-        self._at = at
-        self._shift = shift
-        self._cutter: Cutter | None = None
-        size = len(model.names) + 1
-        self._count, self._torque, self._gram = 0, np.zeros(2), np.zeros((2, size, size))
-        self._at_rest = np.zeros((5, 2))
-
-    def push(self, segment: Segment) -> None:
-        """Take in the next segment of the log."""
-        self._cutter = self._cutter or Cutter(max(1, round(_PIECE_SECONDS / segment.dt)))
-        for piece in self._cutter.push(segment):
-            self._add(piece)
-
-    def finish(self) -> None:
-        """Take in what is left at the end of the log."""
-        if self._cutter is None:
-            return
-        for piece in self._cutter.finish():
-            self._add(piece)
-
-    def score(self, c: FloatArray) -> PredictionScore:
-        """How well the coefficients `c` (q,) predict the torque."""
-        v = np.append(-c, 1.0)
-        residual = np.maximum(np.einsum("x,axy,y->a", v, self._gram, v), 0.0)
-        parts = np.einsum("x,axx->a", c**2, self._gram[:, :-1, :-1])
-        squares = [self._torque, self._gram[:, -1, -1], parts, residual]
-        return PredictionScore(float(self._count), np.stack([*squares, *self._at_rest]))
-
-    def _add(self, piece: Segment) -> None:
-        shift = self._shift.at(piece.dt)
-        if self._at is not None:
-            shift -= self._model.lag(self._at)
-        _, X = _filtered(self._rows, piece, shift)
-        if not X.size:
-            return
-        if self._at is not None:
-            X, omega = np.delete(X, -2, axis=1), X[:, -2]
-            self._at_rest += at_rest(self._model, self._at, X, omega)
-        self._count += X.shape[2]
-        self._torque = self._torque + X[:, -1].sum(axis=1)
-        self._gram += X @ X.swapaxes(1, 2)
-
-    def _rows(self, motion: Motion, dt: float) -> FloatArray:
-        """The regressor (2, q, n), and the velocities if one set of coefficients is scored."""
-        if self._at is None:
-            return regressor(self._model, motion)
-        Y = regressor(self._model, flexed(self._model, self._at, motion, dt), self._at)
-        return np.concatenate([Y, motion.omega[:, None]], axis=1)
-
-
-def at_rest(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> FloatArray:
-    """Samples and squared residuals of joints that move, the same of those at rest, and d² (5, 2).
+def sums_of(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> FloatArray:
+    """Sums (9, 2) over n samples by joint, as `PredictionScore` holds them.
 
     Where a joint stands, dry friction is any torque up to ± f: no model predicts which. Of a joint
     slower than friction's step ω_s is therefore stated, beside the residual r, how far the torque
@@ -196,7 +125,8 @@ def at_rest(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> Fl
         Regressor of each joint, its torque last.
     omega : (2, n), rad/s
     """
-    r = X[:, -1] - np.einsum("q,aqn->an", c, X[:, :-1])
+    parts, tau = c[:, None] * X[:, :-1], X[:, -1]
+    r = tau - parts.sum(axis=1)
     still = np.abs(omega) < model.coulomb_speed
     held = np.abs(r)
     for joint, name in enumerate((F1, F2)):
@@ -204,35 +134,9 @@ def at_rest(model: Model, c: FloatArray, X: FloatArray, omega: FloatArray) -> Fl
             place = model.names.index(name)
             f = max(float(c[place]), 0.0)
             held[joint] = np.maximum(np.abs(r[joint] + f * X[joint, place]) - f, 0.0)
-    rows = [~still, ~still * r**2, still, still * r**2, still * held**2]
+    rows = [tau, tau**2, np.sum(parts**2, axis=1), r**2]
+    rows += [~still, ~still * r**2, still, still * r**2, still * held**2]
     return np.array([row.sum(axis=1) for row in rows])
-
-
-def _filtered(
-    rows: Callable[[Motion, float], FloatArray], piece: Segment, shift: float
-) -> tuple[FloatArray, FloatArray]:
-    """Times (n,) in s and X (2, q + 1, n) of a piece, from the `rows` (2, q, n) of its motion.
-
-    Empty where the piece is too short. See the module's table.
-    """
-    signals, dt, first = _decimated(piece)
-    edge = round(DROPPED / dt)
-    if signals.shape[1] <= max(2 * edge + 2, 6 * (ORDER + 1)):
-        return np.zeros(0), np.zeros((2, 0, 0))
-    theta = butterworth(signals[:2], dt, min(MOTION, 0.45 / dt))
-    Y = rows(motion_of(theta, dt), dt)
-    if shift:
-        place = np.arange(signals.shape[1]) + shift / dt
-        whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
-        Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
-    X = np.concatenate([Y, signals[2:, None]], axis=1)
-    felt = np.asarray(X.any(axis=2))  # k4 is nothing to joint 2, k7 to joint 1
-    alike = np.all(X[0] == X[1], axis=1)  # and k2, k3 to both the same
-    felt[1] &= ~alike
-    X[felt] = butterworth(X[felt], dt, min(CUTOFF, 0.45 / dt))
-    X[1, alike] = X[0, alike]
-    kept = np.arange(edge, signals.shape[1] - edge)
-    return first + dt * kept, X[:, :, edge : signals.shape[1] - edge]
 
 
 def _decimated(piece: Segment) -> tuple[FloatArray, float, float]:
@@ -248,11 +152,11 @@ def _decimated(piece: Segment) -> tuple[FloatArray, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class ScoredTorque:
-    """Times (n,) in s, the torque that is scored and its prediction (2, n) in N m."""
+    """Times (n,) in s of a piece, X (2, q + 1, n) as the filters leave it, velocities (2, n)."""
 
     t: FloatArray
-    measured: FloatArray
-    predicted: FloatArray
+    X: FloatArray
+    omega: FloatArray
 
 
 def scored_torque(
@@ -261,19 +165,33 @@ def scored_torque(
     segments: Iterable[Segment],
     shift: TorqueShift = AT_ONCE,
 ) -> Iterator[ScoredTorque]:
-    """What `score` scores, piece by piece: both torques as the filters leave them.
+    """What `score` scores, piece by piece.
 
-    A piece that is too short to be scored is left out.
+    A piece that is too short to be scored is left out. See the module's table.
     """
-
-    def rows(motion: Motion, dt: float) -> FloatArray:
-        return torque(model, c, flexed(model, c, motion, dt))[:, None]
-
     for piece in pieces_of(segments, _PIECE_SECONDS):
-        lag = shift.at(piece.dt) - model.lag(c)
-        t, X = _filtered(rows, piece, lag)
-        if X.size:
-            yield ScoredTorque(t, X[:, 1], X[:, 0])
+        signals, dt, first = _decimated(piece)
+        edge = round(DROPPED / dt)
+        if signals.shape[1] <= max(2 * edge + 2, 6 * (ORDER + 1)):
+            continue
+        theta = butterworth(signals[:2], dt, min(MOTION, 0.45 / dt))
+        motion = motion_of(theta, dt)
+        Y = regressor(model, flexed(model, c, motion, dt), c)
+        Y = np.concatenate([motion.omega[:, None], Y], axis=1)
+        late = shift.at(piece.dt) - model.lag(c)
+        if late:
+            place = np.arange(signals.shape[1]) + late / dt
+            whole = np.clip(np.floor(place).astype(np.int64), 0, signals.shape[1] - 2)
+            Y = Y[:, :, whole] + (place - whole) * (Y[:, :, whole + 1] - Y[:, :, whole])
+        X = np.concatenate([Y, signals[2:, None]], axis=1)
+        felt = np.asarray(X.any(axis=2))  # k4 is nothing to joint 2, k7 to joint 1
+        alike = np.all(X[0] == X[1], axis=1)  # and k2, k3 to both the same
+        felt[1] &= ~alike
+        X[felt] = butterworth(X[felt], dt, min(CUTOFF, 0.45 / dt))
+        X[1, alike] = X[0, alike]
+        X = X[:, :, edge : signals.shape[1] - edge]
+        kept = np.arange(edge, signals.shape[1] - edge)
+        yield ScoredTorque(first + dt * kept, X[:, 1:], X[:, 0])
 
 
 def motion_of(theta: FloatArray, dt: float) -> Motion:
@@ -299,12 +217,12 @@ def score(
     segments: Iterable[Segment],
     shift: TorqueShift = AT_ONCE,
 ) -> PredictionScore:
-    """How well the coefficients `c` (q,) predict a log's torque; see `PredictionSums`."""
-    sums = PredictionSums(model, shift, c)
-    for segment in segments:
-        sums.push(segment)
-    sums.finish()
-    return sums.score(c)
+    """How well the coefficients `c` (q,) predict a log's torque; see the module."""
+    total = PredictionScore()
+    for piece in scored_torque(model, c, segments, shift):
+        sums = sums_of(model, c, piece.X, piece.omega)
+        total += PredictionScore(float(piece.t.size), sums)
+    return total
 
 
 def cross_validate(

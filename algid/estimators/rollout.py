@@ -79,7 +79,7 @@ def rollouts(
 ) -> RolloutScore:
     """Simulate forward from states of a log of `duration` s by the coefficients `c` (q,).
 
-    `shift` is the time in s after which a logged torque acts, as for `PredictionSums`.
+    `shift` is the time in s after which a logged torque acts, as for `scored_torque`.
     """
     step = time_step(model, c)
     states, torques, later = [], [], []

@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
 from algid.base.names import outside, within
-from algid.base.runtime import executor
 from algid.estimators import robust
 from algid.estimators.body import averaged_over_bodies, with_body
 from algid.estimators.combine import Prior
 from algid.estimators.diagnostics import constrained
 from algid.estimators.excitation import undriven
 from algid.estimators.fit import Fit
-from algid.estimators.prediction import PredictionSums
-from algid.estimators.problem import Source
 from algid.estimators.terms import Selection, TermTrial
 from algid.identification.model_choice import revised
 from algid.identification.passes import long_enough, problem_of
-from algid.identification.recordings import Recording, Recordings
+from algid.identification.recordings import Recordings
 from algid.methods import estimator_of
 from algid.model import DELAYS, FIRST_TERMS, TERMS, Model
 from algid.notices import Notice
 from algid.physics.effort import ELASTIC
 from algid.settings import Settings
-from algid.signals.segments import Segment
-
-Predictions = Mapping[Recording, PredictionSums]
-"""What scores a prediction of a log by any coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +34,12 @@ class Fitted:
     survey : Recordings
     settings : Settings
     chosen : the model that it has in the end
-    predictions : sums that score its prediction of each log, where a pass of the estimator could
-        gather them
     """
 
     fit: Fit
     survey: Recordings = field(default_factory=lambda: Recordings(()))
     settings: Settings = field(default_factory=Settings)
     chosen: Selection = field(default_factory=lambda: Selection(Model(), False))
-    predictions: Predictions = field(default_factory=dict)
 
 
 def run_fit(
@@ -83,11 +70,6 @@ def run_fit(
     if estimator.fit is None:
         raise ValueError(f"{estimator.name} gives time series, not a fit")
     estimate = estimator.fit
-    first = chosen
-    sums: dict[Recording, PredictionSums] = {}
-    watched = None
-    if chosen.model.linear and not chosen.delay and chosen.model.lag_name is None:
-        watched = partial(_scored, chosen.model, settings, sums)  # which depends on no estimate
 
     def fitted(selection: Selection) -> Fit:
         return estimate(problem_of(survey, settings, selection, prior))
@@ -98,7 +80,7 @@ def run_fit(
         if chosen.refuted and settings.chooses and estimator.name == "refined":
             notes = (Notice("REFUTED", numbers={"case": "noise", "kept": "weak"}),)
         else:
-            fit = estimate(problem_of(survey, settings, chosen, prior, watched))
+            fit = fitted(chosen)
             fit, chosen = revised(fit, chosen, settings, fitted)
             if fit.refuted and settings.chooses:
                 notes = fit.notes
@@ -111,8 +93,7 @@ def run_fit(
         fit, chosen = _of_motorless(fit, chosen, survey, settings, picked, prior)
         if fit.estimator == "instruments" and not chosen.shrunk:
             fit = robust.with_feedback_noted(fit, problem_of(survey, settings, chosen))
-    sums = sums if chosen is first else {}
-    return Fitted(finished(fit, settings), survey, settings, chosen, sums)
+    return Fitted(finished(fit, settings), survey, settings, chosen)
 
 
 def finished(fit: Fit, settings: Settings) -> Fit:
@@ -193,28 +174,3 @@ def _shrunk(
         trials=tuple(TermTrial(term, True, np.nan, _SHRUNK) for term in terms),
     )
     return replace(fit, notes=notes + fit.notes), shrunken
-
-
-def _scored(
-    model: Model,
-    settings: Settings,
-    sums: dict[Recording, PredictionSums],
-    log: Recording,
-    moving: Source,
-) -> Iterator[Segment]:
-    """A pass that also gathers, once, what the prediction will be scored by."""
-    if log in sums:
-        yield from moving()
-        return
-    gathered = PredictionSums(model, settings.torque_shift())
-    pushed: Future[None] | None = None
-    with executor(1) as pool:
-        for piece in moving():
-            if pushed is not None:
-                pushed.result()
-            pushed = pool.submit(gathered.push, piece)
-            yield piece
-    if pushed is not None:
-        pushed.result()
-    gathered.finish()
-    sums[log] = gathered

@@ -25,9 +25,9 @@ from algid.estimators.paper import (
     wanders,
 )
 from algid.identification.outcome import Identified, distrusted
+from algid.identification.passes import with_velocities
 from algid.identification.recordings import Recording, Recordings
-from algid.identification.series import series_blocks, write_columns
-from algid.identification.velocities import with_velocities
+from algid.identification.series import write_columns
 from algid.methods import settles
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Estimate, Status
@@ -38,6 +38,7 @@ STAGE1_WINDOW = 2.0  # s
 _STAGE2_UNITS = UNITS | {"l1": "m"}
 STAGE1_FILE = "estimates.parquet"
 STAGE2_FILE = "loaded.parquet"
+ROWS = 1 << 17  # of a block of the series
 
 
 def run_paper(
@@ -122,18 +123,21 @@ def _estimate(
         series = series_of(moving, window, partial(stage2, k=k, gravity=settings.gravity))
     summary = Summary(len(names))
 
-    def watched() -> Iterator[PaperSeries]:
+    def columns() -> Iterator[dict[str, FloatArray]]:
+        """Blocks of whole windows, each of some `ROWS` samples."""
+        gathered, rows = list[PaperSeries](), 0
         for one in series:
             summary.add(one)
-            yield one
-
-    def columns() -> Iterator[dict[str, FloatArray]]:
-        for block in series_blocks(watched(), names):
-            block.pop("k5+k3", None)  # the sum is Table 4's and follows from the others
-            yield block
+            gathered.append(one)
+            rows += one.t.size
+            if rows >= ROWS:
+                yield _columns(gathered, names)
+                gathered, rows = [], 0
+        if gathered:
+            yield _columns(gathered, names)
 
     if folder is None:
-        for _ in watched():
+        for _ in columns():
             pass
     else:
         write_columns(folder / file, columns(), [survey.whole(log).first_ns])
@@ -145,6 +149,14 @@ def _estimate(
         )
     estimate, wander = summary.estimates()
     return estimate, wander, ~wanders(estimate, wander)
+
+
+def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
+    values = np.concatenate([window.values for window in windows], axis=1)
+    columns = {"t": np.concatenate([window.t for window in windows])}
+    columns |= dict(zip(names, values, strict=True))
+    columns.pop("k5+k3", None)  # the sum is Table 4's and follows from the others
+    return columns
 
 
 def _is_no_arm(k: FloatArray, wander: FloatArray) -> bool:

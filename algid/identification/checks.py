@@ -25,9 +25,9 @@ from algid.estimators.robust import unshrunk
 from algid.identification.by_likelihood import Fitted
 from algid.identification.passes import problem_of
 from algid.identification.phases import phase_note
-from algid.identification.predicted import prediction
 from algid.identification.recordings import Recording
 from algid.identification.series import torque_coefficients, torque_shift
+from algid.identification.validate import prediction
 from algid.model import FIRST_TERMS, K4, RIGID
 from algid.notices import Notice, Remedy, has_code
 

@@ -16,7 +16,7 @@ from algid.base.progress import Progress
 from algid.base.runtime import one_blas_thread
 from algid.estimators.paper import SHORTEST
 from algid.identification.by_paper import run_paper
-from algid.identification.known import contradictions
+from algid.identification.known import contradictions, reused
 from algid.identification.open_logs import (
     LogLike,
     open_sources,
@@ -197,14 +197,6 @@ def _with_meaning(settings: Settings, meaning: Profile | None, earlier: Earlier 
             f"{flag('prior')}"
         )
     return settings
-
-
-def reused(profile: Profile | None, earlier: Result) -> Profile | None:
-    """The user's profile of the logs, completed by the profile of the earlier result."""
-    from algid.profile import OF_ONE_LOG, over
-
-    known = {name: one for name, one in earlier.profile.items() if name not in OF_ONE_LOG}
-    return over(profile, known)
 
 
 def _identified(

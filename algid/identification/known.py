@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import isclose
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,6 +35,9 @@ from algid.results import Result
 from algid.settings import Settings
 from algid.signals.shift import TorqueShift
 
+if TYPE_CHECKING:
+    from algid.profile import Profile
+
 FAR = sigmas(CERTAIN)  # beyond which two statements contradict each other
 SAME_LENGTH = 0.01  # of a length: what two rulers differ by
 
@@ -48,6 +52,14 @@ def model_of(result: Result) -> Model:
         return Model(without_delay(settings.terms), settings.gravity)
     model = result.fit.model
     return Model(tuple(model.terms), settings.gravity, model.coulomb_speed, model.stribeck_speed)
+
+
+def reused(profile: Profile | None, earlier: Result) -> Profile | None:
+    """The user's profile of the logs, completed by the profile of the earlier result."""
+    from algid.profile import OF_ONE_LOG, over
+
+    known = {name: one for name, one in earlier.profile.items() if name not in OF_ONE_LOG}
+    return over(profile, known)
 
 
 def shift_of(result: Result) -> TorqueShift:

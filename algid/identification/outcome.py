@@ -20,8 +20,8 @@ from algid.estimators.prediction import PredictionScore, cross_validate, score
 from algid.estimators.terms import Selection
 from algid.identification.by_likelihood import Fitted
 from algid.identification.checks import fit_notes, remarks
-from algid.identification.predicted import prediction
 from algid.identification.series import torque_coefficients, torque_shift
+from algid.identification.validate import prediction
 from algid.model import DELAYS, UNITS, attributes
 from algid.notices import Notice
 from algid.physics.effort import absent
@@ -357,10 +357,7 @@ def _predicted(found: Fitted) -> tuple[PredictionScore, PredictionScore | None]:
     own = PredictionScore()
     for log in survey.logs:
         c = torque_coefficients(fit, log.role)
-        if log in found.predictions:
-            own += found.predictions[log].score(c)
-        else:
-            own += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
+        own += score(fit.shared.model, c, survey.segments(log), torque_shift(settings, fit))
     if not settings.cross_validate:
         return own, None
     unloaded = [partial(survey.segments, log) for log in survey.unloaded]

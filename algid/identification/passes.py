@@ -1,11 +1,13 @@
-"""Logs and settings as estimators are given them."""
+"""Logs, their velocities and settings as estimators are given them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+
+import numpy as np
 
 from algid.base.errors import LogError
 from algid.estimators.combine import Prior, joined, without
@@ -13,10 +15,12 @@ from algid.estimators.elastic import with_rotors
 from algid.estimators.problem import Problem, Source, TooShortError, WeakSettings
 from algid.estimators.terms import Selection
 from algid.identification.recordings import Recording, Recordings
-from algid.identification.velocities import with_velocities
+from algid.options import flag
 from algid.physics.effort import absent
 from algid.settings import Settings
-from algid.signals.segments import Segment
+from algid.signals.filters import correlate, differentiator, half_length, reflected
+from algid.signals.observers import PAPER_POLES, LuenbergerObserver
+from algid.signals.segments import Segment, settled
 from algid.signals.shift import TorqueShift
 
 
@@ -41,12 +45,10 @@ def problem_of(
     settings: Settings,
     chosen: Selection,
     prior: Prior | None = None,
-    watched: Callable[[Recording, Source], Iterator[Segment]] | None = None,
 ) -> Problem:
     """What an estimator is given to fit the chosen model, beside what is known beforehand.
 
-    Each pass over a log goes through `watched`, if given. Segments have velocities only where they
-    are not observed on the way.
+    Segments have velocities only where they are not observed on the way.
     """
     windows = WeakSettings(
         model=chosen.model,
@@ -64,9 +66,7 @@ def problem_of(
         moving: Source = partial(survey.segments, log)
         if own:
             moving = partial(with_velocities, survey, log, settings, luenberger=settings.luenberger)
-        if watched is None:
-            return moving
-        return partial(watched, log, moving)
+        return moving
 
     known = without(prior, absent(settings.effort, chosen.model.names))
     known = with_rotors(known, chosen.model)
@@ -80,3 +80,54 @@ def problem_of(
         known,
         survey.progress,
     )
+
+
+def with_velocities(
+    survey: Recordings, log: Recording, settings: Settings, *, luenberger: bool
+) -> Iterator[Segment]:
+    """Segments of a log with velocities: measured, by the paper's observer, or differentiated.
+
+    Raises
+    ------
+    LogError
+        If measured velocities are asked for and the log has none.
+    """
+    if settings.velocity != "measured" and not luenberger:
+        bandwidth = settings.bandwidth
+        for held, first, last in settled(
+            survey.segments(log), lambda dt: half_length(dt, bandwidth)
+        ):
+            yield _derived(held, bandwidth).part(first, last)
+        return
+    observer: LuenbergerObserver | None = None
+    for segment in survey.segments(log):
+        if settings.velocity == "measured":
+            if segment.omega is None:
+                raise LogError(
+                    f"{log.name}: expected velocities omega1, omega2 for {flag('velocity')}="
+                    "measured, found none; leave it out to observe them"
+                )
+            yield segment
+            continue
+        observer = observer or LuenbergerObserver(segment.dt, settings.poles or PAPER_POLES)
+        if not segment.continues:
+            observer.reset()
+        yield replace(segment, omega=observer.velocities(segment.theta))
+
+
+def _derived(segment: Segment, bandwidth: float) -> Segment:
+    """The segment with velocities by the zero-phase differentiator.
+
+    Its ends go on by point reflection.
+
+    One that is shorter than half a kernel has differences of neighbours.
+    """
+    reach, theta = half_length(segment.dt, bandwidth), segment.theta
+    if len(segment) > reach:
+        kernel = differentiator(segment.dt, bandwidth)
+        omega = correlate(reflected(theta, reach), kernel)
+    elif len(segment) > 1:
+        omega = np.gradient(theta, segment.dt, axis=1)
+    else:
+        omega = np.zeros_like(theta)
+    return replace(segment, omega=omega)

@@ -24,7 +24,6 @@ from algid.estimators.innovations import (
     whiteness_of,
 )
 from algid.estimators.noise import first_guess
-from algid.estimators.paper import PaperSeries
 from algid.estimators.prediction import CUTOFF, MOTION, scored_torque
 from algid.estimators.running import has_running, running
 from algid.identification.recordings import Recordings
@@ -112,12 +111,14 @@ def scored_blocks(
 ) -> Iterator[dict[str, FloatArray]]:
     """The torque that is scored and its prediction, of every log; arguments as `torque_blocks`."""
     for number, log in enumerate(survey.logs):
-        for piece in scored_torque(model, coefficients[log.role], survey.segments(log), shift):
+        c = coefficients[log.role]
+        for piece in scored_torque(model, c, survey.segments(log), shift):
             step = 1
             if piece.t.size > 1:
                 dt = float(piece.t[1] - piece.t[0])
                 step = max(1, int(1 / (SCORED_RATE * CUTOFF * dt)))
-            t, rows = piece.t[::step], np.concatenate([piece.measured, piece.predicted])[:, ::step]
+            t, X = piece.t[::step], piece.X[:, :, ::step]
+            rows = np.concatenate([X[:, -1], np.einsum("q,aqn->an", c, X[:, :-1])])
             yield {
                 "log": np.full(t.size, number, dtype=np.int32),
                 "t": t,
@@ -126,7 +127,6 @@ def scored_blocks(
 
 
 START_KEY = b"start_ns"
-ROWS = 1 << 17
 
 
 def write_columns(
@@ -151,31 +151,6 @@ def write_columns(
     finally:
         if writer is not None:
             writer.close()
-
-
-def series_blocks(
-    series: Iterable[PaperSeries], names: Sequence[str]
-) -> Iterator[dict[str, FloatArray]]:
-    """Windows of estimates gathered into blocks of columns, `t` first.
-
-    a window's values are (s, n).
-    """
-    gathered: list[PaperSeries] = []
-    rows = 0
-    for window in series:
-        gathered.append(window)
-        rows += window.t.size
-        if rows >= ROWS:
-            yield _columns(gathered, names)
-            gathered, rows = [], 0
-    if gathered:
-        yield _columns(gathered, names)
-
-
-def _columns(windows: Sequence[PaperSeries], names: Sequence[str]) -> dict[str, FloatArray]:
-    values = np.concatenate([window.values for window in windows], axis=1)
-    columns = {"t": np.concatenate([window.t for window in windows])}
-    return columns | dict(zip(names, values, strict=True))
 
 
 def information_blocks(fit: Fit, durations: Sequence[float]) -> Iterator[dict[str, FloatArray]]:

@@ -1,27 +1,55 @@
-"""How well a result predicts the torque of logs that it was not made from."""
+"""How well a result predicts logs that it was not made from, as numbers, as tables and as JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionScore, score
-from algid.estimators.rollout import RolloutScore, rollouts
-from algid.identification.known import model_of, shift_of, torque_constants
-from algid.identification.predicted import prediction
+from algid.base.text import ABSENT, file_name, visible
+from algid.estimators.prediction import CUTOFF, FILTER, PredictionScore, score
+from algid.estimators.rollout import HORIZONS, RolloutScore, rollouts
+from algid.identification.known import model_of, reused, shift_of, torque_constants
+from algid.identification.open_logs import LogLike, open_source
 from algid.identification.recordings import Recordings, Role
+from algid.identification.series import torque_blocks
 from algid.model import Model
 from algid.results import Result, TorquePrediction
 from algid.signals.shift import AT_ONCE, TorqueShift
+from algid.table4 import finite
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from algid.check import Judged
+    from algid.profile import Profile
+    from algid.report.document import Table
+
+EVERY = "all logs"
 
 
-@dataclass(frozen=True)
-class Validation:
-    """The prediction of each log, None where it is too short to judge, and of all together."""
-
-    logs: dict[str, TorquePrediction | None]
-    total: TorquePrediction | None
+def prediction(score: PredictionScore) -> TorquePrediction | None:
+    """As the result holds it; None where every log was too short to judge."""
+    if score.count == 0:
+        return None
+    rmse, nrmse, r2, of_load, *by_state = (
+        (float(one[0]), float(one[1]))
+        for one in (score.rmse, score.nrmse, score.r2, score.of_load, *score.by_state)
+    )
+    moving, rest, held = ((finite(one), finite(other)) for one, other in by_state)
+    return TorquePrediction(
+        rmse=rmse,
+        nrmse=nrmse,
+        r2=r2,
+        filter=FILTER,
+        bandwidth=CUTOFF,
+        of_load=of_load,
+        rmse_moving=moving,
+        rmse_rest=rest,
+        rmse_held=held,
+    )
 
 
 @dataclass(frozen=True)
@@ -31,14 +59,6 @@ class Predictor:
     model: Model
     coefficients: Callable[[Role], FloatArray]
     shift: TorqueShift = AT_ONCE
-
-
-@dataclass(frozen=True)
-class Simulation:
-    """How far simulations come from the angles of each log, and of all together."""
-
-    logs: dict[str, RolloutScore]
-    total: RolloutScore
 
 
 def predictor_of(result: Result, name: str) -> Predictor:
@@ -52,8 +72,107 @@ def predictor_of(result: Result, name: str) -> Predictor:
     )
 
 
-def validate(known: Predictor, survey: Recordings) -> Validation:
-    """Predict the torque of a survey's logs.
+@dataclass(frozen=True)
+class Validated:
+    """How well a result predicts logs.
+
+    Parameters
+    ----------
+    logs : by its name the prediction of each log, None where it is too short to judge
+    total : that of all logs together
+    simulation : by log, then of all, how far the arm simulated forward comes from its angles; empty
+        where that was not asked for
+    warnings : what its reader should know
+    max_nrmse : the largest normalised RMSE allowed, if any
+    judged : errors beside their limits, of a synthetic log's result
+    """
+
+    logs: Mapping[str, TorquePrediction | None] = field(default_factory=dict)
+    total: TorquePrediction | None = None
+    simulation: Mapping[str, RolloutScore] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    max_nrmse: float | None = None
+    judged: tuple[Judged, ...] = ()
+
+    def __repr__(self) -> str:
+        r2 = "unknown"
+        if self.total is not None:
+            r2 = ", ".join(f"{one:.4f}" for one in self.total.r2)
+        return f"Validated(logs: {len(self.logs)}, R² {r2})"
+
+    @property
+    def over(self) -> bool:
+        """Whether something is past its limit, or missing."""
+        return self.past or not all(one.passed for one in self.judged)
+
+    @property
+    def past(self) -> bool:
+        """Whether the normalised RMSE of a joint is past the limit, or missing."""
+        if self.max_nrmse is None:
+            return False
+        return self.total is None or max(self.total.nrmse) > self.max_nrmse
+
+    @property
+    def simulated(self) -> dict[str, list[dict[str, Any]]]:
+        """By log, then of all, a row each horizon; empty where nothing was simulated.
+
+        None where there is no start, or where the simulation runs away.
+        """
+        by_log = {}
+        for name, one in self.simulation.items():
+            rows = zip(HORIZONS, one.count, one.rmse, one.distance, strict=True)
+            by_log[name] = [
+                {
+                    "horizon": horizon,
+                    "starts": int(starts),
+                    "rmse": list(map(finite, rmse)),
+                    "moved": list(map(finite, moved)),
+                }
+                for horizon, starts, rmse, moved in rows
+            ]
+        return by_log
+
+    def as_json(self) -> str:
+        """All of it as the text of a JSON file."""
+        every = [*self.logs.values(), self.total]
+        *logs, total = (None if one is None else one.model_dump(mode="json") for one in every)
+        content: dict[str, Any] = {
+            "logs": dict(zip(self.logs, logs, strict=True)),
+            "total": total,
+            "over": self.over,
+        }
+        if self.judged:
+            content["errors"] = [vars(one) for one in self.judged]
+        if self.simulation:
+            content["simulation"] = self.simulated
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+    def tables(self) -> Iterator[Table]:
+        """The predictions, and the simulations if there are any."""
+        from algid.report.document import Table
+        from algid.report.tables import prediction_table
+
+        called = list(map(file_name, self.logs))  # where they differ
+        if len(set(called)) < len(called):
+            called = list(map(visible, self.logs))
+        called.append(EVERY)
+        yield prediction_table(dict(zip(called, [*self.logs.values(), self.total], strict=True)))
+        rows: list[tuple[str, ...]] = []
+        for name, horizons in zip(called, self.simulated.values(), strict=False):
+            for row in horizons:
+                for joint, moved in enumerate(zip(row["rmse"], row["moved"], strict=True)):
+                    cells = [ABSENT, ABSENT]
+                    if row["starts"]:
+                        cells = ["without bounds" if x is None else f"{x:.4g}" for x in moved]
+                    place = (name, f"{row['horizon']:g}", str(row["starts"]), str(joint + 1))
+                    rows.append((*place, *cells))
+        if rows:
+            headings = "Log | Horizon, s | States | Joint | RMSE, rad | Moved, rad"
+            yield Table("Angles of the arm simulated forward", headings, rows)
+
+
+def validate(known: Predictor, survey: Recordings, *, simulate: bool = False) -> Validated:
+    """Predict the torque of a survey's logs and, if asked, simulate the arm from their states.
 
     Raises
     ------
@@ -61,23 +180,31 @@ def validate(known: Predictor, survey: Recordings) -> Validation:
         If a parameter that the prediction needs has no estimate.
     """
     predictions: dict[str, TorquePrediction | None] = {}
-    total = PredictionScore()
+    simulation: dict[str, RolloutScore] = {}
+    total, rolled = PredictionScore(), RolloutScore()
     for log in survey.logs:
-        one = score(known.model, known.coefficients(log.role), survey.segments(log), known.shift)
+        c = known.coefficients(log.role)
+        one = score(known.model, c, survey.segments(log), known.shift)
         predictions[log.name] = prediction(one)
         total += one
-    return Validation(predictions, prediction(total))
+        if simulate:
+            duration, moving = survey.whole(log).duration, survey.segments(log)
+            angles = rollouts(known.model, c, moving, duration, known.shift)
+            simulation[log.name] = angles
+            rolled += angles
+    if simulate:
+        simulation[EVERY] = rolled
+    return Validated(predictions, prediction(total), simulation)
 
 
-def simulate(known: Predictor, survey: Recordings) -> Simulation:
-    """Simulate the arm forward from states of a survey's logs; raises as `validate`."""
-    scores: dict[str, RolloutScore] = {}
-    total = RolloutScore()
-    for log in survey.logs:
-        duration = survey.summary(log).duration
-        one = rollouts(
-            known.model, known.coefficients(log.role), survey.segments(log), duration, known.shift
-        )
-        scores[log.name] = one
-        total += one
-    return Simulation(scores, total)
+def predicted(result: Result, log: LogLike, role: Role, profile: Profile | None) -> pl.DataFrame:
+    """Motion, measured and predicted torque of a log: see `algid.Result.predict`."""
+    import polars as pl
+
+    known = predictor_of(result, result.log.path)
+    source = open_source(log, role, reused(profile, result), known.model.gravity)
+    coefficients: dict[str, FloatArray] = {role: known.coefficients(role)}
+    blocks = list(torque_blocks(Recordings([source]), known.model, coefficients, known.shift))
+    if not blocks:
+        return pl.DataFrame()
+    return pl.concat(map(pl.DataFrame, blocks), rechunk=True).drop("log")

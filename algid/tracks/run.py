@@ -13,8 +13,7 @@ from algid.base.errors import LogError
 from algid.base.files import read_whole
 from algid.base.runtime import one_blas_thread
 from algid.estimators.problem import TooShortError
-from algid.identification.identify import reused
-from algid.identification.known import contradictions
+from algid.identification.known import contradictions, reused
 from algid.identification.open_logs import LogLike, open_source, read_otherwise
 from algid.identification.recordings import Recordings
 from algid.notices import Notice, lossy, merged

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from algid.arm import FloatArray
-from algid.estimators.prediction import PredictionScore, PredictionSums, at_rest, score
+from algid.estimators.prediction import PredictionScore, score, sums_of
 from algid.model import Model
 from algid.signals.segments import Segment
 
@@ -31,9 +31,9 @@ def rows(omega: FloatArray, torque: FloatArray) -> FloatArray:
 def test_a_torque_within_friction_at_rest_is_no_error() -> None:
     """By hand: at rest 0.25 lies within ± 0.3, 0.5 lies 0.2 beyond; moving, friction is 0.3."""
     omega = np.array([[0.0, 0.0, 9.0], [0.0, 0.0, 9.0]])
-    sums = at_rest(MODEL, coefficients(), rows(omega, np.array([0.25, -0.5, 0.4])), omega)
-    assert sums[2] == pytest.approx([2, 2])
-    moving, rest, held = PredictionScore(3.0, np.concatenate([np.zeros((4, 2)), sums])).by_state
+    sums = sums_of(MODEL, coefficients(), rows(omega, np.array([0.25, -0.5, 0.4])), omega)
+    assert sums[6] == pytest.approx([2, 2])
+    moving, rest, held = PredictionScore(3.0, sums).by_state
     assert held[0] == pytest.approx(0.2 / np.sqrt(2))
     assert held[1] == pytest.approx(rest[1])  # joint 2 has no friction
     assert rest[0] == pytest.approx(np.sqrt((0.25**2 + 0.5**2) / 2))
@@ -50,7 +50,3 @@ def test_a_score_splits_its_residual_among_moving_and_standing_joints() -> None:
     assert moving + still == pytest.approx([found.count, found.count])
     assert moved + left == pytest.approx(residual, rel=1e-9)
     assert found.by_state[2, 0] < 0.2 * found.by_state[1, 0]
-    linear = PredictionSums(MODEL)
-    linear.push(log)
-    linear.finish()
-    assert not linear.score(coefficients()).sums[4:].any()

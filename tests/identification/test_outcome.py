@@ -26,8 +26,8 @@ from algid.identification.outcome import (
     table_rows,
     unknown,
 )
-from algid.identification.predicted import prediction
 from algid.identification.recordings import Recordings
+from algid.identification.validate import prediction
 from algid.log import Log, Origin
 from algid.model import RIGID
 from algid.notices import Notice
