@@ -84,16 +84,17 @@ def followed(
     for place, own in enumerate(robots):
         if progress is not None:
             progress("following", place, len(robots))
-        stints += [0] * own.height
-        own = own.drop_nulls("time")
+        dated = own.drop_nulls("time")
         y, std = (
-            own.select(f"{name}{end}" for name in parameters).fill_null(np.nan).to_numpy().T
+            dated.select(f"{name}{end}" for name in parameters).fill_null(np.nan).to_numpy().T
             for end in ("", "_std")
         )
         w = np.where(np.isfinite(y) & (std > 0), std, np.inf) ** -2.0
-        for at in changes(own["t"].to_numpy(), np.where(w > 0, y, np.nan), w):
-            later = own.height - at
-            stints[-later:] = [stints[-1] + 1] * later
+        at = changes(dated["t"].to_numpy(), np.where(w > 0, y, np.nan), w)
+        # logs without a time come first
+        stints.extend(
+            np.searchsorted(at, np.arange(dated.height - own.height, dated.height), "right")
+        )
 
     jobs = jobs.with_columns(stint=pl.Series(stints, dtype=pl.Int32))
     log, lines, means, found = ("robot", "stint", "job", "time", "t", "month"), [], [], []
@@ -104,8 +105,8 @@ def followed(
         if name == "m_p":
             found.append(standing_out(own, "payload"))
             continue
-        median = pl.col("value").median().over("robot", "stint")
-        found.append(standing_out(own.with_columns(expected=median), "outlier"))
+        own = own.with_columns(expected=pl.col("value").median().over("robot", "stint"))
+        found.append(standing_out(own, "outlier"))
         means.append(line(own, "robot", "stint"))
         ends = own.with_columns(month=pl.int_ranges("month", pl.col("month") + SPAN))
         ends = ends.explode("month").join(own, on=["robot", "stint", "month"], how="semi")
@@ -154,7 +155,8 @@ def line(own: pl.DataFrame, *by: str) -> pl.DataFrame:
     Parameters
     ----------
     own : pl.DataFrame
-        A row an estimate in time order: parameter, job, time, t, value, std.
+        A row an estimate in time order: parameter, job, time, t, value, std; expected, a number
+        near the values of a group.
     by : columns of a group
 
     Returns
@@ -163,21 +165,30 @@ def line(own: pl.DataFrame, *by: str) -> pl.DataFrame:
         A row a group: parameter; `job` and `time` of its first log, `latest` and `end` of the
         last of `logs` logs; mean, mean_std; slope, slope_std a month, null of logs of one instant.
     """
-    t, y, w = pl.col("t"), pl.col("value"), pl.col("std") ** -2.0
-    total, logs = w.sum(), pl.len().cast(pl.Int64)
-    mean, off = (w * y).sum() / total, t - (w * t).sum() / total
-    spread = (w * off**2).sum()
-    slope = pl.when(spread > ROUNDING * total).then((w * off * y).sum() / spread)
-    residual = y - mean - slope.fill_null(0.0) * off
-    scale = ((w * residual**2).sum() / (logs - 2).clip(1)).clip(1.0)
-    return own.group_by(*by, "parameter", maintain_order=True).agg(
-        pl.col("job", "time").first(),
+    # sums alone are taken group by group: polars does those at once, and means of means one by one
+    t, y, w = pl.col("t"), pl.col("value") - pl.col("expected"), pl.col("std") ** -2.0
+    sums = own.group_by(*by, "parameter", maintain_order=True).agg(
+        pl.col("job", "time", "expected").first(),
         end=pl.col("time").last(),
         latest=pl.col("job").last(),
-        logs=logs,
-        mean=mean,
-        mean_std=(scale / total).sqrt(),
-        slope=slope,
+        logs=pl.len().cast(pl.Int64),
+        w=w.sum(),
+        t=(w * t).sum(),
+        y=(w * y).sum(),
+        tt=(w * t**2).sum(),
+        ty=(w * t * y).sum(),
+        yy=(w * y**2).sum(),
+    )
+    w, t, y = pl.col("w"), pl.col("t") / pl.col("w"), pl.col("y") / pl.col("w")
+    spread, cross = pl.col("tt") - w * t**2, pl.col("ty") - w * t * y
+    spread = pl.when(spread > ROUNDING * w).then(spread)
+    residual = pl.col("yy") - w * y**2 - (cross**2 / spread).fill_null(0.0)
+    scale = (residual / (pl.col("logs") - 2).clip(1)).clip(1.0)
+    return sums.select(
+        *(*by, "parameter", "job", "time", "end", "latest", "logs"),
+        mean=pl.col("expected") + y,
+        mean_std=(scale / w).sqrt(),
+        slope=cross / spread,
         slope_std=(scale / spread).sqrt(),
     )
 

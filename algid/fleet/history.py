@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import polars as pl
 
@@ -34,32 +33,31 @@ def read_jobs(path: Path) -> pl.DataFrame:
     """
     expected = "expected jobs.parquet of algid batch"
     try:
-        jobs = pl.read_parquet(path)
-        told = ("job", "robot", "status", "time")
-        missing = [name for name in told if name not in jobs.columns]
+        jobs = pl.scan_parquet(path, glob=False)  # of which only what follows is read
+        columns = jobs.collect_schema().names()
+        missing = [name for name in ("job", "robot", "status", "time") if name not in columns]
         if missing:
             raise ResultError(f"{path}: no column {', '.join(missing)}; {expected}")
-        payload = ("label_payload", "m_p", "m_p_std")
-        none = {name: pl.lit(None) for name in payload if name not in jobs.columns}
-        followed = [name for name in PARAMETERS if {name, f"{name}_std"} <= {*jobs.columns}]
+        wanted = ["label_payload", "m_p", "m_p_std"]
+        none = {name: pl.lit(None) for name in wanted if name not in columns}
+        for name in PARAMETERS:
+            wanted += [name, f"{name}_std"] if {name, f"{name}_std"} <= {*columns} else []
         # a manifest's labels may be words: then they are no numbers
-        number = pl.col(*payload, *followed, *(f"{name}_std" for name in followed))
-        number = number.cast(pl.Float64, strict=False)
-        size, most = number.abs(), LIMITS.largest_value
+        number, most = pl.col(wanted).cast(pl.Float64, strict=False), LIMITS.largest_value
         age = pl.col("time") - pl.col("time").min().over("robot")
         t = age.dt.total_seconds() / (86400 * MONTH_DAYS)
         jobs = jobs.with_columns(pl.col("time").cast(pl.Datetime("us", "UTC")), **none).select(
             pl.col("job", "robot", "status").cast(pl.String),
             "time",
-            pl.when((size <= most) & ((size == 0) | (size >= 1 / most))).then(number),
+            pl.when(number.abs().is_between(1 / most, most) | (number == 0)).then(number),
             t=t,
             month=t.floor().cast(pl.Int32),
         )
+        return jobs.filter(pl.col("status").is_in(["ok", "incomplete"])).collect()
     # a panic of polars is no Exception
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = str(error).split("\n", maxsplit=1)[0]
         raise ResultError(f"{path}: cannot read it ({reason}); {expected}") from error
-    return jobs.filter(pl.col("status").is_in(["ok", "incomplete"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,29 +82,21 @@ class History:
     @property
     def untested(self) -> list[Notice]:
         """What was not looked for, and why."""
-        counts = {
-            "nameless": self.nameless,
-            "undated": int(self.roster["undated"].sum()),
-            "steady": self.roster.height - int(self.roster["tested"].sum()),
-        }
-        more = {"least": FEWEST, "months": SPAN}
-        return [
-            Notice("NOT_TESTED", numbers={"case": case, "count": count} | more)
-            for case, count in counts.items()
-            if count
-        ]
+        undated, steady = self.roster["undated"].sum(), (~self.roster["tested"]).sum()
+        counts, notices = {"nameless": self.nameless, "undated": undated, "steady": steady}, []
+        for case, count in counts.items():
+            if count:
+                numbers = {"case": case, "count": count, "least": FEWEST, "months": SPAN}
+                notices.append(Notice("NOT_TESTED", numbers=numbers))
+        return notices
 
     def as_json(self) -> str:
-        """All of it as the text of a JSON file."""
-        return json.dumps(self.as_dict(), indent=2, allow_nan=False)
-
-    def as_dict(self) -> dict[str, Any]:
-        """What was found, in JSON's own types."""
-        rows = {
-            name: json.loads(frame.fill_nan(None).write_json())
-            for name, frame in (("robots", self.roster), ("findings", self.findings))
-        }
-        return {**rows, "untested": [one.text for one in self.untested]}
+        """What was found, as the text of a JSON file."""
+        parts = {}
+        for name, frame in (("robots", self.roster), ("findings", self.findings)):
+            parts[name] = json.loads(frame.fill_nan(None).write_json())
+        parts["untested"] = [one.text for one in self.untested]
+        return json.dumps(parts, indent=2, allow_nan=False)
 
 
 def history_of(path: Path, progress: Progress | None = None) -> History:

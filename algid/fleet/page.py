@@ -17,7 +17,7 @@ from algid.base.significance import NORMAL
 from algid.base.text import ABSENT, joined, percent, significant, unit_text, visible
 from algid.base.verdict import Verdict, graded
 from algid.base.words import counted
-from algid.fleet.findings import ALPHA, CHANGED, KINDS, SPAN
+from algid.fleet.findings import ALPHA, CHANGED, SPAN
 from algid.fleet.history import History
 from algid.model import UNITS
 from algid.notices import Notice
@@ -68,15 +68,14 @@ def write_history(history: History, out: Path, batch: Path) -> tuple[Document, l
 def verdict(history: History) -> Verdict:
     """Grade a fleet by what drifts, changed or stands out, and by what could not be tested."""
     reasons, counts = list[Notice](), list[str]()
-    for kind in KINDS:
-        whose = "robot" if kind in ("drift", "step") else "job"
-        found = history.findings.filter(kind=kind).select("parameter", whose).rows()
-        if found:
-            counts.append(counted(len(found), kind))
-            names = [f"{parameter} of {visible(one)}" for parameter, one in found[:MOST_NAMED]]
-            names += [f"{len(found) - MOST_NAMED} more"] if len(found) > MOST_NAMED else []
-            numbers = {"case": kind, "count": len(found), "names": names}
-            reasons.append(Notice("FLEET_CHANGE", numbers=numbers))
+    for (kind,), found in history.findings.group_by("kind", maintain_order=True):
+        whose = found["robot" if kind in ("drift", "step") else "job"]
+        names = [
+            f"{one} of {visible(of)}" for one, of in zip(found["parameter"], whose, strict=True)
+        ]
+        counts.append(counted(len(names), str(kind)))
+        numbers = {"case": kind, "count": len(names), "names": joined(names, MOST_NAMED)}
+        reasons.append(Notice("FLEET_CHANGE", numbers=numbers))
     fleet = f"{counted(history.roster.height, 'robot')}, {counted(history.jobs.height, 'log')}"
     headline = f"{fleet}: {joined(counts) or 'no findings'}"
     return graded(headline, reasons + history.untested)
@@ -85,26 +84,26 @@ def verdict(history: History) -> Verdict:
 def robot_table(history: History, links: Links) -> Table:
     """Every robot: its latest log, how many logs, how many findings, and their dates."""
     counts, rows = dict(history.findings["robot"].value_counts().iter_rows()), []
-    for row in history.roster.head(MOST_ROWS).iter_rows(named=True):
-        found = counts.get(row["robot"]) or ("none" if row["tested"] else "not tested")
-        latest = (visible(row["latest"]), visible(row["robot"]), str(row["logs"]))
-        rows.append((*latest, str(found), _day(row["first"]), _day(row["last"])))
+    for robot, logs, _, first, last, latest, tested in history.roster.head(MOST_ROWS).iter_rows():
+        found = counts.get(robot) or ("none" if tested else "not tested")
+        own = visible(latest), visible(robot), str(logs), str(found), _day(first), _day(last)
+        rows.append(own)
     columns, cut = "Latest log | Robot | Logs | Findings | From | To", _cut(history.roster, "robot")
-    return Table("Robots", columns, tuple(rows), cut, links)
+    return Table("Robots", columns, rows, cut, links)
 
 
 def finding_table(history: History, links: Links) -> Table:
     """Drifts, steps, payloads unlike their labels and outliers, of each the clearest first."""
     rows = []
-    for row in history.findings.head(MOST_ROWS).iter_rows(named=True):
-        value, half, expected, when = row["value"], row["half"], row["expected"], _day(row["time"])
-        by = f"{percent(value, expected, 3)} ± {percent(half, expected)} %"
+    for row in history.findings.head(MOST_ROWS).iter_rows():
+        kind, robot, job, parameter, time, before, value, half, expected, sigmas = row
+        by, when = f"{percent(value, expected, 3)} ± {percent(half, expected)} %", _day(time)
         if half is None:
             by = f"{significant(value)} for {significant(expected)}"
-        if row["before"]:
-            when = f"{_day(row['before'])} to {when}"
-        own = (visible(row["job"]), visible(row["robot"]), row["parameter"], row["kind"])
-        rows.append((*own, by, significant(row["sigmas"], 2), when))
+        if before:
+            when = f"{_day(before)} to {when}"
+        own = visible(job), visible(robot), parameter, kind, by, significant(sigmas, 2), when
+        rows.append(own)
     note = (
         f"± is 95 %. A drift is a slope a month over {SPAN} months with p < "
         f"{significant(ALPHA, 1)}; a step, where an arm, a drive or a convention was replaced, has "
@@ -112,28 +111,25 @@ def finding_table(history: History, links: Links) -> Table:
         f"apart. A payload is unlike its label. {_cut(history.findings, 'finding')}"
     )
     columns = "Log | Robot | Parameter | What | By | σ | When"
-    return Table("Findings", columns, tuple(rows), note.rstrip(), links)
+    return Table("Findings", columns, rows, note.rstrip(), links)
 
 
 def links_of(history: History, batch: Path, out: Path) -> Links:
     """Where the reports of the logs that the tables name lie, as seen from `out`."""
     links = {}
-    for log in (
-        *history.roster["latest"].head(MOST_ROWS),
-        *history.findings["job"].head(MOST_ROWS),
-    ):
-        report = batch / f"{log}.algid" / "report.html"
-        if report.is_file():
-            there = os.path.relpath(report.resolve(), out.resolve()).replace(os.sep, "/")
-            links[visible(log)] = "./" + quote(there)  # a name such as javascript: leads nowhere
+    for column in (history.roster["latest"], history.findings["job"]):
+        for log in column.head(MOST_ROWS):
+            report = batch / f"{log}.algid" / "report.html"
+            if report.is_file():
+                there = os.path.relpath(report.resolve(), out.resolve())
+                links[visible(log)] = "./" + quote(there)  # `javascript:` leads nowhere
     return links
 
 
 def _cut(every: pl.DataFrame, things: str) -> str:
     """That a long table is cut; nothing of a short one."""
-    if every.height <= MOST_ROWS:
-        return ""
-    return f"{counted(every.height, things)}; the first {MOST_ROWS} are shown."
+    cut = f"{counted(every.height, things)}; the first {MOST_ROWS} are shown."
+    return cut if every.height > MOST_ROWS else ""
 
 
 def _day(time: datetime | None) -> str:
@@ -156,12 +152,11 @@ def overview(history: History) -> Panels | None:
         logs = dated.filter(pl.col(f"{name}_std") > 0, robot=robot).head(MOST_POINTS)
         half = (NORMAL * logs[f"{name}_std"]).to_list()
         bars = {"type": "data", "array": half, "thickness": 1, "width": 0}
-        times, y = _dates(logs["time"]), logs[name].to_numpy()
-        panels.add(place, times, y, "log", error_y=bars)
-        jobs = found.filter(pl.col("kind") != "step", robot=robot, parameter=name)["job"]
-        marked = logs["job"].is_in(jobs.implode()).to_numpy()
-        if marked.any():
-            panels.add(place, times[marked], y[marked], "finding")
+        panels.add(place, _dates(logs["time"]), logs[name].to_numpy(), "log", error_y=bars)
+        single = found.filter(pl.col("kind") != "step", robot=robot, parameter=name)
+        logs = logs.join(single, on="job", how="semi")
+        if logs.height:
+            panels.add(place, _dates(logs["time"]), logs[name].to_numpy(), "finding")
         for day in _dates(found.filter(robot=robot, kind="step")["time"].unique().sort()).tolist():
             panels.mark(place, "change", day)
         windows = history.windows.filter(robot=robot, parameter=name)

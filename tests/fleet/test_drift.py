@@ -142,7 +142,7 @@ def test_numbers_beyond_all_bounds_are_no_estimates(
     history = history_of(tmp_path / "jobs.parquet")
     assert history.jobs.filter(job="j3")[column].to_list() == [None]
     assert not history.findings.filter(kind="step").height
-    json.dumps(history.as_dict(), allow_nan=False)
+    json.loads(history.as_json())
 
 
 @pytest.mark.parametrize(("away", "told"), [(5.99, False), (6.01, True), (-6.01, True)])
@@ -211,10 +211,9 @@ def test_drifts_are_the_latest_of_each_robot_and_the_clearest_comes_first(tmp_pa
     assert found.select("value", "half", "expected", "time").row(0) == (
         last["slope"], pytest.approx(half), last["mean"], last["end"],
     )  # fmt: skip
-    plain = history.as_dict()
+    plain = json.loads(history.as_json())
     assert [row["robot"] for row in plain["findings"]] == ["s", "r"]
     assert plain["robots"][0]["first"].startswith("2026-01-01")
-    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
 
 
 COLUMNS = "expected jobs.parquet of algid batch"

@@ -103,7 +103,7 @@ def test_a_panic_of_the_library_is_a_refusal(
 
     path = tmp_path / "jobs.parquet"
     _jobs(1, 3, seed=1).write_parquet(path)
-    monkeypatch.setattr(pl, "read_parquet", panics)
+    monkeypatch.setattr(pl, "scan_parquet", panics)
     with pytest.raises(ResultError, match=r"jobs\.parquet: cannot read it \(assertion failed"):
         history_of(path)
 
