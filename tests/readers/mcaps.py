@@ -118,32 +118,37 @@ def messages_of(log: Log, **options: Any) -> list[tuple[str, int, bytes]]:
     ]
 
 
-def protobuf_schema() -> tuple[bytes, Any]:
-    """A file descriptor set of a joint state, and the message class."""
-    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+def protobuf_file(*fields: tuple[str, int, int], name: str = "State") -> Any:
+    """A file of protobuf with one message: names, numbers of types and labels of its fields."""
+    from google.protobuf import descriptor_pb2
 
     file = descriptor_pb2.FileDescriptorProto(name="arm.proto", package="arm", syntax="proto3")
-    file.dependency.append("google/protobuf/timestamp.proto")
-    message = file.message_type.add(name="State")
-    kinds = {
-        "name": (9, 3),
-        "position": (1, 3),
-        "velocity": (1, 3),
-        "effort": (1, 3),
-        "mode": (17, 1),
-    }
-    message.field.add(
-        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
-    )
-    for number, (name, (kind, label)) in enumerate(kinds.items(), start=2):
-        message.field.add(name=name, number=number, type=kind, label=label)
+    message = file.message_type.add(name=name)
+    for number, (field, kind, label) in enumerate(fields, start=1):
+        message.field.add(name=field, number=number, type=kind, label=label)
+    return file
+
+
+def protobuf_types(file: Any, name: str = "arm.State") -> tuple[bytes, Any]:
+    """The descriptor set of a file, and the class of one of its messages."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+
     stamp = descriptor_pb2.FileDescriptorProto()
     timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
     pool = descriptor_pool.DescriptorPool()
     pool.Add(stamp)
     pool.Add(file)
-    state = message_factory.GetMessageClass(pool.FindMessageTypeByName("arm.State"))
-    return descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString(), state
+    made = message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
+    return descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString(), made
+
+
+def protobuf_schema() -> tuple[bytes, Any]:
+    """A file descriptor set of a joint state, and the message class."""
+    lists = ((name, 1, 3) for name in ("position", "velocity", "effort"))
+    file = protobuf_file(("timestamp", 11, 1), ("name", 9, 3), *lists, ("mode", 17, 1))
+    file.dependency.append("google/protobuf/timestamp.proto")
+    file.message_type[0].field[0].type_name = ".google.protobuf.Timestamp"
+    return protobuf_types(file)
 
 
 def chunks_of(path: Path) -> list[Any]:

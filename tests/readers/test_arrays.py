@@ -29,16 +29,6 @@ def right(log: Log, stamp_tolerance: int = 1) -> bool:
     )
 
 
-def npz(folder: Path) -> Path:
-    np.savez(folder / "log.npz", t=T, q=THETA.T, tau=TAU.T, note=np.array("unused"), rate=1000.0)
-    return folder / "log.npz"
-
-
-def mat(folder: Path) -> Path:
-    savemat(folder / "log.mat", {"t": T, "q": THETA.T, "tau": TAU.T, "comment": "arm 7"})
-    return folder / "log.mat"
-
-
 @pytest.mark.parametrize(
     ("content", "words"),
     [

@@ -16,7 +16,7 @@ from algid.notices import Notice
 from algid.profile import Profile
 from algid.readers.arrays import of_arrays
 from algid.readers.column_names import Name, take_apart
-from algid.readers.flat import offer_table
+from algid.readers.flat import offer_table, to_nanoseconds
 from tests.readers.headers import TableReader, opened
 
 PLAIN = "t q1 q2 tau1 tau2"
@@ -299,3 +299,46 @@ def test_joint_and_axis_are_no_joints_names() -> None:
     assert chosen(["t", *columns], joints=["elbow", "base"])["theta1"] == "elbow_axis_pos"
     told = refused(["t", "axis_pos", "joint_pos", "axis_torque", "joint_torque"])
     assert told.startswith("no column for theta1, theta2, tau1, tau2; found")
+
+
+FIELD = {
+    "t,q1,q2,tau1,tau2": "t q1 q2 tau1 tau2",
+    "time,pos1,pos2,vel1,vel2,tau1,tau2": "time pos1 pos2 tau1 tau2",
+    "time,pos_meas1,pos_meas2,pos_filt1,pos_filt2,tau_con1,tau_con2,tau_meas1,tau_meas2": (
+        "time pos_meas1 pos_meas2 tau_meas1 tau_meas2"
+    ),
+    "timestamp,actual_q_0,actual_q_1,actual_current_0,actual_current_1": (
+        "timestamp actual_q_0 actual_q_1 actual_current_0 actual_current_1"
+    ),
+    "__time,/js/a/position,/js/a/effort,/js/b/position,/js/b/effort": (
+        "__time /js/a/position /js/b/position /js/a/effort /js/b/effort"
+    ),
+    "time,q[0],q[1],tau_J[0],tau_J[1]": "time q[0] q[1] tau_J[0] tau_J[1]",
+    "T,THETA1,Theta2,Tau1,TAU2": "T THETA1 Theta2 Tau1 TAU2",
+    "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 Torque "
+    "[Nm]": (
+        "Time [ms],Joint 1 Position [deg],Joint 2 Position [deg],Joint 1 Torque [Nm],Joint 2 "
+        "Torque [Nm]"
+    ),
+}
+
+
+@pytest.mark.parametrize("header", FIELD)
+def test_names_of_the_field_are_recognised(header: str) -> None:
+    currents = {"torque_constant": 1.0} if "current" in header else {}
+    settings = {"tau1": currents, "tau2": currents}
+    chosen = opened(header.split(","), settings).origin.mapping
+    wanted = FIELD[header].split("," if "," in FIELD[header] else " ")
+    assert [chosen[name] for name in ("t", "theta1", "theta2", "tau1", "tau2")] == wanted
+
+
+def test_torques_of_other_joints_are_not_taken() -> None:
+    with pytest.raises(LogError, match="no column for tau2; found"):
+        opened(["t", "q1", "q2", "tau2", "tau9"])
+
+
+def test_whole_nanoseconds_stay_exact() -> None:
+    stamps = np.array([1_700_000_000_123_456_789, 1_700_000_000_123_456_790])
+    assert to_nanoseconds(stamps, "ns").tolist() == stamps.tolist()
+    with pytest.raises(ValueError, match="292 years"):
+        to_nanoseconds(np.array([2**62]), "s")

@@ -15,86 +15,53 @@ from algid.profile import Profile, with_settings
 from algid.readers import read_log
 from algid.readers.joints import moving_joints
 from algid.readers.table import SampleTable
-from tests.readers.logs import EPOCH_NS
-from tests.readers.mcaps import joint_state, write_mcap
+from tests.readers.ways import EPOCH, Message, States, written
 
-IN_ORDER = [
-    *(
-        ("shoulder", "elbow"),
-        ("joint1", "joint2"),
-        ("joint_9", "joint_10"),
-        ("J1", "j2"),
-        ("arm_1_joint", "arm_2_joint"),
-    ),
-    *(
-        ("base_joint", "arm_joint"),
-        ("shoulder_lift_joint", "elbow_joint"),
-        ("leftShoulder", "leftElbow"),
-    ),
-    *(
-        ("proximal", "distal"),
-        ("hip", "knee"),
-        ("a", "b"),
-        ("joint_a", "joint_b"),
-        ("upper_arm", "forearm"),
-    ),
-    *(
-        ("left_shoulder", "left_elbow"),
-        ("elbow", "wrist_1"),
-        ("first", "second"),
-        ("axis02", "axis3"),
-        ("root", "x"),
-    ),
-    *(
-        ("1", "2"),
-        ("inner_link", "outer_link"),
-        ("thigh", "shank"),
-        ("boom", "stick"),
-        ("waist", "shoulder"),
-    ),
-    *(("pan", "tilt"), ("primary", "secondary"), ("tilt", "wrist"), ("axis_i", "axis_ii")),
-]
-UNKNOWN = [
-    ("left", "right"),
-    ("q", "x"),
-    ("alpha_joint", "omega_joint"),
-    ("joint1", "arm2"),
-    ("elbow_1", "elbow_x"),
-]
+IN_ORDER = """
+shoulder elbow, joint1 joint2, joint_9 joint_10, J1 j2, arm_1_joint arm_2_joint,
+base_joint arm_joint, shoulder_lift_joint elbow_joint, leftShoulder leftElbow, proximal distal,
+hip knee, a b, joint_a joint_b, upper_arm forearm, left_shoulder left_elbow, elbow wrist_1,
+first second, axis02 axis3, root x, 1 2, inner_link outer_link, thigh shank, boom stick,
+waist shoulder, pan tilt, primary secondary, tilt wrist, axis_i axis_ii
+"""
+UNKNOWN = "left right, q x, alpha_joint omega_joint, joint1 arm2, elbow_1 elbow_x"
 
 
-@pytest.mark.parametrize("names", IN_ORDER)
-def test_names_tell_the_order(names: tuple[str, str], tmp_path: Path) -> None:
-    assert ordered(tmp_path, names) == (names, "names")
-    assert ordered(tmp_path, names[::-1]) == (names, "names")
+def pairs(text: str) -> list[list[str]]:
+    return [pair.split() for pair in text.split(",")]
 
 
-@pytest.mark.parametrize("names", UNKNOWN)
+@pytest.mark.parametrize(("one", "other"), [*pairs(IN_ORDER), ("axis 2", "axis 3")])
+def test_names_tell_the_order(one: str, other: str, tmp_path: Path) -> None:
+    assert ordered(tmp_path, one, other) == ((one, other), "names")
+    assert ordered(tmp_path, other, one) == ((one, other), "names")
+
+
+@pytest.mark.parametrize(("one", "other"), [*pairs(UNKNOWN), ("axis ³", "axis ²")])
 def test_names_that_do_not_tell_leave_the_order_as_it_is(
-    names: tuple[str, str], tmp_path: Path
+    one: str, other: str, tmp_path: Path
 ) -> None:
-    assert ordered(tmp_path, names) == (names, "order")
-    assert ordered(tmp_path, names[::-1]) == (names[::-1], "order")
+    """`str.isdigit` says that ² is one, and `int` does not."""
+    assert ordered(tmp_path, one, other) == ((one, other), "order")
+    assert ordered(tmp_path, other, one) == ((other, one), "order")
 
 
-def ordered(folder: Path, names: tuple[str, str]) -> tuple[tuple[str, str] | None, str | None]:
+def ordered(folder: Path, *names: str) -> tuple[tuple[str, str] | None, str | None]:
     """The joints of messages with such names from the base outwards, and who says so."""
-    reading = read_log(states(folder / "log.mcap", names)).origin.reading
+    reading = read_log(states(folder, *names)).origin.reading
     return reading.joints, reading.joints_told
 
 
-def states(path: Path, names: tuple[str, str]) -> Path:
+def states(folder: Path, *names: str) -> Path:
     """Ten messages.
 
     The first joint of the list stands at 1 rad under 10 N m, the second at 2 under 20.
     """
-    stamps = [EPOCH_NS + step * 1_000_000 for step in range(10)]
     messages = [
-        ("/joint_states", stamp, joint_state(stamp, names, [1, 2 + step], [0, 0], [10, 20]).done())
-        for step, stamp in enumerate(stamps)
+        Message((1, 2 + step), (10, 20), stamp, stamp, names)
+        for step, stamp in enumerate(range(EPOCH, EPOCH + 10**7, 10**6))
     ]
-    write_mcap(path, messages)
-    return path
+    return Path(written("cdr", folder, States(messages)))
 
 
 def told(log: Log) -> list[str]:
@@ -102,7 +69,7 @@ def told(log: Log) -> list[str]:
 
 
 def test_joint_states_in_alphabetical_order_are_put_along_the_arm(tmp_path: Path) -> None:
-    log = read_log(states(tmp_path / "log.mcap", ("elbow", "shoulder")))
+    log = read_log(states(tmp_path, "elbow", "shoulder"))
     assert log.theta[1].tolist() == [1.0] * 10
     assert log.tau[:, 0].tolist() == [20, 10]
     assert log.origin.mapping["theta1"] == "/joint_states: position[shoulder]"
@@ -113,7 +80,7 @@ def test_joint_states_in_alphabetical_order_are_put_along_the_arm(tmp_path: Path
 
 
 def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> None:
-    path = states(tmp_path / "log.mcap", ("left", "right"))
+    path = states(tmp_path, "left", "right")
     log = read_log(path)
     assert log.tau[:, 0].tolist() == [10, 20]
     assert log.origin.reading.joints_told == "order"
@@ -122,8 +89,6 @@ def test_joints_whose_names_do_not_tell_stay_and_are_told(tmp_path: Path) -> Non
     swapped = read_log(path, with_settings(Profile(), {"joints": ["right", "left"]}))
     assert swapped.tau[:, 0].tolist() == [20, 10]
     assert (swapped.origin.reading.joints_told, told(swapped)) == ("profile", [])
-    profile = Profile.model_validate({"joints": ["right", "left"]})
-    assert read_log(path, profile).origin.reading.joints_told == "profile"
 
 
 def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
@@ -159,12 +124,6 @@ def test_everything_a_reader_was_told_is_in_the_origin(tmp_path: Path) -> None:
     for name, row, value in (("theta1", log.theta[0] + np.pi / 2, 10), ("tau1", log.tau[0], 30)):
         channel = reading.channels[name]
         assert np.allclose(row, channel.factor * value + channel.offset, rtol=1e-14)
-
-
-def test_a_raised_digit_is_no_number(tmp_path: Path) -> None:
-    """`str.isdigit` says that ² is one, and `int` does not."""
-    assert ordered(tmp_path, ("axis ³", "axis ²")) == (("axis ³", "axis ²"), "order")
-    assert ordered(tmp_path, ("axis 3", "axis 2")) == (("axis 2", "axis 3"), "names")
 
 
 def moving(unit: float = 1.0, rows: int = 3, **travel: float) -> str | None:

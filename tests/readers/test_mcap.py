@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,12 +15,14 @@ from algid.profile import Profile
 from algid.readers import read_log
 from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
-from tests.readers.mcaps import (
-    TOPIC,
-    joint_state,
-    messages_of,
-    write_mcap,
-)
+from tests.readers.mcaps import messages_of, write_mcap
+from tests.readers.ways import Message, States, sent, written
+
+LOG = noise_log(400, start_ns=EPOCH_NS, velocity=False)
+
+
+def mcap(folder: Path, messages: list[Message], encoding: str = "cdr") -> Path:
+    return Path(written(encoding, folder, States(messages)))
 
 
 @pytest.mark.parametrize("encoding", ["cdr", "json"])
@@ -27,22 +30,16 @@ from tests.readers.mcaps import (
 def test_messages_that_lack_a_quantity_are_lost_and_those_of_other_joints_are_not(
     lacking: str, encoding: str, tmp_path: Path
 ) -> None:
-    log = noise_log(90, start_ns=EPOCH_NS, velocity=False)
-    messages = []
-    for row, stamp in enumerate(log.stamp_ns.tolist()):
-        values = {"position": log.theta[:, row].tolist(), "effort": log.tau[:, row].tolist()}
-        if row % 3 == 1:
-            values[lacking] = []
-        names = ["other"] if row % 3 == 2 else ["j1", "j2"]
-        cut = {key: one[: len(names)] for key, one in values.items()}
-        data = joint_state(stamp, names, **cut).done()
-        if encoding == "json":
-            stamps = {"sec": stamp // 10**9, "nanosec": stamp % 10**9}
-            data = json.dumps({"header": {"stamp": stamps}, "name": names, **cut}).encode()
-        messages.append((TOPIC, stamp, data))
-    write_mcap(tmp_path / "log.mcap", messages, encoding=encoding)
-    found = read_log(tmp_path / "log.mcap")
-    assert found.stamp_ns.tolist() == log.stamp_ns[::3].tolist()
+    messages = sent(LOG.part(0, 90))
+    for row in range(0, 90, 3):
+        without: dict[str, Any] = {lacking: ()}
+        messages[row + 1] = replace(messages[row + 1], **without)
+        one = messages[row + 2]
+        messages[row + 2] = replace(
+            one, name=["other"], position=one.position[:1], effort=one.effort[:1]
+        )
+    found = read_log(mcap(tmp_path, messages, encoding))
+    assert found.stamp_ns.tolist() == LOG.stamp_ns[:90:3].tolist()
     told = {notice.case: (notice.lossy, notice.text) for notice in found.notices}
     fields = f"{lacking}[j1], {lacking}[j2]"
     assert told == {
@@ -55,29 +52,25 @@ def test_messages_that_lack_a_quantity_are_lost_and_those_of_other_joints_are_no
 
 
 def test_joints_named_by_numbers_are_not_places(tmp_path: Path) -> None:
-    log = noise_log(20, start_ns=EPOCH_NS, velocity=False)
-    messages = []
-    for row, stamp in enumerate(log.stamp_ns.tolist()):
-        position, effort = log.theta[::-1, row].tolist(), log.tau[::-1, row].tolist()
-        messages.append((TOPIC, stamp, joint_state(stamp, ["1", "0"], position, (), effort).done()))
-    write_mcap(tmp_path / "log.mcap", messages)
-    assert same(read_log(tmp_path / "log.mcap"), log)
+    turned = replace(LOG, theta=LOG.theta[::-1], tau=LOG.tau[::-1])
+    assert same(read_log(mcap(tmp_path, sent(turned, name=["1", "0"]))), LOG)
 
 
 def test_more_layouts_than_are_remembered(tmp_path: Path) -> None:
-    log = noise_log(400, start_ns=EPOCH_NS, velocity=False)
-    messages = []
-    for row, stamp in enumerate(log.stamp_ns.tolist()):
-        names = ["joint1", "joint2", f"other{row:03d}"]
-        position, effort = [*log.theta[:, row], 0.0], [*log.tau[:, row], 0.0]
-        messages.append((TOPIC, stamp, joint_state(stamp, names, position, (), effort).done()))
-    write_mcap(tmp_path / "log.mcap", messages, chunk_size=1 << 20)
-    assert same(read_log(tmp_path / "log.mcap", Profile(joints=("joint1", "joint2"))), log)
+    messages = [
+        replace(
+            one,
+            name=["j1", "j2", f"other{row:03d}"],
+            position=[*one.position, 0.0],
+            effort=[*one.effort, 0.0],
+        )
+        for row, one in enumerate(sent(LOG))
+    ]
+    assert same(read_log(mcap(tmp_path, messages), Profile(joints=("j1", "j2"))), LOG)
 
 
 def test_xcdr2_is_refused(tmp_path: Path) -> None:
-    log = noise_log(5, start_ns=EPOCH_NS)
-    messages = [(topic, stamp, b"\0\7" + data[2:]) for topic, stamp, data in messages_of(log)]
+    messages = [(topic, stamp, b"\0\7" + data[2:]) for topic, stamp, data in messages_of(LOG)]
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match="XCDR2"):
         read_log(tmp_path / "log.mcap")
@@ -93,27 +86,17 @@ def test_a_file_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])
 def test_other_joints_that_move_are_told_with_how_far(moved: float, tmp_path: Path) -> None:
-    log = noise_log(400, start_ns=EPOCH_NS)
     names = ("base", "a", "wrist", "b", "hand")
     swing = moved * np.sin(np.linspace(0, 12, 400))
-    messages = [
-        (
-            TOPIC,
-            stamp,
-            joint_state(
-                stamp,
-                names if row % 7 else names[:4],  # a message may lack a joint
-                position=[0.5, log.theta[0, row], swing[row], log.theta[1, row], float("nan")][
-                    : 5 if row % 7 else 4
-                ],
-                effort=[0, log.tau[0, row], 0, log.tau[1, row], 0][: 5 if row % 7 else 4],
-            ).done(),
-        )
-        for row, stamp in enumerate(log.stamp_ns.tolist())
-    ]
-    write_mcap(tmp_path / "log.mcap", messages)
-    found = read_log(tmp_path / "log.mcap", Profile(joints=("a", "b")))
-    assert np.array_equal(found.theta, log.theta)
+    messages = []
+    for row, one in enumerate(sent(LOG)):
+        joints = slice(5 if row % 7 else 4)  # a message may lack a joint
+        (theta1, theta2), (tau1, tau2) = one.position, one.effort
+        position = [0.5, theta1, swing[row], theta2, float("nan")][joints]
+        effort = [0, tau1, 0, tau2, 0][joints]
+        messages.append(replace(one, name=names[joints], position=position, effort=effort))
+    found = read_log(mcap(tmp_path, messages), Profile(joints=("a", "b")))
+    assert np.array_equal(found.theta, LOG.theta)
     told = [notice.text for notice in found.notices if notice.code == "OTHER_JOINTS"]
     if moved:
         (text,) = told

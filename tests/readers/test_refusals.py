@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from algid.base.errors import LogError
+from algid.base.errors import LogError, SettingError
 from algid.log import Log
-from algid.profile import Profile, with_settings
+from algid.profile import Profile, load_profile, with_settings
 from algid.readers import read_log
 from algid.writers import write_log
 from tests.inspection.test_checks import moving_log, noticed, spoiled
@@ -289,3 +289,22 @@ def test_units_are_known_as_people_write_them() -> None:
         {"theta1": {"unit": "degrees"}, "time_unit": "milliseconds", "tau1": {"unit": "N.m"}}
     )
     assert (profile.theta1.unit, profile.time_unit, profile.tau1.unit) == ("deg", "ms", "N m")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("topics = 1", "topics.*not permitted"),
+        ('[theta1]\nunit = "grad"', "theta1.unit"),
+        ("[tau1]\ntorque_constant = -1", "torque_constant"),
+        ("signs = [2, 1]", "signs"),
+        ("gravity = nan", "gravity"),
+        ("= 3", "not TOML"),
+    ],
+)
+def test_profiles_are_strict(text: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "algid.toml").write_text(text)
+    with pytest.raises(SettingError, match=told):
+        load_profile(tmp_path / "algid.toml")
+    with pytest.raises(SettingError, match="cannot read it"):
+        load_profile(tmp_path / "none.toml")

@@ -86,6 +86,16 @@ class States:
     metadata: Mapping[str, str] = field(default_factory=dict)
 
 
+def sent(log: Log, **changes: Any) -> list[Message]:
+    """The samples of a log as joint states, all with the same `changes`."""
+    omega = np.empty((0, len(log))) if log.omega is None else log.omega
+    signals = (values.T.tolist() for values in (log.theta, log.tau, omega))
+    return [
+        Message(theta, tau, stamp, stamp, velocity=speed, **changes)
+        for theta, tau, speed, stamp in zip(*signals, log.stamp_ns.tolist(), strict=True)
+    ]
+
+
 def written(way: str, folder: Path, log: Flat | States) -> Any:
     """A path, a frame, a dict, or a function that gives a `Log`; raises `CannotSayError`."""
     if isinstance(log, Flat):

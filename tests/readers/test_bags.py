@@ -1,0 +1,353 @@
+"""ROS 1 bags and SQLite rosbag2 folders: read, read up to a break, or refused."""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer
+
+from algid.base.errors import LogError
+from algid.log import Log
+from algid.profile import Profile
+from algid.readers import read_log
+from algid.readers.bags import open_bag
+from tests.readers.large import write_db3
+from tests.readers.logs import EPOCH_NS, noise_log, same
+from tests.readers.ways import STORES, Message, States, fill, sent, written
+
+LOG = noise_log(200, start_ns=EPOCH_NS)
+PLACES = ("theta1", "theta2", "tau1", "tau2")
+
+
+def bag(folder: Path, *messages: Message) -> Path:
+    """A rosbag2 folder in SQLite."""
+    return Path(written("db3", folder, States(messages or sent(LOG))))
+
+
+def taken(*sources: str, **more: Any) -> Profile:
+    """Settings that name each channel's field."""
+    named = {name: {"source": own} for name, own in zip(PLACES, sources, strict=True)}
+    return Profile.model_validate(named | more)
+
+
+def test_topic_and_source_of_a_profile_are_honoured(tmp_path: Path) -> None:
+    path = bag(tmp_path, *sent(LOG, topic="/one"), *sent(LOG, topic="/two"))
+    assert read_log(path, Profile(topic="/two")).origin.reading.topics == ("/two",)
+    crossed = Profile.model_validate(
+        {
+            "topic": "/one",
+            "tau1": {"source": "effort[j2]"},
+            "tau2": {"topic": "/two", "source": "effort[0]"},
+        }
+    )
+    found = read_log(path, crossed)
+    assert found.tau.tolist() == LOG.tau[::-1].tolist()
+    assert found.origin.mapping["tau2"] == "/two: effort[0]"
+    assert found.origin.reading.topics == ("/one", "/two")
+    recorded = read_log(path, Profile(topic="/one", clock="log"))
+    assert recorded.origin.mapping["t"] == "log time"
+    with pytest.raises(
+        LogError, match=r"joints foo, bar; joints there are: j1, j2; choose two: --joints A,B"
+    ):
+        read_log(path, Profile(joints=("foo", "bar")))
+    with pytest.raises(LogError, match="no topic holds"):
+        read_log(path, Profile(topic="/three"))
+    with pytest.raises(LogError, match=r"joint states on /one, /two; choose: --topic NAME"):
+        read_log(path)
+
+
+def described(folder: Path, names: list[str], more: str = "") -> Path:
+    """A folder of empty databases, and metadata that list them."""
+    folder.mkdir()
+    listed = "".join(f"    - {name}\n" for name in names)
+    (folder / "metadata.yaml").write_text(
+        f"rosbag2_bagfile_information:\n  version: 5\n{more}  relative_file_paths:\n{listed}  "
+        "files: []\n"
+    )
+    return folder
+
+
+def counts(folder: Path) -> list[list[int]]:
+    return [list(one().counts.values()) for one in open_bag(folder, "rosbag2").files]
+
+
+def test_the_files_of_a_bag_come_as_its_metadata_list_them(tmp_path: Path) -> None:
+    names = ["bag_1.db3", '"bag_0.db3"', "'bag_10.db3'", "bag_2.db3"]
+    folder = described(tmp_path / "bag", names, "  compression_mode: none\n")
+    for number in (0, 1, 2):
+        write_db3(folder / f"bag_{number}.db3", 10 * (1 + number))
+    assert counts(folder) == [[20], [10], [30]]
+    (lost,) = open_bag(folder, "rosbag2").notices
+    assert (lost.code, lost.lossy) == ("DAMAGED", True)
+    assert lost.text == "1 of 4 files of the bag missing: bag_10.db3"
+
+
+def test_files_without_metadata_come_by_their_numbers(tmp_path: Path) -> None:
+    for rows, name in ((30, "run_10.db3"), (20, "run_9.db3"), (10, "run.db3")):
+        write_db3(tmp_path / name, rows)
+    (tmp_path / "run_0.txt").touch()
+    assert counts(tmp_path) == [[10], [20], [30]]
+    (tmp_path / "other_9.db3").touch()
+    with pytest.raises(LogError, match="not the numbered parts of one bag"):
+        read_log(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("names", "more", "words"),
+    [
+        (["a.db3", "b.db3"], "", r"none of the bag's files is there; expected \['a.db3', 'b"),
+        (["../a.db3"], "", "none of the bag's files is there"),  # it is, outside the folder
+        ([".."], "", "none of the bag's files is there"),
+        (
+            ["a.db3"],
+            "  compression_mode: FILE\n",
+            r"\(compression_mode FILE\).*ros2 bag convert",
+        ),
+        (["a.db3"], '  compression_mode: "message"\n', "compression_mode message"),
+        ([], "", "expected the metadata of a rosbag2 folder with relative_file_paths"),
+        (["[" * 5], "", "expected the metadata of a rosbag2 folder"),
+    ],
+)
+def test_folders_that_are_no_bag_are_refused(
+    names: list[str], more: str, words: str, tmp_path: Path
+) -> None:
+    write_db3(tmp_path / "a.db3", 10)
+    with pytest.raises(LogError, match=words) as refused:
+        read_log(described(tmp_path / "bag", names, more))
+    assert "\n" not in str(refused.value)
+
+
+def state(row: int, **changes: Any) -> Message:
+    """One a millisecond of two joints, the outer one first."""
+    pair = Message((1, 2), (10, 20), 5 * 10**9 + row * 1_000_000, 10**9 + row, ("b", "a"))
+    return replace(pair, **changes)
+
+
+def test_joints_come_along_the_arm_and_messages_without_them_are_counted(tmp_path: Path) -> None:
+    path = bag(
+        tmp_path,
+        state(0),
+        state(1, name=["c"], position=[9], effort=[9]),
+        state(2),
+        state(3, name=(), position=(), effort=()),
+        state(4),
+    )
+    log = read_log(path)
+    assert log.theta.tolist() == [[2] * 3, [1] * 3]
+    assert log.tau.tolist() == [[20] * 3, [10] * 3]
+    assert log.omega is None
+    assert log.stamp_ns.tolist() == [5 * 10**9 + row * 1_000_000 for row in (0, 2, 4)]
+    assert (log.origin.reading.joints, log.origin.reading.joints_told) == (("a", "b"), "names")
+    assert [notice.text for notice in log.notices if notice.code == "MESSAGES_LEFT_OUT"] == [
+        "2 messages on '/joint_states' left out: of other joints"
+    ]
+    # the recorder's own times, where a user asks for them
+    assert read_log(path, Profile(clock="log")).stamp_ns.tolist() == [
+        10**9 + row for row in (0, 2, 4)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"effort": []},
+            r"found '/joint_states' with .*position\[b\], position\[a\], .*effort \(empty\); name",
+        ),
+        (
+            {"name": ["a", "a"]},
+            "'/joint_states': its messages name the joint 'a' twice; .*name each field",
+        ),
+        (
+            {"position": [1]},
+            "no topic holds theta1, theta2, tau1, tau2 of two joints; found '/joint_states' with",
+        ),
+        (
+            {"name": ["x", "y", "z"], "position": [1, 2, 3], "effort": [1, 2, 3]},
+            r"'/joint_states': 'position' stands there for 3 joints: .*/z; choose two: --joints A",
+        ),
+    ],
+)
+def test_joint_states_that_do_not_fit_are_told(
+    changes: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    path = bag(tmp_path, *(state(row, **changes) for row in range(3)))
+    with pytest.raises(LogError, match=words):
+        read_log(path)
+
+
+def test_a_field_needs_a_topic_and_a_topic_its_field(tmp_path: Path) -> None:
+    path = bag(tmp_path, *map(state, range(3)))
+    sources = ("position[0]", "position[1]", "effort[0]", "effort[1]")
+    with pytest.raises(
+        LogError, match=r"theta1 is taken from 'position\[0\]' without a topic: --topic NAME"
+    ):
+        read_log(path, taken(*sources))
+    log = read_log(path, taken(*sources, topic="/joint_states"))
+    assert log.tau.tolist() == [[10] * 3, [20] * 3]
+    with pytest.raises(LogError, match=r"no message on topic '/other'; .*--set tau1.topic=NAME"):
+        read_log(path, Profile.model_validate({"tau2": {"source": "effort[0]", "topic": "/other"}}))
+    for wrong in ("effort[²]", "effort[2]", "header.frame_id"):
+        with pytest.raises(
+            LogError, match=r"messages on '/joint_states' have no .* for tau2; found header"
+        ):
+            read_log(path, Profile.model_validate({"tau2": {"source": wrong}}))
+
+
+def ros1(path: Path, packing: Writer.CompressionFormat | None = None) -> bytes:
+    """The log as a ROS 1 bag of small chunks."""
+    writer = Writer(path)
+    writer.chunk_threshold = 4096
+    if packing is not None:
+        writer.set_compression(packing)
+    with writer:
+        fill(writer, STORES[0], States(sent(LOG)), {"seq": 0})
+    return path.read_bytes()
+
+
+def poked(content: bytes, place: int, form: str, value: int) -> bytes:
+    changed = bytearray(content)
+    struct.pack_into(form, changed, place, value)
+    return bytes(changed)
+
+
+def lossy(log: Log) -> tuple[str, str]:
+    """Code and text of the only notice, which is of a loss."""
+    (notice,) = log.notices
+    assert notice.lossy
+    return notice.code, notice.text
+
+
+def test_a_bag_without_its_index_is_refused_with_its_mend(tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    content = ros1(path)
+    mend = r"rosbag reindex a\.bag may mend it"
+    for share in (0.2, 0.9, 0.999):
+        path.write_bytes(content[: round(share * len(content))])
+        with pytest.raises(LogError, match=rf"can be read \(.+\); {mend}"):
+            read_log(path)
+    # a recorder that was killed
+    path.write_bytes(poked(content, content.index(b"index_pos=") + 10, "<Q", 0))
+    with pytest.raises(LogError, match=rf"not indexed.*; {mend}"):
+        read_log(path)
+
+
+def test_an_index_that_lists_fewer_messages_than_it_counts_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    content = ros1(path)
+    chunk = content.index(b"count=", content.rindex(b"op=\x04")) + 6  # of the last chunk's index
+    (count,) = struct.unpack_from("<I", content, chunk)
+    pairs = content.rindex(struct.pack("<II", 0, count))  # of what is told of the last chunk
+    path.write_bytes(poked(content, pairs + 4, "<I", count + 3))
+    found = read_log(path)
+    assert same(found, LOG)
+    assert lossy(found)[0] == "DAMAGED"
+
+
+def test_a_bag_is_read_up_to_its_first_damaged_chunk(tmp_path: Path) -> None:
+    path = tmp_path / "a.bag"
+    content = ros1(path, Writer.CompressionFormat.LZ4)
+    third = [place for place in range(len(content)) if content.startswith(b"op=\x05", place)][2]
+    place = content.index(b"\x04\x22\x4d\x18", third)  # an LZ4 frame
+    path.write_bytes(content[: place + 40] + bytes(60) + content[place + 100 :])
+    found = read_log(path)
+    assert 20 < len(found) < 100
+    assert same(found, LOG.part(0, len(found)))
+    code, text = lossy(found)
+    assert code == "DAMAGED"
+    assert f"{len(LOG) - len(found)} messages are missing" in text
+
+
+def changed(folder: Path, *statements: str) -> Path:
+    """The file of a rosbag2 folder behind some statements of SQL."""
+    (file,) = bag(folder).glob("*.db3")
+    with closing(sqlite3.connect(file)) as base:
+        for statement in statements:
+            base.execute(statement)
+        base.commit()
+    return file
+
+
+@pytest.mark.parametrize(
+    ("statements", "left", "told"),
+    [
+        (
+            [
+                "UPDATE messages SET timestamp = 'noon' WHERE rowid = 7",
+                "UPDATE messages SET data = 5 WHERE rowid = 9",
+            ],
+            198,
+            ("DAMAGED", "the file counts 200 messages and holds 198"),
+        ),
+        (
+            ["UPDATE messages SET topic_id = 99 WHERE rowid > 150"],
+            150,
+            (
+                "MESSAGES_LEFT_OUT",
+                "50 messages of no topic that the table 'topics' lists; left out",
+            ),
+        ),
+    ],
+)
+def test_rows_of_no_time_or_no_topic_are_counted(
+    statements: list[str], left: int, told: tuple[str, str], tmp_path: Path
+) -> None:
+    found = read_log(changed(tmp_path, *statements))
+    assert (len(found), lossy(found)) == (left, told)
+
+
+ENDLESS = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c)"
+
+
+@pytest.mark.parametrize(
+    ("statements", "told"),
+    [
+        (
+            [
+                "ALTER TABLE messages RENAME TO m",
+                f"CREATE VIEW messages AS {ENDLESS} SELECT 1 AS topic_id, x AS timestamp FROM c",
+            ],
+            "no table 'messages'",
+        ),
+        (["DROP TABLE topics"], "no table 'topics'"),
+        (["ALTER TABLE messages RENAME COLUMN data TO payload"], "no such column: data"),
+    ],
+)
+def test_a_database_that_is_no_bag_is_refused(
+    statements: list[str], told: str, tmp_path: Path
+) -> None:
+    with pytest.raises(LogError, match=told) as refused:
+        read_log(changed(tmp_path, *statements))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_type_whose_definition_the_file_lacks(tmp_path: Path) -> None:
+    """Files of older rosbag2 hold no definitions: the usual types are those of the rosbags
+    package.
+    """
+    kind = "std_msgs/msg/Float64MultiArray"
+    file = changed(
+        tmp_path,
+        "DELETE FROM message_definitions",
+        "DELETE FROM messages",
+        f"INSERT INTO topics VALUES (2, '/arm', '{kind}', 'cdr', '', '')",
+    )
+    store = STORES[1]
+    layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    rows = []
+    for stamp, *values in zip(LOG.stamp_ns.tolist(), *LOG.theta, *LOG.tau, strict=True):
+        lists = store.types[kind](layout=layout, data=np.array(values))
+        rows.append((2, stamp, bytes(store.serialize_cdr(lists, kind))))
+    with closing(sqlite3.connect(file)) as base:
+        base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
+        base.commit()
+    found = read_log(file, taken(*(f"data[{one}]" for one in range(4)), topic="/arm"))
+    assert np.array_equal(found.theta, LOG.theta)
+    assert np.array_equal(found.tau, LOG.tau)
