@@ -87,7 +87,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "tracks": room(
         "arm compiled criteria errors estimators files identification model names notices options "
         "profile report results runtime signals significance text verdict words",
-        "mcap numpy polars pyarrow pydantic",
+        "numpy polars pyarrow pydantic",
     ),
     "designs": room(
         "arm criteria errors estimators files identification limits log model names "
@@ -109,7 +109,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy plotly polars pydantic",
     ),
     "cli": room(
-        "api errors exits faults guard moved options profile report runtime settings text",
+        "api errors exits faults guard moved options profile progress report runtime settings text",
         "click rich",
     ),
 }  # fmt: skip

@@ -141,8 +141,8 @@ def typed(given: dict[str, Any]) -> dict[str, Any]:
 def answer(result: PlainResult, given: Mapping[str, Any]) -> Answer:
     """The estimates; 3 where the result must not be used as it is, 4 where data were lost."""
     from algid.base.files import result_folder
-    from algid.report.brief import brief
     from algid.report.page import result_document
+    from algid.report.terminal import brief
     from algid.results import result_json
 
     return Answer(

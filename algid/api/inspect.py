@@ -97,7 +97,7 @@ def profile_file(place: str | Path) -> Path:
 
 def answer(found: Inspection, given: Mapping[str, Any]) -> Answer:
     """The tables; of a log that would be refused 2, of a wrong convention 3, of lost data 4."""
-    from algid.report.inspected import inspection_content
+    from algid.report.terminal import inspection_content
 
     def shown() -> Iterator[Table | str]:
         width = shutil.get_terminal_size().columns

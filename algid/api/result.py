@@ -95,7 +95,7 @@ class Result(results.Result):  # noqa: D101
         return Figure({"data": panels.data, "layout": panels.layout})
 
     def __str__(self) -> str:
-        from algid.report.brief import brief
+        from algid.report.terminal import brief
 
         return "\n".join([self.subject, *brief(self)])
 

@@ -24,7 +24,7 @@ from algid import api
 from algid.api.signature import EMPTY, described, options_of
 from algid.base.exits import epilog
 from algid.base.text import lines_of
-from algid.cli.output import complain, shown
+from algid.cli.output import complain, progress, shown
 from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, VALUES, Option
 
 COMMANDS: Mapping[str, str] = {
@@ -125,7 +125,6 @@ def command(name: str) -> Command:
         """Call the verb with what is typed, print its answer, and end with its exit code."""
         from algid.api.options import set_by
         from algid.base.runtime import keep_freed
-        from algid.report.progress import progress
 
         keep_freed()
         as_json = name in PRINTED and typed.pop("format") == "json"

@@ -7,12 +7,14 @@ terminal.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from algid.api.answer import Manual
 from algid.base import text as letters
 from algid.base.errors import without_credentials
+from algid.base.progress import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderableType
@@ -103,3 +105,36 @@ def _print(part: Document | Table | str) -> None:
             terminal.print()
         else:
             print_document(part, terminal)
+
+
+@contextmanager
+def progress(unit: str, quiet: bool = False) -> Iterator[Progress | None]:
+    """Show a bar on standard error while the block runs, if that is a terminal.
+
+    Give what the block is to tell its progress to, None where nobody looks. What is done of each
+    stage is counted in `unit`. The bar is gone once the block has ended.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich import progress as bars
+
+    parts = (
+        bars.TextColumn("{task.description}", markup=False),
+        bars.BarColumn(None),  # as wide as there is room
+        bars.TextColumn("{task.fields[counts]}", markup=False),
+        bars.TimeRemainingColumn(),
+    )
+    screen = console(stderr=True)
+    with bars.Progress(*parts, console=screen, transient=True, redirect_stdout=False) as bar:
+
+        def shown(stage: str, done: int, total: int) -> None:
+            known = total if total >= max(done, 1) else None
+            counts = f"{done:,} of {known:,} {unit}" if known else f"{done:,} {unit}" * (done > 0)
+            if [(task.description, task.total) for task in bar.tasks] != [(stage, known)]:
+                for before in bar.task_ids:
+                    bar.remove_task(before)
+                bar.add_task(stage, total=known, counts=counts)
+            bar.update(bar.task_ids[0], completed=done, counts=counts)
+
+        yield shown

@@ -14,10 +14,9 @@ from algid.designs.campaign import ARMS, SECOND, Design
 from algid.designs.limits import Row
 from algid.model import UNITS
 from algid.notices import Notice, Remedy
-from algid.report.arm import ArmDrawing
 from algid.report.document import Document, Section, Table
 from algid.report.figures import shares_of_time
-from algid.report.plot import Panels
+from algid.report.plot import ArmDrawing, Panels
 
 # of what the margin leaves: a limit that is used as far is what keeps the error bars from being
 # less

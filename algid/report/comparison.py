@@ -19,7 +19,7 @@ from algid.base.text import ABSENT, file_name, joined, percent, visible
 from algid.base.verdict import Grade, Verdict
 from algid.base.words import counted
 from algid.report.document import Document, Section, Table
-from algid.report.plot import Panels, down
+from algid.report.plot import down
 from algid.report.render import page
 from algid.report.tables import settings_of
 from algid.results import Result
@@ -135,16 +135,34 @@ def compare(results: Sequence[Result], labels: Sequence[str] | None = None) -> C
     return Comparison(shown, results)
 
 
+def verdict(found: Comparison) -> Verdict:
+    """Whether the results agree: the largest distance, and whether chance explains it."""
+    far, count = found.largest_sigma, int(np.count_nonzero(~np.isnan(found.sigma)))
+    if far is None:
+        return Verdict("reservations", "no parameter has error bars in two results")
+    log, place = divmod(int(np.nanargmax(np.abs(found.sigma))), len(found.names))
+    words = f"{visible(found.names[place])} of {found.labels[log]}"
+    words += f" ({found.sigma[log, place]:+.1f} σ)"
+    grade: Grade = "good" if far <= FAR else "reservations"
+    return Verdict(grade, f"the largest of {counted(count, 'difference')} is {words}")
+
+
 def write_comparison(found: Comparison, path: Path, force: bool) -> None:
-    """Write the page of a comparison.
+    """Write the page of a comparison, with a figure of the distances from the first result.
 
     Raises
     ------
     OutputError
         If it cannot be written, or exists and `force` is not set.
     """
-    names, (estimates, settings) = found.labels, found.tables()
-    figure = _distances(found) if found.largest_sigma is not None else None
+    labels, figure, (estimates, settings) = found.labels, None, found.tables()
+    if found.largest_sigma is not None:
+        known = np.flatnonzero(~np.isnan(found.sigma).all(axis=0)).tolist()
+        names, reach = [found.names[place] for place in known], max(1.1 * found.largest_sigma, 4.0)
+        figure = down("distances", f"Distance from {labels[0]}, σ", names, reach)
+        for place, label in enumerate(labels[1:]):
+            figure.add(0, found.sigma[place + 1, known], names, label, f"result {place % 5}")
+        figure.mark(0, "chance", -NORMAL, NORMAL)
     document = Document(
         title="Comparison",
         verdict=verdict(found),
@@ -153,33 +171,9 @@ def write_comparison(found: Comparison, path: Path, force: bool) -> None:
             Section("settings", "Settings that differ", (settings,)),
         ),
         kicker="results side by side",
-        name=joined(names, 3),
-        facts=f"{counted(len(names), 'result')} · measured against {names[0]}",
+        name=joined(labels, 3),
+        facts=f"{counted(len(labels), 'result')} · measured against {labels[0]}",
         made=f"Made by algid {__version__}.",
     )
     with whole_file(path, force=force) as temporary:
         temporary.write_text(page(document), encoding="utf-8")
-
-
-def verdict(found: Comparison) -> Verdict:
-    """Whether the results agree: the largest distance, and whether chance explains it."""
-    size, count = found.largest_sigma, int(np.count_nonzero(~np.isnan(found.sigma)))
-    if size is None:
-        return Verdict("reservations", "no parameter has error bars in two results")
-    log, place = np.argwhere(np.abs(found.sigma) == size)[0].tolist()
-    words = f"{visible(found.names[place])} of {found.labels[log]}"
-    far = f"({found.sigma[log, place]:+.1f} σ)"
-    grade: Grade = "good" if size <= FAR else "reservations"
-    return Verdict(grade, f"the largest of {counted(count, 'difference')} is {words} {far}")
-
-
-def _distances(found: Comparison) -> Panels:
-    """How far each result is from the first, in σ of both intervals."""
-    known = np.flatnonzero(~np.isnan(found.sigma).all(axis=0)).tolist()
-    names = [found.names[place] for place in known]
-    reach = max(1.1 * (found.largest_sigma or 0.0), 4.0)
-    panels = down("distances", f"Distance from {found.labels[0]}, σ", names, reach)
-    for place, label in enumerate(found.labels[1:]):
-        panels.add(0, found.sigma[place + 1, known], names, label, f"result {place % 5}")
-    panels.mark(0, "chance", -NORMAL, NORMAL)
-    return panels

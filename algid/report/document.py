@@ -13,8 +13,7 @@ from typing import Literal
 
 from algid.base.text import ABSENT
 from algid.base.verdict import Verdict
-from algid.report.arm import ArmDrawing
-from algid.report.plot import Panels
+from algid.report.plot import ArmDrawing, Panels
 
 Kind = Literal["name", "number", "text", "status"]
 _SIZE = r"\d[\d.,]*(?:e[+-]?\d+)?"

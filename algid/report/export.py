@@ -19,16 +19,18 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from algid import __version__
 from algid.base.blocks import stacked
 from algid.base.files import whole_file
 from algid.base.progress import Progress
 from algid.base.ros2 import HEADER, check_stamps
-from algid.report.series import blocks, by_log, facts_of
+from algid.report.series import facts_of, stretches
 from algid.results import read_result
 
 if TYPE_CHECKING:
@@ -53,30 +55,32 @@ def export_mcap(folder: Path, progress: Progress | None = None) -> Path:
     OutputError
         If the log cannot be written.
     """
+    read_result(folder)
+    files = {name: folder / f"{name}.parquet" for name in ("torque", "estimates", "loaded")}
+    return write_mcap(folder / "estimates.mcap", files, progress)
+
+
+def write_mcap(path: Path, files: Mapping[str, Path], progress: Progress | None = None) -> Path:
+    """Write Parquet series as topics `/algid/NAME` by their names, a message a row.
+
+    A field is a column. A file that is not there is left out. Raises `ResultError`, `OutputError`.
+    """
     from mcap.writer import CompressionType, Writer
 
-    result = read_result(folder)
-    path = folder / "estimates.mcap"
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         writer = Writer(stream, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library=f"algid {result.version}")
-        for name in ("torque", "estimates", "loaded"):
-            write_series(writer, folder / f"{name}.parquet", name, progress)
+        writer.start(profile="ros2", library=f"algid {__version__}")
+        for name, file in files.items():
+            if file.is_file():
+                _write_series(writer, file, name, progress)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
 
-def write_series(writer: Writer, path: Path, name: str, progress: Progress | None = None) -> None:
-    """Write a Parquet series as topic `/algid/name`, a message a row and a field a column.
-
-    Nothing where there is no file.
-    """
-    if not path.is_file():
-        return
-    total, metadata = facts_of(path)
-    starts = json.loads(metadata.get(START_KEY, b"[]"))
-    channels, done = dict[int, int](), 0
-    for log, block in by_log(blocks(path, rows=ROWS)):
+def _write_series(writer: Writer, path: Path, name: str, progress: Progress | None) -> None:
+    _, metadata = facts_of(path)
+    starts, channels = json.loads(metadata.get(START_KEY, b"[]")), dict[int, int]()
+    for log, block in stretches(path, "export", progress, ROWS):
         names = [one for one in block if one not in ("log", "t")]
         if log not in channels:
             # as fields of ROS: k5+k3+z1+z2 is k5_k3_z1_z2
@@ -101,6 +105,3 @@ def write_series(writer: Writer, path: Path, name: str, progress: Progress | Non
         rows["numbers"] = stacked(block, names, axis=1)
         for stamp, row in zip(stamps.tolist(), rows, strict=True):
             writer.add_message(channels[log], stamp, row.tobytes(), stamp)
-        done += stamps.size
-        if progress is not None:
-            progress("export", done, total)

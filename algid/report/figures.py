@@ -6,6 +6,7 @@ damaged.
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from algid.arm import FloatArray
-from algid.base.blocks import rows_of
+from algid.base.blocks import rows_of, stacked
 from algid.base.quantiles import median, quantile
 from algid.base.text import file_name, joined, significant, unit_text
-from algid.model import K1, K3, K5
-from algid.report.plot import Panels, down
+from algid.model import K1, K3, K5, SINES, length_by_coupling, moments_of
+from algid.options import flag
+from algid.report.plot import ArmDrawing, Panels, down
 from algid.report.series import POINTS, Drawn, drawn, table
 from algid.results import Result
 from algid.results.rows import known_truth
@@ -38,6 +40,35 @@ def figures(folder: Path, result: Result, raw: Drawn | None) -> list[Panels]:
     return [plot for plot in made if plot is not None]
 
 
+def arm_of(result: Result, raw: Drawn | None) -> ArmDrawing | None:
+    """The arm of a result, to scale as far as its lengths are known, moved through the first log.
+
+    None where l1 follows from nothing, or no motion is at hand.
+    """
+    value = {name: one.estimate or 0.0 for name, one in result.parameters.items()}
+    held = result.settings | {name: one.estimate for name, one in result.payload.items()}
+    l1, l2, gravity = held.get("l1"), held.get("l2"), held.get("gravity")
+    if l1 is None and gravity is not None:
+        l1 = length_by_coupling(value, gravity)  # l1 = g |K1| / |K2| (Table 1)
+    if l1 is None or l1 <= 0 or raw is None:
+        return None
+    moved = rows_of(raw.samples, raw.samples["log"] == 0)
+    moved = rows_of(moved, np.isfinite(moved["theta1"] + moved["theta2"]))
+    if moved["t"].size < 2:
+        return None
+    theta = stacked(moved, ("theta1", "theta2"))
+    first, second, _ = moments_of(value)
+    if first and second and set(value) & set(SINES):
+        theta[0] += cmath.phase(second / first)  # θ1's zero against gravity
+    reading = f"Play it: does this arm move as yours did? l1 is {significant(l1, 3)} m."
+    if l2 is None or l2 <= 0:
+        l2, way = l1, flag("l2")
+        reading += f" Link 2's length is not known: it is drawn as long as link 1 (give {way})."
+    mass = held.get("m_p")
+    payload = "" if mass is None else f"payload of {significant(mass, 3)} kg"
+    return ArmDrawing(l1, l2, moved["t"], theta, reading, payload, aside=held.get("y_p") or 0.0)
+
+
 def _name_logs(panels: Panels, result: Result, rows: Drawn, count: int) -> None:
     """Draw a line where each of several logs begins, and its name in the first panel."""
     starts = rows.starts
@@ -48,38 +79,33 @@ def _name_logs(panels: Panels, result: Result, rows: Drawn, count: int) -> None:
             panels.text(0, file_name(result.logs[log].path), x)
 
 
-def _prediction(panels: Panels, place: int, below: int, x: FloatArray, of: Any, joint: int) -> None:
-    """Measured and predicted torque of a joint in one panel, what is left in that or another."""
-    panels.add(place, x, of[f"tau{joint}"], "measured")
-    panels.add(place, x, of[f"tau{joint}_predicted"], "predicted by the model")
-    panels.add(below, x, of[f"residual{joint}"], "residual")
-
-
 def torque(folder: Path, result: Result, raw: Drawn) -> Panels:
     """Measured and predicted torque as scored, with the residual as recorded beside."""
     panels = Panels("torque")
     shown = drawn(folder / "scored.parquet", POINTS // 2) or raw
-    for place, joint in ((0, 1), (2, 2)):
-        if shown is not raw:
-            panels.add(place + 1, raw["x"], raw[f"residual{joint}"], "residual as recorded")
-        _prediction(panels, place, place + 1, shown["x"], shown, joint)
+    if shown is not raw:
+        for joint in (1, 2):
+            name = "residual as recorded"
+            panels.add(2 * joint - 1, raw["x"], raw[f"residual{joint}"], name)
+    for place in range(4):
+        panels.draw(place, shown["x"], shown)
     _name_logs(panels, result, shown, 4)
     if result.fit is not None and result.fit.prediction is not None:
         panels.title += result.fit.prediction.band
     return panels
 
 
-def closeup(result: Result, raw: Drawn) -> Panels | None:
+def closeup(result: Result, raw: Drawn) -> Panels:
     """One second about the largest residual of each joint, every sample."""
     titles = []
     for joint, (size, t, log, _) in raw.worst.items():
         of = f" of {file_name(result.logs[log].path)}" if len(raw.starts) > 1 else ""
         titles.append(f"Joint {joint}: {significant(size, 3)} N m at {t:.3f} s{of}")
     panels = Panels("closeup", titles)
-    for place, (joint, (_, t, _, rows)) in enumerate(raw.worst.items()):
-        _prediction(panels, place, place, rows["t"] - t, rows, joint)
+    for place, (_, t, _, rows) in enumerate(raw.worst.values()):
+        panels.draw(place, rows["t"] - t, rows)
         panels.axes(place, "time from there, s", "N m")
-    return panels if titles else None
+    return panels
 
 
 def residual(folder: Path) -> Panels | None:
@@ -91,10 +117,8 @@ def residual(folder: Path) -> Panels | None:
     each = [(joint, kind) for joint in (1, 2) for kind in kinds]
     panels, inside = Panels("residual", [f"Joint {j}: {kind}" for j, kind in each]), []
     for place, (joint, kind) in enumerate(each):
-        own, measured = (
-            rows_of(rows, (rows["quantity"] == what) & (rows["joint"] == joint))
-            for what in (kind, "torque spectrum")
-        )
+        of_joint = rows_of(rows, rows["joint"] == joint)
+        own = rows_of(of_joint, of_joint["quantity"] == kind)
         x, y, low, high = own["x"], own["value"], own["low"], own["high"]
         panels.band(place, x, low, high, "95 % band of white noise")
         if kind == "autocorrelation":
@@ -103,6 +127,7 @@ def residual(folder: Path) -> Panels | None:
             panels.axes(place, "lag, s")
             inside.append(f"{np.count_nonzero((y >= low) & (y <= high))} of {y.size}")
             continue
+        measured = rows_of(of_joint, of_joint["quantity"] == "torque spectrum")
         if measured["x"].size:
             panels.add(place, measured["x"], measured["value"], "measured torque")
         panels.add(place, x, y, "residual")
@@ -118,10 +143,10 @@ def over_time(folder: Path, result: Result, name: str) -> Panels | None:
     if rows is None:
         return None
     known = result.estimates | (result.paper_payload if name == "loaded" else {})
-    names = [one for one in rows.columns if one in known and np.isfinite(rows[one]).any()]
-    names += ["condition"] if "condition" in rows.columns else []
-    titles = [f"{one}, {unit_text(known[one].unit)}" if one in known else one for one in names]
-    panels = Panels(name, titles)
+    titles = {n: f"{n}, {unit_text(one.unit)}" for n, one in known.items()}
+    titles["condition"] = "condition"
+    names = [one for one in rows.columns if one in titles and np.isfinite(rows[one]).any()]
+    panels = Panels(name, [titles[one] for one in names])
     for place, one in enumerate(names):
         value = np.where(np.isfinite(rows[one]), rows[one], np.nan)
         half = rows.columns.get(f"{one}_half", np.zeros(1))
@@ -129,7 +154,7 @@ def over_time(folder: Path, result: Result, name: str) -> Panels | None:
         if half.any():
             panels.band(place, rows["x"], low, high, "its 95 % interval")
         panels.add(place, rows["x"], value, "estimate from all samples so far")
-        if one == "condition":
+        if one not in known:
             panels.axes(place, y="logarithm")
             continue
         # what comes first, and spikes near singular instants, start outside the view
@@ -148,19 +173,17 @@ def over_time(folder: Path, result: Result, name: str) -> Panels | None:
 def signals(result: Result, raw: Drawn) -> Panels:
     """Angles, velocities and torques of all logs."""
     panels = Panels("signals")
-    for place, name in enumerate(("theta", "omega", "tau")):
-        for joint in (1, 2):
-            panels.add(place, raw["x"], raw[f"{name}{joint}"], f"joint {joint}")
+    for place in range(3):
+        panels.draw(place, raw["x"], raw)
     _name_logs(panels, result, raw, 3)
     return panels
 
 
 def coverage(raw: Drawn) -> Panels:
     """Where the motion went: angles and speeds."""
-    panels = Panels("coverage")
-    for place, (name, scale) in enumerate((("theta", 180 / np.pi), ("omega", 1.0))):
-        x, y = scale * raw.samples[f"{name}1"], scale * raw.samples[f"{name}2"]
-        panels.add(place, x, y, "samples")
+    panels, of = Panels("coverage"), raw.samples
+    panels.add(0, np.degrees(of["theta1"]), np.degrees(of["theta2"]), "samples")
+    panels.add(1, of["omega1"], of["omega2"], "samples")
     return panels
 
 
@@ -196,19 +219,17 @@ def inertia(result: Result, raw: Drawn | None) -> Panels | None:
     C = np.full((3, 3), np.nan) if result.fit is None else result.fit.covariance_of(names)
     degrees = np.linspace(-180.0, 180.0, 181)
     c, one = np.cos(np.radians(degrees)), np.ones(degrees.size)
-    panels, m = Panels("inertia"), []
-    # M is linear in k1, k3 and k5 (eq. (3)): these are its derivatives (3, n)
-    for name, slopes in (
-        ("M11", [2 * c, one, one]), ("M12 = M21", [c, one, 0 * c]), ("M22", [0 * c, one, 0 * c])
-    ):  # fmt: skip
-        J = np.array(slopes)
-        m.append(k @ J)
-        half = result.quantile * np.sqrt(np.maximum((J * (C @ J)).sum(axis=0), 0))
-        panels.band(0, degrees, m[-1] - half, m[-1] + half, "95 % interval")
-        panels.add(0, degrees, m[-1], name)
+    # M is linear in k1, k3 and k5 (eq. (3)): these are its derivatives (entry, constant, n)
+    J = np.array([[2 * c, one, one], [c, one, 0 * c], [0 * c, one, 0 * c]])
+    m, variance = k @ J, (J * (C @ J)).sum(axis=1)
+    half = result.quantile * np.sqrt(np.maximum(variance, 0))
+    panels = Panels("inertia")
+    for name, value, wide in zip(("M11", "M12 = M21", "M22"), m, half, strict=True):
+        panels.band(0, degrees, value - wide, value + wide, "95 % interval")
+        panels.add(0, degrees, value, name)
     if raw is not None:
         reached = np.degrees(raw["theta2"])
-        panels.mark(0, "reached", max(np.nanmin(reached), -180.0), min(np.nanmax(reached), 180.0))
+        panels.mark(0, "reached", np.nanmin(reached), np.nanmax(reached))
     smallest = np.linalg.eigvalsh(np.array([m[:2], m[1:]]).T).min()
     panels.note = f"The smallest eigenvalue of M is {significant(float(smallest), 3)} kg m²."
     return panels
@@ -222,12 +243,8 @@ def intervals(result: Result) -> Panels:
             known[name] = one.estimate
             shares.append(100 * one.half / abs(one.estimate))
     widest = min(max(shares, default=1.0), USUAL * median(shares or [1.0]), WIDEST)
-    panels = down(
-        "intervals",
-        "95 % interval, % of the estimate",
-        list(known),
-        1.15 * max(widest, 1e-6),
-    )
+    over = "95 % interval, % of the estimate"
+    panels = down("intervals", over, list(known), 1.15 * max(widest, 1e-6))
 
     def dots(pairs: Iterable[tuple[str, float | None]], name: str, **more: Any) -> None:
         at = [(of, value) for of, value in pairs if of in known and value is not None]

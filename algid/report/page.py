@@ -8,10 +8,8 @@ from algid.base.progress import Progress
 from algid.base.text import file_name, joined, significant
 from algid.base.words import counted
 from algid.methods import settles
-from algid.report.arm import arm_of
 from algid.report.document import Content, Document, Section
-from algid.report.figures import figures, intervals, over_time
-from algid.report.plot import Panels
+from algid.report.figures import arm_of, figures, intervals, over_time
 from algid.report.render import markdown, page, write_library, write_texts
 from algid.report.series import drawn
 from algid.report.tables import (
@@ -67,41 +65,39 @@ def result_document(
     """The report of an identification; with its `folder` also the figures and its samples."""
     fit, leads, raw = result.fit, settles(result.estimator), None
     names = [file_name(log.path) for log in result.logs]
-    plots, paper = list[Panels](), list[Content]()
     arm, other, zero = parameter_tables(result)
-    first = list[Content](arm)
+    first, plots, paper = list[Content](arm), list[Section](), list[Content]()
     if folder is not None:
         raw = drawn(folder / "torque.parquet", progress=progress)
-        plots = figures(folder, result, raw)
+        plots = [Section(one.key, one.title, [one]) for one in figures(folder, result, raw)]
         paper += [over_time(folder, result, name) for name in ("estimates", "loaded")]
         first.append(intervals(result) if fit is not None else None)
     if fit is not None:
         tried = {"logs used": fit.residual, "each log by the others": fit.cross_validation}
         first.append(prediction_table({name: one for name, one in tried.items() if one}))
-    parts = [Section(plot.key, plot.title, [plot]) for plot in plots]
-    judged, asked = result.verdict, replaced_estimator(result)
-    notes = [one.sentence for one in judged.notes]
+    asked = replaced_estimator(result)
+    notes = [one.sentence for one in result.verdict.notes]
     estimator = result.estimator if asked is None else f"{result.estimator}, in place of {asked}"
     origin = [("algid", result.version), ("estimator", estimator)]
     made_by = [settings_table(settings_of(result)), provenance_table(origin, result.logs)]
     title = "The paper's figure and tables"
-    of_paper = Section("paper", title, [*paper, *paper_tables(result)], not leads)
     may_be = f"{counted(len(zero.rows), 'term')} of the torque may be zero"
     sections = [
         Section("numbers", "Numbers", first),
-        *parts[:1],
+        *plots[:1],
         Section("terms", "Other terms of the torque", [other, terms_table(fit)]),
         Section("zero", may_be, [zero], folded=True),
-        *parts[1:],
+        *plots[1:],
         Section("fit", "Noise, whiteness and bounds", fit_tables(fit), folded=True),
         Section("data", "Data quality", [notes, *log_tables(result.logs)], folded=True),
         Section("settings", "Settings and provenance", made_by, folded=True),
     ]
+    of_paper = Section("paper", title, [*paper, *paper_tables(result)], not leads)
     sections.insert(1 if leads else len(sections), of_paper)
     constants = [row[4] for row in arm[0].rows]
     return Document(
         title=f"Identification of {names[0]}",
-        verdict=judged,
+        verdict=result.verdict,
         sections=sections,
         kicker="identification of a two-link arm",
         name=joined(names, 1),

@@ -1,4 +1,4 @@
-"""Panels for plotly's script: traces and layout as plain data, so that nothing is imported.
+"""What a page's script draws, as plain data: panels for plotly, and the arm with its motion.
 
 Texts that plotly shows may hold a little HTML: every name passes through `label`.
 """
@@ -9,6 +9,7 @@ import base64
 import html
 import tomllib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -18,9 +19,11 @@ import numpy as np
 from algid.arm import FloatArray
 from algid.base.text import visible
 
-LONGEST = 56
+LONGEST = 55
 FRAME, TICKS = 24, 55
 """Pixels of a figure around its panels, less those below the last; of a panel below its drawing."""
+FRAMES = 30.0  # a second
+MOST_FRAMES = 6_000
 
 
 class Panels:
@@ -38,20 +41,21 @@ class Panels:
     """What it shows in words."""
 
     def __init__(self, key: str, titles: Sequence[str] = (), height: int = 240) -> None:
-        own = _data()["figures"][key]
+        usual = {"titles": titles, "height": height, "columns": 1, "layout": {}, "curves": ()}
+        own: dict[str, Any] = usual | _data()["figures"][key]
         self.key, self.title, self.reading = key, own["title"], own["reading"]
-        titles, columns = titles or own["titles"], own.get("columns", 1)
-        height, rows = own.get("height", height), -(-len(titles) // columns)
-        grid = {"rows": rows, "columns": columns, "pattern": "independent"}
+        self.curves = own["curves"]
+        rows = -(-len(own["titles"]) // own["columns"])
+        grid = {"rows": rows, "columns": own["columns"], "pattern": "independent"}
         self.data: list[dict[str, Any]] = []
-        self.layout: dict[str, Any] = own.get("layout", {}) | {
-            "grid": grid | {"xgap": 0.12, "ygap": TICKS / height},
+        self.layout: dict[str, Any] = own["layout"] | {
+            "grid": grid | {"xgap": 0.12, "ygap": TICKS / own["height"]},
             "shapes": [],
             "annotations": [],
-            "height": height * rows + FRAME,
+            "height": own["height"] * rows + FRAME,
         }
-        for place, words in enumerate(titles):
-            self.axes(place, {"matches": "x"} if place and own.get("together") else "")
+        for place, words in enumerate(own["titles"]):
+            self.axes(place, {"matches": "x"} if place and "together" in own else "")
             self.text(place, words)
 
     def axes(self, place: int, x: dict[str, Any] | str = "", y: dict[str, Any] | str = "") -> None:
@@ -72,12 +76,18 @@ class Panels:
         trace |= {"xaxis": ref("x", place), "yaxis": ref("y", place)}
         self.data.append(trace | looks.get(look or name, looks["curve"]) | more)
 
+    def draw(self, place: int, x: FloatArray, of: Any) -> None:
+        """Add the curves that `figures.toml` has of a panel, `of` their columns by name."""
+        for column, name in self.curves[place].items():
+            self.add(place, x, of[column], name)
+
     def band(self, place: int, x: FloatArray, low: FloatArray, high: FloatArray, name: str) -> None:
         """Add the area between two series, an area for each stretch without a gap."""
         known = np.flatnonzero(np.isfinite(low) & np.isfinite(high))
         for part in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
-            around = np.concatenate([x[part], x[part][::-1]])
-            self.add(place, around, np.concatenate([high[part], low[part][::-1]]), name, "band")
+            around = np.concatenate([part, part[::-1]])
+            ends = np.concatenate([high[part], low[part][::-1]])
+            self.add(place, x[around], ends, name, "band")
 
     def mark(self, place: int, look: str, low: Any, high: Any = None, way: str = "x") -> None:
         """Add a line over the whole panel where an axis is `low`, or a band up to `high`."""
@@ -96,10 +106,10 @@ class Panels:
 
     def text(self, place: int, words: str, x: Any = None) -> None:
         """Add a text at the top of a panel, at `x`; without one it is the panel's title."""
-        at = {"x": x, "xref": ref("x", place), "yanchor": "top", "text": label(words)}
+        at = {"text": label(words), "x": x, "xref": ref("x", place), "yanchor": "top"}
         if x is None:
-            at |= {"x": 0, "xref": f"{ref('x', place)} domain", "yanchor": "bottom"}
-            at["text"] = f"<b>{at['text']}</b>"
+            at = {"text": f"<b>{at['text']}</b>", "x": 0, "yanchor": "bottom"}
+            at["xref"] = f"{ref('x', place)} domain"
         at |= {"y": 1, "yref": f"{ref('y', place)} domain", "xanchor": "left", "showarrow": False}
         self.layout["annotations"].append(at)
 
@@ -126,9 +136,7 @@ def ref(name: str, place: int) -> str:
 
 def label(text: str) -> str:
     """Foreign text for plotly, shown as it is, never as markup."""
-    shown = visible(text)
-    shown = shown if len(shown) <= LONGEST else shown[: LONGEST - 1] + "…"
-    return html.escape(shown, quote=False)
+    return html.escape(visible(text, LONGEST), quote=False)
 
 
 def packed(values: Any) -> Any:
@@ -148,3 +156,42 @@ def packed(values: Any) -> Any:
         "bdata": base64.b64encode(made.tobytes()).decode(),
         **shape,
     }
+
+
+@dataclass(frozen=True, eq=False)
+class ArmDrawing:
+    """The arm to scale, which stands as its motion begins; a script plays that and draws its path.
+
+    Parameters
+    ----------
+    l1, l2 : float, m
+    t : (N,), s, increasing
+    theta : (2, N), rad, θ1 from the horizontal, θ2 from link 1
+    reading : str
+        One line that says what to look at.
+    payload : str
+        What hangs at the tip, in words; empty where nothing does.
+    height : float, m, or None
+        Below which the tip may not come.
+    aside : float, m
+        How far beside link 2's line the payload's centre of mass lies.
+    """
+
+    l1: float
+    l2: float
+    t: FloatArray
+    theta: FloatArray
+    reading: str
+    payload: str = ""
+    height: float | None = None
+    aside: float = 0.0
+
+    @property
+    def frames(self) -> dict[str, list[float]]:
+        """Times and angles at `FRAMES` a second, fewer of a long motion."""
+        first, last = self.t[0], self.t[-1]
+        t = np.linspace(first, last, 2 + int(min((last - first) * FRAMES, MOST_FRAMES)))
+        frames = {"t": t}
+        for joint, angle in enumerate(self.theta, start=1):
+            frames[f"theta{joint}"] = np.interp(t, self.t, angle)
+        return {name: values.round(3).tolist() for name, values in frames.items()}

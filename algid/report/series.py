@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from algid.base.blocks import concatenated, rows_of
 from algid.base.criteria import CUT
 from algid.base.errors import ResultError
 from algid.base.progress import Progress
-from algid.base.quantiles import median
+from algid.base.quantiles import distinct, median
 
 Block = dict[str, FloatArray]
 AGAIN = "identify again with this version"
@@ -67,17 +66,25 @@ def blocks(path: Path, names: Sequence[str] = (), rows: int = ROWS) -> Iterator[
             yield {name: numbers_of(batch.column(name)) for name in batch.schema.names}
 
 
-def by_log(found: Iterator[Block]) -> Iterator[tuple[int, Block]]:
-    """Pairs of a log and its stretch of a block, with what a prediction leaves of the torque."""
-    for block in found:
+def stretches(
+    path: Path, stage: str, progress: Progress | None = None, rows: int = ROWS
+) -> Iterator[tuple[int, Block]]:
+    """Pairs of a log and its stretch of a block, with what a prediction leaves of the torque.
+
+    `progress` hears how many samples have been used. Raises `ResultError`.
+    """
+    (total, _), done = facts_of(path), 0
+    for block in blocks(path, rows=rows):
         for joint in (1, 2):
             if f"tau{joint}_predicted" in block:
                 left = block[f"tau{joint}"] - block[f"tau{joint}_predicted"]
                 block[f"residual{joint}"] = left
-        log = block.setdefault("log", np.zeros(block["t"].size))
-        firsts = np.flatnonzero(np.diff(log, prepend=-1)).tolist()
-        for first, last in pairwise([*firsts, log.size]):
-            yield int(log[first]), rows_of(block, slice(first, last))
+        logs = block.setdefault("log", np.zeros(block["t"].size))
+        for log in distinct(logs).tolist():
+            yield int(log), rows_of(block, logs == log)
+        done += logs.size
+        if progress is not None:
+            progress(stage, done, total)
 
 
 def table(path: Path) -> dict[str, NDArray[Any]]:
@@ -134,18 +141,18 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
     total, _ = facts_of(path)
     bucket, step = max(1, -(-2 * total // points)), max(1, total // SAMPLES)
     parts, samples, worst = list[Block](), list[Block](), dict[int, Any]()
-    period, done, starts = 0.0, 0, dict[int, float]()
-    for log, part in by_log(blocks(path)):
+    period, starts = 0.0, dict[int, float]()
+    for log, part in stretches(path, "report", progress):
         t = part["t"]
         if log not in starts:  # a hundredth is left between logs
             starts[log] = 1.01 * float(parts[-1]["x"][-1]) if parts else float(t[0])
             shift = starts[log] - t[0]
         part["x"] = t + shift
         period = max(period, median(np.diff(t)))  # NaN, of one sample, is not larger
-        for joint in (1, 2):
-            size = np.abs(np.nan_to_num(part.get(f"residual{joint}", np.zeros(1))))
+        for joint in (1, 2) if "residual2" in part else ():
+            size = np.abs(np.nan_to_num(part[f"residual{joint}"]))
             place = int(size.argmax())
-            if size[place] > worst.get(joint, (0.0,))[0]:
+            if size[place] > worst.get(joint, (-1.0,))[0]:
                 near = rows_of(part, np.abs(t - t[place]) <= HALF)
                 worst[joint] = float(size[place]), float(t[place]), log, near
         # which sample of a stretch moves by the golden ratio: never in step with the motion
@@ -153,9 +160,6 @@ def drawn(path: Path, points: int = POINTS, progress: Progress | None = None) ->
         at = np.minimum((step * (at + np.mod(at * GOLDEN, 1))).astype(int), t.size - 1)
         samples.append(rows_of(part, at))
         parts.append(reduced(part, bucket))
-        done += t.size
-        if progress is not None:
-            progress("report", done, total)
     if not parts:
         raise ResultError(f"{path}: it holds no rows; {AGAIN}")
     columns = concatenated(parts)

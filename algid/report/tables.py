@@ -91,27 +91,23 @@ def prediction_table(found: Mapping[str, TorquePrediction | None]) -> Table:
 
     Also of joints while they move and while they stand, where one stands at times.
     """
-    rows, filters = [], []
+    rows, filters = [], dict[str, None]()
     for where, one in found.items():
         if one is None:
             rows.append((where, "too short", *[ABSENT] * 6))
             continue
-        filters.append(f"Filter: {one.filter}.")
-        states: list[tuple[float | None, float | None]] = [(None, None)] * 3
-        if any(one.rmse_rest or ()):
-            known = (one.rmse_moving, one.rmse_rest, one.rmse_held)
-            states = [state or (None, None) for state in known]
-        for joint, rmse, nrmse, r2, *of in zip(
-            "12", one.rmse, one.nrmse, one.r2, *states, strict=True
-        ):
-            numbers = (significant(rmse, 3), significant(100 * nrmse, 3), f"{r2:.5f}")
-            rows.append((where, joint, *numbers, *(significant(value, 3) for value in of)))
-    note = " ".join(dict.fromkeys(filters))
+        filters[f"Filter: {one.filter}."] = None
+        stands = any(one.rmse_rest or ())
+        states = (one.rmse_moving, one.rmse_rest, one.rmse_held) if stands else (None,) * 3
+        for joint in (0, 1):
+            values = one.rmse[joint], 100 * one.nrmse[joint], *(of and of[joint] for of in states)
+            rmse, nrmse, *more = (significant(value, 3) for value in values)
+            rows.append((where, str(joint + 1), rmse, nrmse, f"{one.r2[joint]:.5f}", *more))
     return Table(
         "Torque prediction",
         "Torque of | Joint | RMSE, N m | RMSE / RMS, % | R² | Moving | At rest | Beyond ± f there",
         rows,
-        note,
+        " ".join(filters),
     )
 
 
@@ -188,19 +184,17 @@ def settings_table(settings: Mapping[str, Any]) -> Table:
 
 def settings_of(result: Result) -> dict[str, str]:
     """What was asked for, how the first log of each kind was read, and what the logs decided."""
-    used, model, fit = dict[str, Any](), result.torque_model, result.fit
+    every, model, fit = dict(result.settings), result.torque_model, result.fit
+    for log in reversed(result.logs):
+        if log.reading is not None:
+            every[f"{log.role} log"] = asdict(log.reading)
     if model is not None:
-        used["terms"] = ", ".join(model.terms) or "plain"
+        every["used.terms"] = ", ".join(model.terms) or "plain"
         if "coulomb" in model.terms:
-            used["Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
+            every["used.Coulomb friction over"] = f"{significant(model.coulomb_speed, 2)} rad/s"
     if fit is not None and fit.torque_hold is not None:
-        used["torque_hold"] = fit.torque_hold.used
-    read = {
-        f"{log.role} log": asdict(log.reading)
-        for log in reversed(result.logs)
-        if log.reading is not None
-    }
-    return flat_settings(result.settings | read | {"used": used})
+        every["used.torque_hold"] = fit.torque_hold.used
+    return flat_settings(every)
 
 
 def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
@@ -210,18 +204,17 @@ def flat_settings(settings: Mapping[str, Any], prefix: str = "") -> dict[str, st
         if isinstance(value, Mapping):
             flat |= flat_settings(value, f"{prefix}{name}.")
         else:
-            flat[f"{prefix}{name}"] = setting_text(value)
+            flat[f"{prefix}{name}"] = _in_profile(value)
     return flat
 
 
-def setting_text(value: object) -> str:
-    """A setting's value as one reads it in a profile."""
+def _in_profile(value: object) -> str:
     if isinstance(value, bool):
         return yes_or_no(value)
+    if isinstance(value, list | tuple):
+        value = ", ".join(map(_in_profile, value))
     if isinstance(value, float):
         return f"{value:.12g}"
-    if isinstance(value, list | tuple):
-        value = ", ".join(map(setting_text, value))
     return ABSENT if value in (None, "") else str(value)
 
 

@@ -12,14 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from algid.base.criteria import HOLE
-from algid.base.files import whole_file
 from algid.base.significance import NORMAL
 from algid.base.text import file_name, formatted, joined, resolved, significant
 from algid.base.verdict import Verdict, graded
 from algid.base.words import counted
 from algid.notices import Notice, has_code, lossy, notes_of, warnings_of
 from algid.report.document import Document, Section, Table
-from algid.report.export import write_series
+from algid.report.export import write_mcap
 from algid.report.plot import Panels
 from algid.report.render import markdown, page, write_texts
 from algid.report.series import reduced
@@ -91,14 +90,7 @@ def write_pages(result: TrackResult, folder: Path, mcap: bool = False) -> list[P
     pages = {"report.html": page(document), "report.md": markdown(document)}
     written = write_texts(folder, pages)
     if mcap:
-        from mcap.writer import CompressionType, Writer
-
-        written.append(folder / "track.mcap")
-        with whole_file(written[-1]) as temporary, temporary.open("wb") as stream:
-            writer = Writer(stream, compression=CompressionType.ZSTD)
-            writer.start(profile="ros2", library=f"algid {result.version}")
-            write_series(writer, folder / CURVE, "payload")
-            writer.finish()  # type: ignore[no-untyped-call]
+        written.append(write_mcap(folder / "track.mcap", {"payload": folder / CURVE}))
     return written
 
 

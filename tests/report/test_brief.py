@@ -8,7 +8,7 @@ import pytest
 
 import algid
 from algid.notices import Notice
-from algid.report.brief import WIDTH, brief
+from algid.report.terminal import WIDTH, brief
 from algid.results import Result
 from algid.results.model import TorqueModel
 from algid.settings import Settings

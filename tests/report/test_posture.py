@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from algid.report.arm import ArmDrawing, arm_of
+from algid.report.figures import arm_of
+from algid.report.plot import ArmDrawing
 from algid.report.series import Drawn, drawn
 from algid.results import Estimate, Result
 
