@@ -12,7 +12,7 @@ import random
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,22 +24,22 @@ from algid.base.errors import AlgidError
 from algid.base.files import refuse_links, whole_folder
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
-from algid.batches.records import JobStatus, stat_of
-from algid.batches.run import Batch, BatchConfig, sweep
+from algid.batches.job import Task
+from algid.batches.jobs import JobStatus, stat_of
+from algid.batches.run import Batch, sweep
 from algid.settings import Settings
 from pipelines.hostile.batches import furnish_output, grow, manifest, record
 
 
-class AtOnce(Executor):
+class AtOnce:
     """Ends every job at once: one of two with an empty result, the others as failed."""
 
     def __init__(self) -> None:
         self.ran = 0
 
-    def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
+    def submit(self, _fn: Callable[..., Any], task: Task) -> Future[Any]:
         """Run a task."""
         self.ran += 1
-        (task,) = args
         status = JobStatus.OK if len(task.job.name) % 2 else JobStatus.FAILED
         future: Future[Any] = Future()
         try:
@@ -110,8 +110,8 @@ def _run(jobs: list[Any], out: Path, executor: AtOnce) -> tuple[set[str], str | 
     """The jobs of the table that a batch leaves, and why it was stopped."""
     store = open_store(str(out))
     sweep(store)
-    recipe = BatchConfig(str(out), Settings(), lambda _file: None)
-    ended = Batch(store, recipe, executor, 1, lambda *_: None).run(jobs)
+    task_of = partial(Task, settings=Settings(), out=str(out))
+    ended = Batch(store, task_of, executor.submit, 1, lambda *_: None).run(jobs)
     if ended.stopped is not None:
         return set(), ended.stopped
     return set(pl.read_parquet(out / "jobs.parquet")["job"]), None

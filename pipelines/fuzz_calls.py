@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
-from algid.base.faults import EXIT_INTERNAL
+from algid.base.exits import Exit
 from algid.base.text import printable
 from pipelines.hostile import FINE
 from pipelines.hostile.calls import Call, draw_call
@@ -71,7 +71,7 @@ def judged(call: Call, code: int, out: str, err: str) -> tuple[str, str]:
     last = err.strip().splitlines()[-3:]
     if code == 142:
         return "hang", ""
-    if code == EXIT_INTERNAL:
+    if code == Exit.INTERNAL:
         return "internal", _trace(err)
     if "not enough memory" in err:
         return "memory", _trace(err)

@@ -22,7 +22,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "limits": room(),
     "units": room(),
     "options": room(),
-    "faults": room("errors guard options"),
+    "faults": room("errors exits guard options"),
     "progress": room(),
     "significance": room(),
     "criteria": room(),
@@ -59,7 +59,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
     "table4": room("arm estimators limits log model results synth"),
-    "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow zstandard"),
+    "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "
         "quantiles ros2 runtime units words",

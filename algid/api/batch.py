@@ -29,11 +29,10 @@ from algid.base.text import visible
 from algid.options import Option, flag
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    from concurrent.futures import Future
 
     from algid.base.progress import Progress
-    from algid.batches.jobs import Job
-    from algid.batches.records import JobRecord
+    from algid.batches.jobs import Job, JobRecord
     from algid.batches.run import Batched
     from algid.profile import Profile
     from algid.settings import Settings
@@ -132,8 +131,8 @@ def batch(
     """
     from algid.base.stores import absolute, open_store, shown
     from algid.batches.discover import jobs_of
-    from algid.batches.lock import locked
-    from algid.batches.run import Batch, BatchConfig, stopped_by_signals, sweep
+    from algid.batches.job import Task
+    from algid.batches.run import Batch, locked, stopped_by_signals, sweep
     from algid.identification.prior import statement_of
 
     if isinstance(sources, str | Path):
@@ -161,11 +160,19 @@ def batch(
             asked = asked.but(prior=absolute(asked.prior))
         names, place = [absolute(source) for source in names], absolute(place)
 
-    def profile_of(file: str | None) -> Profile | None:
+    @cache  # each file once
+    def profile_of(file: str) -> Profile | None:
         """That of a manifest's entry with the options over it."""
-        if file is None:
-            return said
         return meant(file, settings_of(None, file, options)[1])
+
+    def task_of(job: Job) -> Task:
+        of_job = said
+        try:
+            if job.profile is not None and job.trouble is None:
+                of_job = profile_of(job.profile)
+        except SettingError as error:
+            job = replace(job, trouble=str(error))
+        return Task(job, asked, place, of_job, known, report)
 
     def ended_job(last: JobRecord, done: int, total: int) -> None:
         if progress is not None:
@@ -174,7 +181,6 @@ def batch(
     def look() -> list[Job]:
         return jobs_of(names, place, "logs" if known is None else "loaded", links)
 
-    recipe = BatchConfig(place, asked, cache(profile_of), known, report)  # each file once
     jobs = [] if watch else look()
     if not (jobs or watch):
         raise SettingError(f"{' '.join(names)}: expected logs in MCAP, Parquet or CSV, found none")
@@ -187,9 +193,9 @@ def batch(
     with locked(place, shared=part is not None):
         sweep(store)
         try:
-            with _workers(place, scheduler, workers, memory_limit, timeout) as (executor, slots):
+            with _workers(place, scheduler, workers, memory_limit, timeout) as (submit, slots):
                 running = Batch(
-                    *(store, recipe, executor, slots, ended_job), shared=part is not None
+                    *(store, task_of, submit, slots, ended_job), shared=part is not None
                 )
                 with stopped_by_signals(running.stop):
                     if watch:
@@ -238,17 +244,17 @@ def answer(ended: Batched, _given: Mapping[str, Any]) -> Answer:
 @contextmanager
 def _workers(
     out: str, scheduler: str | None, workers: int | None, memory_limit: Any, timeout: float
-) -> Iterator[tuple[Executor, int]]:
-    """The workers, and how many jobs to hand out at once; they end with the block."""
+) -> Iterator[tuple[Callable[..., Future[Any]], int]]:
+    """What hands calls to workers, and how many at once; they end with the block."""
     from algid.base.runtime import cores
     from algid.base.stores import is_url
-    from algid.batches.records import FOLDER
+    from algid.batches.jobs import FOLDER
     from algid.batches.workers import Workers
 
     if scheduler is None:
         count = workers or cores()
         with Workers(count, memory_limit, timeout) as executor:
-            yield executor, 2 * count
+            yield executor.submit, 2 * count
         return
     from algid.batches.cluster import cluster
 

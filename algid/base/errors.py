@@ -8,10 +8,8 @@ exception.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 LONGEST_TEXT = 2000  # characters
-LONGEST_CHAIN = 100
 
 
 # What stands before the @ of a URL; a slash in it should have been written %2F, and may
@@ -80,13 +78,3 @@ def text_of(error: BaseException) -> str:
     if isinstance(error, AlgidError):
         return text
     return f"{type(error).__name__}: {text}"
-
-
-def chain_of(error: BaseException) -> Iterator[BaseException]:
-    """An exception and its causes, each once: chains may be circular, or very long."""
-    seen: set[int] = set()
-    following: BaseException | None = error
-    while following is not None and id(following) not in seen and len(seen) < LONGEST_CHAIN:
-        seen.add(id(following))
-        yield following
-        following = following.__cause__ or following.__context__

@@ -13,12 +13,9 @@ from pathlib import Path
 from types import TracebackType
 
 from algid.base.errors import AlgidError, text_of
+from algid.base.exits import Exit
 from algid.guard import TRACEBACK, reading
 from algid.options import flag
-
-EXIT_USAGE = 2
-EXIT_INTERNAL = 70
-"""The number that sysexits.h gives to an internal error."""
 
 _OWN = str(Path(__file__).parents[1]) + os.sep
 _MEANT = (AlgidError, SystemExit, KeyboardInterrupt, GeneratorExit)
@@ -55,7 +52,7 @@ def fault(error: BaseException) -> tuple[str, int]:
     str
         What could not be done, why, and what to do.
     int
-        `EXIT_USAGE` where memory, the system or a library refused a file; `EXIT_INTERNAL` where
+        `Exit.USAGE` where memory, the system or a library refused a file; `Exit.INTERNAL` where
         algid is wrong.
     """
     place = ""
@@ -67,18 +64,18 @@ def fault(error: BaseException) -> tuple[str, int]:
     trace = f"see where with {TRACEBACK}=1"
     if isinstance(error, MemoryError):
         cut = f"{flag('start')} and {flag('end')}"
-        return f"{place}not enough memory ({reason}); cut the log with {cut}", EXIT_USAGE
+        return f"{place}not enough memory ({reason}); cut the log with {cut}", Exit.USAGE
     if isinstance(error, OSError) and error.strerror:
         what = error.strerror
         if error.filename is not None:
             what = f"{error.filename}: {what}"
-        return f"{place}{what}; mend that and run it again, or {trace}", EXIT_USAGE
+        return f"{place}{what}; mend that and run it again, or {trace}", Exit.USAGE
     if place and not _ours(error.__traceback__):
         remedy = "look at the file, or write it anew in another format"
-        return f"{place}a library cannot take it ({reason}); {remedy}; {trace}", EXIT_USAGE
+        return f"{place}a library cannot take it ({reason}); {remedy}; {trace}", Exit.USAGE
     return (
         f"internal error: {place}{reason}; this is a fault of algid: report it, {trace}",
-        EXIT_INTERNAL,
+        Exit.INTERNAL,
     )
 
 

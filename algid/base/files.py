@@ -16,7 +16,8 @@ import stat
 import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -62,15 +63,14 @@ def refuse_links(folder: Path, name: str) -> None:
             )
 
 
-@contextmanager
-def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterator[Path]:
+def whole_file(path: Path, *, force: bool = True) -> AbstractContextManager[Path]:
     """Give a temporary name beside `path` to write to; it becomes `path` when the block ends well.
+
+    What killed runs left there is deleted first, once a folder: this looks through it.
 
     Parameters
     ----------
     path : Path
-    sweep : bool
-        Delete first what killed runs left there: this looks through the folder.
     force : bool
         Replace one that exists, also one that another process has made meanwhile.
 
@@ -79,21 +79,28 @@ def whole_file(path: Path, *, sweep: bool = True, force: bool = True) -> Iterato
     OutputError
         If the folder cannot be made or written to, or the file exists and `force` is not set.
     """
-    with _whole(path, Path.touch, sweep=sweep, force=force) as temporary:
-        yield temporary
+    return _whole(path, Path.touch, force)
+
+
+def whole_folder(folder: Path, force: bool) -> AbstractContextManager[Path]:
+    """Give a temporary folder to write to; see `whole_file`, whose errors it raises.
+
+    A folder that is replaced stands there, whole, until its successor does.
+    """
+    return _whole(folder, Path.mkdir, force)
+
+
+_delete_leftovers_once = cache(delete_leftovers)
 
 
 @contextmanager
-def _whole(
-    place: Path, make: Callable[[Path], None], *, sweep: bool, force: bool
-) -> Iterator[Path]:
+def _whole(place: Path, make: Callable[[Path], None], force: bool) -> Iterator[Path]:
     """A temporary file or folder by `make`, which becomes `place` when the block ends well."""
     refuse_existing(place, force)
     with ExitStack() as stack:
         with writing(place, "cannot write there"):
             place.parent.mkdir(parents=True, exist_ok=True)
-            if sweep:
-                delete_leftovers(place.parent)
+            _delete_leftovers_once(place.parent.absolute())
             temporary = stack.enter_context(staged(place, make))
         with writing(place):
             yield temporary
@@ -279,30 +286,6 @@ def refuse_existing(folder: Path, force: bool) -> None:
     refuse_url(folder)
     if os.path.lexists(folder) and not force:
         raise OutputError(EXISTS.format(folder))
-
-
-@contextmanager
-def whole_folder(folder: Path, force: bool, *, sweep: bool = True) -> Iterator[Path]:
-    """Give a temporary folder to write to; it becomes `folder` when the block ends well.
-
-    A folder that is replaced stands there, whole, until its successor does.
-
-    Parameters
-    ----------
-    folder : Path
-    force : bool
-        Replace one that exists.
-    sweep : bool
-        As of `whole_file`.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be made or written to, or exists and `force` is not set, at the start
-        or at the end.
-    """
-    with _whole(folder, Path.mkdir, sweep=sweep, force=force) as temporary:
-        yield temporary
 
 
 def remove_whole(place: Path) -> None:

@@ -19,11 +19,11 @@ import ctypes
 import os
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from itertools import islice
-from typing import Any, TypeVar
+from typing import TypeVar
 
 _VARIABLES = (
     "OPENBLAS_NUM_THREADS",
@@ -88,49 +88,35 @@ def keep_to_one_core() -> None:
     _has_other_cores = False
 
 
-def executor(threads: int) -> Executor:
-    """Threads for work beside other work.
-
-    Where the process keeps to one core, calls run as they are handed in.
-    """
-    from concurrent.futures import ThreadPoolExecutor
-
-    return ThreadPoolExecutor(threads) if _has_other_cores else _AtOnce()
-
-
-class _AtOnce(Executor):
-    """Runs each call in the thread that hands it in."""
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        done: Future[Any] = Future()
-        _settle(done, partial(fn, *args, **kwargs))
-        return done
-
-
-def _settle(done: Future[T], work: Callable[[], T]) -> None:
-    """Let a future have what the work gives, or its exception."""
-    try:
-        done.set_result(work())
-    except Exception as error:  # handed to whoever asks for the result
-        done.set_exception(error)
-
-
 def beside(work: Callable[[], T]) -> Future[T]:
     """A piece of work in a thread of its own, which does not keep the process alive.
 
     Done at once on one core.
     """
     done: Future[T] = Future()
+
+    def settle() -> None:
+        try:
+            done.set_result(work())
+        except BaseException as error:  # handed to whoever asks for the result
+            done.set_exception(error)
+
     if _has_other_cores:
-        threading.Thread(target=_settle, args=(done, work), daemon=True).start()
+        threading.Thread(target=settle, daemon=True).start()
     else:
-        _settle(done, work)
+        settle()
     return done
 
 
 def ahead(source: Iterator[T]) -> Iterator[T]:
-    """The same items, the next one being made in a thread of its own while the last one is used."""
-    with executor(1) as pool:
+    """The same items, the next one being made in a thread of its own while the last one is used.
+
+    On one core each is made when it is asked for.
+    """
+    if not _has_other_cores:
+        yield from source
+        return
+    with ThreadPoolExecutor(1) as pool:
         coming = pool.submit(list, islice(source, 1))
         while item := coming.result():
             coming = pool.submit(list, islice(source, 1))

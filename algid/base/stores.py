@@ -87,7 +87,7 @@ class Store:
         """Write the whole file. Raises `OutputError`."""
         if self.folder is not None:
             refuse_links(self.folder, name)
-            with whole_file(self.folder / name, sweep=False) as temporary:
+            with whole_file(self.folder / name) as temporary:
                 temporary.write_bytes(content)
             return
         with (

@@ -15,7 +15,6 @@ from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from algid import __version__
@@ -71,8 +70,10 @@ def _slots(timeout: float | None) -> Workers:
 
 
 @contextmanager
-def cluster(address: str, out: Path | None, timeout: float | None) -> Iterator[tuple[Any, int]]:
-    """What hands jobs to a Dask cluster by its `submit`, and how many at once.
+def cluster(
+    address: str, out: Path | None, timeout: float | None
+) -> Iterator[tuple[Callable[..., Future[Any]], int]]:
+    """What hands calls to a Dask cluster, and how many at once.
 
     Raises
     ------
@@ -86,8 +87,8 @@ def cluster(address: str, out: Path | None, timeout: float | None) -> Iterator[t
         remedy = "Dask is not installed; pip install 'algid[dask]'"
         raise SettingError(f"{flag('scheduler')}: {remedy}") from error
     # its tracebacks of a lost scheduler; the batch says it in a line
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
 
     async def greet() -> None:  # a client would wait for one that says nothing
         async with rpc(address, timeout=SECONDS) as scheduler:  # type: ignore[no-untyped-call]
@@ -113,7 +114,7 @@ def cluster(address: str, out: Path | None, timeout: float | None) -> Iterator[t
             future: Future[Any] = executor.submit(job, pickle.dumps((out, timeout, fn, args)))
             return future
 
-        yield SimpleNamespace(submit=submit), 2 * threads
+        yield submit, 2 * threads
     finally:
         with suppress(Exception):  # of a scheduler that is gone
             client.close(timeout=SECONDS)

@@ -26,7 +26,8 @@ BAG = "metadata.yaml"
 """What makes a folder a bag."""
 MOST_NAMED = 8
 """Logs of one name that are listed."""
-_ROLE = re.compile(r"(?P<base>.+)[-_](?P<role>unloaded|loaded)")
+_ENDINGS = "|".join(map(re.escape, SUFFIXES))
+_NAME = re.compile(rf"(.+?)(?:[-_](unloaded|loaded))?(?i:{_ENDINGS})?", re.DOTALL)
 
 
 def jobs_of(
@@ -74,7 +75,11 @@ def _logs(source: str, out: str, links: list[str]) -> list[Found]:
     path = Path(source)
     if is_url(source) or (path.is_dir() and not _is_bag(source)):
         below = _below(source, out, links)
-        return [one for one in below if one[2] or _is_log(one[1]) or _is_bag(one[0])]
+        return [
+            (one, name, trouble)
+            for one, name, trouble in below
+            if trouble or name.lower().endswith(SUFFIXES) or _is_bag(one)
+        ]
     if path.exists():
         return [(source, path.name, None)]
     first, _, last = source.partition("**") if "**" in path.parts else (source, "", None)
@@ -114,29 +119,23 @@ def _below(source: str, out: str, links: list[str]) -> Iterator[Found]:
         )
 
     if is_url(source):
-        for url, name in list_urls(source):
-            if not is_passed_over(name):
-                yield url, name, None
+        yield from (
+            (url, name, None) for url, name in list_urls(source) if not is_passed_over(name)
+        )
         return
     folder, unreadable = str(Path(source)), list[OSError]()
     for place, folders, names in os.walk(folder, onerror=unreadable.append):
-        below = place[len(folder) :].lstrip("/")
+        below = place[len(folder) :].strip("/")
         if BAG in names and below:
             folders.clear()
             yield place, below, None
             continue
-        entered = list[str]()
-        for name in folders:
-            if is_passed_over(f"{below}/{name}".lstrip("/")):
-                continue
-            if os.path.islink(f"{place}/{name}"):  # noqa: PTH114
-                links.append(f"{place}/{name}")
-            else:
-                entered.append(name)
-        folders[:] = entered
-        for name in (f"{below}/{name}".lstrip("/") for name in sorted(names)):
-            if not is_passed_over(name):
-                yield f"{folder}/{name}", name, None
+        below += "/" if below else ""
+        folders[:] = [name for name in folders if not is_passed_over(below + name)]
+        links += [f"{place}/{name}" for name in folders if Path(place, name).is_symlink()]
+        for name in sorted(names):
+            if not is_passed_over(below + name):
+                yield f"{place}/{name}", below + name, None
     for error in unreadable:
         place = str(error.filename)
         if place == folder:
@@ -149,17 +148,10 @@ def _is_bag(path: str) -> bool:
     return Path(path, BAG).is_file()
 
 
-def _is_log(name: str) -> bool:
-    return name.lower().endswith(SUFFIXES)
-
-
 def _job_of(path: str, name: str, trouble: str | None, alone: str) -> Job:
     """The job of one log; one whose name is unfit stands under another."""
-    if not trouble:
-        suffix = max((end for end in SUFFIXES if name.lower().endswith(end)), key=len, default="")
-        name = name[: len(name) - len(suffix)]
-    match = _ROLE.fullmatch(name)
-    name, role = (match["base"], match["role"]) if match else (name, alone)
+    match = _NAME.fullmatch(name)
+    name, role = match.groups(alone) if match else (name, alone)
     fault = name_fault(name)
     if fault and not trouble:
         trouble = f"{redacted_path(path)}: a log's name becomes a folder's: {fault}; rename it"

@@ -18,12 +18,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from algid import __version__
-from algid.base.errors import AlgidError, LogError, chain_of, text_of, without_credentials
+from algid.base.errors import AlgidError, LogError, text_of, without_credentials
 from algid.base.files import refuse_links, sha256_of, temporary_folder
 from algid.base.runtime import keep_freed, keep_to_one_core
 from algid.base.stores import is_url, open_store, put_folder, reading
-from algid.batches.jobs import Job, redacted_path
-from algid.batches.records import Input, JobRecord, JobStatus, stat_of
+from algid.batches.jobs import Input, Job, JobRecord, JobStatus, redacted_path, stat_of
 from algid.identification.identify import identify
 from algid.identification.open_logs import Staged
 from algid.options import flag
@@ -33,8 +32,6 @@ from algid.settings import Settings
 if TYPE_CHECKING:
     from algid.profile import Profile
 
-FULL = (os.strerror(errno.ENOSPC), os.strerror(errno.EDQUOT))
-"""What is said of a full disk, by libraries with exceptions of their own too."""
 TOO_LARGE = f"it needs more memory than a worker has; raise {flag('memory_limit')}"
 _PIECE = 1 << 23
 
@@ -48,33 +45,36 @@ class Task:
 
     job: Job
     settings: Settings
-    profile: Profile | None
-    parameters: Result | None
     out: str
-    report: bool
+    profile: Profile | None = None
+    parameters: Result | None = None
+    report: bool = True
 
     @cached_property
     def basis(self) -> str:
         """A hash of everything but the logs that decides the job's outcome."""
-        models = {"profile": self.profile, "parameters": self.parameters}
         content: dict[str, Any] = {
-            name: one and one.model_dump(mode="json") for name, one in models.items()
+            name: one and one.model_dump(mode="json")
+            for name, one in (("profile", self.profile), ("parameters", self.parameters))
         }
-        content |= {"settings": self.settings.as_json(), "report": self.report}
-        content |= {"version": __version__}
+        content |= {
+            "settings": self.settings.as_json(),
+            "report": self.report,
+            "version": __version__,
+        }
         prior = self.settings.prior or (self.profile and self.profile.prior)
         if prior:
             content["prior"] = sha256_of(Path(prior))
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
-    def record(self, status: JobStatus, reason: str, **known: Any) -> JobRecord:
-        """The job's record; `known` are other fields of it."""
-        if "inputs" not in known:
-            known["inputs"] = inputs_of(self.job)
+    def record(
+        self, status: JobStatus, reason: str, inputs: tuple[Input, ...] | None = None, **known: Any
+    ) -> JobRecord:
+        """The job's record; `inputs` are its logs as they are now by default."""
+        if inputs is None:
+            inputs = inputs_of(self.job)
         job, settings = redacted(self.job), self.settings.as_json()
-        return JobRecord(
-            job, status, reason, self.basis, settings=settings, version=__version__, **known
-        )
+        return JobRecord(job, status, reason, self.basis, inputs, settings, __version__, **known)
 
 
 def run_task(task: Task) -> JobRecord | str:
@@ -90,9 +90,9 @@ def run_task(task: Task) -> JobRecord | str:
     try:
         result = _identified(task)
     except BaseException as error:
-        if any(is_full(text_of(one)) for one in chain_of(error)):
-            return text_of(error)
         reason = TOO_LARGE if isinstance(error, MemoryError) else text_of(error)
+        if is_full(reason):
+            return reason
         seconds = time.perf_counter() - start
         return task.record(JobStatus.FAILED, reason, inputs=inputs, seconds=seconds)
     judged, hashes = result.verdict, {log.path: log.sha256 for log in result.logs}
@@ -127,8 +127,8 @@ def run_task(task: Task) -> JobRecord | str:
 
 
 def is_full(text: str) -> bool:
-    """Whether an exception's text says that there was no space left."""
-    return any(words in text for words in FULL)
+    """Whether a text says that there was no space left: libraries have exceptions of their own."""
+    return any(os.strerror(number) in text for number in (errno.ENOSPC, errno.EDQUOT))
 
 
 def redacted(job: Job) -> Job:
@@ -154,21 +154,17 @@ def inputs_of(job: Job) -> tuple[Input, ...]:
 
 def _identified(task: Task) -> Result:
     """Identify; what lies in an object store is fetched before and put there after."""
-    paths = task.job.logs + task.job.loaded
-    away = is_url(task.out)
+    job, away = task.job, is_url(task.out)
     if not away:
-        refuse_links(Path(task.out), task.job.name)
-    remote = any(map(is_url, (*paths, task.out)))
-    with temporary_folder() if remote else nullcontext(Path()) as stage:
-        place = (stage if away else Path(task.out)) / task.job.name
-        logs: list[str | Staged] = []
-        for number, path in enumerate(paths):
-            logs.append(fetched(path, stage / f"logs/{number}") if is_url(path) else path)
-        first_loaded = len(task.job.logs)
+        refuse_links(Path(task.out), job.name)
+    urls = [path for path in job.logs + job.loaded if is_url(path)]
+    with temporary_folder() if urls or away else nullcontext(Path()) as stage:
+        place = (stage if away else Path(task.out)) / job.name
+        copies = {url: fetched(url, stage / f"logs/{n}") for n, url in enumerate(urls)}
         try:
             result = identify(
-                logs[:first_loaded],
-                logs[first_loaded:],
+                [copies.get(path, path) for path in job.logs],
+                [copies.get(path, path) for path in job.loaded],
                 task.settings,
                 parameters=task.parameters,
                 profile=task.profile,
@@ -179,12 +175,11 @@ def _identified(task: Task) -> Result:
                 shared_library=not away,
             )
         except AlgidError as error:  # which names the copies
-            for log in logs:
-                if isinstance(log, Staged):
-                    error.args = (str(error).replace(str(log.path), log.url),)
+            for copy in copies.values():
+                error.args = (str(error).replace(str(copy.path), copy.url),)
             raise
         if away:
-            name = f"{task.job.name}.algid"
+            name = f"{job.name}.algid"
             put_folder(open_store(task.out), name, place.with_name(f"{place.name}.algid"))
         return result
 

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import fcntl
 import fnmatch
 import os
 import signal
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from algid import __version__
-from algid.base.errors import AlgidError, OutputError, SettingError, text_of
+from algid.base.errors import AlgidError, OutputError, text_of
+from algid.base.files import refuse_links
 from algid.base.staging import TEMPORARY, delete_leftovers
-from algid.base.stores import Store
+from algid.base.stores import Store, is_url
 from algid.batches.job import Task, is_full, redacted, run_task
-from algid.batches.jobs import TABLE, Job
-from algid.batches.records import (
+from algid.batches.jobs import (
     FAILURES,
+    FOLDER,
+    TABLE,
     Input,
+    Job,
     JobRecord,
     JobStatus,
     read_records,
@@ -32,23 +37,11 @@ from algid.batches.records import (
 )
 from algid.batches.table import write_jobs
 from algid.batches.workers import CallFailedError, WorkerDiedError
-from algid.profile import Profile
-from algid.results import Result
-from algid.settings import Settings
+from algid.options import flag
 
 LOOK_EVERY = 2.0  # s, for logs that have arrived
 _STOP_EVERY = 0.1  # s, for a stop
-
-
-@dataclass(frozen=True)
-class BatchConfig:
-    """What all jobs of a batch share; `profile` gives the profile of a job's file, or of none."""
-
-    out: str
-    settings: Settings
-    profile: Callable[[str | None], Profile | None]
-    parameters: Result | None = None
-    report: bool = True
+DYING = 2.0  # s that the processes of a killed batch may take to be gone
 
 
 @dataclass(frozen=True)
@@ -95,8 +88,8 @@ class Batch:
     Parameters
     ----------
     store : OUT
-    config : what its jobs share
-    executor : who runs them
+    task_of : gives what is to be done of a job
+    submit : hands a call to a worker, and gives its future
     slots : how many are handed out at once
     progress : called with the record of each job that ends, and how many of how many have
     shared : whether other batches do other jobs of the same OUT
@@ -105,15 +98,14 @@ class Batch:
     def __init__(
         self,
         store: Store,
-        config: BatchConfig,
-        executor: Executor,
+        task_of: Callable[[Job], Task],
+        submit: Callable[..., Future[Any]],
         slots: int,
         progress: Callable[[JobRecord, int, int], object],
         shared: bool = False,
     ) -> None:
-        self._shared = shared
-        self._store, self._config, self._executor = store, config, executor
-        self._slots, self._progress = slots, progress
+        self._store, self._task_of, self._submit = store, task_of, submit
+        self._slots, self._progress, self._shared = slots, progress, shared
         self._stopped: str | None = None
         self._ran = 0
         self._written = False
@@ -132,15 +124,9 @@ class Batch:
         which it cannot be known whether its logs and results are as they were fails this time and
         keeps what is known of it.
         """
-        waiting, unreachable, config = deque[Task](), dict[str, JobRecord](), self._config
-        for job in jobs:
-            before, profile = self.records.get(job.name), None
-            try:
-                if job.trouble is None:
-                    profile = config.profile(job.profile)
-            except SettingError as error:
-                job = replace(job, trouble=str(error))
-            task = Task(job, config.settings, profile, config.parameters, config.out, config.report)
+        waiting, unreachable = deque[Task](), dict[str, JobRecord]()
+        for task in map(self._task_of, jobs):
+            job, before = task.job, self.records.get(task.job.name)
             if job.trouble is not None:
                 ended = task.record(JobStatus.FAILED, job.trouble)
             elif before is None:
@@ -183,21 +169,19 @@ class Batch:
         Logs are taken once they are as the last look has seen them and hold something: others are
         still being written. A trouble is reported once.
         """
-        before, complaint = dict[str, tuple[Input, ...]](), ""
-        ended = self.run([])
+        ended, before, complaint = self.run([]), dict[str, Sequence[Input]](), ""
         while not self.stop.is_set():
-            jobs = list[Job]()
+            jobs, settled, now = list[Job](), list[Job](), dict[str, Sequence[Input]]()
             try:
                 jobs = look()
             except AlgidError as error:  # a store may be away for a while
                 if str(error) != complaint and complain is not None:
                     complain(str(error))
                 complaint = str(error)
-            now, settled = dict[str, tuple[Input, ...]](), list[Job]()
             for job in jobs:
                 now[job.name] = ()  # whoever reads it says why it cannot be looked at
                 with suppress(AlgidError):
-                    now[job.name] = tuple(map(stat_of, job.logs + job.loaded))
+                    now[job.name] = [stat_of(path) for path in job.logs + job.loaded]
                 held = job.trouble or all(one.size for one in now[job.name])
                 if held and now[job.name] == before.get(job.name):
                     settled.append(job)
@@ -234,7 +218,7 @@ class Batch:
             while waiting and len(running) < self._slots:
                 task = waiting.popleft()
                 try:
-                    future = self._executor.submit(run_task, task)
+                    future = self._submit(run_task, task)
                 except Exception as error:  # a client that is closed
                     future = Future()
                     future.set_exception(error)
@@ -263,11 +247,10 @@ class Batch:
             return task.record(JobStatus.KILLED, f"it took its worker with it: {ended!s:.80}")
         if isinstance(ended, CallFailedError):
             return task.record(JobStatus.FAILED, str(ended))
-        if isinstance(ended, str):
-            self._stop_because(ended)
-        else:  # no process can be started, a cluster is lost
+        if not isinstance(ended, str):  # no process can be started, a cluster is lost
             why = text_of(ended).removeprefix("Exception: ").partition("\n")[0]
-            self._stop_because(f"no worker can run jobs ({why})")
+            ended = f"no worker can run jobs ({why})"
+        self._stop_because(ended)
         return None
 
     def _keep(self, record: JobRecord) -> bool:
@@ -294,6 +277,52 @@ class Batch:
         remedy = "make room and run again" if is_full(reason) else "run again"
         self._stopped = self._stopped or f"{reason}; {remedy}: what is finished is kept"
         self.stop.set()
+
+
+@contextmanager
+def locked(out: str, shared: bool = False) -> Iterator[None]:
+    """Hold OUT, or share it with others that share it; the system lets go of it with the process.
+
+    The file that stands for it stays: two processes that find none would lock two. Object stores
+    have no locks: two batches that run on one URL at the same time do the same jobs twice, and each
+    leaves a ``jobs.parquet`` of what it knows. Every object is whole all the same, and the next
+    batch takes up all records.
+
+    Raises
+    ------
+    OutputError
+        If another batch of this machine holds it, or it cannot be made.
+    """
+    if is_url(out):
+        yield
+        return
+    path = Path(out, FOLDER, "lock")
+    refuse_links(Path(out), f"{FOLDER}/lock")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+    except OSError as error:
+        raise OutputError(
+            f"{out}: cannot write there ({error.strerror}); choose another folder with "
+            f"{flag('out')}"
+        ) from error
+    kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+    until = time.monotonic() + DYING
+    try:
+        while True:
+            try:
+                fcntl.flock(handle, kind | fcntl.LOCK_NB)
+                break
+            except BlockingIOError as error:
+                if time.monotonic() > until:
+                    raise OutputError(
+                        f"{out}: another batch is at work there; wait for it or choose another "
+                        f"{flag('out')}"
+                    ) from error
+                time.sleep(0.02)
+        yield
+    finally:
+        os.close(handle)
 
 
 @contextmanager

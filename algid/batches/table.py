@@ -9,8 +9,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from algid.base.stores import Store
-from algid.batches.jobs import TABLE, utc_of
-from algid.batches.records import JobRecord
+from algid.batches.jobs import TABLE, JobRecord, utc_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -48,13 +47,13 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
     kinds: dict[str, Any] = dict.fromkeys(COLUMNS, pl.String)
     kinds |= {"time": pl.Datetime("us", "UTC"), "seconds": pl.Float64, "log_seconds": pl.Float64}
     kinds |= {"reasons": texts, "logs": texts, "sha256": texts, "size": sizes, "changed": times}
-    rows = list[dict[str, Any]]()
-    labels = {name for one in records for name in one.job.labels}
-    words = set[str]()  # labels that are not numbers in every job
-    for one in records:
-        words |= {name for name, label in one.job.labels.items() if type(label) in (str, bool)}
+    rows, labels = list[dict[str, Any]](), dict[str, Any]()
+    for one in records:  # text, unless they are numbers in every job
+        for name, label in one.job.labels.items():
+            if type(label) in (str, bool) or name not in labels:
+                labels[name] = pl.String if type(label) in (str, bool) else pl.Float64
     for name in sorted(labels):
-        kinds[f"label_{name}"] = pl.String if name in words else pl.Float64
+        kinds[f"label_{name}"] = labels[name]
     for name in sorted({name for one in records for name in one.estimates}):
         kinds |= {name: pl.Float64, f"{name}_std": pl.Float64, f"{name}_status": pl.String}
     for one in records:
@@ -62,16 +61,12 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         row |= {"time": time_of(one), "settings": json.dumps(one.settings, sort_keys=True)}
         row |= {column: [getattr(log, name) for log in one.inputs] for column, name in _OF_LOGS}
         for name, label in one.job.labels.items():
-            row[f"label_{name}"] = str(label) if name in words else label
+            row[f"label_{name}"] = str(label) if labels[name] == pl.String else label
         for name, numbers in one.estimates.items():
             row |= zip((name, f"{name}_std", f"{name}_status"), numbers, strict=True)
         rows.append(row)
-    return pl.DataFrame(
-        [
-            pl.Series(name, [row.get(name) for row in rows], kind, strict=False)
-            for name, kind in kinds.items()
-        ]
-    )
+    columns = {name: [row.get(name) for row in rows] for name in kinds}
+    return pl.DataFrame(columns, kinds, strict=False)
 
 
 def time_of(record: JobRecord) -> datetime | None:

@@ -71,9 +71,9 @@ class Workers(ThreadPoolExecutor):
         paths = os.pathsep.join(map(os.path.abspath, sys.path))
         self._environment = {**os.environ, **dict.fromkeys(THREADS, "1"), "PYTHONPATH": paths}
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Run ``fn(*args, **kwargs)`` in a worker."""
-        return super().submit(self._answer, (fn, args, kwargs))
+    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]:  # type: ignore[override]
+        """Run ``fn(*args)`` in a worker."""
+        return super().submit(self._answer, (fn, args))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
         """End the workers at once, whatever they do."""
@@ -153,8 +153,8 @@ def serve() -> None:
     while True:
         call = pipe.recv_bytes()
         try:
-            fn, args, kwargs = pickle.loads(call)
-            answer = True, fn(*args, **kwargs)
+            fn, args = pickle.loads(call)
+            answer = True, fn(*args)
         except BaseException as error:  # whatever a call raises becomes words
             answer = False, text_of(error)
         send(answer)

@@ -154,8 +154,7 @@ def identify(
     if out is None:
         return _identified(survey, settings, earlier, stated)
     folder = result_folder(sources[0].name, Path(out), name)
-    # a batch sweeps its whole output once
-    with whole_folder(folder, force, sweep=name is None) as temporary:
+    with whole_folder(folder, force) as temporary:
         result = _identified(survey, settings, earlier, stated, temporary, series=report)
         if command is not None:
             result = result.model_copy(update={"settings": result.settings | {"command": command}})

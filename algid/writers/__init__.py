@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
 
 from algid.base.errors import OutputError
-from algid.log import Log, Truth
+from algid.log import Log, Truth, add, word_sum
 
 FORMATS = ("mcap", "parquet", "csv")
 
@@ -55,3 +58,19 @@ def write_log(
         raise OutputError(f"{path}: expected a log of {', '.join(FORMATS)}, found {name!r:.60}")
     blocks = [log] if isinstance(log, Log) else log
     import_module(f"algid.writers.{name}").write(path, blocks, truth=truth, force=force)
+
+
+def columns(block: Log, sums: dict[str, int]) -> dict[str, NDArray[Any]]:
+    """Columns (N,) by canonical name, ``t`` in s first and ``stamp_ns`` last.
+
+    The sums of their words are added to `sums`, in place.
+    """
+    by_name: dict[str, NDArray[Any]] = {"t": block.stamp_ns / 1e9}
+    pairs = {"theta": block.theta, "tau": block.tau, "omega": block.omega, "q_des": block.reference}
+    for name, pair in pairs.items():
+        if pair is not None:
+            by_name |= {f"{name}1": pair[0], f"{name}2": pair[1]}
+    by_name["stamp_ns"] = block.stamp_ns
+    for name, values in by_name.items():
+        sums[name] = add(sums.get(name, 0), word_sum(values))
+    return by_name

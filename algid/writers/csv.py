@@ -7,7 +7,7 @@ from pathlib import Path
 
 from algid.base.files import whole_file
 from algid.log import Companion, Log, Truth
-from algid.writers.blocks import columns, summed
+from algid.writers import columns
 
 _EXACT_SECONDS_NS = 1 << 53
 """Stamps below 104 days survive as float64 seconds: half a unit in the last place is < 0.5 ns."""
@@ -37,10 +37,9 @@ def write(
                 if stamped is None:
                     whole = block.stamp_ns[0] >= 0 and block.stamp_ns[-1] < _EXACT_SECONDS_NS
                     stamped = not whole
-                by_name = columns(block)
+                by_name = columns(block, sums)
                 if not stamped:
-                    del by_name["stamp_ns"]
-                summed(sums, by_name)
+                    del by_name["stamp_ns"], sums["stamp_ns"]
                 pl.DataFrame(by_name).write_csv(stream, include_header=first)
     beside = path.with_name(path.name + ".truth.json")
     if truth is None:

@@ -2,7 +2,7 @@
 
 The angles that a controller was to follow are the positions of /joint_references.
 
-All messages of a chunk are laid out at once as rows of one structured array, since only the stamp
+The messages of a block are laid out at once as rows of one structured array, since only the stamp
 and the numbers differ between them.
 """
 
@@ -37,16 +37,9 @@ _QOS = """\
 
 
 def write(
-    path: Path,
-    blocks: Iterable[Log],
-    *,
-    truth: Truth | None = None,
-    chunk_size: int = _CHUNK,
-    force: bool = True,
+    path: Path, blocks: Iterable[Log], *, truth: Truth | None = None, force: bool = True
 ) -> None:
     """Write the blocks of a log; the truth goes into the metadata record "algid".
-
-    A chunk holds about `chunk_size` bytes of messages of one block at most.
 
     Raises
     ------
@@ -54,26 +47,30 @@ def write(
         If the file cannot be written there, or exists and `force` is not set, or a stamp is none
         of a ROS 2 header's.
     """
-    from mcap.records import Channel, Schema
+    from mcap.writer import CompressionType, Writer
 
-    from algid.writers.chunks import HEAD_BYTES, ChunkedFile
-
-    schema = Schema(1, JOINT_STATE_DEFINITION.encode(), "ros2msg", JOINT_STATE)
-    states, followed = (
-        Channel(number, topic, "cdr", {"offered_qos_profiles": _QOS}, schema.id)
-        for number, topic in enumerate((TOPIC, REFERENCES), start=1)
-    )
+    channels, count = dict[str, int](), 0
     with whole_file(path, force=force) as temporary, temporary.open("wb") as stream:
-        file = ChunkedFile(stream, schema)
+        writer = Writer(stream, chunk_size=_CHUNK, compression=CompressionType.ZSTD)
+        writer.start("ros2", "algid")
+        schema = writer.register_schema(JOINT_STATE, "ros2msg", JOINT_STATE_DEFINITION.encode())
         for block in blocks:
             check_stamps(path, block.stamp_ns)
-            rows = max(1, chunk_size // (HEAD_BYTES + messages(block.part(0, 1)).itemsize))
-            for first in range(0, len(block), rows):
-                part = block.part(first, min(first + rows, len(block)))
-                file.add(states, part.stamp_ns, messages(part))
-                if part.reference is not None:
-                    file.add(followed, part.stamp_ns, _filled(part, position=part.reference))
-        file.finish({KEY: {KEY: Companion(truth, {}).dumps()}} if truth is not None else {})
+            written = {TOPIC: messages(block)}
+            if block.reference is not None:
+                written[REFERENCES] = _filled(block, position=block.reference)
+            for topic in written:
+                if topic not in channels:
+                    qos = {"offered_qos_profiles": _QOS}
+                    channels[topic] = writer.register_channel(topic, "cdr", schema, qos)
+            for place, stamp in enumerate(block.stamp_ns.tolist()):
+                for topic, rows in written.items():
+                    content = rows[place].tobytes()
+                    writer.add_message(channels[topic], stamp, content, stamp, count)
+                count += 1
+        if truth is not None:
+            writer.add_metadata(KEY, {KEY: Companion(truth, {}).dumps()})
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 def messages(block: Log) -> NDArray[np.void]:

@@ -9,7 +9,7 @@ from algid.base.arrow import table_of_columns
 from algid.base.errors import OutputError
 from algid.base.files import whole_file
 from algid.log import KEY, Companion, Log, Truth
-from algid.writers.blocks import columns, summed
+from algid.writers import columns
 
 
 def write(
@@ -29,9 +29,7 @@ def write(
     with whole_file(path, force=force) as temporary:
         try:
             for block in blocks:
-                by_name = columns(block)
-                summed(sums, by_name)
-                table = table_of_columns(by_name)
+                table = table_of_columns(columns(block, sums))
                 # floats of a measured signal hardly ever repeat: a dictionary would only cost time
                 writer = writer or pq.ParquetWriter(
                     temporary,

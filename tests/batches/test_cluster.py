@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Executor, Future
+from concurrent.futures import CancelledError, Future
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -18,7 +19,7 @@ from algid.base.stores import open_store
 from algid.batches.cluster import job_of
 from algid.batches.job import Task
 from algid.batches.jobs import Job
-from algid.batches.run import Batch, BatchConfig
+from algid.batches.run import Batch
 from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.settings import Settings
 from tests.batches import calls
@@ -33,25 +34,24 @@ pytest.importorskip("distributed", reason="distributed is absent")
 def test_what_is_no_jobs_fault_ends_the_batch_and_what_is_fails_alone(tmp_path: Path) -> None:
     from distributed.scheduler import KilledWorker
 
-    class Lost(Executor):
-        def submit(self, *_call: Any, **_more: Any) -> Future[Any]:
-            outcome = outcomes.pop()
-            if isinstance(outcome, OSError):
-                raise outcome
-            done: Future[Any] = Future()
-            if isinstance(outcome, CallFailedError):
-                done.set_result(outcome)
-            else:
-                done.set_exception(outcome)
-            return done
+    def submit(*_call: Any) -> Future[Any]:
+        outcome = outcomes.pop()
+        if isinstance(outcome, OSError):
+            raise outcome
+        done: Future[Any] = Future()
+        if isinstance(outcome, CallFailedError):
+            done.set_result(outcome)
+        else:
+            done.set_exception(outcome)
+        return done
 
     killed = KilledWorker("run-1", cast(Any, SimpleNamespace(address="tcp://box:1")), 3)
-    config = BatchConfig(str(tmp_path), Settings(), lambda _file: None)
+    task_of = partial(Task, settings=Settings(), out=str(tmp_path))
     ends = list[Any]()
     faults: list[BaseException] = [CallFailedError("as asked"), WorkerDiedError("as asked"), killed]
     outcomes: list[BaseException] = [CancelledError(), OSError("as asked"), *reversed(faults)]
     while outcomes:
-        batch = Batch(open_store(str(tmp_path)), config, Lost(), 1, lambda *_: None)
+        batch = Batch(open_store(str(tmp_path)), task_of, submit, 1, lambda *_: None)
         ended = batch.run([Job("a", ("a.csv",))], retry_failed=True)
         ends.append(ended.stopped or ended.records[0].status.value)
     assert ends[:3] == ["failed", "killed", "killed"]
@@ -76,7 +76,7 @@ def test_a_worker_runs_jobs_of_its_own_version_that_see_the_output(tmp_path: Pat
 def test_no_secret_is_in_what_dask_prints_of_a_call() -> None:
     """Keys are made of the function's name; a worker logs the arguments of one that raises."""
     place = "s3://KEY:SECRET@lab/a.csv"
-    task = Task(Job("a", (place,)), Settings(), None, None, place, False)
+    task = Task(Job("a", (place,)), Settings(), place)
     assert "SECRET" not in f"{task!r} {task}"
     told = job_of("0.1")(pickle.dumps((None, None, calls.add, (task,))))
     assert isinstance(told, Exception)

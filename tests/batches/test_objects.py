@@ -8,8 +8,8 @@ import io
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
@@ -19,12 +19,11 @@ import algid
 from algid.base.errors import AlgidError, LogError, OutputError, without_credentials
 from algid.base.stores import connect, list_urls, open_store, put_folder
 from algid.batches.discover import jobs_of
-from algid.batches.job import fetched
-from algid.batches.records import JobStatus
-from algid.batches.run import Batch, BatchConfig, Batched
-from algid.settings import Settings
+from algid.batches.job import Task, fetched
+from algid.batches.jobs import JobStatus
+from algid.batches.run import Batch, Batched
 from algid.synth.sensors import Sensors
-from tests.batches.test_run import Here
+from tests.batches.test_run import WEAK, Here, batch_of
 from tests.objects import Served, s3
 from tests.processes import Outcome
 
@@ -69,17 +68,11 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-CONFIG = BatchConfig(
-    "", Settings(estimator="weak", model="plain"), lambda _file: None, report=False
-)
-
-
-def _run(served: Served, place: str | None = None, user: str = "", **recipe: Any) -> Batched:
+def _run(served: Served, place: str | None = None, user: str = "", report: bool = False) -> Batched:
     out = served.url("out", user) if place is None else place
     jobs = jobs_of([served.url("logs", user)], out)
-    return Batch(
-        open_store(out), replace(CONFIG, out=out, **recipe), Here(), 1, lambda *_: None
-    ).run(jobs)
+    task_of = partial(Task, settings=WEAK, out=out, report=report)
+    return Batch(open_store(out), task_of, Here().submit, 1, lambda *_: None).run(jobs)
 
 
 def _ends(ended: Batched) -> dict[str, JobStatus]:
@@ -230,13 +223,8 @@ def test_what_a_batch_wrote_below_its_source_is_no_log(
     for _ in range(2):
         jobs = jobs_of([served.url("")], out)
         assert [job.name for job in jobs] == ["logs/jobs", "logs/r 1/a"]
-        Batch(
-            open_store(out),
-            replace(CONFIG, out=out, report=True),
-            Here(),
-            1,
-            lambda *_: None,
-        ).run(jobs)
+        task_of = partial(Task, settings=WEAK, out=out)
+        Batch(open_store(out), task_of, Here().submit, 1, lambda *_: None).run(jobs)
 
 
 def _folder(place: Path, *names: str) -> Path:
@@ -282,16 +270,14 @@ def test_a_log_that_fails_once_changed_keeps_no_result(
     ]
 
 
-def _settings_fail(_file: str | None) -> None:
-    raise algid.base.errors.SettingError("no such profile")
-
-
 def test_a_job_that_fails_for_its_settings_keeps_the_result_of_its_log(
     served: Served, log: bytes
 ) -> None:
     open_store(served.url("logs")).write("a.csv", log)
     _run(served)
-    assert _ends(_run(served, profile=_settings_fail)) == {"a": JobStatus.FAILED}
+    for job in jobs_of([served.url("logs")], served.url("out")):
+        failed = replace(job, trouble="no such profile")
+        assert _ends(batch_of(served.url("out")).run([failed])) == {"a": JobStatus.FAILED}
     assert open_store(served.url("out")).exists("a.algid/result.json")
 
 

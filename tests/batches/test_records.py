@@ -16,36 +16,27 @@ import pytest
 from algid.base.errors import OutputError
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
-from algid.batches.jobs import Job, name_fault
-from algid.batches.lock import locked
-from algid.batches.records import (
+from algid.batches.jobs import (
     Input,
+    Job,
     JobRecord,
     JobStatus,
+    name_fault,
     read_records,
     record_name,
     write_record,
 )
-from algid.batches.run import Batch, BatchConfig, Batched, sweep
+from algid.batches.run import Batched, locked, sweep
 from algid.batches.workers import CallFailedError
-from algid.settings import Settings
-from tests.batches.test_run import Here
+from tests.batches.test_run import Here, batch_of
 
 
 def _fail(_name: str) -> None:
     raise CallFailedError("as asked")
 
 
-CONFIG = BatchConfig("", Settings(), lambda _file: None)
-
-
-def _batch(out: Path, executor: Here | None = None) -> Batch:
-    config = replace(CONFIG, out=str(out))
-    return Batch(open_store(str(out)), config, executor or Here(_fail), 1, lambda *_: None)
-
-
-def _run(logs: Path, out: Path, executor: Here | None = None) -> Batched:
-    return _batch(out, executor).run(jobs_of([str(logs)], str(out)))
+def _run(logs: Path, out: Path, here: Here | None = None) -> Batched:
+    return batch_of(out, here or Here(_fail)).run(jobs_of([str(logs)], str(out)))
 
 
 @pytest.fixture
@@ -107,7 +98,7 @@ def test_a_record_that_is_none_counts_as_none_and_is_told(
         encoding="utf-8",
         errors="surrogatepass",
     )
-    batch = _batch(out)
+    batch = batch_of(out, Here(_fail))
     assert list(batch.unreadable) == [".jobs/other.json"]
     assert "\n" not in batch.unreadable[".jobs/other.json"]
     assert len(batch.run(jobs_of([str(logs)], str(out))).records) == 2
@@ -222,17 +213,17 @@ def test_an_estimate_of_a_foreign_name_harms_no_other_column(logs: Path) -> None
 
 def test_the_table_is_written_for_changes_alone_and_touched_logs_run_again(logs: Path) -> None:
     out = logs.parent / "out"
-    executor = Here(_fail)
-    batch = _batch(out, executor)
+    here = Here(_fail)
+    batch = batch_of(out, here)
     jobs = jobs_of([str(logs)], str(out))
     batch.run(jobs)
     written = (out / "jobs.parquet").stat().st_ino
     batch.run(jobs)
-    assert executor.ran == ["a", "b"]
+    assert here.ran == ["a", "b"]
     assert (out / "jobs.parquet").stat().st_ino == written
     os.utime(logs / "a.csv", ns=(0, 10**18))
     assert batch.run(jobs).anew == {"of other logs": 1}
     (out / "jobs.parquet").unlink()
     batch.run(jobs)
-    assert executor.ran == ["a", "b", "a"]
+    assert here.ran == ["a", "b", "a"]
     assert pl.read_parquet(out / "jobs.parquet")["changed"].to_list()[0][0].year == 2001

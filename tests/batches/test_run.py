@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import shutil
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,9 @@ from algid.base.errors import OutputError
 from algid.base.stores import open_store
 from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
-from algid.batches.lock import locked
-from algid.batches.records import JobStatus
-from algid.batches.run import Batch, BatchConfig, Batched
+from algid.batches.job import Task
+from algid.batches.jobs import JobStatus
+from algid.batches.run import Batch, Batched, locked
 from algid.batches.workers import WorkerDiedError
 from algid.identification.identify import identify
 from algid.notices import Notice
@@ -33,18 +33,18 @@ from algid.synth.sensors import Sensors
 from pipelines.prior import urdf
 
 
-class Here(Executor):
-    """Runs a call where it is submitted; `before` may raise instead."""
+class Here:
+    """Runs a task where it is submitted; `before` may raise instead."""
 
     def __init__(self, before: Callable[[str], None] = lambda _name: None) -> None:
         self.before, self.ran = before, list[str]()
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, fn: Callable[[Task], Any], task: Task) -> Future[Any]:
         future: Future[Any] = Future()
-        self.ran.append(args[0].job.name)
+        self.ran.append(task.job.name)
         try:
-            self.before(args[0].job.name)
-            future.set_result(fn(*args, **kwargs))
+            self.before(task.job.name)
+            future.set_result(fn(task))
         except Exception as error:
             future.set_exception(error)
         return future
@@ -71,16 +71,17 @@ def logs(made: Path, tmp_path: Path) -> Path:
 
 
 WEAK = Settings(estimator="weak", model="plain")
-CONFIG = BatchConfig("", WEAK, lambda _file: None, report=False)
 
 
-def _run(
-    logs: Path, executor: Executor | None = None, recipe: BatchConfig = CONFIG, **more: bool
-) -> Batched:
+def batch_of(out: str | Path, here: Here | None = None, settings: Settings = WEAK) -> Batch:
+    """A batch on `out` that runs its jobs in this process."""
+    task_of = partial(Task, settings=settings, out=str(out), report=False)
+    return Batch(open_store(str(out)), task_of, (here or Here()).submit, 1, lambda *_: None)
+
+
+def _run(logs: Path, here: Here | None = None, settings: Settings = WEAK) -> Batched:
     out = logs.parent / "out"
-    store = open_store(str(out))
-    batch = Batch(store, replace(recipe, out=str(out)), executor or Here(), 1, lambda *_: None)
-    return batch.run(jobs_of([str(logs)], str(out)), **more)
+    return batch_of(out, here, settings).run(jobs_of([str(logs)], str(out)))
 
 
 def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None:
@@ -107,7 +108,7 @@ def test_a_bad_log_fails_alone_and_the_table_has_a_row_a_job(logs: Path) -> None
 
 
 def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here(), 1)))
+    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here().submit, 1)))
     quick: Any = {"estimator": "weak", "model": "plain", "report": False}
     out = logs.parent / "out"
     assert algid.batch(logs, out, **quick).anew == {}
@@ -126,12 +127,12 @@ def test_what_is_run_anew_is_told(logs: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_changed_prior_is_another_setting(logs: Path) -> None:
     prior, arm = logs.parent / "arm.urdf", load_case("case1").arm
-    recipe = replace(CONFIG, settings=WEAK.but(prior=str(prior)))
+    settings = WEAK.but(prior=str(prior))
     for one, count in ((arm, 3), (arm, 0), (replace(arm, m2=1.1 * arm.m2), 3)):
         prior.write_text(urdf(one))
-        executor = Here()
-        _run(logs, executor, recipe)
-        assert len(executor.ran) == count
+        here = Here()
+        _run(logs, here, settings)
+        assert len(here.ran) == count
 
 
 def test_a_job_that_kills_its_workers_is_set_aside(logs: Path) -> None:
@@ -153,9 +154,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
 
     def full(*args: Any, **more: Any) -> Any:
         if more["name"] == "a":
-            raise OutputError("r1/a: cannot write") from OSError(
-                errno.ENOSPC, "No space left on device"
-            )
+            raise OutputError("r1/a: cannot write (No space left on device)")
         return identify(*args, **more)
 
     monkeypatch.setattr("algid.batches.job.identify", full)
@@ -169,7 +168,7 @@ def test_a_full_disk_stops_the_batch_and_keeps_what_is_finished(
 def test_parts_share_an_output_and_its_table_is_of_all(
     logs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here(), 1)))
+    monkeypatch.setattr("algid.api.batch._workers", lambda *_: nullcontext((Here().submit, 1)))
     out = logs.parent / "out"
     quick: Any = {"estimator": "weak", "model": "plain", "report": False}
     with locked(str(out), shared=True):  # as another part holds it

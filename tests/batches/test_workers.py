@@ -29,7 +29,7 @@ def workers() -> Iterator[Workers]:
 
 
 def test_answers_and_errors_come_back(workers: Workers) -> None:
-    assert workers.submit(calls.add, 2, b=3).result() == 5
+    assert workers.submit(calls.add, 2, 3).result() == 5
     with pytest.raises(CallFailedError, match="ValueError: as asked"):
         workers.submit(calls.fail).result()
 

@@ -18,8 +18,7 @@ import algid
 from algid.api.batch import answer
 from algid.api.compare import labels_of as labels
 from algid.base.errors import SettingError
-from algid.batches.jobs import Job
-from algid.batches.records import JobRecord, JobStatus
+from algid.batches.jobs import Job, JobRecord, JobStatus
 from algid.batches.run import Batch, Batched
 from algid.cli.output import shown
 from algid.designs.prior import PriorKnowledge, prior_of

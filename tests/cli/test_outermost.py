@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 import algid.cli
-from algid.base.faults import EXIT_INTERNAL
+from algid.base.exits import Exit
 from algid.base.text import printable
 from algid.cli.output import console
 from tests.cli.commands import call
@@ -112,10 +112,10 @@ def test_a_fault_of_algid_is_called_one(
         "attribute 'name'; "
         "this is a fault of algid: report it, see where with ALGID_TRACEBACK=1\n"
     )
-    assert run("inspect", "log.csv") == (EXIT_INTERNAL, line)
+    assert run("inspect", "log.csv") == (Exit.INTERNAL, line)
     monkeypatch.setenv("ALGID_TRACEBACK", "1")
     code, told = run("inspect", "log.csv")
-    assert code == EXIT_INTERNAL
+    assert code == Exit.INTERNAL
     assert told.startswith("Traceback")
     assert told.endswith(line)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -16,8 +17,9 @@ from scipy.stats import norm
 
 from algid.base.stores import open_store
 from algid.batches.discover import jobs_of
-from algid.batches.records import JobRecord, JobStatus, stat_of
-from algid.batches.run import Batch, BatchConfig
+from algid.batches.job import Task
+from algid.batches.jobs import JobRecord, JobStatus, stat_of
+from algid.batches.run import Batch
 from algid.fleet.history import history_of
 from algid.fleet.page import overview
 from algid.settings import Settings
@@ -30,15 +32,14 @@ StoredRecords = tuple[str, int, dict[str, tuple[float, float, str]]]
 """Robot, first stamp in ns and estimates of a job."""
 
 
-class Finished(Executor):
+class Finished:
     """Ends every job at once, with what is known of it."""
 
     def __init__(self, known: Mapping[str, StoredRecords]) -> None:
         self.known = known
 
-    def submit(self, _fn: Callable[..., Any], /, *args: Any, **_more: Any) -> Future[Any]:
+    def submit(self, _fn: Callable[..., Any], task: Task) -> Future[Any]:
         future: Future[Any] = Future()
-        (task,) = args
         _, start_ns, estimates = self.known[task.job.name]
         inputs = tuple(map(stat_of, task.job.logs))
         future.set_result(
@@ -60,8 +61,9 @@ def _written(folder: Path, known: Mapping[str, StoredRecords]) -> Path:
         lines.append(f"{name},a.csv,{robot},0.5")
     (folder / "manifest.csv").write_text("\n".join(lines))
     jobs = jobs_of([str(folder / "manifest.csv")], str(folder))
-    recipe = BatchConfig(str(folder), Settings(), lambda _file: None)
-    ended = Batch(open_store(str(folder)), recipe, Finished(known), 1, lambda *_: None).run(jobs)
+    task_of = partial(Task, settings=Settings(), out=str(folder))
+    submit = Finished(known).submit
+    ended = Batch(open_store(str(folder)), task_of, submit, 1, lambda *_: None).run(jobs)
     assert [record.status for record in ended.records] == [JobStatus.OK] * len(known)
     return folder
 
