@@ -9,7 +9,7 @@ import pytest
 import algid
 from algid.api.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
 from algid.base.errors import OutputError
-from algid.inspection.report import inspect_log
+from algid.inspection.checks import inspect_log
 from algid.profile import load_profile
 from tests.processes import Outcome
 

@@ -19,7 +19,7 @@ from algid.base.text import lines_of
 from algid.options import flag
 
 if TYPE_CHECKING:
-    from algid.inspection.report import Inspection
+    from algid.inspection.checks import Inspection
     from algid.report.document import Table
 
 PROFILE = "algid.toml"
@@ -75,7 +75,7 @@ def inspect(
     >>> found.refused is None, found.clock.rows
     (True, 2001)
     """
-    from algid.inspection.report import inspect_log
+    from algid.inspection.checks import inspect_log
 
     own, log = meant(profile, options, log)
     if write_profile is not None and not isinstance(log, str | Path):

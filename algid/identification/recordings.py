@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import cache, partial
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Literal
 
@@ -234,7 +235,7 @@ class Recordings:
 
         The first is examined, and refuses a log only where that is all of it.
         """
-        from algid.inspection.clipping import beyond, clipped
+        from algid.inspection.channels import beyond, clipped
 
         if log.digest is not None and log._hash is None and not 0 < log.promised <= SHORT:
             log._hash = beside(log.digest)
@@ -271,6 +272,7 @@ class Recordings:
     def _examined(self, log: Recording, block: Log, *, whole: bool) -> tuple[Notice, ...]:
         """What the named checks find in the first block of a log."""
         from algid.inspection.checks import CONTRADICTIONS, admitted, examine
+        from algid.inspection.conventions import judged
 
         begin = block if whole else block.part(0, EXAMINED)
         if log.role not in self._limits:
@@ -278,7 +280,7 @@ class Recordings:
         alike = [one for one in self.logs if one.role == log.role]
         found = examine(
             begin,
-            gravity=log.weight,
+            cache(partial(judged, begin, gravity=log.weight > 0)),
             effort=log.effort,
             whole=whole,
             alone=len(alike) == 1,
@@ -292,7 +294,7 @@ class Recordings:
     def _judge_arm(self, log: Recording, begin: Log) -> None:
         """Find the limits of torques of the role of `log`, and keep what conventions ask for."""
         from algid.estimators.convention_search import MOST_LOGS, seconds_of_each
-        from algid.inspection.clipping import saturation
+        from algid.inspection.channels import saturation
         from algid.inspection.conventions import recorded
 
         alike = [one for one in self.logs if one.role == log.role]

@@ -1,11 +1,14 @@
-"""Checks of single channels: false torques, angles that jump, freeze or are in degrees, spikes."""
+"""Checks of single channels: false or cut-off torques, angles that jump, freeze or are in degrees.
+
+Limits that cut torques off are found by motion, reported, and what lies beyond them is left out.
+"""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from itertools import product
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +17,21 @@ import numpy as np
 from algid.base.criteria import CUT
 from algid.base.errors import LogError
 from algid.base.quantiles import median, quantile
-from algid.estimators.saturation import UNSEEN, Saturation
+from algid.estimators.saturation import UNSEEN, Limit, Saturation, saturation_of
 from algid.inspection.figures import (
     channels,
     noise_floor,
     robust_deviation,
     saturated_share,
-    source,
     thinned,
 )
-from algid.log import Log
-from algid.notices import Notice, Remedy
+from algid.log import Log, Origin
+from algid.notices import Notice, Remedy, nevertheless
 from algid.readers.formats import entries_at
+from algid.signals.segments import Segment, segments
 
+LOOKED_AT = 1 << 18
+"""Samples at the beginning of logs in which limits are looked for."""
 _DENORMAL = 1e-6
 _SPIKE = 30.0
 _STANDS, _CLEAR = 0.4, 6.0
@@ -49,29 +54,44 @@ _MOST = 3
 """Channels that are named in the place of a torque that is none."""
 
 
+def _found(code: str, origin: Origin, name: str, *remedies: Remedy, **numbers: Any) -> Notice:
+    """A notice of the channel `name`, which is called as in algid and as in its log."""
+    own = origin.mapping.get(name, name)
+    channel = name if own == name else f"{name} ({own})"
+    return Notice(code, numbers={"channel": channel} | numbers, remedies=remedies)
+
+
+def _refused(code: str, origin: Origin, name: str, *remedies: Remedy, **numbers: Any) -> Notice:
+    """The same, for which the log is refused; where that is accepted it warns."""
+    if code in origin.reading.accepted:
+        return _found(code, origin, name, accepted=True, **numbers)
+    found = _found(code, origin, name, *remedies, nevertheless(code), **numbers)
+    return replace(found, refuse=True)
+
+
 def efforts(log: Log, known: Saturation = UNSEEN) -> Iterator[Notice]:
     """Torques that are zero, constant or at a limit.
 
     That of a joint without a motor may be anything. A limit that motion shows to be true is no
-    reason to doubt; of one that cuts the torque off `algid.inspection.clipping` warns.
+    reason to doubt; of one that cuts the torque off `clipped` warns.
     """
-    apart = {limit.joint + 1 for limit in known.limits} | {log.origin.reading.passive}
+    passive = log.origin.reading.passive
+    apart = {limit.joint + 1 for limit in known.limits} | {passive}
     for joint, tau in enumerate(log.tau, start=1):
-        name = f"tau{joint}"
+        name, largest = f"tau{joint}", float(np.abs(tau).max())
         if joint in apart:
             continue
-        seen, largest = {"channel": source(log.origin, name)}, float(np.abs(tau).max())
         if largest < _DENORMAL or tau.min() == tau.max():
             case = "constant" if largest >= _DENORMAL else "tiny" if largest else "zero"
             remedies = torques_beside(log, name)
             remedies = remedies or [Remedy({f"{name}.source": None}, "name the measured torque")]
-            if log.tau[2 - joint].any() and not log.origin.reading.passive:
+            if log.tau[2 - joint].any() and not passive:
                 remedies.append(Remedy({"passive": joint}, "for a joint without a motor"))
-            numbers = seen | {"case": case, "largest": largest, "value": float(tau[0])}
-            yield Notice("EFFORT_ZERO", numbers=numbers, refuse=True, remedies=tuple(remedies))
+            numbers = {"case": case, "largest": largest, "value": float(tau[0])}
+            yield _refused("EFFORT_ZERO", log.origin, name, *remedies, **numbers)
         elif (share := saturated_share(tau)) > 0.01:
             case = "true" if joint - 1 in known.sound else "open"
-            yield Notice("SATURATED_EFFORT", numbers=seen | {"percent": 100 * share, "case": case})
+            yield _found("SATURATED_EFFORT", log.origin, name, percent=100 * share, case=case)
 
 
 def torques_beside(log: Log, channel: str) -> list[Remedy]:
@@ -85,14 +105,14 @@ def torques_beside(log: Log, channel: str) -> list[Remedy]:
         return []
     used, found = set(log.origin.mapping.values()), []
     amperes = {f"{channel}.unit": "A", f"{channel}.torque_constant": None}
-    for (words, unit), entry in product(((_TORQUES, {}), (_CURRENTS, amperes)), entries):
-        for field in entry.fields or (entry.name,):
-            home, place = {}, field
-            if entry.fields:
-                home, place = {f"{channel}.topic": entry.name}, f"{entry.name}: {field}"
-            if words.search(field) and not _OTHER.search(field) and place not in used:
-                takes = home | {f"{channel}.source": field} | unit
-                found.append((channel[-1] not in place, Remedy(takes, "the log also holds")))
+    for words, unit in ((_TORQUES, {}), (_CURRENTS, amperes)):
+        for entry in entries:
+            topic = {f"{channel}.topic": entry.name} if entry.fields else {}
+            for field in entry.fields or (entry.name,):
+                place = f"{entry.name}: {field}" if topic else field
+                if words.search(field) and not _OTHER.search(field) and place not in used:
+                    takes = topic | {f"{channel}.source": field} | unit
+                    found.append((channel[-1] not in place, Remedy(takes, "the log also holds")))
     found.sort(key=lambda one: one[0])
     return [remedy for _, remedy in found[:_MOST]]
 
@@ -103,22 +123,19 @@ def held_efforts(log: Log) -> Iterator[Notice]:
     A torque in coarse counts keeps its values too, but changes whenever it passes a count: its runs
     are of every length. A log whose angles are held as well was recorded slowly as a whole.
     """
-    for joint, (theta, tau) in enumerate(zip(log.theta, log.tau, strict=True), start=1):
-        changes = np.flatnonzero(tau[1:] != tau[:-1])
+    for (name, tau), theta in zip(channels(log, ("tau",)), log.theta, strict=True):
+        changes = np.flatnonzero(np.diff(tau))
         if not _HELD_RUNS <= changes.size < (tau.size - 1) * _HELD_SHARE:
             continue
         runs = np.diff(changes)
         usual = median(thinned(runs))
         off = np.abs(runs - usual * np.maximum(1.0, np.round(runs / usual)))
         in_step = float(np.mean(off <= _OFF_STEP * usual))
-        moves = np.count_nonzero(theta[1:] != theta[:-1]) > 1.5 * changes.size
+        moves = np.count_nonzero(np.diff(theta)) > 1.5 * changes.size
         if usual >= 2 and in_step >= _IN_STEP and moves:
-            numbers = {
-                "channel": source(log.origin, f"tau{joint}"),
-                "held": 1e3 * usual * log.period,
-                "late": 5e2 * (usual - 1) * log.period,
-            }
-            yield Notice("HELD_EFFORT", numbers=numbers)
+            late = 0.5e3 * (usual - 1) * log.period  # ms, in the mean
+            held = 1e3 * usual * log.period
+            yield _found("HELD_EFFORT", log.origin, name, held=held, late=late)
 
 
 def stuck(log: Log, quantities: Sequence[str] = ("theta", "tau")) -> Iterator[Notice]:
@@ -130,23 +147,23 @@ def stuck(log: Log, quantities: Sequence[str] = ("theta", "tau")) -> Iterator[No
     for name, values in channels(log, quantities):
         sizes = np.abs(np.diff(values))
         changes = np.flatnonzero(sizes)
-        runs, case = np.diff(changes), "torque"
+        runs = np.diff(changes)
         if not runs.size or runs.size == sizes.size - 1:  # no run is longer than a sample
             continue
-        if name.startswith("tau"):
+        case = "torque" if name.startswith("tau") else "angle"
+        if case == "torque":
             held = values[changes[1:]]
             least = max(_DEAD / log.period, _DEAD_RUNS * quantile(thinned(runs), 0.95))
             long = (runs >= least) & (held > values.min()) & (held < values.max())
             long &= changes.size >= _DEAD_RUNS
         else:
-            case, usual = "angle", quantile(thinned(sizes[changes]), 0.99)
+            usual = quantile(thinned(sizes[changes]), 0.99)
             long = (runs > max(10, round(0.02 / log.period))) & (sizes[changes[1:]] > 5 * usual)
         longest = int(np.argmax(runs * long))
         if long[longest]:
-            start, length = int(changes[longest]) + 1, int(runs[longest])
-            lasts = {"seconds": length * log.period, "start": start * log.period}
-            numbers = {"case": case, "channel": source(log.origin, name)} | lasts
-            yield Notice("SENSOR_FAULT", numbers=numbers)
+            start = (int(changes[longest]) + 1) * log.period
+            lasts = int(runs[longest]) * log.period
+            yield _found("SENSOR_FAULT", log.origin, name, case=case, seconds=lasts, start=start)
 
 
 def angles(log: Log) -> Iterator[Notice]:
@@ -154,16 +171,15 @@ def angles(log: Log) -> Iterator[Notice]:
     # over a gap that cuts the log, a joint may have turned round
     joined = np.diff(log.stamp_ns) <= CUT * log.period * 1e9
     for name, theta in channels(log, ("theta",)):
-        what, sizes = source(log.origin, name), np.abs(np.diff(theta))
+        sizes = np.abs(np.diff(theta))
         if not sizes.any():
-            numbers = {"case": "constant", "channel": what, "value": float(theta[0])}
-            yield Notice("HARDLY_DRIVEN", numbers=numbers)
+            value = float(theta[0])
+            yield _found("HARDLY_DRIVEN", log.origin, name, case="constant", value=value)
         wraps = int(np.count_nonzero((np.abs(sizes - _TURN) < 0.1 * _TURN) & joined))
         # at this rate the arm moves by far less than a turn between two samples
         if wraps and median(thinned(sizes)) < 0.5:
-            unwrap = (Remedy({f"{name}.unwrap": True}),)
-            numbers = {"channel": what, "count": wraps}
-            yield Notice("WRAPPED_ANGLE", numbers=numbers, refuse=True, remedies=unwrap)
+            unwrap = Remedy({f"{name}.unwrap": True})
+            yield _refused("WRAPPED_ANGLE", log.origin, name, unwrap, count=wraps)
 
 
 def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
@@ -185,22 +201,22 @@ def degrees(log: Log, is_to_scale: Callable[[], bool]) -> Iterator[Notice]:
         power = math.log(max(ratio, 1e-9)) / math.log(180 / math.pi)
         if len(log) > 20 and abs(abs(power) - 1) < _AS_DEGREES:
             what, quantity = ("angles", "theta") if power > 0 else ("velocities", "omega")
-            seen = {"case": "signal", "what": what, "joint": joint}
-            found.append((f"{quantity}{joint}", seen))
+            found.append((f"{quantity}{joint}", {"case": "signal", "what": what, "joint": joint}))
     widest = np.abs(log.theta).max(axis=1)
     if widest.max() > 12 * math.pi and not ratios.any() and not is_to_scale():
-        seen = {"case": "reach", "largest": float(widest.max())}
-        found.append((f"theta{np.argmax(widest) + 1}", seen))
+        reach = {"case": "reach", "largest": float(widest.max())}
+        found.append((f"theta{np.argmax(widest) + 1}", reach))
     for name, numbers in found:
-        told = log.origin.reading.told(name)
         unit = "angle_unit" if name.startswith("theta") else f"{name}.unit"
+        if log.origin.reading.told(name):
+            numbers["unit"] = log.origin.reading.channels[name].unit
+            yield _found("DEGREES", log.origin, name, **numbers)
+            continue
         remedies = (
             Remedy({unit: "deg"}, "where they are in degrees"),
             Remedy({f"{name}.gear_ratio": None}, "for those of a motor behind its gear"),
-            Remedy({f"{name}.unit": "rad"}, "where it is right"),
         )
-        numbers["unit"] = log.origin.reading.channels[name].unit if told else None
-        yield Notice("DEGREES", numbers=numbers, refuse=not told, remedies=() if told else remedies)
+        yield _refused("DEGREES", log.origin, name, *remedies, unit=None, **numbers)
 
 
 def spikes(log: Log) -> Iterator[Notice]:
@@ -233,5 +249,41 @@ def spikes(log: Log) -> Iterator[Notice]:
             places = places[~turns_back]
         if places.size:
             seen = {"count": len(places), "start": float(log.t[places[0]])}
-            what = {"case": "spikes", "channel": source(log.origin, name)}
-            yield Notice("SENSOR_FAULT", numbers=what | seen)
+            yield _found("SENSOR_FAULT", log.origin, name, case="spikes", **seen)
+
+
+def saturation(*logs: Log, gravity: float = 9.81, effort: str | None = None) -> Saturation:
+    """The limits that cut off torques of an arm's logs, and the joints whose limits are sound.
+
+    They are looked for in the beginning of the logs, at most `LOOKED_AT` samples in all.
+
+    Parameters
+    ----------
+    logs : of one arm, with or without one payload, or their beginnings
+    gravity : float, m/s^2
+        0 for an arm in a horizontal plane.
+    effort : str, as in a profile
+        An external torque is not what moves the arm, and shows no limit.
+    """
+    pieces: list[Segment] = []
+    for log in logs if effort != "external" else ():
+        if len(log) > 1 and "CLIPPED_TORQUE" not in log.origin.reading.accepted:
+            pieces += segments([log.part(0, LOOKED_AT // len(logs))])
+    return saturation_of(pieces, gravity)
+
+
+def beyond(log: Log, limits: Sequence[Limit]) -> list[int]:
+    """How many samples of a log, or of a block of it, lie beyond each of its limits."""
+    return [int(np.count_nonzero(limit.beyond(log.tau))) for limit in limits]
+
+
+def clipped(
+    origin: Origin, limits: Sequence[Limit], counts: Sequence[int], rows: int
+) -> Iterator[Notice]:
+    """Limits beyond which `counts` samples of `rows` lie."""
+    keep = Remedy({"accept": "CLIPPED_TORQUE"}, "to use them nevertheless")
+    for limit, count in zip(limits, counts, strict=True):
+        if count:
+            level = max(abs(side) for side in (limit.low, limit.high) if np.isfinite(side))
+            seen = {"level": level, "count": count, "percent": 100 * count / rows}
+            yield _found("CLIPPED_TORQUE", origin, f"tau{limit.joint + 1}", keep, **seen)

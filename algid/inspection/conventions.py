@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from algid.estimators.convention_search import (
-    EXPLAINED,
     MET,
     MOST_LOGS,
     Judgement,
@@ -70,11 +69,10 @@ def judged(log: Log, *, gravity: bool = True) -> Judgement | None:
 
 def recorded(log: Log, seconds: float = math.inf) -> list[Recorded]:
     """The stretches of a log without a gap, the longest first, `seconds` of them in all."""
-    parts = []
+    parts, passive = [], log.origin.reading.passive
     for stretch in sorted(stretches([log]), key=len, reverse=True)[:MOST_LOGS]:
         part = stretch.part(0, int(min(len(stretch), seconds / stretch.dt)))
         seconds -= len(part) * part.dt
-        passive = log.origin.reading.passive
         parts.append(Recorded(part.theta.copy(), part.tau.copy(), part.dt, passive))
     return parts
 
@@ -99,23 +97,21 @@ def mend(origin: Origin, judgement: Judgement | None) -> Notice | None:
     """
     if judgement is None or not judgement.alone:
         return None
-    as_read, convention = judgement.as_read, judgement.best.convention
-    off_by = max(map(abs, convention.zero))
-    if off_by < _SMALL and replace(convention, zero=AS_READ.zero) == AS_READ:
-        return None
-    settings = _settings(convention, origin)
-    if not settings:  # it is how the log was read
+    broken, best = judgement.as_read.broken, judgement.best
+    settings = _settings(best.convention, origin)
+    is_phase = best.family == AS_READ and max(map(abs, best.zero)) < _SMALL
+    if is_phase or not settings:  # without settings it is how the log was read
         return None
     wrong = []
     for name, value in settings.items():
         channel, dot, key = name.partition(".")
         form = _WRONG[channel.rstrip("12") + dot + key]
         wrong.append(form.format(joint=channel[-1], value=value))
-    left, then = (100 * float(one.left.max()) for one in (as_read, judgement.best))
+    left, then = (100 * float(one.left.max()) for one in (judgement.as_read, best))
     contradiction = f"{left:.3g} % of a torque stays unexplained, {then:.2g} % otherwise"
-    if as_read.broken:
-        name, far = min(as_read.broken.items(), key=lambda one: one[1])
-        contradiction = f"{name} is broken by {round(-far):,} σ"
+    if broken:
+        worst = min(broken, key=broken.__getitem__)
+        contradiction = f"{worst} is broken by {round(-broken[worst]):,} σ"
     numbers = {"wrong": " and ".join(dict.fromkeys(wrong)), "contradiction": contradiction}
     return Notice("WRONG_CONVENTION", numbers=numbers, remedies=(Remedy(settings),))
 
@@ -144,10 +140,10 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     as_read, trials = judgement.as_read, judgement.trials
     if judgement.alone and judgement.best.convention == AS_READ:
         return None
-    k, left = as_read.constants, float(as_read.left.max())
-    if left < EXPLAINED and math.hypot(k[K2], k[K4]) < _LEAST_PULL * abs(k[K3] + k[K5]):
+    k = as_read.constants
+    if math.hypot(k[K2], k[K4]) < _LEAST_PULL * abs(k[K3] + k[K5]):
         weightless = trials.weightless()
-        if weightless.convincing and weightless.left.max() < left + _OF_WEIGHT:
+        if weightless.convincing and weightless.left.max() < as_read.left.max() + _OF_WEIGHT:
             driver = Remedy({"effort": "gravity-compensated"}, "for such a driver")
             level = Remedy({"gravity": 0}, "for a horizontal plane")
             numbers = {"case": "arm"}
@@ -156,9 +152,8 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     named += trials.under(_TORQUES, AS_READ.zero, *_SIDEWAYS)
     likely = []
     for one in (*named, trials.zeroed(AS_READ), trials.zeroed(_TORQUES)):
-        pull = max(one.demands.get("k2 > 0", 0.0), one.demands.get("k4 > 0", 0.0))
-        is_other = one.family != AS_READ or abs(one.zero[0]) > _SMALL
-        if is_other and one.plausible and pull > MET:  # gravity pulls down, beyond doubt
+        down = max(one.demands.get(f"{name} > 0", 0.0) for name in (K2, K4)) > MET
+        if one.plausible and down and (one.family != AS_READ or abs(one.zero[0]) > _SMALL):
             likely.append(one)
     least = min((one.score for one in likely), default=-math.inf) + trials.apart
     near = [one for one in likely if one.score < least]
@@ -168,9 +163,9 @@ def doubted(origin: Origin, judgement: Judgement | None) -> Notice | None:
     near = [one for one in near if one in named] or near
     offered = tuple(Remedy(_settings(one.convention, origin)) for one in near)
     turn = near[0].zero[0]
-    if turn not in (0.0, pi):
-        return Notice("WRONG_ZERO", numbers={"turn": -degrees(turn)}, remedies=offered)
-    return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
+    if turn in (0.0, pi):
+        return Notice("FLIPPED_SIGN", numbers={"weight": k[K4]}, remedies=offered)
+    return Notice("WRONG_ZERO", numbers={"turn": -degrees(turn)}, remedies=offered)
 
 
 def zeroed(origin: Origin, turn: float, half: float) -> Remedy:
@@ -190,30 +185,27 @@ def _settings(convention: Convention, origin: Origin) -> dict[str, Any]:
 
 def _exactly(convention: Convention, origin: Origin) -> dict[str, Any]:
     """The settings, by dotted names, that read a log by `convention`."""
-    reading = origin.reading
-    settings: dict[str, Any] = {}
-    swapped = {"theta": convention.swapped, "tau": convention.torques_swapped}
-    if all(swapped.values()) and reading.joints is not None:
+    reading, settings = origin.reading, dict[str, Any]()
+    swapped = ["theta"] * convention.swapped + ["tau"] * convention.torques_swapped
+    if len(swapped) == 2 and reading.joints is not None:
         settings["joints"] = list(reversed(reading.joints))
-    else:
-        for quantity in [one for one, is_swapped in swapped.items() if is_swapped]:
-            for own, other in ("12", "21"):
-                name = quantity + other
-                source = origin.mapping.get(name, name)
-                settings[f"{quantity}{own}.source"] = source.partition(": ")[2] or source
+        swapped = []
+    for quantity in swapped:
+        for own, other in ("12", "21"):
+            source = origin.mapping.get(quantity + other, quantity + other)
+            settings[f"{quantity}{own}.source"] = source.rpartition(": ")[2]
     # A channel that is swapped keeps what the profile says of its joint: names and units go with
     # the joint.
     for joint, scale in enumerate(convention.scale, start=1):
-        angle, torque = convention.signs[joint - 1], convention.torque_signs[joint - 1]
-        if angle < 0 and torque < 0:
-            signs = settings.setdefault("signs", list(reading.signs))
-            signs[joint - 1] *= -1
-        elif angle < 0 or torque < 0:
+        place = joint - 1
+        angle, torque = convention.signs[place], convention.torque_signs[place]
+        if angle + torque < 0:
+            settings.setdefault("signs", list(reading.signs))[place] *= -1
+        elif angle != torque:
             name = f"theta{joint}" if angle < 0 else f"tau{joint}"
             channel = reading.channels.get(name)
-            # the sign that the profile gives the channel, beside that of its joint
-            sign = channel.sign * reading.signs[joint - 1] if channel else 1
-            settings[f"{name}.sign"] = -sign
+            # against the sign that the profile gives the channel, beside that of its joint
+            settings[f"{name}.sign"] = -channel.sign * reading.signs[place] if channel else -1
         units = [unit for one, unit in _UNITS.items() if isclose(scale, one)]
         if units:
             settings[f"theta{joint}.unit"] = units[0]

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import Any
 
 from algid.base.files import as_toml
 from algid.base.text import visible
 from algid.base.units import names_of
-from algid.inspection.report import Inspection
-from algid.readers.formats import FORMATS
+from algid.inspection.checks import Inspection
 from algid.readers.table import CHANNELS
 
 _HEAD = """\
@@ -68,7 +66,6 @@ _UNITS = {
     "# kd = 2.0  # N m s/rad\n",
 }
 _UNITS["q_des"] = _UNITS["theta"]
-_ON_TOPICS = tuple(form.name for form in FORMATS if form.messages)
 
 
 def draft_profile(found: Inspection) -> str:
@@ -76,28 +73,31 @@ def draft_profile(found: Inspection) -> str:
 
     For one that cannot be read yet, its names stand in comments.
     """
-    reading, mapping, on_topics = found.reading, found.mapping or {}, found.format in _ON_TOPICS
-    known: dict[str, Any] = {"joints": reading.joints, "time_unit": reading.time_unit}
-    if reading.topics:
-        known["topic"] = reading.topics[0]
-    if not on_topics:
-        known["time"] = mapping.get("t")
-    text = _filled(_HEAD, known)
+    reading, mapping = found.reading, found.mapping or {}
+    first_topic, *_ = *reading.topics, ""
+    own_time = "" if first_topic else mapping.get("t")
+    text = _filled(
+        _HEAD,
+        topic=first_topic,
+        joints=reading.joints,
+        time=own_time,
+        time_unit=reading.time_unit,
+    )
     if found.refused:
         text += f"# {visible(found.refused, 1000)}\n"
     for one in found.entries[:64]:
         text += f"# in the log: {visible(one.name, 80)} ({visible(one.type, 60)})\n"
     for name in CHANNELS:
-        own = {"source": mapping.get(name, "")}
-        if on_topics:
-            own["topic"], _, own["source"] = own["source"].partition(": ")
-            if own["topic"] == known.get("topic"):
-                del own["topic"]
-        text += f"\n[{name}]\n{_filled(_CHANNEL, own)}{_UNITS[name[:-1]]}"
+        source, topic = mapping.get(name, ""), ""
+        if first_topic:
+            topic, _, source = source.partition(": ")
+        other = "" if topic == first_topic else topic
+        own = _filled(_CHANNEL, source=source, topic=other)
+        text += f"\n[{name}]\n{own}{_UNITS[name[:-1]]}"
     return text
 
 
-def _filled(text: str, known: Mapping[str, Any]) -> str:
+def _filled(text: str, **known: Any) -> str:
     """The text with what is known of some keys in the place of their commented lines."""
     for name, value in known.items():
         if value:

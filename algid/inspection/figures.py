@@ -13,7 +13,7 @@ from algid.arm import FloatArray
 from algid.base.criteria import GAP
 from algid.base.quantiles import distinct, median
 from algid.estimators.convention_search import Judgement
-from algid.log import Log, Origin
+from algid.log import Log
 from algid.model import K2, K3, K4, K5
 from algid.notices import of_codes
 from algid.readers.clock import PAUSE
@@ -33,21 +33,19 @@ def channels(
             yield f"{quantity}{joint}", values
 
 
-def source(origin: Origin, name: str) -> str:
-    """A channel, and what it is called in its log where that is another name."""
-    own = origin.mapping.get(name, name)
-    return name if own == name else f"{name} ({own})"
-
-
 def thinned(values: Any) -> Any:
     """Evenly spread values (…, N), a view: all below `ENOUGH`, else that many or up to twice."""
     return values[..., :: max(1, values.shape[-1] // ENOUGH)]
 
 
+def windows(values: Any, size: int) -> Any:
+    """Each `size` values in a row out of values (…, N), `thinned`, as columns (…, size, M)."""
+    return thinned(sliding_window_view(values, size, axis=-1).swapaxes(-1, -2))
+
+
 def differences(values: Any, order: int) -> Any:
     """Differences of that order of values (…, N), `thinned`; below `ENOUGH` the same as NumPy's."""
-    windows = sliding_window_view(values, order + 1, axis=-1).swapaxes(-1, -2)
-    return np.diff(thinned(windows), order, axis=-2)[..., 0, :]
+    return np.diff(windows(values, order + 1), order, axis=-2)[..., 0, :]
 
 
 @dataclass(frozen=True)
@@ -144,8 +142,7 @@ def grid_step(values: FloatArray) -> float:
     if steps.size < 2:
         return 0.0
     ratios = steps / steps.min()
-    on_grid = np.abs(ratios - np.rint(ratios)).max() < 0.05
-    return float(steps.min()) if on_grid else 0.0
+    return float(steps.min() * (np.abs(ratios - np.rint(ratios)).max() < 0.05))
 
 
 def saturated_share(values: FloatArray) -> float:

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from algid.arm import FloatArray
 from algid.base.quantiles import median, medians, quantile
-from algid.inspection.figures import clock_figures, differences, grid_step, noise_floor
-from algid.log import IntArray, Log
+from algid.inspection.figures import clock_figures, differences, grid_step, noise_floor, windows
+from algid.log import Log
 from algid.notices import Notice, Remedy, nevertheless
 from algid.signals.spacing import NEAR, near_stamps
 
@@ -24,25 +23,22 @@ _REST, _STILL = 0.5, 1e-3
 
 def sampling(log: Log) -> Iterator[Notice]:
     """Logs too short or too slow for their motion; stamps that cluster, miss samples or jitter."""
-    clock = clock_figures(log)
-    rate, period = clock.rate, 1e3 / clock.rate
+    clock, period = clock_figures(log), 1e3 * log.period  # ms
     if clock.duration < _SHORTEST:
         yield Notice("SHORT_LOG", numbers={"case": "estimate", "seconds": clock.duration})
-    samples = samples_a_period(log)
-    if samples < _FEWEST:
-        yield Notice("SLOW_SAMPLING", numbers={"case": "period", "samples": samples, "rate": rate})
-    near = near_stamps(log.stamp_ns, log.period)
-    if near:
+    if (samples := samples_a_period(log)) < _FEWEST:
+        slow = {"case": "period", "samples": samples, "rate": clock.rate}
+        yield Notice("SLOW_SAMPLING", numbers=slow)
+    if near := near_stamps(log.stamp_ns, log.period):
         clusters = {"case": "near", "count": near, "share": NEAR, "period": period}
         yield Notice("UNEVEN_STAMPS", numbers=clusters)
-    lost = lost_steps(log)
-    if lost:
+    if lost := lost_steps(log):
         override = (nevertheless("LOST_SAMPLES"),)
         yield Notice("LOST_SAMPLES", numbers={"count": lost}, remedies=override)
     if clock.gaps:
         gaps = {"case": "gaps", "count": clock.gaps, "seconds": clock.longest_gap}
         yield Notice("GAPS", numbers=gaps)
-    if clock.jitter * rate > 0.01:
+    if clock.jitter > 0.01 * log.period:
         error = np.sqrt(np.mean(np.diff(log.theta, 2, axis=1) ** 2, axis=1)) / 8
         small = all(error <= [noise_floor(theta) for theta in log.theta])
         seen = {"jitter": 1e3 * clock.jitter, "period": period, "error": float(error.max())}
@@ -76,14 +72,14 @@ def lost_steps(log: Log) -> int:
     A step that is twice the mean of its neighbours' is a lost sample's, where the stamps of all
     three are even: others are a stamp's jitter. Noise makes a step that is zero as often.
     """
-    count = len(log) - 3
-    spans = [slice(first, first + count + 1) for first in range(3)]
-    before, own, after = (differences(log.theta[:, span], 1) for span in spans)
-    periods = np.array([differences(log.stamp_ns[span], 1) for span in spans]) * 1e-9 / log.period
+    # three steps that follow one another; of a long log some stand for all
+    before, own, after = np.diff(windows(log.theta, 4), axis=1).swapaxes(0, 1)
+    periods = np.diff(windows(log.stamp_ns, 4), axis=0) * 1e-9 / log.period
+    even = np.abs(periods - 1) < _LOST
     around = 0.5 * (before + after)
     size = np.linalg.norm(around, axis=0)
-    clear = (size > quantile(size, 0.25)) & np.all(np.abs(periods - 1) < _LOST, axis=0)
-    each = count / max(1, size.size)  # of a long log some steps stand for all
+    clear = (size > quantile(size, 0.25)) & even.all(axis=0)
+    each = (len(log) - 3) / size.size
     lost, chance = (
         round(each * np.count_nonzero(clear & (np.linalg.norm(off, axis=0) < _LOST * size)))
         for off in (own - 2 * around, own)
@@ -102,24 +98,19 @@ def rests(log: Log, whole: bool) -> Iterator[Notice]:
     few, rests, flags = max(4, round(0.02 / log.period)), [], {}
     # how far noise and encoder let an angle be from its place
     room = [
-        max(8 * noise_floor(theta), 2 * grid_step(theta), _STILL * float(np.ptp(theta)))
+        [max(8 * noise_floor(theta), 2 * grid_step(theta), _STILL * float(np.ptp(theta)))]
         for theta in log.theta
     ]
-
-    def away(ends: FloatArray) -> IntArray:
-        """The samples in which an angle is not where it is in the `ends` (2, few)."""
-        off = np.abs(log.theta - medians(ends)[:, None]) > np.array(room)[:, None]
-        return np.flatnonzero(off.any(axis=0))
-
-    first, last = away(log.theta[:, :few]), away(log.theta[:, -few:])
-    if not (first.size and last.size):
-        return
-    start, end = log.t[max(first[0] - 1, 0)], log.t[min(last[-1] + 1, len(log) - 1)]
-    if start >= _REST:
-        rests.append(f"for its first {start:.3g} s")
-        flags["start"] = float(f"{start:.4g}")
-    if whole and log.duration - end >= _REST:
-        rests.append(f"for its last {log.duration - end:.3g} s")
-        flags["end"] = float(f"{end:.4g}")
+    for flag, step, word in (("start", 1, "first"), ("end", -1, "last"))[: 1 + whole]:
+        theta, t = log.theta[:, ::step], log.t[::step]
+        away = np.abs(theta - medians(theta[:, :few])[:, None]) > room
+        left = np.flatnonzero(away.any(axis=0))
+        if not left.size:  # it rests all the time
+            return
+        edge = float(t[max(left[0] - 1, 0)])
+        lasts = abs(edge - float(t[0]))
+        if lasts >= _REST:
+            rests.append(f"for its {word} {lasts:.3g} s")
+            flags[flag] = float(f"{edge:.4g}")
     if rests:
         yield Notice("RESTS", numbers={"rests": rests}, remedies=(Remedy(flags),))

@@ -23,7 +23,7 @@ from algid.results.verdict import share_text
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from algid.inspection.report import Inspection
+    from algid.inspection.checks import Inspection
 
 WIDTH = 80
 LINE = "{0.name:<4}{0.with_half:>19} {0.unit:<10}{1:>{2}} "

@@ -9,7 +9,6 @@ give the same bytes.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
@@ -432,13 +431,13 @@ class Result(_Model):
         """The estimates as a polars frame: parameter, estimate, std, low, high, unit, status."""
         import polars as pl
 
-        rows = []
-        for name, one in self.estimates.items():
-            low, high = one.ci95 or (None, None)
-            rows.append((name, one.estimate, one.std, low, high, one.unit, one.status.value))
-        columns = dict.fromkeys(("parameter", "estimate", "std", "low", "high"), pl.Float64)
-        text = dict.fromkeys(("parameter", "unit", "status"), pl.String)
-        return pl.DataFrame(rows, schema={**columns, **text}, orient="row")
+        names = ("parameter", "estimate", "std", "low", "high", "unit", "status")
+        kinds = (pl.String, *[pl.Float64] * 4, pl.String, pl.String)
+        rows = [
+            (name, one.estimate, one.std, *(one.ci95 or (None, None)), one.unit, one.status.value)
+            for name, one in self.estimates.items()
+        ]
+        return pl.DataFrame(rows, dict(zip(names, kinds, strict=True)), orient="row")
 
     def __eq__(self, other: object) -> bool:
         """Whether both hold the same, whatever else either can do."""
@@ -463,10 +462,7 @@ def result_schema() -> dict[str, Any]:
 
 def result_json(result: Result) -> str:
     """The text of `result.json`."""
-    return (
-        json.dumps(result.model_dump(mode="json"), indent=2, ensure_ascii=False, allow_nan=False)
-        + "\n"
-    )
+    return result.model_dump_json(indent=2) + "\n"
 
 
 def write_result(result: Result, path: Path) -> None:

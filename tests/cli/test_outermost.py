@@ -98,7 +98,7 @@ def test_what_a_library_raises_names_the_file_and_the_stage(
     run: Callable[..., Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("algid.inspection.report.format_of", raising(raised))
+    monkeypatch.setattr("algid.inspection.checks.format_of", raising(raised))
     assert run("inspect", "log.csv") == (code, f"algid: {line}\n")
 
 
@@ -106,7 +106,7 @@ def test_a_fault_of_algid_is_called_one(
     run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # then algid's own line fails
-    monkeypatch.setattr("algid.inspection.report.format_of", lambda _path: None)
+    monkeypatch.setattr("algid.inspection.checks.format_of", lambda _path: None)
     line = (
         "algid: internal error: while opening log.csv: AttributeError: 'NoneType' object has no "
         "attribute 'name'; "
@@ -123,7 +123,7 @@ def test_a_fault_of_algid_is_called_one(
 def test_an_end_that_is_meant_keeps_its_meaning(
     run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("algid.inspection.report.format_of", raising(SystemExit(3)))
+    monkeypatch.setattr("algid.inspection.checks.format_of", raising(SystemExit(3)))
     assert run("inspect", "log.csv") == (3, "")
 
 

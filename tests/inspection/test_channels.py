@@ -191,11 +191,13 @@ def test_what_a_check_tells_is_what_was_put_in(row: int) -> None:
 
 def test_what_is_no_torque_is_told_with_what_names_another() -> None:
     name = "name the measured torque: --set tau{}.source=NAME"
+    nevertheless = "to use it nevertheless: --accept EFFORT_ZERO"
     (zero,) = efforts(logged(tau2=0 * T))
     assert zero.refuse
-    assert zero.advice == f"{name.format(2)}; for a joint without a motor: --set passive=2"
+    passive = "for a joint without a motor: --set passive=2"
+    assert zero.advice == f"{name.format(2)}; {passive}; {nevertheless}"
     none = efforts(logged(tau1=0 * T, tau2=0 * T))  # a passive joint needs another's motor
-    assert [one.advice for one in none] == [name.format(joint) for joint in (1, 2)]
+    assert [one.advice for one in none] == [f"{name.format(j)}; {nevertheless}" for j in (1, 2)]
 
 
 @pytest.mark.parametrize(
@@ -210,7 +212,7 @@ def test_what_is_in_degrees_is_told_with_its_flags(log: Log, unit: str, name: st
     (found,) = degrees(log, lambda: False)
     assert found.refuse
     assert [one.settings for one in found.remedies] == [
-        {unit: "deg"}, {f"{name}.gear_ratio": None}, {f"{name}.unit": "rad"},
+        {unit: "deg"}, {f"{name}.gear_ratio": None}, {"accept": "DEGREES"},
     ]  # fmt: skip
 
 
@@ -259,7 +261,10 @@ def test_steps_twice_as_long_are_counted(lost: int, told: int) -> None:
 def test_a_wrap_is_told_with_what_undoes_it() -> None:
     (found,) = angles(logged(jumped(1)))
     assert found.refuse
-    assert found.clause == "theta2 jumps by a turn 1 time: --set theta2.unwrap=true"
+    assert found.clause == (
+        "theta2 jumps by a turn 1 time: --set theta2.unwrap=true; "
+        "to use it nevertheless: --accept WRAPPED_ANGLE"
+    )
 
 
 def test_jitter_is_told_with_what_resampling_costs() -> None:

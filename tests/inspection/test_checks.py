@@ -10,11 +10,11 @@ import pytest
 
 from algid.arm import Arm, FloatArray, inverse_dynamics
 from algid.base.errors import LogError
-from algid.inspection.checks import admitted, examine
+from algid.inspection.checks import admitted, examine, inspect_log
 from algid.inspection.conventions import judged
 from algid.inspection.figures import dynamic_figures, signal_figures
 from algid.log import Log, Origin
-from algid.notices import Notice
+from algid.notices import Notice, codes_of, has_code
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.synth.excitation import wide_multi_sine
@@ -42,19 +42,18 @@ def moving_log(rows: int = 6000, pace: float = 1.0, k: FloatArray = K) -> Log:
     return Log(np.arange(rows) * 1_000_000, noisy, tau, Origin("arm.csv", "csv", {}), omega)
 
 
-@pytest.fixture
-def signals_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No convention is sought: for checks that look at signals."""
-    monkeypatch.setattr("algid.inspection.checks.judged", lambda *_, **__: None)
-
-
 def noticed(log: Log, *, whole: bool = True) -> tuple[Notice, ...]:
     """What the checks find in a log that is used nevertheless."""
-    return admitted(log, examine(log, whole=whole))
+    return admitted(log, examine(log, lambda: judged(log), whole=whole))
+
+
+def of_signals(log: Log) -> tuple[Notice, ...]:
+    """What the checks of its signals find in a log: no convention is sought."""
+    return examine(log, lambda: None)
 
 
 def codes(log: Log) -> list[str]:
-    return [finding.code for finding in examine(log)]
+    return codes_of(inspect_log(log).findings)
 
 
 def test_a_clean_log_raises_nothing() -> None:
@@ -107,15 +106,14 @@ TOLD = (
 )
 
 
-@pytest.mark.usefixtures("signals_alone")
 @pytest.mark.parametrize("code", REFUSED + TOLD)
 def test_each_check_sees_what_it_is_for(code: str) -> None:
     log = spoiled(code)
     if code in REFUSED:
         with pytest.raises(LogError, match=f"arm.csv: {code}"):
-            noticed(log)
+            admitted(log, of_signals(log))
     else:
-        assert code in [notice.code for notice in noticed(log)]
+        assert has_code(admitted(log, of_signals(log)), code)
 
 
 def test_encoder_step_and_noise_floor() -> None:
@@ -143,7 +141,6 @@ def test_the_recorded_runs_tell_their_zero(shared_data: Path) -> None:
         assert figures.explained > 0.8
 
 
-@pytest.mark.usefixtures("signals_alone")
 @pytest.mark.parametrize("share", [0.0, 0.08, 0.15])
 def test_stamps_that_jitter_have_lost_nothing_and_hide_no_loss(share: float) -> None:
     """A long step of the clock makes a step of the angles twice its neighbours'."""
@@ -152,21 +149,20 @@ def test_stamps_that_jitter_have_lost_nothing_and_hide_no_loss(share: float) -> 
     stamps = log.stamp_ns + np.round(jitter).astype(np.int64)
     kept = rng.random(len(log)) > 0.05
     lost = Log(stamps[: kept.sum()], log.theta[:, kept], log.tau[:, kept], log.origin)
-    assert "LOST_SAMPLES" not in codes(replace(log, stamp_ns=stamps))
-    assert "LOST_SAMPLES" in codes(lost)
+    assert not has_code(of_signals(replace(log, stamp_ns=stamps)), "LOST_SAMPLES")
+    assert has_code(of_signals(lost), "LOST_SAMPLES")
 
 
-@pytest.mark.usefixtures("signals_alone")
 def test_encoders_and_rest_make_no_lost_samples() -> None:
     log, step = moving_log(), 2 * np.pi / 4096
     noise = 3e-4 * np.random.default_rng(0).standard_normal(log.theta.shape)
     for theta in (np.round(log.theta / step) * step, log.theta[:, :1] + noise):
-        assert "LOST_SAMPLES" not in codes(replace(log, theta=theta))
+        assert not has_code(of_signals(replace(log, theta=theta)), "LOST_SAMPLES")
 
 
 def test_a_refusal_names_what_overrides_it_and_yields_to_that() -> None:
     log = spoiled("EFFORT_ZERO")
-    (refused,) = examine(log)
+    (refused,) = inspect_log(log).findings
     assert refused.advice.endswith("to use it nevertheless: --accept EFFORT_ZERO")
     reading = replace(log.origin.reading, accepted=("EFFORT_ZERO",))
     accepted = noticed(replace(log, origin=replace(log.origin, reading=reading)))[0]

@@ -9,8 +9,8 @@ import pytest
 
 from algid.identification.open_logs import open_sources
 from algid.identification.recordings import Recordings
-from algid.inspection.clipping import beyond, clipped, saturation
-from algid.inspection.report import inspect_log
+from algid.inspection.channels import beyond, clipped, saturation
+from algid.inspection.checks import inspect_log
 from algid.log import Log
 from tests.inspection.test_checks import moving_log
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from pydantic import BaseModel
 
 from algid.base.errors import OutputError, SettingError
-from algid.inspection.report import inspect_log
+from algid.inspection.checks import inspect_log
 from algid.profile import Angle, Profile, Torque, Velocity, load_profile
 from algid.readers import read_log
 from algid.writers import FORMATS, write_log

@@ -14,10 +14,10 @@ import polars as pl
 import pytest
 
 from algid.estimators.conventions import AS_READ, Convention
+from algid.inspection.checks import inspect_log
 from algid.inspection.conventions import judged, mend
 from algid.inspection.draft import draft_profile
 from algid.inspection.figures import dynamic_figures
-from algid.inspection.report import inspect_log
 from algid.log import Log, Origin, Reading
 from algid.notices import Notice
 from algid.profile import load_profile
@@ -106,7 +106,12 @@ def judgement(
     as_read = SimpleNamespace(broken=broken or {}, left=np.array([0.123, 0.456]))
     return SimpleNamespace(
         as_read=as_read,
-        best=SimpleNamespace(convention=convention, left=np.array([0.001, 0.0123])),
+        best=SimpleNamespace(
+            convention=convention,
+            family=replace(convention, zero=(0.0, 0.0)),
+            zero=convention.zero,
+            left=np.array([0.001, 0.0123]),
+        ),
         alone=alone,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from algid.inspection.checks import examine
+from algid.inspection.checks import inspect_log
 from algid.log import Log
 from algid.profile import Profile
 from algid.readers import read_log
@@ -108,7 +108,7 @@ def test_of_two_topics_with_both_joints_it_is_said_which_was_taken(tmp_path: Pat
 
 def held_beside(log: Log, joint: int) -> list[dict[str, object]]:
     """The settings that are told to take other channels for the torque of a joint that is zero."""
-    zero = [one for one in examine(log) if one.code == "EFFORT_ZERO"]
+    zero = [one for one in inspect_log(log).findings if one.code == "EFFORT_ZERO"]
     remedies = [
         remedy for one in zero for remedy in one.remedies if remedy.when == "the log also holds"
     ]

@@ -13,7 +13,7 @@ import pytest
 import scipy.io
 
 from algid.base.errors import LogError
-from algid.inspection.report import inspect_log
+from algid.inspection.checks import inspect_log
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.formats import format_of
