@@ -62,7 +62,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "
-        "quantiles ros2 runtime units words",
+        "quantiles ros2 runtime text units words",
         "google h5py lz4 mcap numpy polars pyarrow rosbags ruamel scipy zstandard",
     ),
     "inspection": room("arm criteria errors estimators faults files log model notices profile "

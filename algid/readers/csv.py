@@ -12,9 +12,8 @@ from algid.base.errors import LogError
 from algid.base.files import read_whole
 from algid.log import Companion, loads
 from algid.notices import Notice
-from algid.readers.dialect import Dialect, detect
+from algid.readers.dialect import Dialect, detect, head_of, pieces
 from algid.readers.table_cells import TableFile
-from algid.readers.text import NUL_AMONG_ROWS, head_of, pieces
 
 if TYPE_CHECKING:
     import polars as pl
@@ -157,8 +156,6 @@ def _frames(
                 f"{path}: past row {done}: quotes stay open; close them, or save the table "
                 "without quotes"
             ) from error
-        if "\0" in cell:
-            raise LogError(f"{path}: past row {done}: {NUL_AMONG_ROWS}") from error
         raise LogError(
             f"{path}: column {names[int(number)]!r}, past row {done}: expected a number, "
             f"found {cell[:40]!r}; mend the file or name another column"

@@ -1,10 +1,10 @@
-"""Dialect of a text table from its first lines: separator, decimal comma, header, comments."""
+"""Tables of text: recognised, unpacked, and their dialect from the first lines."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,6 @@ from algid.base.errors import LogError
 from algid.base.limits import LIMITS
 from algid.base.units import is_foreign, unit_of
 from algid.base.words import counted
-from algid.notices import Remedy
 from algid.options import flag
 
 if TYPE_CHECKING:
@@ -30,12 +29,54 @@ _DATE = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}")
 _ZONED = re.compile(r"(?:Z|[+-]\d{2}:?\d{2})$")
 
 
-class NoHeaderError(LogError):
-    """A table without a header, of so many columns."""
+_CODECS = {"csv.gz": "gzip", "csv.zst": "zstd"}
 
-    def __init__(self, columns: int, message: str) -> None:
-        super().__init__(message)
-        self.columns = columns
+
+def looks_like_text(head: bytes) -> bool:
+    """Whether bytes are UTF-8 text, with tabs and line ends as only controls, or UTF-16."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return True
+    if any(byte < 32 and byte not in b"\t\n\r\f" for byte in set(head)):
+        return False
+    try:
+        head.decode("utf-8")
+    except UnicodeDecodeError as error:
+        return error.start > len(head) - 4
+    return True
+
+
+def pieces(path: Path, kind: str) -> Iterator[bytes]:
+    """The text of a "csv", "csv.gz" or "csv.zst" file, 64 KiB or more at a time.
+
+    Raises
+    ------
+    LogError
+        If compressed data are damaged, cut off, or unpack to more than any table.
+    """
+    import pyarrow as pa
+
+    most = LIMITS.free_text_bytes + LIMITS.text_a_byte * path.stat().st_size
+    size, total = LIMITS.head_bytes, 0
+    try:
+        with pa.input_stream(str(path), compression=_CODECS.get(kind)) as stream:
+            while piece := stream.read(size):
+                total += len(piece)
+                if total > most:
+                    raise LogError(
+                        f"{path}: the compressed data unpack to more than {counted(most, 'byte')}, "
+                        "as no table of their size does; if it is one, unpack it first"
+                    )
+                yield piece
+                size = 1 << 24
+    except (OSError, ValueError) as error:
+        raise LogError(
+            f"{path}: the compressed data are damaged or cut off ({error}); copy it again"
+        ) from error
+
+
+def head_of(path: Path, kind: str) -> bytes:
+    """The first unpacked bytes, 64 KiB at most."""
+    return next(pieces(path, kind), b"")
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +86,8 @@ class Dialect:
     Parameters
     ----------
     schema : pyarrow.Schema
-        The header's cells, blanks stripped; integers, dates (ISO 8601), texts or numbers by what
-        the first lines hold; units of a row under the header.
+        The header's cells, blanks stripped, numbered where there is no header; integers, dates (ISO
+        8601), texts or numbers by what the first lines hold; units of a row under the header.
     separator : str
         One character, or "" for runs of blanks.
     decimal_comma : bool
@@ -75,8 +116,7 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     Raises
     ------
     LogError
-        If there is no header, no data under it, there are not so many columns as names, or the text
-        is not UTF-8.
+        If there are no data, not so many columns as names, or the text is not UTF-8.
     """
     import pyarrow as pa
 
@@ -103,7 +143,7 @@ def detect(path: Path, head: bytes, names: Sequence[str] | None = None) -> Diale
     if all(_is_number(cell) for cell in columns if cell):
         skip, rows = 0, [header, *rows]
         if names is None:
-            columns = _commented_header(path, above, columns, separator)
+            columns = _commented_header(above, columns, separator)
         elif len(names) == len(columns):
             columns = list(names)
         else:
@@ -202,21 +242,13 @@ def _lines(path: Path, head: bytes) -> list[str]:
         raise LogError(f"{path}: the text is UTF-16; save it as UTF-8")
     text = head.decode("utf-8-sig", errors="replace")
     lines = re.split("\r\n|\n", text)
-    if max(map(len, lines[:-1] or lines)) >= LIMITS.line_bytes - 4 or (
-        len(lines) == 1 and len(head) >= LIMITS.line_bytes
-    ):
-        raise LogError(
-            f"{path}: a line of more than 65,000 characters; expected a table of a few columns"
-        )
     for number, line in enumerate(lines, start=1):
         if "\r" in line.rstrip("\r"):
             raise LogError(
                 f"{path}: line {number} holds carriage returns alone, without line feeds; save it "
                 "with line feeds"
             )
-    if len(head) >= LIMITS.line_bytes:  # the last line may break off
-        return lines[:-1]
-    return lines
+    return lines[:-1] if len(head) >= LIMITS.head_bytes else lines  # the last one may break off
 
 
 def _separator(path: Path, header: str, rows: list[str]) -> str:
@@ -232,15 +264,10 @@ def _separator(path: Path, header: str, rows: list[str]) -> str:
     )
 
 
-def _commented_header(path: Path, above: list[str], cells: list[str], separator: str) -> list[str]:
-    """The header's cells among the comments `above` the table."""
+def _commented_header(above: list[str], cells: list[str], separator: str) -> list[str]:
+    """The header's cells among the comments `above` the table; numbered where there is none."""
     for text in reversed(above):
         names = split(text, separator)
         if len(names) == len(cells) and not any(map(_is_number, names)):
             return names
-    named = Remedy({"columns": ["t", "theta1", "theta2", "tau1", "tau2"]}, "name its columns")
-    raise NoHeaderError(
-        len(cells),
-        f"{path}: the table has no header, its first line is {', '.join(cells)[:60]!r}; "
-        f"put a line with the columns' names above it, or {named}",
-    )
+    return [f"column {place}" for place in range(1, len(cells) + 1)]

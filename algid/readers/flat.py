@@ -34,11 +34,18 @@ from algid.readers.column_names import (
     time_among,
     units_in_names,
 )
+from algid.readers.convert import channel_readings, laws_of
 from algid.readers.joints import LOOKED, moving_joints, reading_of
-from algid.readers.log_reader import TableReader, make_reader
-from algid.readers.offered import Clock, Offered
-from algid.readers.stated import lines_of
-from algid.readers.table import JOINT_CHANNELS, REFERENCES, SampleTable, in_pairs
+from algid.readers.log_reader import TableReader
+from algid.readers.stated import lines_of, settings_unused, stated_rate, unused
+from algid.readers.table import (
+    JOINT_CHANNELS,
+    REFERENCES,
+    Clock,
+    Offered,
+    SampleTable,
+    in_pairs,
+)
 from algid.readers.table_cells import (
     Cell,
     TableFile,
@@ -137,7 +144,8 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     Raises
     ------
     LogError
-        If a channel has no source, or that holds no numbers.
+        If a channel has no source or that holds no numbers, a torque is in amperes without a torque
+        constant, or an angle in counts without counts a turn.
     """
     path, fields = offered.path, offered.fields
     sources = _sources(offered, profile)
@@ -169,13 +177,6 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
         clock = Clock("ns", True)
     elif unit is None and all(sources[name] == name for name in ("t", *profile.needed)):
         clock = Clock("s", False)  # algid's own names mean algid's own units
-    topics = dict.fromkeys(fields[source].topic for name, source in sources.items() if name != "t")
-    reading = replace(
-        reading,
-        clock=offered.clock,
-        time_unit=clock.unit if offered.clock == "column" else None,
-        topics=tuple(filter(None, topics)),
-    )
 
     def look(others: Mapping[str, str]) -> Iterator[SampleTable]:
         return offered.tables({"t": sources["t"], **others}, clock, [], LOOKED)
@@ -188,15 +189,33 @@ def open_offered(offered: Offered, profile: Profile) -> TableReader:
     # of counts nobody knows how far they are
     angle = ANGLE.get(profile.channel("theta1").unit or units.get("theta1", "rad"))
     notices += moving_joints(others, look, angle) if angle else ()
-    return make_reader(
-        Origin(path, offered.kind, mapping, offered.truth, reading),
-        partial(offered.tables, sources, clock),
-        profile,
-        units,
-        tuple(notices),
-        offered.rows,
-        offered.said,
+    topics = dict.fromkeys(fields[source].topic for name, source in sources.items() if name != "t")
+    channels, of_units = channel_readings(path, mapping, profile, units)
+    reading = replace(
+        reading,
+        clock=offered.clock,
+        time_unit=clock.unit if offered.clock == "column" else None,
+        topics=tuple(filter(None, topics)),
+        channels=channels,
+        zero=profile.zero,
+        second_angle=profile.second_angle,
+        drive=profile.drive,
+        passive=profile.passive,
+        signs=profile.signs,
+        offsets=profile.offsets,
+        unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
+        start=profile.start,
+        end=profile.end,
+        segment=profile.segment,
+        accepted=profile.accept,
     )
+    notices += of_units
+    notices += unused(offered.said, reading, profile)
+    notices += settings_unused(profile, reading, mapping)
+    origin = Origin(path, offered.kind, mapping, offered.truth, reading)
+    tables, laws = partial(offered.tables, sources, clock), laws_of(path, profile)
+    rate = stated_rate(offered.said)
+    return TableReader(origin, tables, tuple(notices), offered.rows, rate, laws)
 
 
 def _sources(offered: Offered, profile: Profile) -> dict[str, str]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from algid.base.errors import LogError
 from algid.base.files import read_start
 from algid.base.limits import LIMITS
-from algid.readers.text import GZIP, MCAP, NUL_AMONG_ROWS, ZSTD, head_of, looks_like_text
+from algid.readers.dialect import head_of, looks_like_text
 
 if TYPE_CHECKING:
     from algid.profile import Profile
@@ -70,7 +70,7 @@ class FileFormat:
 
 
 FORMATS: tuple[FileFormat, ...] = (
-    FileFormat("mcap", "MCAP", (".mcap",), MCAP, messages=True),
+    FileFormat("mcap", "MCAP", (".mcap",), b"\x89MCAP0\r\n", messages=True),
     FileFormat("rosbag2", "rosbag2 folder", (), b"", messages=True),
     FileFormat("db3", "rosbag2 SQLite file", (".db3",), b"SQLite format 3\x00", messages=True),
     FileFormat("bag", "ROS 1 bag", (".bag",), b"#ROSBAG V", messages=True),
@@ -79,8 +79,8 @@ FORMATS: tuple[FileFormat, ...] = (
     FileFormat("npz", "NumPy archive", (".npz",), b"PK\x03\x04"),
     FileFormat("mat", "MATLAB", (".mat",), b"MATLAB "),
     FileFormat("hdf5", "HDF5 (`algid[hdf5]`)", (".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n"),
-    FileFormat("csv.zst", "CSV packed with zstd", (".csv.zst",), ZSTD),
-    FileFormat("csv.gz", "CSV packed with gzip", (".csv.gz",), GZIP),
+    FileFormat("csv.zst", "CSV packed with zstd", (".csv.zst",), b"\x28\xb5\x2f\xfd"),
+    FileFormat("csv.gz", "CSV packed with gzip", (".csv.gz",), b"\x1f\x8b"),
     FileFormat("jsonl", "JSON lines", (".jsonl", ".ndjson"), b""),
     FileFormat("csv", "CSV", (".csv",), b""),
 )
@@ -131,14 +131,8 @@ def format_of(path: Path) -> FileFormat:
     for form in FORMATS:
         if not (form.magic and head.startswith(form.magic)):
             continue
-        if form.magic in (GZIP, ZSTD):
+        if form.name.startswith("csv."):
             inside = head_of(path, form.name)
-            if inside.startswith(MCAP):
-                unpack = "zstd -d" if form.magic == ZSTD else "gunzip"
-                raise LogError(
-                    f"{path}: an MCAP file compressed as a whole, which cannot be read by parts; "
-                    f"unpack it first: {unpack} {path.name}"
-                )
             if not (inside and looks_like_text(inside)):
                 raise LogError(
                     f"{path}: compressed, but not a table of text; unpack it and name what is "
@@ -146,7 +140,7 @@ def format_of(path: Path) -> FileFormat:
                 )
         if form.name != "npz" or path.suffix.lower() == ".npz":  # any zip begins so
             return form
-    text = head.rstrip(b"\0")  # of a log that breaks off
+    text = head.replace(b"\0", b"")  # which a crash leaves at the end, or among the rows
     if text and looks_like_text(text):
         from algid.readers.arrays import is_json_lines
 
@@ -155,17 +149,10 @@ def format_of(path: Path) -> FileFormat:
         return _BY_NAME["rosbag2"]
     if not head:
         raise LogError(f"{path}: the file is empty; expected a log in MCAP, Parquet or CSV")
-    if not text:
-        raise LogError(
-            f"{path}: the file begins with NUL bytes alone, as a crash leaves them where nothing "
-            "was written; look for another copy, and at the recorder"
-        )
     if head.startswith(b"\x93NUMPY"):
         raise LogError(
             f"{path}: a single NumPy array; save its columns with np.savez(FILE, t=…, q=…, tau=…)"
         )
-    if looks_like_text(head.replace(b"\0", b"")):
-        raise LogError(f"{path}: {NUL_AMONG_ROWS}")
     raise LogError(
         f"{path}: unknown format, it begins with {head[:8]!r}; expected a log in MCAP, Parquet or "
         "CSV"
@@ -239,12 +226,7 @@ def _topics(file: MessageFile) -> Iterator[Entry]:
 
 
 def entries_at(path: Path) -> Entries:
-    """What a log at a path holds: see `entries_of`; columns without a name are numbered."""
+    """What a log at a path holds: see `entries_of`."""
     from algid.profile import Profile
-    from algid.readers.dialect import NoHeaderError
 
-    try:
-        return entries_of(open_file(path, Profile()))
-    except NoHeaderError as error:
-        names = tuple(f"column {place + 1}" for place in range(error.columns))
-        return entries_of(open_file(path, Profile(columns=names)))
+    return entries_of(open_file(path, Profile()))

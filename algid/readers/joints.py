@@ -14,6 +14,7 @@ import numpy as np
 
 from algid.base.criteria import BESIDE_STILL, SWINGING
 from algid.base.errors import LogError
+from algid.base.text import joined
 from algid.log import Reading
 from algid.notices import Notice, Remedy, nevertheless
 from algid.readers.table import SampleTable
@@ -133,17 +134,17 @@ def _words(name: str) -> list[str]:
 _NAMED = 4
 LOOKED = 1 << 14
 """Samples in which the joints that are not read are looked at."""
-Tables = Callable[[Mapping[str, str]], Iterator[SampleTable]]
-"""Tables of a topic's fields, whose paths are given by the columns' names."""
 
 
 def moving_joints(
-    positions: Mapping[str, str], tables: Tables, unit: float = 1.0
+    positions: Mapping[str, str],
+    tables: Callable[[Mapping[str, str]], Iterator[SampleTable]],
+    unit: float,
 ) -> tuple[Notice, ...]:
-    """Say which of the other joints of a topic or table move, and how far, in its first table.
+    """Say which of the other joints of a log move, and how far, in its first table.
 
-    Where they move, the two-link model lacks their torque. `positions` has by joint the path of
-    its position, in `unit` rad.
+    Where they move, the two-link model lacks their torque. `positions` has by joint the name of
+    its angle, in `unit` rad; `tables` reads such fields by channel.
     """
     if not positions:
         return ()
@@ -163,9 +164,7 @@ def moving_joints(
     if not moved:
         return ()
     furthest = sorted(moved, key=lambda joint: -moved[joint])
-    listed = ", ".join(f"{joint} by {moved[joint]:.2g} rad" for joint in furthest[:_NAMED])
-    if len(moved) > _NAMED:
-        listed += f" and {len(moved) - _NAMED} more"
+    listed = joined([f"{joint} by {moved[joint]:.2g} rad" for joint in furthest], _NAMED)
     swing = max(moved.values()) > SWINGING
     numbers = {
         "count": len(moved),

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,12 +17,9 @@ from algid.base.words import counted
 from algid.log import IntArray, Log, Origin
 from algid.notices import Notice, Remedy
 from algid.readers.clock import in_order
-from algid.readers.convert import Law, channel_readings, convert, laws_of
-from algid.readers.stated import other_rate, settings_unused, stated_rate, unused
+from algid.readers.convert import Law, convert
+from algid.readers.stated import other_rate
 from algid.readers.table import BLOCK_ROWS, REFERENCES, ROWS, SampleTable, cut
-
-if TYPE_CHECKING:
-    from algid.profile import Profile
 
 QUANTITIES = ("theta", "tau", "omega", "q_des")
 PASSIVE_TORQUE = 0.01
@@ -196,62 +192,6 @@ class TableReader:
         share = 100 * float(own / other)
         numbers = {"column": mapping[names[0]], "joint": passive, "percent": share}
         return (Notice("PASSIVE_TORQUE", numbers=numbers),)
-
-
-def make_reader(
-    origin: Origin,
-    tables: Callable[[list[Notice]], Iterator[SampleTable]],
-    profile: Profile,
-    stated: Mapping[str, str],
-    notices: tuple[Notice, ...] = (),
-    rows: int = 0,
-    said: Sequence[str] = (),
-) -> TableReader:
-    """A reader of `tables` as a profile says.
-
-    Parameters
-    ----------
-    origin : Origin
-        Its reading holds what the format's reader has decided: joints, topics, clock, unit of time.
-    tables : callable
-        As of `TableReader`.
-    profile : Profile
-    stated : mapping
-        By canonical channel the unit that the file's own names state.
-    notices, rows : as of `TableReader`
-    said : sequence of str
-        What the file states in words.
-
-    Raises
-    ------
-    LogError
-        If a torque is in amperes without a torque constant, or an angle in counts without counts a
-        turn.
-    """
-    channels, of_units = channel_readings(origin.path, origin.mapping, profile, stated)
-    reading = replace(
-        origin.reading,
-        channels=channels,
-        zero=profile.zero,
-        second_angle=profile.second_angle,
-        drive=profile.drive,
-        passive=profile.passive,
-        signs=profile.signs,
-        offsets=profile.offsets,
-        unwrap=(profile.theta1.unwrap, profile.theta2.unwrap),
-        start=profile.start,
-        end=profile.end,
-        segment=profile.segment,
-        accepted=profile.accept,
-    )
-    notices += (
-        *of_units,
-        *unused(said, reading, profile),
-        *settings_unused(profile, reading, origin.mapping),
-    )
-    origin = replace(origin, reading=reading)
-    laws = laws_of(origin.path, profile)
-    return TableReader(origin, tables, notices, rows, stated_rate(said), laws)
 
 
 _TURN = 2 * math.pi

@@ -24,6 +24,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Metadata, Schema, Statistics
+from mcap.writer import MCAP0_MAGIC as MCAP
 from numpy.typing import NDArray
 
 from algid.base.errors import LogError
@@ -39,7 +40,6 @@ from algid.readers.messages.message_file import (
     gather,
 )
 from algid.readers.messages.reader import MessageLog
-from algid.readers.text import MCAP
 
 _FRAME = struct.Struct("<BQ")
 _INDEX = struct.Struct("<BQHI")
@@ -58,13 +58,8 @@ _KINDS: dict[int, tuple[Any, str]] = {
     Opcode.STATISTICS: (Statistics, ""),
 }
 """Records that define something, and what they are known by."""
-_SUMMARY = (2, 3, 4, 8, 10, 11, 13, 14)
-"""Codes of the records that may stand behind the end of the data."""
-_LEAST = {Opcode.MESSAGE: _HEAD_BYTES - 9, Opcode.DATA_END: 4}
-"""Bytes of such a record's content."""
 _LOOSE_BYTES = 1 << 23
 """Of records outside of chunks that are read at once."""
-_SMALL_BYTES = 1 << 13
 _BUFFER_BYTES = 1 << 9
 """What is read of a chunk to know its head."""
 Definitions = list[tuple[int, bytes]]
@@ -157,10 +152,8 @@ def mcap_file(path: Path) -> MessageFile:
         if statistics:
             promised += Counter(statistics.channel_message_counts)
             span = statistics.message_start_time, statistics.message_end_time
-            indexed = all(part.counts is not None for part in found.parts)
-            undefined = any((Opcode.CHANNEL, number) not in records for number in promised)
-            if undefined or (indexed and found.counts() != promised):
-                why = "its indexes and its statistics count different messages"
+            if any((Opcode.CHANNEL, number) not in records for number in promised):
+                why = "it counts messages of channels that it does not define"
         if why or not statistics or all(part.loose for part in found.parts):
             numbers = {"case": "summary" if why else "none", "why": why}
             found.notices.insert(0, Notice("DAMAGED_INDEX", numbers=numbers))
@@ -204,7 +197,7 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         code, length, channel, entries = _INDEX.unpack(head.ljust(_INDEX.size, b"\0"))
         end = place + _FRAME.size + length
         known = 0 < code <= Opcode.DATA_END or code >= 0x80
-        known &= length >= _LEAST.get(code, 0)
+        known &= code != Opcode.MESSAGE or length >= _HEAD_BYTES - 9
         if not known or end > size:
             break
         last = found.parts[-1] if found.parts else _Part(0, 0)
@@ -226,10 +219,10 @@ def _walk(stream: IO[bytes], size: int, found: _Contents) -> None:
         place = end
         if code == Opcode.FOOTER:
             break
-    left = size - place
-    if data_end and (left <= len(MCAP) or (place < end and known and code in _SUMMARY)):
+    left, torn = size - place, place < end and (known or len(head) < _FRAME.size)
+    if data_end and (left <= len(MCAP) or torn):
         return  # what breaks off behind the data is its summary
-    if (known or len(head) < _FRAME.size) and (place < end or not data_end):
+    if torn:
         case = "chunk" if code == Opcode.CHUNK else "record"
         numbers: dict[str, Any] = {"case": case if left else "end", "bytes": left}
         found.notices.append(Notice("CUT_OFF", numbers=numbers))
@@ -269,8 +262,8 @@ def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint1
     ValueError
         If it is damaged; the libraries raise more.
     """
-    content, index = _read(stream, part.start, part.length), b""
-    size, checked = len(content), False
+    content, checked = _read(stream, part.start, part.length), False
+    listed: Listed | None = None
     if not part.loose:
         chunk = _parsed(Chunk, content)
         content, size = _unpacked(chunk), chunk.uncompressed_size
@@ -280,11 +273,9 @@ def _records(stream: IO[bytes], part: _Part) -> tuple[Messages, NDArray[np.uint1
             whole and checked and zlib.crc32(content) != chunk.uncompressed_crc
         ):
             raise ValueError("a chunk's size or its checksum is wrong")
-        index = _read(stream, part.start + part.length, part.index_length)
+        listed = _by_index(content, _read(stream, part.start + part.length, part.index_length))
     octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
-    # a small chunk is sooner walked than compared with its index
-    listed = _by_index(octets, content, index) if size > _SMALL_BYTES else None
-    offsets, others, end = listed or _one_by_one(content, 0, octets.size)
+    offsets, others, end = listed or _one_by_one(content, 0, len(content))
     if end != len(content) and not part.torn:
         raise ValueError("its records do not fill it")
     heads = gather(octets, offsets, f"V{_HEAD.itemsize}").view(_HEAD)
@@ -344,12 +335,13 @@ def _one_by_one(content: bytes, place: int, stop: int) -> Listed:
     return np.array(offsets, np.int64), others, place
 
 
-def _by_index(octets: NDArray[np.uint8], content: bytes, index: bytes) -> Listed | None:
+def _by_index(content: bytes, index: bytes) -> Listed | None:
     """The same by the message indexes behind a chunk.
 
     None where the messages that they list do not fill the chunk behind its first definitions: an
     index has no checksum of its own.
     """
+    octets: NDArray[np.uint8] = np.frombuffer(content, np.uint8)
     found, place = [np.empty(0, np.int64)], 0
     while place < len(index):
         _, length, _, entries = _INDEX.unpack_from(index, place)

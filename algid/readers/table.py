@@ -1,16 +1,25 @@
-"""Samples as a file holds them: named channels in the file's own units, not yet converted."""
+"""What a log offers, of whatever format: numbers by name, what is stated of them, its samples.
+
+Samples are in the file's own units, not yet converted.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from algid.arm import FloatArray
 from algid.base.blocks import concatenated, rows_of
-from algid.log import IntArray
+from algid.base.text import joined
+from algid.log import IntArray, Truth
+from algid.notices import Notice
+
+if TYPE_CHECKING:
+    from algid.readers.table_cells import Cell
 
 JOINT_CHANNELS = ("theta1", "theta2", "tau1", "tau2")
 VELOCITIES = ("omega1", "omega2")
@@ -68,3 +77,83 @@ def in_pairs(sources: Mapping[str, str], velocity: str | None) -> dict[str, str]
 BLOCK_ROWS = 1 << 18
 ROWS = 1 << 16
 """Rows a table: few enough to stay in a core's cache between decoding and copying."""
+_LISTED = 16
+"""Names that a message lists."""
+
+
+class Clock(NamedTuple):
+    """Unit of a time column, whether anybody states it, and rate in Hz of rows without a time."""
+
+    unit: str | None
+    stated: bool
+    rate: float | None = None
+
+
+@dataclass(frozen=True)
+class TopicField:
+    """A number in a topic's messages, by its path; `joint` is what they call the joint it is of.
+
+    A time is of the messages themselves, or without a `topic` of their recorder.
+    """
+
+    column: str
+    topic: str = ""
+    joint: str = ""
+    is_clock: bool = False
+    is_number: ClassVar[bool] = True
+    type: ClassVar[str] = "numbers"
+
+
+@dataclass(frozen=True, eq=False)
+class Offered:
+    """What a log offers.
+
+    Attributes
+    ----------
+    path, kind : str
+        What messages call it, and its format.
+    fields : mapping
+        Its numbers and times by name.
+    chosen : mapping
+        By canonical channel the name that the user, or the names themselves, choose for it.
+    tables : callable
+        A fresh pass over some of the fields by channel, the time as "t": see `samples`.
+    truth : Truth, optional
+        What it tells of a simulated arm.
+    clock : str
+        Where its times are from, as in a `Reading`.
+    joints : pair of str, optional
+        The joints' own names that the columns' names show.
+    rows : int
+        Samples to expect, 0 where nobody knows.
+    units : mapping
+        By name the unit that is stated elsewhere than in the name.
+    notices : tuple of Notice
+        What is to be said of it.
+    said : tuple of str
+        What it states in words.
+    others : tuple of str
+        What else it holds, of another length.
+    """
+
+    path: str
+    kind: str
+    fields: Mapping[str, Cell | TopicField]
+    chosen: Mapping[str, str]
+    tables: Callable[[Mapping[str, str], Clock, list[Notice], int | None], Iterator[SampleTable]]
+    truth: Truth | None
+    clock: str = "column"
+    joints: tuple[str, str] | None = None
+    rows: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
+    said: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+
+    def listed(self) -> str:
+        """The names, for a message."""
+        listed = joined([repr(name[:40]) for name in self.fields], _LISTED)
+        if self.others:
+            others = ", ".join(self.others[:_LISTED])
+            listed += f"; the log also holds, of another length: {others}"
+        return listed

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from algid.base.errors import LogError
+from algid.base.text import joined
 from algid.log import Companion
 from algid.notices import Notice
 from algid.profile import Profile
@@ -71,8 +72,8 @@ def test_two_of_numbered_joints_are_called_by_number_word_or_column(
 
 def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> None:
     assert refusal("q1 q2 tau1") == (
-        "no column for t, tau1, tau2; found 'q1', 'q2', 'tau1'; name them: --set time=NAME --set "
-        "tau1.source=NAME "
+        "no column for t, tau1, tau2; found 'q1', 'q2' and 'tau1'; name them: "
+        "--set time=NAME --set tau1.source=NAME "
         "--set tau2.source=NAME; "
         "or give the samples a second of a log without a time: --rate HZ; "
         "or take them from another file: --torque-file FILE; "
@@ -84,7 +85,7 @@ def test_columns_that_are_missing_are_named_with_the_flags_that_name_them() -> N
     assert f"'c15{'x' * 37}' and 2 more; name them" in told
     assert refusal(PLAIN, {"theta2": {"source": "angle"}}) == (
         "theta2 is to be taken from 'angle', which is not there; found "
-        f"{', '.join(map(repr, PLAIN.split()))}; "
+        f"{joined([*map(repr, PLAIN.split())])}; "
         "name another: --set theta2.source=NAME"
     )
 

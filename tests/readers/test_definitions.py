@@ -9,7 +9,8 @@ import pytest
 
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.readers.messages.definitions import DefinitionError, Field, parse
+from algid.readers.messages.layout import MisfitError
+from algid.readers.messages.ros import Field, parse
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import Cdr, write_mcap
 
@@ -75,7 +76,7 @@ def test_every_kind_of_member_takes_its_place(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_read_is_refused_in_one_line(body: str, told: str) -> None:
-    with pytest.raises(DefinitionError, match=told) as refused:
+    with pytest.raises(MisfitError, match=told) as refused:
         parse("a/msg/T", f"module a {{ module msg {{ {body} }}; }};", idl=True)
     assert "\n" not in str(refused.value)
 
@@ -87,7 +88,9 @@ def test_a_text_of_another_recorder_is_read_as_ros_writes_it() -> None:
     two = Field("b", "a/msg/B", 2), Field("s", "string", None)
     assert types == {root: two, "a/msg/B": (Field("x", "float64", -1),)}
     assert parse("a/T", "int8 debug=1")[1]["a/msg/T"][0].type == "uint8"  # nothing is a byte
-    with pytest.raises(DefinitionError, match=r"Could not parse: int8 9x\)$"):
+    capitals = "Arm/State two\n===\nMSG: Arm/State\nfloat64 x\n"
+    assert parse("Arm/Both", capitals)[1]["Arm/msg/Both"] == (Field("two", "Arm/msg/State", None),)
+    with pytest.raises(MisfitError, match=r"Could not parse: int8 9x\)$"):
         parse("a/T", "int8 y\nint8 9x\n")
 
 

@@ -157,7 +157,7 @@ def test_joints_that_move_are_told_from_those_that_creep() -> None:
 def test_the_four_that_move_furthest_are_named() -> None:
     assert moving(a=0.1, b=-0.5, c=0.3, d=0.2) == (
         "4 other joints move meanwhile: joint of b by 0.5 rad, joint of c by 0.3 rad, joint of d "
-        "by 0.2 rad, joint of a by 0.1 rad"
+        "by 0.2 rad and joint of a by 0.1 rad"
     )
     assert (moving(a=1, b=2, c=3, d=4, e=5, f=6) or "").endswith(
         "joint of d by 4 rad, joint of c by 3 rad and 2 more"

@@ -13,11 +13,12 @@ import pytest
 
 from algid.arm import FloatArray
 from algid.base.errors import LogError
-from algid.log import Log, Origin, join
+from algid.log import Log, join
 from algid.notices import Notice
 from algid.profile import Profile
-from algid.readers.log_reader import TableReader, make_reader
-from algid.readers.table import CHANNELS, SampleTable
+from algid.readers.flat import open_offered
+from algid.readers.log_reader import TableReader
+from algid.readers.table import CHANNELS, Offered, SampleTable, TopicField
 
 MS = 1_000_000
 MAPPING = {name: f"column {name}" for name in CHANNELS[:4]}
@@ -40,10 +41,18 @@ def reader(
     *sizes: int, settings: dict[str, Any] | None = None, **channels: FloatArray
 ) -> TableReader:
     profile = Profile.model_validate(settings or {})
-    origin = Origin("log.csv", "csv", MAPPING)
-    return make_reader(
-        origin, lambda told: tables(told, sizes, channels), profile, {}, (Notice("FIRST", "first"),)
+    fields = {name: TopicField(name) for name in MAPPING.values()}
+    fields["t"] = TopicField("t", is_clock=True)
+    offered = Offered(
+        "log.csv",
+        "csv",
+        fields,
+        MAPPING | {"t": "t"},
+        lambda *given: tables(given[2], sizes, channels),
+        None,
+        notices=(Notice("FIRST", "first"),),
     )
+    return open_offered(offered, profile)
 
 
 def codes(log: Log) -> list[str]:

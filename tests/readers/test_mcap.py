@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import zstandard
 
 from algid.base.errors import LogError
 from algid.profile import Profile
 from algid.readers import read_log
-from algid.writers import write_log
 from tests.readers.logs import EPOCH_NS, noise_log, same
 from tests.readers.mcaps import messages_of, write_mcap
 from tests.readers.ways import Message, States, sent, written
@@ -74,14 +72,6 @@ def test_xcdr2_is_refused(tmp_path: Path) -> None:
     write_mcap(tmp_path / "log.mcap", messages)
     with pytest.raises(LogError, match="XCDR2"):
         read_log(tmp_path / "log.mcap")
-
-
-def test_a_file_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:
-    write_log(tmp_path / "log.mcap", noise_log(10))
-    packed = zstandard.compress((tmp_path / "log.mcap").read_bytes())
-    (tmp_path / "log.mcap.zstd").write_bytes(packed)
-    with pytest.raises(LogError, match=r"compressed as a whole.*zstd -d"):
-        read_log(tmp_path / "log.mcap.zstd")
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.3])

@@ -96,9 +96,6 @@ def redefined(kind: type, **change: Any) -> Callable[[Records], Records]:
 
 
 WRONG: dict[str, Callable[[Records], Records]] = {
-    "a count": changing(
-        Statistics, lambda one: one.channel_message_counts.update({1: len(LOG) - 1})
-    ),
     "a count of another channel": changing(
         Statistics, lambda one: one.channel_message_counts.update({7: 1})
     ),
@@ -308,8 +305,11 @@ def test_a_message_index_that_lies_is_not_believed(place: int, value: int, tmp_p
     # the offset of the first message, or the channel
     path.write_bytes(poked(path.read_bytes(), index + place, "<h" if place == 9 else "<q", value))
     found = read_log(path)
-    assert same(found, LONG)
-    assert [one.code for one in found.notices] == ["DAMAGED_INDEX"] * (place == 9)
+    if place == 9:  # the chunk is taken for one of another channel's
+        assert lost(found).keys() == {"DAMAGED"}
+    else:
+        assert same(found, LONG)
+        assert not found.notices
 
 
 def test_a_file_of_which_damage_left_nothing_says_so_and_where(tmp_path: Path) -> None:

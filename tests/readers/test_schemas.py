@@ -20,7 +20,6 @@ from algid.base.ros2 import JOINT_STATE, JOINT_STATE_DEFINITION
 from algid.profile import Profile
 from algid.readers import read_log
 from algid.readers.messages import protobuf
-from algid.readers.messages.definitions import DefinitionError
 from algid.readers.messages.layout import Codec, Decoder, MisfitError
 from algid.readers.messages.message_file import Messages
 from tests.readers.logs import EPOCH_NS, noise_log, same
@@ -157,7 +156,7 @@ def test_a_protobuf_type_that_is_missing_is_refused_where_it_is_needed() -> None
         ("arm.State", data[:-3]),
         ("arm.State", b"\xff" * 100),
     ):
-        with pytest.raises(DefinitionError):
+        with pytest.raises(MisfitError):
             protobuf.parse(root, broken)
 
 

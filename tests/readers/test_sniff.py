@@ -12,9 +12,8 @@ import zstandard
 
 from algid.api.guide import text_of
 from algid.base.errors import LogError
-from algid.readers.dialect import Dialect, detect, split
+from algid.readers.dialect import Dialect, detect, looks_like_text, split
 from algid.readers.formats import FORMATS, SUFFIXES, format_of
-from algid.readers.text import looks_like_text
 
 CONTENT = {
     "mcap": b"\x89MCAP0\r\n...", "parquet": b"PAR1...", "bag": b"#ROSBAG V2.0\n",
@@ -51,11 +50,8 @@ def test_a_zip_is_a_log_of_numpy_by_its_name_alone(tmp_path: Path) -> None:
     [
         (b"", "the file is empty; expected a log"),
         (b"\x00\x01", "unknown format, it begins with"),
-        (
-            gzip.compress(CONTENT["mcap"], mtime=0),
-            "an MCAP file compressed as a whole, .* unpack it first: gunzip log.dat",
-        ),
-        (zstandard.compress(CONTENT["mcap"]), "unpack it first: zstd -d log.dat"),
+        (b"\x00\x00", "unknown format, it begins with"),
+        (gzip.compress(CONTENT["mcap"], mtime=0), "compressed, but not a table of text; unpack"),
         (gzip.compress(b"\x00", mtime=0), "compressed, but not a table of text"),
         (zstandard.compress(b""), "compressed, but not a table of text"),
     ],
@@ -100,11 +96,6 @@ def found(text: str) -> Dialect:
         ("t,q1\n", "a header and no rows below it"),
         ("t,q1\ns,rad\n", "a header and no rows below it"),
         ("time\n1\n2\n", "'time' has one column; expected columns split by"),
-        (
-            "1,2\n3,4\n",
-            "no header, its first line is '1, 2'; put a line with the columns' names above it, or",
-        ),
-        ("# t q1 q2\n1,2\n3,4\n", "no header"),
         (
             "t,q1,q2,tau1,tau2\n1,2,3\n4,5,6\n",
             "line 2 has 3 cells under a header of 5; mend the header",

@@ -13,12 +13,11 @@ from algid.base.words import repeated
 from algid.notices import Remedy
 from algid.profile import Profile
 from algid.readers.column_names import STEMS, ChannelChoice, choose
-from algid.readers.messages.codec import codec_for
 from algid.readers.messages.layout import MessageLayout, MisfitError
 from algid.readers.messages.message_file import MessageFile
-from algid.readers.offered import TopicField
+from algid.readers.messages.topic import codec_for
 from algid.readers.stated import in_json_schema, lines_of, units_in
-from algid.readers.table import REFERENCES
+from algid.readers.table import REFERENCES, TopicField
 from algid.readers.table_cells import LABELS
 
 _SAMPLES = 64

@@ -62,7 +62,10 @@ class JsonRecords:
             raise MisfitError("a JSON message that is no object")
         leaves: dict[str, Any] = {}
         _gather(content, "", leaves, 0)
-        numbers = {path: leaf for path, leaf in leaves.items() if type(leaf) is float}
+        numbers = {}
+        for path, leaf in leaves.items():
+            if type(leaf) is float or (type(leaf) is bool and path in GOOD | BAD):
+                numbers[path] = float(leaf)
         # what changes with every message is no structure: of very many groups a few are enough
         groups = GROUPS if len(self._known) < LIMITS.layouts else ()
         told = {
@@ -70,11 +73,9 @@ class JsonRecords:
             for path, leaf in leaves.items()
             if type(leaf) is tuple or path.rpartition(".")[2] in groups
         }
-        # flags that are numbers are looked at where those of every format are
-        lacks = tuple(one for one in GOOD | BAD if leaves.get(one) is (one in BAD))
-        structure = tuple(numbers), tuple(told.items()), lacks
+        structure = tuple(numbers), tuple(told.items())
         if structure not in self._known:
-            layout = MessageLayout(fixed=[(0, 8)], lacks=lacks)
+            layout = MessageLayout(fixed=[(0, 8)])
             for place, path in enumerate(numbers, start=1):
                 layout.numbers[path] = Numbers(8 * place, "<f8")
             for path, leaf in leaves.items():

@@ -26,7 +26,7 @@ _ELEMENT = re.compile(r"(.*)\[(\d{1,9})\]")
 
 
 class MisfitError(Exception):
-    """A message that is not what its schema says."""
+    """A message that is not what its schema says, or a schema that cannot be read."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,6 @@ class MessageLayout:
     """Single texts: all of a JSON message, elsewhere those that name an arm or a recording."""
     flags: list[int] = field(default_factory=list)
     """Bytes of which only the highest bit is fixed: those of a varint."""
-    lacks: tuple[str, ...] = ()
-    """Fields by which a message says itself that it is no measurement."""
 
     def pin(self, start: int, end: int) -> None:
         """Note that the bytes [start, end) fix the layout."""
@@ -271,7 +269,7 @@ class Decoder:
         for start, end in layout.fixed:
             mask[lead + start : lead + end] = 0xFF
         mask[lead + np.array(layout.flags, np.intp)] |= 0x80
-        lacks = list(layout.lacks)
+        lacks = list[str]()  # by what a message says itself that it is no measurement
         for name in sorted(GOOD | BAD):  # another value of a flag is another pattern
             if (flag := layout.find(name)) is not None:
                 width = 0 if flag.kind == "zero" else flag.width or int(flag.kind[-1])

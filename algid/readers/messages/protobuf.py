@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from algid.base.limits import LIMITS
-from algid.readers.messages.definitions import DefinitionError
 from algid.readers.messages.layout import MessageLayout, MisfitError, Numbers
 
 _KINDS = {1: "<f8", 2: "<f4", 6: "<u8", 7: "<u4", 15: "<i4", 16: "<i8"}
@@ -36,7 +35,7 @@ def parse(root: str, data: bytes) -> Types:
 
     Raises
     ------
-    DefinitionError
+    MisfitError
         If the bytes are no such set, or `root` is not in it.
     """
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
@@ -58,9 +57,9 @@ def parse(root: str, data: bytes) -> Types:
                 types[name] = {own.number: own for own in message.field}, zeros
                 waiting += [(name, one) for one in message.nested_type]
     except (DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise DefinitionError(f"{root}: no set of descriptors ({error})") from error
+        raise MisfitError(f"{root}: no set of descriptors ({error})") from error
     if f".{root}" not in types:
-        raise DefinitionError(f"{root}: the type is not defined")
+        raise MisfitError(f"{root}: the type is not defined")
     return types
 
 

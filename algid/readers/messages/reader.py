@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from algid.base.errors import LogError
 from algid.notices import Notice, Remedy
@@ -21,8 +20,15 @@ from algid.readers.messages.joint_topic import (
 from algid.readers.messages.layout import MessageLayout
 from algid.readers.messages.message_file import MessageFile
 from algid.readers.messages.topic import topic_tables
-from algid.readers.offered import Clock, Offered, TopicField
-from algid.readers.table import REFERENCES, ROWS, SampleTable, in_pairs
+from algid.readers.table import (
+    REFERENCES,
+    ROWS,
+    Clock,
+    Offered,
+    SampleTable,
+    TopicField,
+    in_pairs,
+)
 
 
 @dataclass(frozen=True)
@@ -83,25 +89,73 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
             layouts.append(layout)
             if layout.has(wanted.values()) and stamp_in(layout):
                 break  # later messages tell nothing more
-        stamps[home] = _stamp(file, home, wanted, layouts, profile)
+        _refuse_absent(file, home, wanted, layouts)
+        stamps[home] = None
+        if profile.clock != "log":
+            stamps[home] = next(filter(None, map(stamp_in, layouts)), None)
+        if profile.clock == "header" and stamps[home] is None:
+            log_clock = Remedy({"clock": "log"})
+            raise LogError(f"{file.path}: messages on {home!r} carry no stamp: {log_clock}")
         stated, lines = stated_of(file, home, paths, layouts)
         units |= stated
         said += lines
     # the main topic has the clock
     main, stamp = next(iter(stamps.items()))
     chosen["t"], time = "log time", TopicField("", is_clock=True)
-    if stamped := profile.clock != "log" and stamp is not None:
+    if stamp:
         chosen["t"] = stamp[0].rpartition(".")[0]
         time = TopicField(chosen["t"], main, is_clock=True)
     fields[chosen["t"]] = time
+
+    def tables(
+        sources: Mapping[str, str], _clock: Clock, told: list[Notice], most: int | None = None
+    ) -> Iterator[SampleTable]:
+        """The samples of the first topic, each with what the others have at its time.
+
+        Tables have at least `most` rows, but for the last. All stamps are in ns.
+
+        Raises
+        ------
+        LogError
+            If another topic has no sample.
+        """
+        homes: dict[str, dict[str, str]] = {}
+        for channel, source in sources.items():
+            if channel != "t":
+                homes.setdefault(fields[source].topic, {})[channel] = fields[source].column
+
+        def read(name: str, told: list[Notice]) -> Iterator[SampleTable]:
+            own = log.files, name, homes[name], stamps[name], profile.clock == "header" or None
+            return topic_tables(*own, told, most or ROWS)
+
+        main, *others = homes
+        samples = read(main, told)
+        if not others:
+            return samples
+        needed, followed = list[Series](), list[Series]()
+        for one in others:
+            only_followed = set(homes[one]) <= set(REFERENCES)
+            own = list[Notice]() if only_followed else told  # it may be missing
+            try:
+                series = whole_topic(log.path, one, homes[one], read(one, own), own)
+                (followed if only_followed else needed).append(series)
+            except LogError as error:
+                if not only_followed:
+                    raise
+                why = str(error).removeprefix(f"{log.path}: ")
+                numbers = {"case": "reference", "topic": one, "why": why}
+                told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
+        return aligned(in_order(log.path, samples, told), needed, told, followed)
+
+    clock = "header" if stamp else "log"
     return Offered(
         log.path,
         log.kind,
         fields,
         chosen,
-        partial(_tables, log, stamps, profile.clock, fields),
+        tables,
         file.truth,
-        "header" if stamped else "log",
+        clock,
         joints,
         file.count(main),
         units,
@@ -110,75 +164,18 @@ def offer_messages(log: MessageLog, profile: Profile) -> Offered:
     )
 
 
-def _stamp(
-    file: MessageFile,
-    name: str,
-    paths: Mapping[str, str],
-    layouts: Sequence[MessageLayout],
-    profile: Profile,
-) -> tuple[str, str] | None:
-    """Where a topic's messages have their stamp, if one of the first has each of the `paths`."""
+def _refuse_absent(
+    file: MessageFile, topic: str, paths: Mapping[str, str], layouts: Sequence[MessageLayout]
+) -> None:
+    """Raises `LogError` where none of the first messages has one of the paths by channel."""
     if not layouts:
         each = Remedy({"tau1.topic": None}, "for one channel")
-        text = f"there is no message on topic {name!r}; found {file.listed()}; name another"
+        text = f"there is no message on topic {topic!r}; found {file.listed()}; name another"
         raise LogError(file.lacking(f"{text}: {TOPIC}; {each}"))
     for channel, path in paths.items():
         if not any(layout.find(path) for layout in layouts):
             known = next((list(one.numbers)[:12] for one in layouts if one.numbers), ["nothing"])
             raise LogError(
-                f"{file.path}: messages on {name!r} have no {path!r} for {channel}; found "
+                f"{file.path}: messages on {topic!r} have no {path!r} for {channel}; found "
                 f"{', '.join(known)}; {Remedy({f'{channel}.source': None}, 'name another')}"
             )
-    stamp = next(filter(None, map(stamp_in, layouts)), None)
-    if profile.clock == "header" and stamp is None:
-        log_clock = Remedy({"clock": "log"})
-        raise LogError(f"{file.path}: messages on {name!r} carry no stamp: {log_clock}")
-    return stamp
-
-
-def _tables(
-    log: MessageLog,
-    stamps: Mapping[str, tuple[str, str] | None],
-    chosen_clock: str | None,
-    fields: Mapping[str, TopicField],
-    sources: Mapping[str, str],
-    _clock: Clock,
-    told: list[Notice],
-    most: int = ROWS,
-) -> Iterator[SampleTable]:
-    """The samples of the first topic, each with what the others have at its time.
-
-    Tables have at least `most` rows, but for the last. All stamps are in ns.
-
-    Raises
-    ------
-    LogError
-        If another topic has no sample.
-    """
-
-    def read(name: str, told: list[Notice]) -> Iterator[SampleTable]:
-        own = log.files, name, homes[name], stamps[name], chosen_clock
-        return topic_tables(*own, told, most)
-
-    homes: dict[str, dict[str, str]] = {}
-    for channel, source in sources.items():
-        if channel != "t":
-            homes.setdefault(fields[source].topic, {})[channel] = fields[source].column
-    main, *others = homes
-    samples = read(main, told)
-    if not others:
-        return samples
-    needed, followed = list[Series](), list[Series]()
-    for one in others:
-        only_followed = set(homes[one]) <= set(REFERENCES)
-        own = list[Notice]() if only_followed else told  # it may be missing
-        try:
-            series = whole_topic(log.path, one, homes[one], read(one, own), own)
-            (followed if only_followed else needed).append(series)
-        except LogError as error:
-            if not only_followed:
-                raise
-            why = str(error).removeprefix(f"{log.path}: ")
-            numbers = {"case": "reference", "topic": one, "why": why}
-            told.append(Notice("MESSAGES_LEFT_OUT", numbers=numbers))
-    return aligned(in_order(log.path, samples, told), needed, told, followed)

@@ -1,9 +1,10 @@
-"""One topic's numbers as tables: the channels that carry it, its fields, its clock."""
+"""One topic: what reads its messages; its numbers as tables, by its fields and its clock."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,48 @@ import numpy as np
 from algid.base.errors import LogError
 from algid.notices import Notice, Remedy
 from algid.readers.flat import to_nanoseconds
-from algid.readers.messages.codec import codec_for
-from algid.readers.messages.layout import Decoder
-from algid.readers.messages.message_file import MessageFile
+from algid.readers.messages import protobuf, ros
+from algid.readers.messages.json import JsonRecords
+from algid.readers.messages.layout import Codec, Decoder, MisfitError
+from algid.readers.messages.message_file import MessageChannel, MessageFile
 from algid.readers.stated import several
 from algid.readers.table import SampleTable, stack
 
 _STAMP = ("sec", "nanosec")
+
+
+def codec_for(path: str, channel: MessageChannel) -> Codec:
+    """What reads a channel's messages.
+
+    Raises
+    ------
+    LogError
+        If the encoding of the messages or of the schema is not known, or the schema cannot be read.
+    """
+    place = f"{path}: topic {channel.topic!r}"
+    root, text = channel.type, channel.definition.decode("utf-8", errors="replace")
+    form = channel.encoding, channel.definition_encoding
+    try:
+        if form in (("cdr", "ros2msg"), ("cdr", "ros2idl"), ("ros1", "ros1msg")):
+            ros1 = channel.encoding == "ros1"
+            root, types = ros.parse(root, text, idl=form[1] == "ros2idl", ros1=ros1)
+            return Codec(partial(ros.parse_layout, root=root, types=types, ros1=ros1))
+        if form == ("protobuf", "protobuf"):
+            messages = protobuf.parse(root, channel.definition)
+            return Codec(partial(protobuf.parse_layout, root=root, types=messages))
+    except MisfitError as error:
+        raise LogError(f"{place}: the message definition cannot be read: {error}") from error
+    if channel.encoding == "json":
+        records = JsonRecords()
+        return Codec(records.parse, records.records)
+    if form == ("cdr", ""):
+        raise LogError(
+            f"{place}: the file holds no definition of {root}, and none is known; record with MCAP"
+        )
+    raise LogError(
+        f"{place}: message encoding {form[0]!r} with schema encoding {form[1]!r}; expected cdr "
+        "with ros2msg or ros2idl, ros1 with ros1msg, protobuf, or json"
+    )
 
 
 def topic_tables(
@@ -25,7 +61,7 @@ def topic_tables(
     topic: str,
     paths: Mapping[str, str],
     stamp: tuple[str, str] | None,
-    clock: str | None,
+    by_header: bool | None,
     told: list[Notice],
     rows: int,
 ) -> Iterator[SampleTable]:
@@ -40,8 +76,8 @@ def topic_tables(
         By canonical channel the path of its number.
     stamp : pair of str, optional
         The paths of a stamp's seconds and nanoseconds.
-    clock : "header", "log" or None
-        None: the header's stamps, unless they stand still.
+    by_header : bool or None
+        Whether to take that stamp; None: unless it stands still.
     told : list of Notice
     rows : int
 
@@ -51,9 +87,8 @@ def topic_tables(
         If half of the messages do not fit their schema, or their stamps are none.
     """
     wanted, place = dict(paths), ""
-    if stamp is not None and clock != "log":
+    if stamp is not None:
         wanted |= dict(zip(_STAMP, stamp, strict=True))
-    by_header: bool | None = None  # once it is known
 
     def clocked(parts: Sequence[SampleTable]) -> SampleTable:
         """The samples with the stamps of the chosen clock and float64 columns."""
@@ -69,8 +104,8 @@ def topic_tables(
                 raise LogError(f"{place}: a header stamp with {error}; {log_clock}") from error
             if by_header is None and len(table):
                 still = len(table) > 1 and not np.any(header != header[0])
-                by_header = clock == "header" or not still
-                if not by_header:
+                by_header = not still
+                if still:
                     numbers = {"case": "still", "topic": topic, "stamp": int(header[0])}
                     told.append(Notice("UNEVEN_STAMPS", numbers=numbers))
             stamps = header if by_header else stamps
