@@ -338,11 +338,10 @@ def test_the_truth_in_the_metadata_is_read_where_it_can_be(tmp_path: Path) -> No
     assert read_log(path).origin.truth == TRUTH
     content = path.read_bytes()
     name = b"\x05\0\0\0algid"
-    place = content.index(name, content.index(name) + 1) - 9  # the header has it too
-    path.write_bytes(content[:place] + bytes(64) + content[place + 64 :])
+    place = content.index(name, content.index(name) + 1)  # the header has it too
+    path.write_bytes(content[:place] + b"\x05\0\0\0other" + content[place + 9 :])
     found = read_log(path)
     assert (same(found, LOG), found.origin.truth) == (True, None)
-    assert {"DAMAGED"} <= {one.code for one in found.notices}
     path.write_bytes(content.replace(b'"arm"', b'"mra"'))
     with pytest.raises(
         LogError, match=rf"^{path}: the truth in the file's metadata cannot be read \(.+\)$"
