@@ -16,13 +16,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from algid.api.batch import batch
     from algid.api.compare import compare
-    from algid.api.convert import convert
+    from algid.api.convert import convert, read_log, write_log
     from algid.api.design import design
     from algid.api.export import export
-    from algid.api.identify import identify
+    from algid.api.identify import Result, identify, read_result
     from algid.api.inspect import inspect
-    from algid.api.read import read_log, write_log
-    from algid.api.result import Result, read_result
     from algid.api.synth import synthesise
     from algid.api.track import track
     from algid.api.validate import validate
@@ -64,7 +62,7 @@ _HOMES = {
     "Arm": "algid.arm",
     "Log": "algid.log",
     "Profile": "algid.profile",
-    "Result": "algid.api.result",
+    "Result": "algid.api.identify",
     "Settings": "algid.settings",
     "batch": "algid.api.batch",
     "compare": "algid.api.compare",
@@ -73,13 +71,13 @@ _HOMES = {
     "export": "algid.api.export",
     "identify": "algid.api.identify",
     "inspect": "algid.api.inspect",
-    "read_log": "algid.api.read",
-    "read_result": "algid.api.result",
+    "read_log": "algid.api.convert",
+    "read_result": "algid.api.identify",
     "simulate": "algid.synth.simulator",
     "synthesise": "algid.api.synth",
     "track": "algid.api.track",
     "validate": "algid.api.validate",
-    "write_log": "algid.api.read",
+    "write_log": "algid.api.convert",
 }
 
 

@@ -5,7 +5,7 @@ A flag that became a setting behind ``--set`` is not listed: `algid.options.BY_S
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 
 from algid.base.errors import SettingError
 from algid.options import BY_SET, flag
@@ -34,24 +34,15 @@ MOVED: Mapping[str, str] = {
 """By the old name what stands in its place."""
 
 
-def refuse_moved(arguments: Sequence[str]) -> None:
-    """Refuse a call that uses a name of version 0.2.
+def refuse_moved(call: str) -> None:
+    """Refuse a call, of a command or of Python, that uses a name of version 0.2.
 
     Raises
     ------
     SettingError
-        If the command, or a flag, has moved: it says what to do instead.
+        If the command, a flag or a keyword has moved: it says what to do instead.
     """
-    call = f"algid {' '.join(arguments)} ".replace("=", " ")
     by_set = {f"--{name.replace('_', '-')}": f"{flag(name)}=VALUE" for name in BY_SET}
     for name, now in {**MOVED, **by_set}.items():
-        if f"{name.replace('=', ' ')} " in call:
+        if f"{name} ".replace("=", " ") in f"{call} ".replace("=", " "):
             raise SettingError(f"{name} is not in this version; instead: {now}")
-
-
-def refuse_moved_keywords(verb: str, names: Iterable[str]) -> None:
-    """Raise `SettingError` at a keyword of a verb that has moved."""
-    for name in names:
-        old = f"{verb}({name}=…)"
-        if old in MOVED:
-            raise SettingError(f"{old} is not in this version; instead: {MOVED[old]}")

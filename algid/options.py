@@ -31,8 +31,8 @@ BY_SET = frozenset(
     }
 )
 """Settings without a flag of their own."""
-VALUES: Mapping[str, str | tuple[str, ...]] = {
-    "joints": ("A", "B"),
+VALUES: Mapping[str, str] = {
+    "joints": "A,B",
     **dict.fromkeys(("l1", "l2"), "M"),
     **dict.fromkeys(("topic", "source", "q_des", "time"), "NAME"),
     "rate": "HZ",
@@ -49,45 +49,40 @@ VALUES: Mapping[str, str | tuple[str, ...]] = {
 class Option:
     """A keyword of a verb, or a field of `Settings` or `Profile`, as the command line has it.
 
-    An annotation states what its type does not say, `algid.api.signature.options_of` the rest.
+    An annotation states what its type does not say, `algid.api.options.options_of` the rest.
 
     Parameters
     ----------
     kind : type
         What is typed, where Python takes more.
-    check : type
-        What pydantic holds a value against, and makes of text; its words where there are any.
     panel : str
         Where help shows it.
+    name : str
+    help : str
+        The first sentence of its entry in the docstring; its words where there is none.
+    check : type
+        What pydantic holds a value against, and makes of text; its words where there are any.
     default : object
         What a command takes where Python's default is None.
     suggested : callable
         Gives what completes it, where no type states that.
-    name : str
-    help : str
-        The first sentence of its entry in the docstring; its words where there is none.
     words : list of str
         The words that it may be; none where it may be others.
     """
 
     kind: Any = None
-    check: Any = None
     panel: str = ""
-    default: Any = None
-    suggested: Callable[[], Sequence[str]] | None = None
     name: str = ""
     help: str = ""
+    check: Any = None
+    default: Any = None
+    suggested: Callable[[], Sequence[str]] | None = None
     words: Sequence[str] = ()
 
     @property
     def flag(self) -> str:
         """How it is typed."""
         return flag(self.name, off=self.default is True)
-
-    @property
-    def argument(self) -> bool:
-        """Whether it is typed without a flag."""
-        return self.panel == ARGUMENTS
 
     @property
     def by_set(self) -> bool:

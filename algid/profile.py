@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr,
 
 from algid.base.errors import SettingError
 from algid.base.files import misfit, read_toml
-from algid.base.limits import PHYSICAL, PRIOR_ERROR, Range
+from algid.base.limits import PHYSICAL, PRIOR_ERROR, within
 from algid.base.units import names_of, unit_of
 from algid.options import Option, flag
 
@@ -65,12 +65,6 @@ CHANNELS_OF: Mapping[str, tuple[str, ...]] = {
 """Settings that are the unit of each of several channels."""
 OF_ONE_LOG = ("torque_file", "segment")
 """Settings that no other log shares."""
-
-
-def field(default: Any, bounds: Range) -> Any:
-    """A field with its least and largest value."""
-    low, high = bounds
-    return Field(default, ge=low, le=high)
 
 
 def parts_of(given: Any) -> Any:
@@ -239,13 +233,13 @@ class Profile(_Strict):
     clock: Literal["header", "log"] | None = None
     time: str | None = None
     time_unit: TimeUnit | None = None
-    rate: float | None = field(None, PHYSICAL.rate)
+    rate: float | None = within(PHYSICAL.rate, None)
     columns: Annotated[tuple[str, ...] | None, BeforeValidator(parts_of)] = None
     zero: Literal["horizontal", "hanging", "upright"] = "horizontal"
     second_angle: Literal["relative", "absolute"] = "relative"
     drive: Literal["joint", "base"] = "joint"
     passive: Literal[1, 2] | None = None
-    gravity: float = Field(default=9.81, ge=0)
+    gravity: float = within(PHYSICAL.gravity, 9.81)
     effort: Effort | None = None
     velocity: Literal["observer", "measured"] | None = None
     signs: tuple[Literal[1, -1], Literal[1, -1]] = (1, 1)
@@ -254,7 +248,7 @@ class Profile(_Strict):
     end: float | None = Field(default=None, gt=0)
     torque_file: PathText = None
     prior: PathText = None
-    prior_error: float | None = field(None, PRIOR_ERROR)
+    prior_error: float | None = within(PRIOR_ERROR, None)
     segment: int | None = Field(default=None, ge=1)
     accept: Annotated[tuple[Check, ...], BeforeValidator(parts_of)] = ()
     theta1: Angle = Angle()

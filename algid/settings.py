@@ -13,10 +13,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from algid.base.errors import SettingError
 from algid.base.files import misfit
-from algid.base.limits import PHYSICAL, PRIOR_ERROR
+from algid.base.limits import PHYSICAL, PRIOR_ERROR, within
 from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
 from algid.options import Option, flag
-from algid.profile import Effort, PathText, field, parts_of
+from algid.profile import Effort, PathText, parts_of
 
 if TYPE_CHECKING:
     from algid.signals.shift import TorqueShift
@@ -102,18 +102,18 @@ class Settings(BaseModel):
     velocity: Literal["observer", "measured"] = "observer"
     observer: Literal["luenberger", "zero-phase"] | None = None
     poles: Annotated[tuple[complex, ...] | None, BeforeValidator(_poles)] = None
-    window: float | None = field(None, PHYSICAL.window)
-    bandwidth: float = field(60.0, PHYSICAL.bandwidth)
-    gravity: float = field(9.81, PHYSICAL.gravity)
+    window: float | None = within(PHYSICAL.window, None)
+    bandwidth: float = within(PHYSICAL.bandwidth, 60.0)
+    gravity: float = within(PHYSICAL.gravity, 9.81)
     effort: Effort | None = None
     model: Annotated[str, Option(suggested=_terms)] = "auto"
     torque_hold: Literal["auto", "foh", "zoh"] = "auto"
-    delay: float = field(0.0, PHYSICAL.delay)
-    l1: float | None = field(None, PHYSICAL.length)
-    l2: float | None = field(None, PHYSICAL.length)
-    payload_mass: float | None = field(None, PHYSICAL.mass)
+    delay: float = within(PHYSICAL.delay, 0.0)
+    l1: float | None = within(PHYSICAL.length, None)
+    l2: float | None = within(PHYSICAL.length, None)
+    payload_mass: float | None = within(PHYSICAL.mass, None)
     prior: PathText = None
-    prior_error: float | None = field(None, PRIOR_ERROR)
+    prior_error: float | None = within(PRIOR_ERROR, None)
     constrain: bool = False
     cross_validate: bool = False
 

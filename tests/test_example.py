@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import algid
-from algid.api.example import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
+from algid.api.synth import ARM, FRICTION, LOGS, PAYLOAD, PROFILE
 from algid.base.errors import OutputError
 from algid.inspection.checks import inspect_log
 from algid.profile import load_profile

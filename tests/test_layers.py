@@ -19,7 +19,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
     "exits": room(),
     "guard": room("exits"),
     "staging": room("guard"),
-    "limits": room(),
+    "limits": room(packages="pydantic"),
     "units": room(),
     "options": room(),
     "faults": room("errors exits guard options"),
@@ -109,7 +109,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "numpy plotly polars pydantic",
     ),
     "cli": room(
-        "api errors exits faults guard moved options profile progress report runtime settings text",
+        "api errors exits faults guard moved options progress report runtime text",
         "click rich",
     ),
 }  # fmt: skip

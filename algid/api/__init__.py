@@ -1,5 +1,39 @@
-"""The verbs: one module each, as a notebook calls it and as the command line calls it.
+"""A module a verb: a function that Python calls, and what its command shows of what it gives."""
 
-A verb takes logs, results and profiles in any form, reads, works, and writes where `out` is given.
-What it gives is printed as the module's `answer` says; `report` gives answers itself.
-"""
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from algid.base.exits import Exit
+
+if TYPE_CHECKING:
+    from algid.report.document import Document, Table
+
+
+class Manual(str):
+    """Markdown, which a terminal shows as such."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is printed, and the exit code.
+
+    Parameters
+    ----------
+    shown : documents, tables and lines for standard output
+    json : callable, or None
+        Gives the same as the text of a JSON file.
+    remarks : sequence of str
+        Lines for standard error.
+    complaints : sequence of str
+        Lines for standard error that say what is wrong.
+    exit : Exit
+    """
+
+    shown: Iterable[Document | Table | str] = ()
+    json: Callable[[], str] | None = None
+    remarks: Sequence[str] = ()
+    complaints: Sequence[str] = ()
+    exit: Exit = Exit.OK

@@ -12,19 +12,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
 from pydantic import ByteSize, Field
 
-from algid.api.answer import Answer
-from algid.api.options import (
-    AnyResult,
-    Options,
-    ProfileLike,
-    bounded,
-    meant,
-    opened,
-    settings_of,
-)
-from algid.api.signature import verb
+from algid.api import Answer
+from algid.api.options import AnyResult, Options, ProfileLike, meant, opened, settings_of, verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
+from algid.base.limits import within
 from algid.base.text import visible
 from algid.options import Option, flag
 
@@ -40,7 +32,7 @@ if TYPE_CHECKING:
 UNIT = "jobs"
 """What progress counts."""
 Size = Annotated[str | int, Option(check=Annotated[ByteSize, Field(ge=1 << 29)])]
-Part = Annotated[str, Option(check=Annotated[str, Field(pattern="^[0-9]{1,9}/[0-9]{1,9}$")])]
+Part = Annotated[str, Field(pattern="^[0-9]{1,9}/[0-9]{1,9}$")]
 Complaint = Callable[[str], None]
 """Hears, in one line, what goes wrong while a batch goes on."""
 
@@ -53,10 +45,10 @@ def batch(
     *,
     parameters: AnyResult | None = None,
     profile: ProfileLike | None = None,
-    workers: Annotated[int, bounded((1, 4096), int)] | None = None,
+    workers: Annotated[int, within((1, 4096))] | None = None,
     scheduler: str | None = None,
     memory_limit: Size | None = None,
-    timeout: Annotated[float, bounded((1e-3, 1e7))] = 3600.0,
+    timeout: Annotated[float, within((1e-3, 1e7))] = 3600.0,
     retry_failed: bool = False,
     watch: bool = False,
     part: Part | None = None,

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from algid.api.answer import Answer
-from algid.api.options import opened
-from algid.api.signature import verb
+from algid.api import Answer
+from algid.api.options import opened, verb
 from algid.base.errors import SettingError
 from algid.options import Option
 from algid.results import Result

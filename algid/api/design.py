@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from algid.api.answer import Answer
+from algid.api import Answer
 from algid.api.options import (
     CASES,
     AnyLog,
@@ -14,14 +14,13 @@ from algid.api.options import (
     Length,
     Mass,
     Seed,
-    bounded,
     called,
     folder_or_none,
     meant,
+    verb,
 )
-from algid.api.signature import verb
 from algid.base.exits import exit_of
-from algid.base.limits import PHYSICAL, PLANNED, PRIOR_ERROR
+from algid.base.limits import PHYSICAL, PLANNED, PRIOR_ERROR, within
 from algid.options import Option
 from algid.results import Result
 
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 UNIT = "steps"
 """What progress counts."""
 
-Noise = Annotated[float, bounded((1e-12, PHYSICAL.noise[1]))]
+Noise = Annotated[float, within((1e-12, PHYSICAL.noise[1]))]
 Pair = float | str | Sequence[float]
 Span = float | str | Sequence[float | Sequence[float]]
 
@@ -46,7 +45,7 @@ def design(
     speed: Pair | None = None,
     acceleration: Pair | None = None,
     torque: Pair | None = None,
-    tip_height: Annotated[float, bounded(PLANNED["tip_height"])] | None = None,
+    tip_height: Annotated[float, within(PLANNED["tip_height"])] | None = None,
     duration: float | None = None,
     rate: float | None = None,
     runs: Sequence[int] | str | None = None,
@@ -54,11 +53,11 @@ def design(
     position_noise: Noise | None = None,
     torque_noise: Noise | None = None,
     noise_from: AnyLog | None = None,
-    prior_error: Annotated[float, bounded(PRIOR_ERROR)] | None = None,
+    prior_error: Annotated[float, within(PRIOR_ERROR)] | None = None,
     payload: Mass | None = None,
     l1: Length | None = None,
     l2: Length | None = None,
-    margin: Annotated[float, bounded((0, 0.5))] = 0.05,
+    margin: Annotated[float, within((0, 0.5))] = 0.05,
     joints: Sequence[str] | str = "joint1,joint2",
     seed: Seed = 0,
     out: Folder | None = None,

@@ -10,22 +10,21 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator
 
-from algid.api.answer import Answer
+from algid.api import Answer
 from algid.api.options import (
     AnyResult,
     Folder,
     Length,
     Mass,
     Seed,
-    bounded,
     called,
     folder_or_none,
     opened,
-    within,
+    verb,
 )
-from algid.api.signature import verb
 from algid.base.errors import SettingError
 from algid.base.files import whole_file
+from algid.base.limits import within
 from algid.options import Option, flag
 from algid.profile import parts_of
 
@@ -65,8 +64,8 @@ def export(
     l2: Length | None = None,
     m1: Mass | None = None,
     m2: Mass | None = None,
-    rotor1: Annotated[float, bounded((0, 1e6))] | None = None,
-    draws: Annotated[int, bounded((1, 100_000), int)] | None = None,
+    rotor1: Annotated[float, within((0, 1e6))] | None = None,
+    draws: Annotated[int, within((1, 100_000))] | None = None,
     seed: Seed = 0,
     flange: Flange | None = None,
     out: Folder | None = None,

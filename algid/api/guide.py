@@ -8,8 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-from algid.api.answer import Answer, Manual
-from algid.api.signature import options_of
+from algid.api import Answer, Manual
 from algid.base.errors import SettingError
 from algid.notices import code_of_now, message
 from algid.options import Option
@@ -69,6 +68,7 @@ def text_of(topic: str) -> str:
     text = (FOLDER / f"{topic}.md").read_text(encoding="utf-8")
 
     def table(mark: re.Match[str]) -> str:
+        from algid.api.options import options_of
         from algid.base import exits
         from algid.base.units import UNITS
         from algid.methods import ESTIMATORS

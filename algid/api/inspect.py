@@ -9,9 +9,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from algid.api.answer import Answer
-from algid.api.options import AnyLog, LogOptions, ProfileLike, meant
-from algid.api.signature import verb
+from algid.api import Answer
+from algid.api.options import AnyLog, LogOptions, ProfileLike, meant, verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
 from algid.base.files import whole_file

@@ -1,19 +1,50 @@
-"""What a caller says beside the logs: a profile in any form, and single settings by their names."""
+"""What a verb takes: logs, a profile in any form, settings by their names; and as a command has it.
+
+A verb's signature and docstring state of each keyword its type, its bounds and its help: the
+command line and the guide are made from them, and the verb checks its values by them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import builtins
+import inspect
+import re
+import sys
+from collections import ChainMap, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import replace
 from difflib import get_close_matches
+from functools import cache, wraps
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    TypedDict,
+    TypeVar,
+    get_args,
+    get_origin,
+)
 
-from pydantic import Field
+from pydantic import TypeAdapter, ValidationError
 
 from algid.base.errors import SettingError
-from algid.base.files import parsed_toml, whole_folder
-from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, Range
-from algid.options import Option, flag
+from algid.base.files import misfit, parsed_toml, whole_folder
+from algid.base.limits import KNOWN_LENGTH, KNOWN_MASS, within
+from algid.moved import refuse_moved
+from algid.options import (
+    ADVANCED,
+    ARGUMENTS,
+    EVERYDAY,
+    EVERYDAY_FIELDS,
+    SELDOM,
+    TYPED,
+    Option,
+    flag,
+)
 from algid.profile import Effort, Profile, load_profile, over, with_settings
 from algid.settings import OF_BOTH, Settings
 
@@ -21,16 +52,10 @@ if TYPE_CHECKING:
     from algid.identification.open_logs import LogLike
     from algid.results import Result
 
-
-def within(bounds: Range) -> Any:
-    """What a number's type states of its least and its largest value."""
-    return Field(ge=bounds[0], le=bounds[1])
-
-
-def bounded(bounds: Range, kind: Any = float) -> Option:
-    """The same of a verb's keyword."""
-    return Option(check=Annotated[kind, within(bounds)])
-
+Verb = TypeVar("Verb", bound=Callable[..., Any])
+CALLERS = ("settings", "progress", "complain", "command", "sensors", "labels")
+"""Keywords that no command line has."""
+EMPTY = inspect.Parameter.empty
 
 ProfileLike = Annotated["Profile | str | Path | Mapping[str, Any]", Option(kind=Path)]
 """A profile, the path of its file, or what would stand in that."""
@@ -41,13 +66,11 @@ AnyResult = Annotated["Result | str | Path", Option(kind=Path)]
 """A result, or the path of one."""
 Folder = Annotated[str | Path, Option(default=Path())]
 """Where a command writes: the working folder by default."""
-Length = Annotated[float, bounded(KNOWN_LENGTH)]
-Mass = Annotated[float, bounded(KNOWN_MASS)]
-Seed = Annotated[int, bounded((0, 2**63), int)]
+Length = Annotated[float, within(KNOWN_LENGTH)]
+Mass = Annotated[float, within(KNOWN_MASS)]
+Seed = Annotated[int, within((0, 2**63))]
 Export = bool | Literal["mcap"]
 """Whether what is shown over time is also written as MCAP."""
-
-
 CASES = ("case1", "case2")
 """The cases that algid knows, for completion."""
 Channel = Mapping[str, Any]
@@ -107,6 +130,113 @@ class Options(LogOptions, total=False):
     payload_mass: float | None
     constrain: bool
     cross_validate: bool
+
+
+@cache
+def options_of(taker: Callable[..., Any], of: str = "") -> Mapping[str, Option]:
+    """What a verb, `Settings` or `Profile` takes that a command line has, by name.
+
+    Of ``**options`` that is what it takes of `Profile` and `Settings`; `of` is a channel, whose
+    fields are the profile's.
+    """
+    # what is imported for type checkers alone is typed as a path
+    module = vars(sys.modules[taker.__module__])
+    names = ChainMap(module, vars(builtins), defaultdict[str, Any](lambda: Path))
+    helps, found = described(taker)[1], dict[str, Option]()
+    is_model = hasattr(taker, "model_fields")
+    for own, one in inspect.signature(taker).parameters.items():
+        if own in CALLERS:
+            continue
+        hint, name = one.annotation, of + own
+        if isinstance(hint, str):
+            hint = eval(hint, module, names)  # our own source
+        parts = list(_parts(hint))
+        if one.kind is one.VAR_KEYWORD:
+            taken = parts[1].__annotations__
+            every = {**options_of(Profile), **options_of(Settings)}
+            found |= {key: every[key] for key in every if key.partition(".")[0] in taken}
+            continue
+        if hasattr(hint, "model_fields"):
+            found |= options_of(hint, f"{name}.")
+            continue
+        stated = next((part for part in parts if isinstance(part, Option)), None)
+        literals = (get_args(part) for part in parts if get_origin(part) is Literal)
+        words = list(dict.fromkeys(map(str, chain.from_iterable(literals))))
+        check = Literal[*words] if words else None
+        if stated is None:  # what a type states beside its kind
+            check = check or next((part for part in parts if get_origin(part) is Annotated), None)
+            stated = Option(check=check)
+        kinds, kind = {part for part in parts if isinstance(part, type)}, stated.kind
+        if kind is None:  # text where Python takes several forms
+            kind = Path if Path in kinds else str
+            if len(kinds) == 1 and not words:
+                (kind,) = kinds
+        panel, default = EVERYDAY, stated.default if one.default is None else one.default
+        if name in SELDOM or (is_model and name not in EVERYDAY_FIELDS):
+            panel = ADVANCED
+        elif one.kind is not one.KEYWORD_ONLY and name not in TYPED:
+            panel = ARGUMENTS
+        if is_model:  # a field that is not typed is not said
+            default = False if kind is bool else None
+        found[name] = replace(
+            stated,
+            name=name,
+            kind=kind,
+            default=default,
+            panel=panel,
+            help=helps.get(own) or f"{', '.join(words)}.",
+            words=words,
+        )
+    return found
+
+
+def _parts(hint: Any) -> Iterator[Any]:
+    """All that a type is made of."""
+    yield hint
+    for part in get_args(hint):
+        if part is not type(None):
+            yield from _parts(part)
+
+
+def verb(function: Verb) -> Verb:
+    """A function that is called with what pydantic makes of its keywords.
+
+    One that is out of its bounds, none of the words that are known, or of a name that has moved is
+    refused.
+    """
+
+    @wraps(function)
+    def called(*args: Any, **given: Any) -> Any:
+        refuse_moved(" ".join(f"{function.__name__}({name}=…)" for name in given))
+        bound = inspect.signature(function).bind(*args, **given)
+        for name, one in options_of(function).items():
+            value = bound.arguments.get(name)
+            if one.check is None or value is None or isinstance(value, bool):
+                continue
+            try:
+                bound.arguments[name] = TypeAdapter(one.check).validate_python(value)
+            except ValidationError as error:
+                why = f"{misfit(error)[1]} ({one.help.rstrip('.')})"
+                raise SettingError(f"{one.flag}: {why}") from None
+        return function(*bound.args, **bound.kwargs)
+
+    return called  # type: ignore[return-value]  # it takes and gives the same
+
+
+def described(taker: Callable[..., Any]) -> tuple[list[str], dict[str, str]]:
+    """What a docstring says: paragraphs, the example of a command the last, and of each parameter.
+
+    Of a parameter that is the first sentence.
+    """
+    above, *rest = re.split(r"\n\n([A-Z]\w+)\n-+\n", inspect.cleandoc(taker.__doc__ or ""))
+    sections, helps = dict(zip(rest[::2], rest[1::2], strict=True)), dict[str, str]()
+    for entry in re.split(r"\n(?=\S)", sections.get("Parameters", "")):
+        names, _, body = entry.partition("\n")
+        first = re.split(r"(?<=\.)\s", " ".join(body.split()))[0]
+        for name in names.partition(" : ")[0].split(", "):
+            helps[name.strip("*")] = first
+    example = sections.get("Examples", "").partition("\n\n")[0].replace("$", "Example:")
+    return [" ".join(one.split()) for one in (*above.split("\n\n"), example)], helps
 
 
 def refuse_unknown(options: Iterable[str], known: Collection[str]) -> None:

@@ -7,9 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from algid.api.answer import Answer
-from algid.api.options import Export
-from algid.api.signature import verb
+from algid.api import Answer
+from algid.api.options import Export, verb
 from algid.base.errors import ResultError, SettingError
 from algid.options import Option, flag
 

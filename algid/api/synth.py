@@ -9,27 +9,28 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 
-from algid.api import example
-from algid.api.answer import Answer
-from algid.api.options import CASES, Folder, Seed, bounded, within
-from algid.api.signature import options_of, verb
+from algid.api import Answer
+from algid.api.options import CASES, Folder, Seed, options_of, verb
+from algid.arm import Arm, FloatArray, with_payload
 from algid.base.errors import SettingError
 from algid.base.files import refuse_existing, whole_file
-from algid.base.limits import PHYSICAL
-from algid.log import Log
+from algid.base.limits import PHYSICAL, within
+from algid.log import Log, Truth
 from algid.options import Option, flag
 from algid.profile import parts_of
 from algid.synth import run
 from algid.synth.cases import load_case
-from algid.synth.sensors import Sensors
+from algid.synth.excitation import SampledTorque, Torque, wide_multi_sine
+from algid.synth.sensors import Sensors, record, sample_times
+from algid.synth.simulator import HANGING, simulate
 from algid.writers import write_log
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
     from algid.synth.cases import Case
-    from algid.synth.excitation import Torque
 
 FIRST_YEAR, LAST_YEAR = 1970, 2037
 """Of a log's start: the stamps in messages of ROS 2 end in January 2038."""
@@ -72,15 +73,39 @@ Schedule = Annotated[
     ),
 ]
 Moment = Annotated[datetime | date | str, Option(check=Annotated[Any, BeforeValidator(_moment)])]
-Noise = Annotated[float, bounded(PHYSICAL.noise)]
+Noise = Annotated[float, within(PHYSICAL.noise)]
+
+ARM = Arm(
+    m1=1.2, m2=0.8, lc1=0.15, lc2=0.12, l1=0.30, l2=0.25, I1=0.010, I2=0.006, b1=0.50, b2=0.40,
+    g=9.81,
+)  # fmt: skip
+"""The arm of the example logs, four runs with a real log's faults and one with a payload.
+
+Its angles are zero where it hangs straight down, and its log does not say so; its joints have dry
+friction, and its sensors noise and steps. What it truly is stands in none of the files.
+"""
+PAYLOAD = 0.5
+"""kg, at the tip in ``loaded.csv``."""
+FRICTION = (0.4, 0.2)
+"""N m of dry friction, which the motors overcome beside what moves the arm."""
+SENSORS = Sensors(torque_noise=0.02, encoder_bits=14)
+STRENGTH = 0.3
+"""Of the torque that swings an arm round and round."""
+RATE, DURATION = 500.0, 10.0
+LOGS = {"run1": 0.0, "run2": 0.0, "run3": 0.0, "run4": 0.0, "loaded": PAYLOAD}
+PROFILE = "arm.toml"
+PROFILE_TEXT = f"""\
+# What the logs of this arm do not say; `inspect LOG {flag("write_profile")} FILE` writes all.
+zero = "hanging"  # θ1 is zero hanging straight down, not along the horizontal
+"""
 
 
 @verb
 def synthesise(
     case: Annotated[str | Path, Option(kind=str, suggested=lambda: CASES)],
     *,
-    duration: Annotated[float, bounded(PHYSICAL.duration)] | None = None,
-    rate: Annotated[float, bounded(PHYSICAL.rate)] = 1000.0,
+    duration: Annotated[float, within(PHYSICAL.duration)] | None = None,
+    rate: Annotated[float, within(PHYSICAL.rate)] = 1000.0,
     torque: Annotated[str | Path | Log, Option(kind=str, suggested=lambda: run.EXCITATIONS)]
     | None = None,
     motion: str | Path | None = None,
@@ -89,9 +114,9 @@ def synthesise(
     sensors: Sensors | None = None,
     position_noise: Noise | None = None,
     torque_noise: Noise | None = None,
-    encoder_bits: Annotated[int, bounded((4, 32), int)] | None = None,
+    encoder_bits: Annotated[int, within((4, 32))] | None = None,
     jitter: Noise | None = None,
-    drop: Annotated[float, bounded((0, 0.9))] | None = None,
+    drop: Annotated[float, within((0, 0.9))] | None = None,
     seed: Seed | None = None,
     start_time: Moment | None = None,
     payload_schedule: Schedule | None = None,
@@ -177,8 +202,8 @@ def synthesise(
         for name, one in options_of(synthesise).items():
             if name not in ("case", "out", "force") and own[name] not in (None, one.default):
                 raise SettingError(f"{one.flag}: the example is always the same; leave it out")
-        names = [*(f"{name}.csv" for name in example.LOGS), example.PROFILE]
-        simulated = example.example_logs
+        names = [*(f"{name}.csv" for name in LOGS), PROFILE]
+        simulated = example_logs
     else:
         arm = load_case(str(case))
         of_sensors = {one.name: own.get(one.name) for one in fields(Sensors)}
@@ -223,7 +248,7 @@ def synthesise(
         write_log(file, log, truth=log.origin.truth, force=force)
     for file in files[len(logs) :]:
         with whole_file(file, force=force) as temporary:
-            temporary.write_text(example.PROFILE_TEXT, encoding="utf-8")
+            temporary.write_text(PROFILE_TEXT, encoding="utf-8")
     return tuple(logs)  # type: ignore[return-value]  # as many as its docstring says
 
 
@@ -231,14 +256,12 @@ def answer(logs: Sequence[Log], given: Mapping[str, Any]) -> Answer:
     """The files."""
     names = [f"{log.origin.path}.{given['format']}" for log in logs]
     if given["case"] == "example":
-        names = [*(f"{log.origin.path}.csv" for log in logs), example.PROFILE]
+        names = [*(f"{log.origin.path}.csv" for log in logs), PROFILE]
     return Answer([str(Path(given["out"]) / name) for name in names])
 
 
 def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquisition) -> Torque:
     """The excitation of that name, or the torque of a log, between whose samples it is held."""
-    from algid.synth.excitation import SampledTorque
-
     if isinstance(given, str) and given in run.EXCITATIONS:
         torque = run.excitation(case, given)
         if hold == "exact":
@@ -254,3 +277,22 @@ def _drive(case: Case, given: str | Path | Log, hold: Any, recording: run.Acquis
             )
         given = read_log(given)
     return SampledTorque(given.t, given.tau, "foh" if hold == "foh" else "zoh")
+
+
+def example_logs() -> list[Log]:
+    """The runs ``run1`` to ``run4``, and ``loaded``: each its own motion, angles from hanging."""
+    logs = []
+    for seed, (name, payload) in enumerate(LOGS.items()):
+        sensors = replace(SENSORS, seed=seed)
+        k = with_payload(ARM.constants(), ARM.payload_constants(payload))
+        strong = wide_multi_sine(ARM, seed=seed)
+
+        def drive(at: FloatArray, strong: Torque = strong) -> FloatArray:
+            return STRENGTH * strong(at)
+
+        motion = simulate(k, drive, sample_times(RATE, DURATION, sensors), HANGING, np.zeros(2))
+        tau = motion.tau + np.array(FRICTION)[:, None] * np.sign(motion.omega)
+        log = record(replace(motion, tau=tau), sensors, Truth(ARM, payload, "example"), name)
+        origin = replace(log.origin, truth=None)
+        logs.append(replace(log, theta=log.theta - HANGING[:, None], origin=origin))
+    return logs

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from algid.api.answer import Answer
+from algid.api import Answer
 from algid.api.options import (
     AnyLog,
     AnyResult,
@@ -17,8 +17,8 @@ from algid.api.options import (
     ProfileLike,
     folder_or_none,
     meant,
+    verb,
 )
-from algid.api.signature import verb
 from algid.base.exits import exit_of
 
 if TYPE_CHECKING:

@@ -7,20 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from algid.api.answer import Answer
-from algid.api.options import (
-    AnyResult,
-    LogOptions,
-    Logs,
-    ProfileLike,
-    bounded,
-    called,
-    meant,
-    opened,
-)
-from algid.api.signature import verb
+from algid.api import Answer
+from algid.api.options import AnyResult, LogOptions, Logs, ProfileLike, called, meant, opened, verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit
+from algid.base.limits import within
 from algid.check import judge
 from algid.options import Option, flag
 from algid.results import Result
@@ -37,7 +28,7 @@ def validate(
     logs: Logs | None = None,
     loaded: Logs | None = None,
     *,
-    max_nrmse: Annotated[float, bounded((0, 1e9))] | None = None,
+    max_nrmse: Annotated[float, within((0, 1e9))] | None = None,
     max_error: Annotated[float | str | Path, Option(kind=str)] | None = None,
     simulate: bool = False,
     profile: ProfileLike | None = None,

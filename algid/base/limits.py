@@ -8,6 +8,7 @@ recorder of a two-link arm writes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,13 @@ LIMITS = FileLimits()
 
 Range = tuple[float, float]
 """The least and the largest value."""
+
+
+def within(bounds: Range, default: Any = ...) -> Any:
+    """What pydantic holds a number against, and its default where it is a field."""
+    from pydantic import Field
+
+    return Field(default, ge=bounds[0], le=bounds[1])
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,179 @@
-"""The application: its commands are made when they are called, or listed."""
+"""The application: each command out of its verb, made when it is called; errors become one line.
+
+A positional parameter is an argument, a keyword an option; its help is what the docstring says of
+it, and a verb that reads logs has an option for each field of `Settings` and `Profile`. A verb's
+module says by `answer` what is printed, and how the command ends.
+"""
 
 from __future__ import annotations
 
+import inspect
 import os
-from collections.abc import Sequence
+import shlex
+import sys
+import traceback
+from collections.abc import Mapping, Sequence
+from functools import partial
+from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args, get_origin
 
 import click
-from click.shell_completion import get_completion_class
+from click.shell_completion import CompletionItem, get_completion_class
 
-from algid import __version__
-from algid.base.errors import SettingError
-from algid.base.exits import Exit
-from algid.cli.derive import COMMANDS, command, listed
-from algid.cli.output import say
+from algid import __version__, api
+from algid.base.errors import AlgidError, SettingError
+from algid.base.exits import Exit, epilog
+from algid.base.faults import fault
+from algid.base.text import lines_of
+from algid.cli.output import complain, progress, remark, say, shown
+from algid.guard import TRACEBACK
+from algid.moved import refuse_moved
+from algid.options import ADVANCED, ARGUMENTS, EVERYDAY, VALUES, Option
 
-COMPLETE = "_ALGID_COMPLETE"
-STARTS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ".config/fish/config.fish"}
-"""By shell the file that it reads as it starts, below the home folder."""
+COMMANDS: Mapping[str, str] = {
+    "inspect": "inspect",
+    "design": "design",
+    "identify": "identify",
+    "validate": "validate",
+    "export": "export",
+    "batch": "batch",
+    "track": "track",
+    "report": "report",
+    "compare": "compare",
+    "synth": "synthesise",
+    "convert": "convert",
+    "guide": "guide",
+}
+"""The function of each command, whose module has the command's name, in the order of help."""
+PRINTED = ("inspect", "design", "identify", "validate", "track", "report", "compare")
+"""Commands that print tables, or JSON."""
+LETTERS = {"out": "-o", "quiet": "-q", "verbose": "-v"}
+KINDS = {Path: "PATH", float: "X", int: "N"}
+"""By the type of a value what stands for it."""
+
+
+class Command(click.Command):
+    """A command whose help has a line an option, by panel."""
+
+    taken: Mapping[str, Option]
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write arguments and options."""
+        panels: dict[str, list[tuple[str, str]]] = {ARGUMENTS: [], EVERYDAY: [], ADVANCED: []}
+        for one in self.get_params(ctx):
+            known = self.taken.get(str(one.name), Option(panel=ADVANCED))  # click's own is --help
+            label, text = one.get_help_record(ctx) or (str(one.metavar), "")
+            panels[known.panel].append((label, text or known.help))
+        for panel in filter(panels.get, panels):
+            with formatter.section(panel):
+                formatter.write_dl(panels[panel])
+
+
+def listed(name: str) -> str:
+    """The first sentence of a command's docstring, without loading what it needs."""
+    text = (Path(api.__path__[0]) / f"{name}.py").read_text(encoding="utf-8")
+    docstring = text.partition(f"\ndef {COMMANDS[name]}(")[2].split('"""')[1]
+    return " ".join(docstring.partition("\n\n")[0].split())
+
+
+def command(name: str) -> Command:
+    """The command that calls a verb."""
+    from algid.api.options import described, options_of
+
+    module = import_module(f"algid.api.{name}")
+    verb = getattr(module, COMMANDS[name])
+    parameters = inspect.signature(verb).parameters
+    every, text = options_of(verb).values(), "Any other setting, as tau1.sign=-1; may be repeated."
+    by_set = [one for one in every if one.by_set]
+    taken = [one for one in every if not one.by_set]
+    tops = {one.name.partition(".")[0]: one for one in every}
+    settable = [top for top, one in tops.items() if one.by_set or top not in parameters]
+    several = [one.name for one in parameters.values() if one.kind is one.VAR_POSITIONAL]
+    if by_set:
+        lines = [f"{one.name}={word}" for one in by_set for word in one.words or [""]]
+        if "options" not in parameters:
+            text = f"NAME=VALUE of {', '.join(one.name for one in by_set)}."
+        taken.append(Option(list[str], ADVANCED, "set", text, suggested=lambda: lines))
+    if name in PRINTED:
+        either = click.Choice(["table", "json"])
+        taken.append(Option(either, ADVANCED, "format", "What to print.", default="table"))
+    if name == "identify":
+        taken.append(Option(bool, ADVANCED, "verbose", "All tables, logs, settings."))
+    taken.append(Option(bool, ADVANCED, "quiet", "Print nothing but errors."))
+
+    def run(quiet: bool, verbose: bool = False, set: Sequence[str] = (), **typed: Any) -> None:  # noqa: A002
+        """Call the verb with what is typed, print its answer, and end with its exit code."""
+        from algid.api.options import set_by
+        from algid.base.runtime import keep_freed
+
+        keep_freed()
+        as_json = name in PRINTED and typed.pop("format") == "json"
+        given = {key: value for key, value in typed.items() if value not in (None, ())}
+        given = getattr(module, "typed", dict)(given | set_by(set, settable))
+        with progress(getattr(module, "UNIT", "samples"), quiet) as bar:
+            line = shlex.join(["algid", *sys.argv[1:]])
+            callers = {"command": line, "complain": complain, "progress": bar}
+            called = {key: value for key, value in callers.items() if key in parameters}
+            called |= {key: value for key, value in given.items() if key not in several}
+            value = verb(*[given[key] for key in several], **called)
+        answers = value  # of a report
+        if hasattr(module, "answer"):
+            answers = [module.answer(value, given | {"verbose": verbose})]
+        for one in answers:
+            shown(one, as_json, quiet)
+        click.get_current_context().exit(max(one.exit for one in answers))
+
+    *above, example = described(verb)[0]
+    text = "\n\n".join((*above, "\b\n" + "\n".join(lines_of(example, 76, rest="  "))))
+    made = Command(name, params=list(map(_parameter, taken)), help=text, callback=run)
+    made.epilog, made.taken = epilog(name), {one.name: one for one in taken}
+    return made
+
+
+def _parameter(one: Option) -> click.Parameter:
+    """An option as click takes it."""
+    many, off, name = get_origin(one.kind) is list, one.default is True, one.name.upper()
+    kind = get_args(one.kind)[0] if many else one.kind
+    value = VALUES.get(one.name, KINDS.get(kind, "TEXT"))
+    said: dict[str, Any] = {
+        "type": click.Path(path_type=Path) if kind is Path else kind,
+        "metavar": "WORD" if one.words or isinstance(kind, click.Choice) else value,
+        "required": one.default is inspect.Parameter.empty,
+    }
+    if one.words or one.suggested:
+        said["shell_complete"] = partial(_completed, one)
+    if not (many or said["required"] or one.default in (None, False)):
+        said["default"] = one.default
+    if one.panel == ARGUMENTS:
+        said["metavar"] = f"{name.removesuffix('S')}..." if many else name
+        return click.Argument([one.name], nargs=-1 if many else 1, **said)
+    if kind is bool:  # what is given switches it off
+        said = {"flag_value": not off, "default": off, "is_flag": True}
+    names = [one.flag if one.flag.startswith("--") else f"--{one.name}", one.name]
+    if one.name in LETTERS:
+        names.insert(0, LETTERS[one.name])
+    return click.Option(names, help=one.help, multiple=many, **said)
+
+
+def _completed(one: Option, _ctx: object, _parameter: object, begun: str) -> list[CompletionItem]:
+    """Completes the last of several words, separated by commas and each used once; else a file."""
+    before, comma, last = begun.rpartition(",")
+    found = [
+        CompletionItem(before + comma + word)
+        for word in (one.suggested() if one.suggested else one.words)
+        if word.startswith(last) and word not in before.split(",")
+    ]
+    return found or [CompletionItem(begun, type="file")]
+
+
+EVAL = 'eval "$(_ALGID_COMPLETE={}_source algid)"'
+STARTS = {
+    "bash": (".bashrc", EVAL),
+    "zsh": (".zshrc", EVAL),
+    "fish": (".config/fish/config.fish", "_ALGID_COMPLETE={}_source algid | source"),
+}
+"""By shell the file that it reads as it starts, below the home folder, and the line for it."""
 
 
 def _completion(ctx: click.Context, option: click.Parameter, wanted: bool) -> None:
@@ -26,16 +182,15 @@ def _completion(ctx: click.Context, option: click.Parameter, wanted: bool) -> No
     shell = Path(os.environ.get("SHELL", "")).name
     if shell not in STARTS:
         raise SettingError(f"{option.opts[0]}: expected bash, zsh or fish, found {shell!r:.60}")
-    script = get_completion_class(shell)(app, {}, "algid", COMPLETE).source()  # type: ignore[misc]
     if option.name == "install_completion":
-        start, script = Path.home() / STARTS[shell], f'eval "$({COMPLETE}={shell}_source algid)"'
-        if shell == "fish":
-            script = f"{COMPLETE}=fish_source algid | source"
+        start, line = Path.home() / STARTS[shell][0], STARTS[shell][1].format(shell)
         start.parent.mkdir(parents=True, exist_ok=True)
         with start.open("a", encoding="utf-8") as file:
-            file.write(f"{script}\n")
-        script = f"added to {start}: {script}"
-    say(script)
+            file.write(f"{line}\n")
+        say(f"added to {start}: {line}")
+    else:
+        made = get_completion_class(shell)(app, {}, "algid", "_ALGID_COMPLETE")  # type: ignore[misc]
+        say(made.source())
     ctx.exit()
 
 
@@ -72,15 +227,37 @@ for name, text in (
 
 
 def called(arguments: Sequence[str]) -> int:
-    """Run a command and return its exit code."""
-    if COMPLETE in os.environ:
-        app.main(prog_name="algid")
-    if not arguments:
-        called(["--help"])
-        return Exit.USAGE
+    """Run a command, or complete one, and return its exit code."""
+    if arguments or "_ALGID_COMPLETE" in os.environ:
+        return int(app.main(list(arguments), "algid", standalone_mode=False))
+    called(["--help"])
+    return Exit.USAGE
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run a command and return its exit code: the outermost place, where errors become lines.
+
+    Raises
+    ------
+    SystemExit
+        As the command ends by itself with an exit code of its own.
+    """
     try:
-        with app.make_context("algid", list(arguments)) as context:
-            app.invoke(context)
-    except click.exceptions.Exit as ended:
-        return ended.exit_code
-    return 0
+        try:
+            refuse_moved(shlex.join(["algid", *arguments]))
+            return called(arguments)
+        finally:
+            sys.stdout.flush()  # else a full disk is told by the interpreter, in its words
+    except SystemExit:
+        raise
+    except BaseException as error:  # whatever a library raises, a panic too
+        cause, (line, code) = error, fault(error)
+        if isinstance(error, AlgidError):
+            line, code = str(error), Exit.USAGE
+        elif isinstance(error, click.UsageError):
+            more = "" if error.ctx is None else f"; {error.ctx.command_path} --help lists all"
+            line, code = error.format_message().rstrip(".?") + more, Exit.USAGE
+    if os.environ.get(TRACEBACK) == "1":
+        remark("".join(traceback.format_exception(cause)))
+    complain(line)
+    return code

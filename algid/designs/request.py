@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError, ValidationInfo
+from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from algid.arm import FloatArray
 from algid.base.errors import SettingError
 from algid.base.files import misfit, toml_content
-from algid.base.limits import PLANNED
+from algid.base.limits import PLANNED, within
 from algid.designs.belief import objective_of
 from algid.designs.campaign import Campaign
 from algid.designs.information import Experiment
@@ -85,12 +85,6 @@ Pair = Annotated[FloatArray, PlainValidator(_pair)]
 UNLIMITED = np.full(2, np.inf)
 
 
-def _within(name: str) -> Any:
-    """What a number may be: as the option of that name."""
-    low, high = PLANNED[name]
-    return Field(ge=low, le=high, allow_inf_nan=False)
-
-
 class Request(BaseModel):
     """What a campaign is asked to keep to; inf is no limit."""
 
@@ -101,8 +95,8 @@ class Request(BaseModel):
     torque: Pair
     acceleration: Pair = UNLIMITED
     tip_height: float = -np.inf
-    duration: Annotated[float, _within("duration")] = DURATION
-    rate: Annotated[float, _within("rate")] = RATE
+    duration: float = within(PLANNED["duration"], DURATION)
+    rate: float = within(PLANNED["rate"], RATE)
     runs: Pair | None = None
 
 

@@ -9,36 +9,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from algid.arm import Arm, FloatArray
 from algid.base.errors import SettingError
 from algid.base.files import read_toml
-from algid.base.limits import PHYSICAL, Range
+from algid.base.limits import PHYSICAL, within
 from algid.synth.excitation import MultiSine
 
 _CASES = Path(str(resources.files("algid"))) / "cases"
 
 
-def _within(bounds: Range) -> Any:
-    return Field(ge=bounds[0], le=bounds[1], allow_inf_nan=False)
-
-
-Mass = Annotated[float, _within(PHYSICAL.mass)]
-Length = Annotated[float, _within(PHYSICAL.length)]
-Inertia = Annotated[float, _within(PHYSICAL.inertia)]
-Friction = Annotated[float, _within(PHYSICAL.friction)]
-Gravity = Annotated[float, _within(PHYSICAL.gravity)]
-Payload = Annotated[float, _within((0.0, PHYSICAL.mass[1]))]
-Centre = Annotated[float, _within((-PHYSICAL.length[1], PHYSICAL.length[1]))]
-Turn = Annotated[float, _within((-3.15, 3.15))]  # rad, of a centre of mass off its link's line
+Mass = Annotated[float, within(PHYSICAL.mass)]
+Length = Annotated[float, within(PHYSICAL.length)]
+Inertia = Annotated[float, within(PHYSICAL.inertia)]
+Friction = Annotated[float, within(PHYSICAL.friction)]
+Gravity = Annotated[float, within(PHYSICAL.gravity)]
+Payload = Annotated[float, within((0.0, PHYSICAL.mass[1]))]
+Centre = Annotated[float, within((-PHYSICAL.length[1], PHYSICAL.length[1]))]
+Turn = Annotated[float, within((-3.15, 3.15))]  # rad, of a centre of mass off its link's line
 Percent = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _SOME = Field(min_length=1, max_length=1000)
-Amplitudes = Annotated[list[Annotated[float, _within(PHYSICAL.torque)]], _SOME]
-Frequencies = Annotated[list[Annotated[float, _within((0.0, PHYSICAL.bandwidth[1]))]], _SOME]
-Phases = Annotated[list[Annotated[float, _within(PHYSICAL.angle)]], _SOME]
+Amplitudes = Annotated[list[Annotated[float, within(PHYSICAL.torque)]], _SOME]
+Frequencies = Annotated[list[Annotated[float, within((0.0, PHYSICAL.bandwidth[1]))]], _SOME]
+Phases = Annotated[list[Annotated[float, within(PHYSICAL.angle)]], _SOME]
 
 
 @dataclass(frozen=True)

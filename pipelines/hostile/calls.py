@@ -14,7 +14,7 @@ from typing import Any
 
 import polars as pl
 
-from algid.cli.derive import COMMANDS, command
+from algid.cli.app import COMMANDS, command
 from pipelines.hostile import places, values
 from pipelines.mutations import damage
 

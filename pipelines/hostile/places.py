@@ -11,7 +11,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from algid.cli import run
+from algid.cli.app import run
 
 CASE = Path(__file__).parents[2] / "data" / "cases" / "case1.toml"
 _TEXTS = {

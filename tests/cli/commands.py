@@ -12,8 +12,7 @@ from typing import Any
 from unittest.mock import patch
 
 from algid.api.options import meant, set_by
-from algid.cli import run
-from algid.cli.app import app
+from algid.cli.app import app, run
 from algid.profile import Profile
 
 __all__ = ["app", "call", "profile_from"]

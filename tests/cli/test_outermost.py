@@ -18,6 +18,7 @@ import pytest
 import algid.cli
 from algid.base.exits import Exit
 from algid.base.text import printable
+from algid.cli.app import run as run_command
 from algid.cli.output import console
 from tests.cli.commands import call
 from tests.processes import begin
@@ -51,7 +52,7 @@ def run(
     def running(*arguments: str) -> tuple[object, str]:
         monkeypatch.setattr(sys, "argv", ["algid", *arguments])
         try:
-            code: object = algid.cli.run(arguments)
+            code: object = run_command(arguments)
         except SystemExit as end:
             code = end.code
         return code, capsys.readouterr().err

@@ -18,7 +18,7 @@ from click.testing import CliRunner
 from algid.base.errors import AlgidError
 from algid.base.files import read_whole
 from algid.base.limits import LIMITS
-from algid.cli.derive import COMMANDS, command
+from algid.cli.app import COMMANDS, command
 from tests.cli.commands import app
 
 WRITTEN = {"out", "scratch", "write_profile"}

@@ -161,7 +161,7 @@ rows = [",".join(map(repr, map(float, row))) for row in table]
 toy.write_text("\\n".join(["TOYLOG", head, *rows, ""]))
 from algid.batches.discover import jobs_of
 assert [job.name for job in jobs_of([str(toy.parent.absolute())], "results")] == ["arm"]
-from algid.cli.derive import command
+from algid.cli.app import command
 unit = next(one for one in command("inspect").params if one.name == "torque_unit")
 assert [one.value for one in unit.shell_complete(None, "N m")] == ["N m", "N mm"]
 assert called("convert", toy, "-o", "arm.csv").exit_code == 0
@@ -184,7 +184,7 @@ from click.testing import CliRunner
 import algid
 from algid.api.guide import text_of
 from algid.cli.app import app
-from algid.cli.derive import command as derived
+from algid.cli.app import command as derived
 from algid.notices import Remedy
 
 def called(*words):
