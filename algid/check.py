@@ -34,11 +34,8 @@ class Judged:
     @property
     def text(self) -> str:
         """One line for the terminal."""
-        word, size = "OVER", "no estimate"
-        if self.passed:
-            word = "ok  "
-        if self.error is not None:
-            size = f"{self.error:.4g} %"
+        word = "ok  " if self.passed else "OVER"
+        size = "no estimate" if self.error is None else f"{self.error:.4g} %"
         return f"{word}  {self.parameter:12}  {size:>12}  limit {self.limit:.4g} %"
 
 

@@ -6,8 +6,8 @@ identification, reports and the guide. Adding one is a module and an entry.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
@@ -27,9 +27,8 @@ class Estimator:
         What it is called in a sentence.
     does, when : str
         What it does and when to take it, for the guide.
-    fit : callable or None
-        ``fit(problem)`` gives a `Fit`. None where estimates are what time series settle to: the
-        paper's method.
+    settles : bool
+        Whether estimates are what time series settle to: the paper's method, which has no `fit`.
     observer : "zero-phase" or "luenberger"
         Where its velocities come from, unless the settings say otherwise.
     lacks : names of settings
@@ -42,28 +41,15 @@ class Estimator:
     title: str
     does: str
     when: str
-    fit: Callable[[Problem], Fit] | None
     observer: Literal["zero-phase", "luenberger"] = "zero-phase"
     lacks: tuple[str, ...] = ()
     beside_paper: bool = False
+    settles: bool = False
 
-
-def _refined(problem: Problem) -> Fit:
-    from algid.estimators import refined
-
-    return refined.fit(problem)
-
-
-def _weak(problem: Problem) -> Fit:
-    from algid.estimators import weak
-
-    return weak.fit(problem)
-
-
-def _instruments(problem: Problem) -> Fit:
-    from algid.estimators import instruments
-
-    return instruments.fit(problem)
+    def fit(self, problem: Problem) -> Fit:
+        """What the module of its name makes of a problem."""
+        fit: Fit = import_module(f"algid.estimators.{self.name}").fit(problem)
+        return fit
 
 
 ESTIMATORS: tuple[Estimator, ...] = (
@@ -73,7 +59,6 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "maximum likelihood with noise in angles and torques; noise levels from the data; banded "
         "Gauss-Newton",
         "always, first",
-        _refined,
         beside_paper=True,
     ),
     Estimator(
@@ -82,22 +67,20 @@ ESTIMATORS: tuple[Estimator, ...] = (
         "momentum form under sliding modulating functions, weighted least squares; no acceleration "
         "anywhere",
         "very long logs, a first look",
-        _weak,
     ),
     Estimator(
         "instruments",
         "instrumental variables",
         "the same windows, with regressors simulated from the measured torque as instruments",
         "where unmodelled torque drives the motion",
-        _instruments,
     ),
     Estimator(
         "paper",
         "the paper's method",
         "the paper's observer and nested integrals, as time series",
         "to compare with the paper",
-        None,
         observer="luenberger",
+        settles=True,
         lacks=(
             "model",
             "delay",
@@ -116,19 +99,10 @@ NAMES = tuple(one.name for one in ESTIMATORS)
 
 
 def estimator_of(name: str) -> Estimator:
-    """The entry of a name.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
-    estimator = next((one for one in ESTIMATORS if one.name == name), None)
-    if estimator is None:
-        raise ValueError(f"estimator must be one of {', '.join(NAMES)}, got {name!r}")
-    return estimator
+    """The entry of a name that `NAMES` holds."""
+    return ESTIMATORS[NAMES.index(name)]
 
 
 def settles(name: object) -> bool:
     """Whether the estimates of the estimator of that name are what time series settle to."""
-    return any(one.name == name and one.fit is None for one in ESTIMATORS)
+    return any(one.name == name and one.settles for one in ESTIMATORS)

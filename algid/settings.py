@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from algid.base.errors import SettingError
 from algid.base.files import misfit
 from algid.base.limits import PHYSICAL, PRIOR_ERROR, within
-from algid.methods import ESTIMATORS, NAMES, Estimator, estimator_of
+from algid.methods import ESTIMATORS, NAMES, estimator_of
 from algid.options import Option, flag
 from algid.profile import Effort, PathText, parts_of
 
@@ -133,9 +133,17 @@ class Settings(BaseModel):
                 f"{flag('effort')} external: such a torque has nothing of the arm's weight; leave "
                 f"{flag('gravity')} out, or say {flag('effort')} gravity-compensated"
             )
-        if self.model not in ("auto", "plain"):
-            self._check_terms()
-        self._refuse_what_it_lacks(estimator_of(self.estimator))
+        self._check_terms()
+        estimator = estimator_of(self.estimator)
+        for name in estimator.lacks:
+            value = getattr(self, name)
+            # of gravity that is zero: without it there is no payload
+            if value == 0 if name == "gravity" else value not in (DEFAULTS[name], "plain"):
+                others = [one.name for one in ESTIMATORS if name not in one.lacks]
+                raise SettingError(
+                    f"{flag(name)} {value}: {estimator.title} cannot take that; use "
+                    f"{flag('estimator')} {' or '.join(others[:2])}"
+                )
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Settings:
@@ -194,6 +202,8 @@ class Settings(BaseModel):
         return dict(self) | {"poles": poles}
 
     def _check_terms(self) -> None:
+        if not self.terms:
+            return
         from algid.model import CHOICES, EVERY_TERM
         from algid.physics.effort import without_terms
 
@@ -219,19 +229,6 @@ class Settings(BaseModel):
             raise SettingError(
                 f"{flag('model')}: no log separates a delay from a lag; leave one of them out"
             )
-
-    def _refuse_what_it_lacks(self, estimator: Estimator) -> None:
-        for name in estimator.lacks:
-            value = getattr(self, name)
-            lacking = value not in (DEFAULTS[name], "plain")
-            if name == "gravity":  # without it there is no payload
-                lacking = value == 0
-            if lacking:
-                others = [one.name for one in ESTIMATORS if name not in one.lacks]
-                raise SettingError(
-                    f"{flag(name)} {value}: {estimator.title} cannot take that; use "
-                    f"{flag('estimator')} {' or '.join(others[:2])}"
-                )
 
 
 DEFAULTS: Mapping[str, Any] = {name: field.default for name, field in Settings.model_fields.items()}

@@ -42,7 +42,8 @@ def compare(
     Returns
     -------
     Comparison
-        By parameter the distances in combined standard deviations, and tables.
+        `sigma`, an array (R, P) of each result's distances from the first one by parameter
+        (`names`), in combined standard deviations; `largest_sigma`, `settings` that differ, tables.
 
     Raises
     ------

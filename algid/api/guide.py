@@ -44,11 +44,9 @@ def guide(topic: Annotated[str, Option(suggested=lambda: TOPICS)] | None = None)
     $ algid guide start
     """
     if topic is None:
-        titles = dict[str, str]()
-        for name in TOPICS:
-            with (FOLDER / f"{name}.md").open(encoding="utf-8") as lines:
-                titles[name] = next(lines)[2:].rstrip()
-        return str(_tables().contents(titles))
+        texts = ((FOLDER / f"{name}.md").read_text(encoding="utf-8") for name in TOPICS)
+        titles = (text.partition("\n")[0].removeprefix("# ") for text in texts)
+        return str(_tables().contents(dict(zip(TOPICS, titles, strict=True))))
     if topic in TOPICS:
         return text_of(topic)
     try:
@@ -69,7 +67,7 @@ def text_of(topic: str) -> str:
 
     def table(mark: re.Match[str]) -> str:
         from algid.api.options import options_of
-        from algid.base import exits
+        from algid.base.exits import Exit
         from algid.base.units import UNITS
         from algid.methods import ESTIMATORS
         from algid.moved import MOVED
@@ -81,7 +79,7 @@ def text_of(topic: str) -> str:
 
         registries: Mapping[str, Any] = {
             "estimators": ESTIMATORS,
-            "exits": exits,
+            "exits": Exit,
             "formats": FORMATS,
             "messages": messages(),
             "moved": MOVED,

@@ -13,7 +13,7 @@ from algid.api import Answer
 from algid.api.options import AnyLog, LogOptions, ProfileLike, meant, verb
 from algid.base.errors import SettingError
 from algid.base.exits import Exit, exit_of
-from algid.base.files import whole_file
+from algid.base.files import refuse_existing, whole_file
 from algid.base.text import lines_of
 from algid.options import flag
 
@@ -79,11 +79,14 @@ def inspect(
     own, log = meant(profile, options, log)
     if write_profile is not None and not isinstance(log, str | Path):
         raise SettingError(f"{flag('write_profile')}: expected the path of a log, found arrays")
+    file = None if write_profile is None else profile_file(write_profile)
+    if file is not None:
+        refuse_existing(file, force)
     found = inspect_log(log, own)
-    if write_profile is not None:
+    if file is not None:
         from algid.inspection.draft import draft_profile
 
-        with whole_file(profile_file(write_profile), force=force) as temporary:
+        with whole_file(file, force=force) as temporary:
             temporary.write_text(draft_profile(found), encoding="utf-8")
     return found
 

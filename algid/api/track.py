@@ -23,7 +23,6 @@ from algid.base.exits import exit_of
 
 if TYPE_CHECKING:
     from algid.base.progress import Progress
-    from algid.identification.open_logs import LogLike
     from algid.tracks.result import TrackResult
 
 
@@ -101,18 +100,18 @@ def track(
     >>> len(found.track.stretches), round(found.track.stretches[1].m_p, 2)
     (2, 0.1)
     """
+    from algid.log import Log
     from algid.tracks.page import track_folder, write_track
     from algid.tracks.run import track_log
 
     own, log = meant(profile, options, log)
-    folder = None
-    if out is not None:
-        folder = track_folder(_name(log), Path(out))
+    name = str(log) if isinstance(log, str | Path) else "log"
+    if isinstance(log, Log):
+        name = log.origin.path
+    folder = None if out is None else track_folder(name, Path(out))
     if progress is not None:
         progress("weighing the payload", 0, 0)
-    settings = {}
-    if command is not None:
-        settings["command"] = command
+    settings = {} if command is None else {"command": command}
     with folder_or_none(folder, force) as temporary:
         result = track_log(log, parameters, l1=l1, l2=l2, profile=own, settings=settings)
         if temporary is not None:
@@ -131,14 +130,3 @@ def answer(result: TrackResult, given: Mapping[str, Any]) -> Answer:
         [f"wrote {track_folder(str(given['log']), given['out'])}"],
         exit=exit_of(failed=verdict(result).failed or not result.complete, lost=result.data_lost),
     )
-
-
-def _name(log: LogLike) -> str:
-    """What a log is called: its path, or what one in memory calls itself."""
-    from algid.log import Log
-
-    if isinstance(log, Log):
-        return log.origin.path
-    if isinstance(log, str | Path):
-        return str(log)
-    return "log"

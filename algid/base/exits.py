@@ -7,46 +7,40 @@ from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """An exit code."""
+    """An exit code, what it means, and what whoever called does then."""
 
-    OK = 0
-    LIMIT = 1
-    USAGE = 2
-    FAILED = 3
-    DATA_LOST = 4
-    INTERNAL = 70
-    STOPPED = 130
+    meaning: str
+    then: str
+
+    def __new__(cls, code: int, meaning: str, then: str) -> Exit:
+        """The code with its texts."""
+        made = int.__new__(cls, code)
+        made._value_, made.meaning, made.then = code, meaning, then
+        return made
+
+    OK = 0, "a result to use, good or with reservations", "go on"
+    LIMIT = 1, "a limit was exceeded: an error, a misfit, failed jobs of a batch", "alert"
+    USAGE = 2, "the call or a file is wrong; one line says what to do", "correct it, do not retry"
+    FAILED = (
+        3,
+        "failed, or some parameters not identifiable: do not use",
+        "read the verdict and the report",
+    )
+    DATA_LOST = 4, "usable, but data were lost", "go on, and check the recorder"
+    INTERNAL = 70, "a fault of algid", "report it"
+    STOPPED = 130, "stopped by a signal (128 + its number); nothing half-written is left", "retry"
 
 
-MEANINGS: Mapping[Exit, str] = {
-    Exit.OK: "a result to use, good or with reservations",
-    Exit.LIMIT: "a limit was exceeded: an error, a misfit, failed jobs of a batch",
-    Exit.USAGE: "the call or a file is wrong; one line says what to do",
-    Exit.FAILED: "failed, or some parameters not identifiable: do not use",
-    Exit.DATA_LOST: "usable, but data were lost",
-    Exit.INTERNAL: "a fault of algid",
-    Exit.STOPPED: "stopped by a signal (128 + its number); nothing half-written is left",
+OF_COMMAND: Mapping[str, tuple[int, ...]] = {
+    "inspect": (0, 2, 3, 4),
+    "design": (0, 2, 3),
+    "identify": (0, 2, 3, 4),
+    "validate": (0, 1, 2),
+    "batch": (0, 1, 2, 3, 4, 130),
+    "track": (0, 2, 3, 4),
+    "convert": (0, 2, 4),
 }
-WHAT_TO_DO: Mapping[Exit, str] = {
-    Exit.OK: "go on",
-    Exit.LIMIT: "alert",
-    Exit.USAGE: "correct it, do not retry",
-    Exit.FAILED: "read the verdict and the report",
-    Exit.DATA_LOST: "go on, and check the recorder",
-    Exit.INTERNAL: "report it",
-    Exit.STOPPED: "retry",
-}
-_ALWAYS = (Exit.OK, Exit.USAGE)
-OF_COMMAND: Mapping[str, tuple[Exit, ...]] = {
-    "inspect": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
-    "design": _ALWAYS + (Exit.FAILED,),
-    "identify": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
-    "validate": (Exit.OK, Exit.LIMIT, Exit.USAGE),
-    "batch": (Exit.OK, Exit.LIMIT, Exit.USAGE, Exit.FAILED, Exit.DATA_LOST, Exit.STOPPED),
-    "track": _ALWAYS + (Exit.FAILED, Exit.DATA_LOST),
-    "convert": _ALWAYS + (Exit.DATA_LOST,),
-}
-"""The codes that a command ends with by itself; any other command ends with `OK` or `USAGE`."""
+"""The codes that a command ends with by itself; any other command ends with 0 or 2."""
 
 
 def exit_of(*, failed: bool, lost: bool) -> Exit:
@@ -60,5 +54,5 @@ def exit_of(*, failed: bool, lost: bool) -> Exit:
 
 def epilog(command: str) -> str:
     """The codes of a command as its help ends with them."""
-    codes = OF_COMMAND.get(command, _ALWAYS)
-    return "Exit codes: " + "; ".join(f"{int(code)} {MEANINGS[code]}" for code in codes) + "."
+    codes = [one for one in Exit if one in OF_COMMAND.get(command, (0, 2))]
+    return "Exit codes: " + "; ".join(f"{int(one)} {one.meaning}" for one in codes) + "."

@@ -67,7 +67,7 @@ def run_fit(
         If the settings' estimator gives time series.
     """
     estimator = estimator_of(settings.estimator)
-    if estimator.fit is None:
+    if estimator.settles:
         raise ValueError(f"{estimator.name} gives time series, not a fit")
     estimate = estimator.fit
 

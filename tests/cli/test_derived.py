@@ -18,7 +18,7 @@ import algid
 from algid.api.guide import TOPICS, text_of
 from algid.api.options import LogOptions, Options, options_of
 from algid.base.errors import AlgidError, SettingError
-from algid.base.exits import MEANINGS, WHAT_TO_DO, epilog
+from algid.base.exits import Exit, epilog
 from algid.cli.app import COMMANDS, Command, command, listed
 from algid.methods import ESTIMATORS
 from algid.moved import MOVED
@@ -309,8 +309,8 @@ def test_the_completion_of_a_shell_is_printed_and_installed(
 
 
 def test_tables_of_the_guide_and_the_readme_are_those_of_the_code() -> None:
-    for code, meaning in MEANINGS.items():
-        line = f"| {int(code)} | {meaning} | {WHAT_TO_DO[code]} |\n"
+    for code in Exit:
+        line = f"| {int(code)} | {code.meaning} | {code.then} |\n"
         assert line in text_of("batch")
         assert line in (ROOT / "README.md").read_text(encoding="utf-8")
     for one in ESTIMATORS:
