@@ -368,12 +368,11 @@ def join(blocks: Iterable[Log]) -> Log:
         raise ValueError("a log needs at least one block, got none")
     if len(parts) == 1:
         return parts[0]
-    signals: dict[str, Any] = {
-        name: joined([getattr(part, name) for part in parts]) for name in SIGNALS
+    whole: dict[str, Any] = {
+        name: joined([getattr(one, name) for one in parts]) for name in SIGNALS
     }
-    stamps = np.concatenate([part.stamp_ns for part in parts])
-    notices = tuple(notice for part in parts for notice in part.notices)
-    return replace(parts[0], stamp_ns=stamps, notices=notices, **signals)
+    whole["stamp_ns"] = np.concatenate([part.stamp_ns for part in parts])
+    return replace(parts[0], notices=sum((part.notices for part in parts), ()), **whole)
 
 
 def joined(parts: Sequence[FloatArray | None]) -> FloatArray | None:

@@ -203,7 +203,6 @@ def test_a_file_system_without_locks_is_written_to_and_not_swept(
     [
         (OSError(errno.ENOSPC, "No space left on device"), "No space left on device"),
         (OSError("the library's own\nwords"), "the library's own"),
-        (OSError(), "OSError"),
     ],
 )
 def test_what_the_system_says_is_told_whoever_raises_it(

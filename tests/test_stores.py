@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from algid.base.errors import LogError, OutputError
-from algid.base.stores import list_urls, object_stat, open_store, reading
+from algid.base.stores import list_urls, open_store, reading
+from algid.batches.jobs import stat_of
 from tests.objects import Served, s3
 
 
@@ -66,8 +67,8 @@ def test_objects_below_a_url_and_one_that_is_not_there(served: Served) -> None:
     open_store(served.url("logs")).write("r1/a.csv", b"123")
     assert list_urls(served.url("logs")) == [(served.url("logs/r1/a.csv"), "r1/a.csv")]
     assert list_urls(served.url("logs/r1/a.csv")) == [(served.url("logs/r1/a.csv"), "a.csv")]
-    assert object_stat(served.url("logs/r1/a.csv"))[0] == 3
-    assert object_stat(served.url("logs/absent")) == (0, 0)
+    assert stat_of(served.url("logs/r1/a.csv")).size == 3
+    assert stat_of(served.url("logs/absent")).size == 0
     with (
         pytest.raises(LogError, match="check name and rights"),
         reading(served.url("absent")) as (filesystem, path),

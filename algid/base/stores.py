@@ -125,8 +125,14 @@ class Store:
         """
         from pyarrow.fs import FileSelector, FileType
 
-        if self.folder is not None:
-            return _names_below(self.folder, under)
+        start = len(self.root) + 1
+        if self.folder is not None:  # links to folders and unreadable ones are passed over
+            return sorted(
+                f"{place}/{name}"[start:]
+                for place, _, names in os.walk(self.folder / under)
+                for name in names
+                if name[0] != "." and Path(place, name).is_file()
+            )
         path = f"{self.root}/{under}".rstrip("/")
         with _translated(self.place, OutputError, "its objects cannot be listed"):
             entries = self.filesystem.get_file_info(
@@ -141,28 +147,13 @@ class Store:
                 f"{self.place}: expected at most {MOST_LISTED:,} objects, found {len(entries):,}; "
                 "name a prefix of fewer"
             )
-        names = []
-        for info in entries:
-            if info.type == FileType.File and not info.base_name.startswith("."):
-                names.append(info.path.removeprefix(f"{self.root}/"))
-        return sorted(names)
+        files = (one for one in entries if one.is_file and not one.base_name.startswith("."))
+        return sorted(one.path[start:] for one in files)
 
     def exists(self, name: str) -> bool:
         """Whether there is such a file. Raises `LogError` where that cannot be known."""
         with _translated(f"{self.place}/{name}", LogError, "it cannot be looked at"):
             return bool(self.filesystem.get_file_info(f"{self.root}/{name}").is_file)
-
-
-def _names_below(root: Path, under: str) -> list[str]:
-    """Names in a local folder; links to folders and unreadable entries are skipped."""
-    start = len(str(root)) + 1
-    below = []
-    for folder, _, names in os.walk(root / under):
-        for name in names:
-            path = f"{folder}/{name}"
-            if name[0] != "." and Path(path).is_file():
-                below.append(path[start:])
-    return sorted(below)
 
 
 def open_store(place: str) -> Store:
@@ -218,21 +209,6 @@ def list_urls(url: str) -> list[tuple[str, str]]:
     return below or [(url, store.root.rpartition("/")[2])]
 
 
-def object_stat(url: str) -> tuple[int, int]:
-    """Size in bytes and time of change in ns of an object; zeros where there is none.
-
-    Raises
-    ------
-    LogError
-        If that cannot be known.
-    """
-    with reading(url) as (filesystem, path):
-        info = filesystem.get_file_info(path)
-    if not info.is_file:
-        return 0, 0
-    return info.size, info.mtime_ns
-
-
 @contextmanager
 def reading(url: str) -> Iterator[tuple[Any, str]]:
     """The file system and path of an object.
@@ -257,15 +233,9 @@ def _translated(
     try:
         yield
     except (OSError, UnicodeError, pa.ArrowException) as error:
-        raise kind(f"{place}: {what} ({_first_line(error)}); {do}") from error
-
-
-def _first_line(error: BaseException) -> str:
-    """Of what an object store's client says.
-
-    Before it is cut, so that no half of a secret stays.
-    """
-    return without_credentials(str(error)).split("\n", maxsplit=1)[0][:200]
+        # before it is cut, so that no half of a secret stays
+        said = without_credentials(str(error)).partition("\n")[0][:200]
+        raise kind(f"{place}: {what} ({said}); {do}") from error
 
 
 def put_folder(store: Store, name: str, folder: Path) -> None:

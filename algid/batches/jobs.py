@@ -20,7 +20,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from algid.base.errors import LogError, without_credentials
 from algid.base.files import first_misfit
 from algid.base.limits import LIMITS
-from algid.base.stores import Store, is_url, object_stat
+from algid.base.stores import Store, is_url, reading
 
 FOLDER = ".jobs"
 Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
@@ -183,7 +183,10 @@ def stat_of(path: str) -> Input:
         If it may be there and cannot be looked at.
     """
     if is_url(path):
-        return Input(redacted_path(path), *object_stat(path))
+        with reading(path) as (filesystem, key):
+            info = filesystem.get_file_info(key)
+        found = (info.size, info.mtime_ns) if info.is_file else (0, 0)
+        return Input(redacted_path(path), *found)
     files = [Path(path)]
     try:
         if files[0].is_dir():

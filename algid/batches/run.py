@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import fnmatch
+import io
 import os
 import signal
 import threading
@@ -35,7 +36,7 @@ from algid.batches.jobs import (
     stat_of,
     write_record,
 )
-from algid.batches.table import write_jobs
+from algid.batches.table import jobs_frame
 from algid.batches.workers import CallFailedError, WorkerDiedError
 from algid.options import flag
 
@@ -150,7 +151,9 @@ class Batch:
             if not (self._written and self._store.exists(TABLE)):
                 if self._shared:  # the others have come further meanwhile
                     self.records |= read_records(self._store)[0]
-                write_jobs(self._store, [self.records[name] for name in sorted(self.records)])
+                content = io.BytesIO()
+                jobs_frame([one for _, one in sorted(self.records.items())]).write_parquet(content)
+                self._store.write(TABLE, content.getvalue())
                 self._written = True
         except OutputError as error:
             self._stop_because(str(error))

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from algid.base.stores import Store
-from algid.batches.jobs import TABLE, JobRecord, utc_of
+from algid.batches.jobs import JobRecord, utc_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,13 +21,6 @@ COLUMNS = (
 _OF_LOGS = (("logs", "path"), ("sha256", "sha256"), ("size", "size"), ("changed", "mtime_ns"))
 """Columns of lists, and the field of each log."""
 FIRST_EPOCH_NS = 10**17  # stamps before 1973 count from some start, not from 1970
-
-
-def write_jobs(store: Store, records: Sequence[JobRecord]) -> None:
-    """Write ``jobs.parquet``, whole or not at all. Raises `OutputError`."""
-    content = io.BytesIO()
-    jobs_frame(records).write_parquet(content)
-    store.write(TABLE, content.getvalue())
 
 
 def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
@@ -58,7 +49,11 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         kinds |= {name: pl.Float64, f"{name}_std": pl.Float64, f"{name}_status": pl.String}
     for one in records:
         row: dict[str, Any] = {**vars(one), "job": one.job.name, "robot": one.job.robot}
-        row |= {"time": time_of(one), "settings": json.dumps(one.settings, sort_keys=True)}
+        row["settings"] = json.dumps(one.settings, sort_keys=True)
+        if one.job.time is not None:  # as its manifest says, or as its first stamp does
+            row["time"] = utc_of(one.job.time)
+        elif one.start_ns is not None and one.start_ns >= FIRST_EPOCH_NS:
+            row["time"] = datetime.fromtimestamp(one.start_ns * 1e-9, UTC)
         row |= {column: [getattr(log, name) for log in one.inputs] for column, name in _OF_LOGS}
         for name, label in one.job.labels.items():
             row[f"label_{name}"] = str(label) if labels[name] == pl.String else label
@@ -67,12 +62,3 @@ def jobs_frame(records: Sequence[JobRecord]) -> pl.DataFrame:
         rows.append(row)
     columns = {name: [row.get(name) for row in rows] for name in kinds}
     return pl.DataFrame(columns, kinds, strict=False)
-
-
-def time_of(record: JobRecord) -> datetime | None:
-    """When the job's logs were taken, in UTC: as its manifest says, or as its first stamp does."""
-    if record.job.time is not None:
-        return utc_of(record.job.time)
-    if record.start_ns is None or record.start_ns < FIRST_EPOCH_NS:
-        return None
-    return datetime.fromtimestamp(record.start_ns * 1e-9, UTC)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import resource
 import signal
-import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
@@ -83,11 +82,6 @@ def raise_unprintable() -> NoReturn:
     raise UnprintableError
 
 
-def raise_huge() -> NoReturn:
-    """Raise an exception of many words."""
-    raise ValueError("x" * (1 << 26))
-
-
 class Panic(BaseException):
     """What compiled libraries raise."""
 
@@ -95,11 +89,6 @@ class Panic(BaseException):
 def raise_base() -> NoReturn:
     """Raise it."""
     raise Panic("as asked")
-
-
-def leave() -> NoReturn:
-    """Try to end the process."""
-    sys.exit(3)
 
 
 def give_unpicklable() -> Any:

@@ -128,15 +128,11 @@ def test_a_pattern_of_two_stars_goes_through_folders_and_not_through_results(
         ("**/f.*", ["f.txt"]),
     ):
         assert [job.name for job in jobs_of([str(tmp_path / pattern)], "out")] == names, pattern
-    with pytest.raises(SettingError, match="no such file, folder or match"):
-        jobs_of([f"{tmp_path}/**/*.bag"], "out")
+    for absent in ("**/*.bag", "absent*.csv"):
+        with pytest.raises(SettingError, match="no such file, folder or match"):
+            jobs_of([f"{tmp_path}/{absent}"], "out")
     with pytest.raises(SettingError, match=r"expected one \*\* at most; name the folders"):
         jobs_of([f"{tmp_path}/**/x/**/*.csv"], "out")
-
-
-def test_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match="no such file, folder or match"):
-        jobs_of([str(tmp_path / "absent*.csv")], "out")
 
 
 def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
@@ -166,24 +162,14 @@ def test_manifests_in_csv_and_toml_say_the_same(tmp_path: Path) -> None:
         ("name,logs\n../x,a.csv\n", "row 1.name: a job's name becomes a folder's"),
         ("name,logs\nx,\n", "row 1: expected logs, or loaded ones"),
         ("name,logs,time\nx,a.csv,yesterday\n", "row 1.time: expected ISO 8601"),
-        (
-            "name,logs,time\nx,a.csv,0001-01-01T00:00+23:59\n",
-            "row 1.time: expected ISO 8601.* from 1970 to 2261",
-        ),
         ("name,logs\na.algid/b,a.csv\n", "row 1.name: a job's name .* ends in .algid"),
-        ("name,logs\njobs.parquet/b,a.csv\n", "row 1.name: .* no folder that is jobs.parquet"),
         (f"name,logs\n{'abc/' * 250}d,a.csv\n", "row 1.name: a job's name .* at most 1000 bytes"),
         (
             "name,logs,logs\nx,a.csv,b.csv\n",
             r"the manifest cannot be read \(two columns are named 'logs'\); mend it",
         ),
         ("name,logs\nx,a,b,c\n", "row 1.cells beyond the header: expected text.*found .'b', 'c'."),
-        ("name,logs\nx,a.csv;;b.csv\n", "row 1.logs.1: .* found ''"),
         ("name,logs\ny,a.csv\nx,a\0.csv\n", "row 2.logs.0: "),
-        (
-            "name,logs\n" + "x" * 140_000 + ",a.csv\n",
-            "the manifest cannot be read \\(field larger than",
-        ),
     ],
 )
 def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told: str) -> None:
@@ -196,17 +182,12 @@ def test_a_bad_manifest_is_refused_by_its_place(tmp_path: Path, text: str, told:
     ("text", "told"),
     [
         ("", r"expected tables \[\[job\]\] alone, found none"),
-        ("job = [1]", "job 1: .*found 1"),
         (f"more = 1\n{JOB}", r"expected tables \[\[job\]\] alone, found more"),
-        ("[[job]]\nlogs = 'a.csv'", "job 1.name: field required"),
         ("[[job]]\nname = 'x'\nlogs = 5", "job 1.logs: expected a valid list, found 5"),
-        ("[[job]]\nname = 'x'\nlogs = ['a.csv', ' ']", "job 1.logs.1: .*found ' '"),
         ("[[job]]\nname = 'x'\nlogs = 'a.csv'\ntime = 07:32:00", "job 1.time: expected ISO 8601"),
         ("a = " + "[" * 5000 + "]" * 5000, r"not TOML \(maximum recursion depth"),
         (f"{JOB}payload = 0x1{'0' * 5000}", "job 1.payload: expected text, a date, .*, found "),
-        (f"{JOB}payload = nan", "job 1.payload: .* number below"),
         (f"{JOB}payload = {{a = 1}}", "job 1.payload: .* found {'a': 1}"),
-        (f"{JOB}robot = [1]", r"job 1.robot: .* found \[1\]"),
     ],
 )
 def test_a_bad_manifest_in_toml_is_refused_by_its_place(
@@ -243,7 +224,7 @@ def test_what_else_a_row_holds_is_a_label(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["", "/a", "a/", "a//b", "../a", "a/..", ".a", "a\\b", "a\nb", "a\x7f", "ä" * 101]
+    "name", ["", "/a", "a/", "../a", "a/..", "a\\b", "a\nb", "ä" * 101, "jobs.parquet/b"]
 )
 def test_a_name_that_could_leave_the_folder_of_results_is_refused(name: str) -> None:
     assert name_fault(name) is not None

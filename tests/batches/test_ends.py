@@ -1,6 +1,4 @@
-"""How commands end, as processes of their own: on hostile folders, shared outputs, and where
-nothing can be written.
-"""
+"""How commands end as processes: on hostile folders, and where nothing can be written."""
 
 from __future__ import annotations
 
@@ -10,7 +8,6 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-import algid
 from pipelines.fuzz_files import sound_files
 from pipelines.hostile import corpus
 from tests.batches.commands import QUICK, Started, left, start, write_logs
@@ -63,56 +60,3 @@ def test_where_nothing_can_be_written_every_command_says_so_in_a_line(tmp_path: 
         last = told.strip().splitlines()[-1]
         assert last.startswith("algid: "), told
         assert str(place) in last
-
-
-FOLDER = Path()
-WRITERS = {
-    "identify": (("LOG", "--estimator", "weak", "--model", "plain"), FOLDER, {"d0-unloaded.algid"}),
-    "synth": (
-        ("case1", "--duration", "2"),
-        FOLDER,
-        {"case1-unloaded.mcap", "case1-loaded.mcap"},
-    ),
-    "export": (("RESULT", "--to", "urdf"), Path("a.urdf"), {"a.urdf"}),
-}
-"""By command its arguments, what `-o` names, and what then stands there."""
-
-
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A log and its result."""
-    place = tmp_path_factory.mktemp("arm")
-    log = next(write_logs(place / "logs", 1).glob("*.csv"))
-    algid.identify([log], estimator="weak", model="plain", out=place, report=False)
-    return {"LOG": log, "RESULT": place / "d0-unloaded.algid"}
-
-
-@pytest.mark.parametrize("writer", WRITERS)
-def test_of_two_processes_that_write_one_output_one_is_refused(
-    writer: str, tmp_path: Path, arm: dict[str, Path]
-) -> None:
-    """The refused one leaves nothing, and what stands there is one's alone, whole."""
-    words, name, wanted = WRITERS[writer]
-    arguments = [arm.get(word, word) for word in words]
-    out, alone = tmp_path / "out", tmp_path / "alone"
-    command = [writer, *arguments, "-o"]
-    for place in (out, alone):
-        place.mkdir()
-    ends = [ended(one) for one in [start(*command, out / name) for _ in range(2)]]
-    assert sorted(code for code, _ in ends) in ([0, 2], [2, 3]), ends
-    assert all("exists already" in told for code, told in ends if code == 2)
-    assert {path.name for path in out.iterdir()} == wanted
-    ended(start(*command, alone / name))
-    assert files(out) == files(alone)
-
-
-def files(folder: Path) -> dict[str, int]:
-    """By path the lines of each file; what was written at another time has as many."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes().count(b"\n") if path.suffix in TEXT else 0
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
-
-
-TEXT = (".csv", ".urdf", ".json", ".md", ".yaml")

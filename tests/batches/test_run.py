@@ -16,7 +16,7 @@ import polars as pl
 import pytest
 
 import algid
-from algid.base.errors import OutputError
+from algid.base.errors import OutputError, SettingError
 from algid.base.stores import open_store
 from algid.base.verdict import Verdict
 from algid.batches.discover import jobs_of
@@ -181,11 +181,8 @@ def test_parts_share_an_output_and_its_table_is_of_all(
     ]
     assert pl.read_parquet(out / "jobs.parquet")["job"].to_list() == ["bad", "r1/a", "r1/b"]
     assert algid.batch(logs, out, **quick).ran == 0
-    for wrong in ("0/2", "3/2", "2", "a/b", "", "-1/2", "1/2/3"):
-        told = "string should match pattern"
-        if wrong in ("0/2", "3/2"):
-            told = "expected 1/N to N/N, and no --watch"
-        with pytest.raises(algid.base.errors.SettingError, match=f"^--part: {told}"):
+    for wrong in ("0/2", "3/2"):
+        with pytest.raises(SettingError, match=r"^--part: expected 1/N to N/N, and no --watch"):
             algid.batch(logs, out, part=wrong, **quick)
 
 
