@@ -6,41 +6,32 @@ from collections.abc import Mapping
 
 from algid.arm import CONSTANT_NAMES, FloatArray, with_payload
 from algid.base.limits import LIMITS
+from algid.base.names import within
 from algid.estimators.paper import STAGE1_NAMES
 from algid.log import Truth
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Table4Row
 
-UNLOADED_ROWS = STAGE1_NAMES
-LOADED_ROWS = ("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
+Rows = dict[str, tuple[str, ...]]
+"""Constants by the row that is their sum; a loaded one holds the payload's share, z, too."""
+
+
+def _summing(*rows: str) -> Rows:
+    return {row: within(row.split("+"), CONSTANT_NAMES) for row in rows}
+
+
+UNLOADED_ROWS = _summing(*STAGE1_NAMES)
+LOADED_ROWS = _summing("k5+k3+z1+z2", "k1+z3", "k3+z2", "k4+z4", "k2+z5")
 UNITS = {
-    row: PARAMETER_UNITS[row.partition("+")[0]] for row in UNLOADED_ROWS + LOADED_ROWS + ("m_p",)
+    row: PARAMETER_UNITS[row.partition("+")[0]] for row in (*UNLOADED_ROWS, *LOADED_ROWS, "m_p")
 }
 """By row, in their order: that of its first constant."""
 
 
-def unloaded_rows(k: FloatArray) -> dict[str, float]:
-    """The first six rows from k1 … k7 (7,)."""
-    k1, k2, k3, k4, k5, k6, _ = k.tolist()
-    return dict(zip(UNLOADED_ROWS, (k5 + k3, k1, k3, k6, k4, k2), strict=True))
-
-
-def loaded_rows(k: FloatArray) -> dict[str, float]:
-    """The next five rows from the loaded arm's constants (7,)."""
-    k1, k2, k3, k4, k5, _, _ = k.tolist()
-    return dict(zip(LOADED_ROWS, (k5 + k3, k1, k3, k4, k2), strict=True))
-
-
-def true_rows(truth: Truth | None, payload: float | None) -> dict[str, float]:
-    """All rows of the arm behind a synthetic log, with the loaded log's `payload` in kg."""
-    if truth is None:
-        return {}
-    k = truth.arm.constants()
-    rows = unloaded_rows(k)
-    if payload:
-        rows |= loaded_rows(with_payload(k, truth.arm.payload_constants(payload)))
-        rows["m_p"] = payload
-    return rows
+def sums(rows: Rows, k: FloatArray) -> dict[str, float]:
+    """The rows of an arm's, or of a loaded arm's, constants (7,)."""
+    value = dict(zip(CONSTANT_NAMES, k.tolist(), strict=True))
+    return {row: sum(map(value.__getitem__, names)) for row, names in rows.items()}
 
 
 def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, float]:
@@ -53,45 +44,44 @@ def true_parameters(truth: Truth | None, payload: float | None) -> dict[str, flo
     return constants | {"m_p": payload, "l1": truth.arm.l1, "l2": truth.arm.l2}
 
 
-def paper_errors(truth: Truth | None) -> dict[str, float]:
-    """The paper's errors in percent, where the log comes from one of its cases unchanged."""
-    if truth is None or not truth.case:
-        return {}
-    from algid.synth.cases import case_names, load_case
-
-    if truth.case not in case_names():
-        return {}
-    case = load_case(truth.case)
-    if case.arm != truth.arm:
-        return {}
-    return case.paper_error_percent
-
-
 def table4(
     estimates: Mapping[str, float],
     std: Mapping[str, float],
-    true: Mapping[str, float],
-    paper: Mapping[str, float],
+    truth: Truth | None,
+    payload: float | None,
 ) -> list[Table4Row]:
-    """The twelve rows; what was not estimated, or is not known, is null."""
+    """The twelve rows; what was not estimated, or is not known, is null.
+
+    The truth is that of the arm behind a synthetic log and of the loaded log's `payload` in kg. The
+    paper's errors are those of its cases, where the log comes from one unchanged.
+    """
+    true, paper = dict[str, float](), dict[str, float]()
+    if truth is not None:
+        from algid.synth.cases import case_names, load_case
+
+        k = truth.arm.constants()
+        true = sums(UNLOADED_ROWS, k)
+        if payload:
+            loaded = with_payload(k, truth.arm.payload_constants(payload))
+            true |= sums(LOADED_ROWS, loaded) | {"m_p": payload}
+        case = load_case(truth.case) if truth.case in case_names() else None
+        if case is not None and case.arm == truth.arm:
+            paper = case.paper_error_percent
     rows = []
     for name, unit in UNITS.items():
-        estimate, truth = finite(estimates.get(name)), true.get(name)
-        error = None
-        if estimate is not None and truth:
-            error = 100 * abs(estimate / truth - 1)
-        spread, of_paper = finite(std.get(name)), paper.get(name)
-        rows.append(
-            Table4Row(
-                parameter=name,
-                unit=unit,
-                estimate=estimate,
-                std=spread,
-                truth=truth,
-                error_percent=error,
-                paper_error_percent=of_paper,
-            )
+        estimate, known = finite(estimates.get(name)), true.get(name)
+        row = Table4Row(
+            parameter=name,
+            unit=unit,
+            estimate=estimate,
+            std=finite(std.get(name)),
+            truth=known,
+            error_percent=100 * abs(estimate / known - 1)
+            if known and estimate is not None
+            else None,
+            paper_error_percent=paper.get(name),
         )
+        rows.append(row)
     return rows
 
 

@@ -58,7 +58,7 @@ TABLE: dict[str, Room] = {  # lower rooms first
         "errors files log model names notices options settings significance text "
         "verdict words", "numpy polars pydantic"),
     "synth": room("arm errors files limits log progress", "numpy pydantic scipy"),
-    "table4": room("arm estimators limits log model results synth"),
+    "table4": room("arm estimators limits log model names results synth"),
     "writers": room("arrow errors files log ros2", "mcap numpy polars pyarrow"),
     "readers": room(
         "arm arrow blocks criteria errors faults files limits log notices options profile "

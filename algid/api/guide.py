@@ -95,6 +95,6 @@ def text_of(topic: str) -> str:
 
 def _tables() -> Any:
     """The macros of ``tables.md.j2``, which write what the registries hold."""
-    from algid.exports.templating import template
+    from algid.exports import template
 
     return template(FOLDER / "tables.md.j2").module

@@ -5,6 +5,7 @@ Names out of logs are foreign text, which may not reach a terminal or a page as 
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import textwrap
@@ -18,36 +19,20 @@ _HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 
 def visible(text: str, longest: int = LONGEST) -> str:
     """`text` with every invisible character escaped, cut to a length of `longest`."""
-    shown = "".join(map(_shown, text[:longest]))
-    if len(text) > longest:
-        shown += "…"
-    return shown
+    return printable(text[:longest], kept="") + ("…" if len(text) > longest else "")
 
 
-def printable(text: str) -> str:
-    """`text` with every invisible character but line feeds and tabs as a JSON escape."""
-    if text.isascii() and text.replace("\n", "").replace("\t", "").isprintable():
-        return text
-    return "".join(
-        c if c in "\n\t" or unicodedata.category(c) not in _HIDDEN else _as_json(c) for c in text
-    )
+def printable(text: str, kept: str = "\n\t") -> str:
+    """`text` with every invisible character, but those `kept`, as JSON's strings escape it."""
+
+    def shown(odd: re.Match[str]) -> str:
+        hidden = odd[0] not in kept and unicodedata.category(odd[0]) in _HIDDEN
+        return json.dumps(odd[0])[1:-1] if hidden else odd[0]
+
+    return _ODD.sub(shown, text)
 
 
-def _as_json(character: str) -> str:
-    """A character as JSON's strings may hold it: UTF-16 in hexadecimal."""
-    units = character.encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[i : i + 2].hex()}" for i in range(0, len(units), 2))
-
-
-def _shown(character: str) -> str:
-    if unicodedata.category(character) not in _HIDDEN:
-        return character
-    code = ord(character)
-    if code < 0x100:
-        return f"\\x{code:02x}"
-    if code < 0x10000:
-        return f"\\u{code:04x}"
-    return f"\\U{code:08x}"
+_ODD = re.compile(r"[^ -~]")
 
 
 def file_name(path: str) -> str:
@@ -119,12 +104,10 @@ def significant(value: float | None, digits: int = 5) -> str:
         return "∞" if value > 0 else "−∞"
     if value == 0:
         return "0"
-    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])  # once rounded
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")  # once rounded
     if SMALLEST_FIXED <= abs(value) < LARGEST_FIXED:
-        return f"{value:.{max(digits - 1 - exponent, 0)}f}"
-    if abs(exponent) >= 300:  # ten to that power is no number
-        return f"{value:.{digits - 1}e}"
-    return f"{value / 10.0**exponent:.{digits - 1}f}e{exponent}"
+        return f"{value:.{max(digits - 1 - int(power), 0)}f}"
+    return f"{mantissa}e{int(power)}"
 
 
 def resolved(value: float | None, std: float | None) -> str:
@@ -137,13 +120,7 @@ def resolved(value: float | None, std: float | None) -> str:
 
 def digits_of(value: float | None, std: float | None) -> int:
     """Significant digits of `value` that its standard deviation supports: two to eight."""
-    if (
-        value is None
-        or std is None
-        or not (math.isfinite(value) and math.isfinite(std))
-        or value == 0
-        or std <= 0
-    ):
+    if not (value and std and std > 0 and math.isfinite(value) and math.isfinite(std)):
         return 5
     leading = math.floor(math.log10(abs(value))) - math.floor(math.log10(std))
     return min(max(leading + 2, 2), MOST_DIGITS)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
 from typing import Any
@@ -27,7 +26,7 @@ from algid.base.errors import ResultError, SettingError
 from algid.base.names import within
 from algid.estimators.diagnostics import bounds
 from algid.estimators.parametrisation import BODY_PARAMETERS, Shared
-from algid.exports.description import Description, describe
+from algid.exports.description import describe
 from algid.exports.formats import ROBOTS, SUFFIXES, takes, written
 from algid.exports.links import Knowns
 from algid.identification.known import model_of, prior_of, with_error_bar
@@ -49,63 +48,6 @@ def freedom_of(quantile: float) -> float:
     return 1 / float(brentq(lambda of: student_quantile(1 / of) - widest, least, 0.5, rtol=1e-10))
 
 
-def draws_of(
-    result: Result, file: str, seed: int, knowns: Knowns, *, links: bool
-) -> Iterator[tuple[dict[str, float], Description, int]]:
-    """Possible arms without end: numbers by name, the arm, and how many were refused before it.
-
-    Raises
-    ------
-    ResultError
-        If the estimates have no error bars, or hardly an arm is like them.
-    SettingError
-        If what is known leaves no positive mass or inertia at the estimates themselves.
-    """
-    model = model_of(result)
-    arm = prior_of(result, model, file).names
-    others = [name for name in result.estimates if name not in (*model.names, *result.loaded)]
-    names = (*arm, *with_error_bar(result, others))
-    mean = np.array([result.estimates[name].estimate for name in names], dtype=np.float64)
-    best = describe(result, file, knowns, links=links)
-    assert result.fit is not None  # or there is no prior
-    covariance = result.fit.covariance_of(names)
-    size = np.sqrt(np.diag(covariance))
-    size[size == 0] = 1.0
-    still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
-    freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
-    shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
-    refused, why, limits = 0, "", bounds(shared)
-    while refused < _HOPELESS:
-        wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
-        one_each = random.multivariate_normal(
-            still, correlation, method="eigh", check_valid="ignore"
-        )
-        drawn = mean + size * one_each * wide
-        numbers = dict(zip(names, drawn.tolist(), strict=True))
-        beta = np.array([numbers.get(name, 0.0) for name in shared.names])
-        broken = [name for name, limit in limits.items() if limit(beta) < 0]
-        moved = {}
-        for kind, given in (("parameters", result.parameters), ("payload", result.payload)):
-            moved[kind] = {
-                name: one.model_copy(update={"estimate": numbers.get(name, one.estimate)})
-                for name, one in given.items()
-            }
-        try:
-            one = describe(result.model_copy(update=moved), file, knowns, links=links)
-        except (ResultError, SettingError) as error:
-            broken.append(str(error))
-        if broken:
-            refused, why = refused + 1, broken[-1]
-            continue
-        numbers |= {name: one.value[name] for name in arm}  # as l1 moved them
-        yield numbers, replace(one, word="drawn", warnings=best.warnings), refused
-        refused = 0
-    raise ResultError(
-        f"{file}: {_HOPELESS} draws in a row are no arm ({why}); identify it from more "
-        "informative logs"
-    )
-
-
 def drawn_files(
     result: Result, file: str, to: str, knowns: Knowns, count: int, seed: int
 ) -> tuple[dict[str, bytes], tuple[Notice, ...]]:
@@ -119,26 +61,64 @@ def drawn_files(
     Raises
     ------
     ResultError
-        As `draws_of`.
+        If the estimates have no error bars, or hardly an arm is like them.
     SettingError
         If the format has no draws or no place for what is known, or that leaves no possible arm.
     """
     if to not in (*SUFFIXES, *TABLES):
         raise SettingError(f"{flag('draws')}: {to} has no draws; leave it out")
     takes(to, knowns)
+    model, links = model_of(result), to in ROBOTS
+    arm = prior_of(result, model, file).names
+    others = [name for name in result.estimates if name not in (*model.names, *result.loaded)]
+    names = (*arm, *with_error_bar(result, others))
+    mean = np.array([result.estimates[name].estimate for name in names], dtype=np.float64)
+    best = describe(result, file, knowns, links=links)
+    assert result.fit is not None  # or there is no prior
+    covariance = result.fit.covariance_of(names)
+    size = np.sqrt(np.diag(covariance))
+    size[size == 0] = 1.0
+    still, correlation = np.zeros(len(names)), covariance / np.outer(size, size)
+    freedom, random = freedom_of(result.quantile), np.random.default_rng(seed)
+    shared = Shared(model, payload="m_p" in names, body=within(BODY_PARAMETERS, names))
+    limits, broken = bounds(shared), list[str]()
     files: dict[str, bytes] = {"manifest.json": b""}
     rows: list[dict[str, Any]] = []
-    refused, warnings = 0, tuple[Notice, ...]()
-    several = draws_of(result, file, seed, knowns, links=to in ROBOTS)
-    for place, (numbers, arm, before) in zip(range(1, count + 1), several, strict=False):
-        refused, warnings, row = refused + before, arm.warnings, dict[str, Any](draw=place)
+    refused = in_a_row = 0
+    while len(rows) < count:
+        if in_a_row == _HOPELESS:
+            raise ResultError(
+                f"{file}: {_HOPELESS} draws in a row are no arm ({broken[-1]}); identify it from "
+                "more informative logs"
+            )
+        wide = 1.0 if freedom == inf else np.sqrt(freedom / random.chisquare(freedom))
+        one_each = random.multivariate_normal(
+            still, correlation, method="eigh", check_valid="ignore"
+        )
+        numbers = dict(zip(names, (mean + size * one_each * wide).tolist(), strict=True))
+        beta = np.array([numbers.get(name, 0.0) for name in shared.names])
+        broken = [name for name, limit in limits.items() if limit(beta) < 0]
+        moved = {}
+        for kind, given in (("parameters", result.parameters), ("payload", result.payload)):
+            moved[kind] = {
+                name: one.model_copy(update={"estimate": numbers.get(name, one.estimate)})
+                for name, one in given.items()
+            }
+        try:
+            one = describe(result.model_copy(update=moved), file, knowns, links=links)
+        except (ResultError, SettingError) as error:
+            broken.append(str(error))
+        if broken:
+            refused, in_a_row = refused + 1, in_a_row + 1
+            continue
+        in_a_row, row = 0, dict[str, Any](draw=len(rows) + 1)
         if to not in TABLES:
-            row["file"] = f"draw-{place:0{len(str(count))}d}{SUFFIXES[to]}"
-            said = f"{arm.source}, draw {place} of seed {seed}"
-            files[row["file"]] = written(replace(arm, source=said), to).encode()
-        rows.append(row | numbers)
-    freedom = freedom_of(result.quantile)
-    names = list(numbers)
+            row["file"] = f"draw-{row['draw']:0{len(str(count))}d}{SUFFIXES[to]}"
+            said = f"{one.source}, draw {row['draw']} of seed {seed}"
+            drawn = replace(one, word="drawn", source=said, warnings=best.warnings)
+            files[row["file"]] = written(drawn, to).encode()
+        # of the arm as l1 moved it
+        rows.append(row | numbers | {name: one.value[name] for name in arm})
     manifest = {
         "algid": __version__,
         "result": file,
@@ -148,10 +128,10 @@ def drawn_files(
         "known": {**knowns},
         "distribution": "normal" if freedom == inf else "Student's t",
         "degrees_of_freedom": None if freedom == inf else freedom,
-        "names": names,
+        "names": list(names),
         "from_prior": [name for name in names if result.estimates[name].status == "FROM_PRIOR"],
         "estimates": [result.estimates[name].estimate for name in names],
-        "covariance": [] if result.fit is None else result.fit.covariance_of(names).tolist(),
+        "covariance": covariance.tolist(),
         "draws": rows,
     }
     files["manifest.json"] = (json.dumps(manifest, indent=1, ensure_ascii=False) + "\n").encode()
@@ -162,4 +142,4 @@ def drawn_files(
         frame = pl.DataFrame(rows)
         frame.write_csv(content) if to == "csv" else frame.write_parquet(content)
         files[f"draws.{to}"] = content.getvalue()
-    return files, warnings
+    return files, best.warnings

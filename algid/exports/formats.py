@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from algid.base.errors import ResultError, SettingError
+from algid.base.names import names_in, outside
+from algid.exports import template
 from algid.exports.description import Description, describe
 from algid.exports.links import Knowns
-from algid.exports.programs import program
-from algid.exports.templating import template
 from algid.identification.known import contradictions, covariance_of
-from algid.model import EVERY_TERM, SINES, UNITS
+from algid.model import EVERY_TERM, SINES, TERMS, UNITS, Model, Weighted, attributes
 from algid.notices import Notice
 from algid.options import flag
 from algid.results import Result
@@ -31,7 +31,6 @@ SUFFIXES = {"urdf": ".urdf", "mjcf": ".xml", "sdf": ".sdf", "python": ".py", "c"
 """Of an arm's formats."""
 ROBOTS = ("urdf", "mjcf", "sdf")
 """Formats made of links; MJCF alone has rotors."""
-TEMPLATES = Path(__file__).parent / "templates"
 
 
 def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, tuple[Notice, ...]]:
@@ -56,8 +55,7 @@ def exported(result: Result, file: str, to: str, knowns: Knowns) -> tuple[str, t
     takes(to, knowns)
     if to == "payload":
         content = _payload(result, file, knowns)
-        text = template(TEMPLATES / "payload.yaml.j2").render(content)
-        return text, contradictions(result, knowns)
+        return _filled("payload.yaml", content), contradictions(result, knowns)
     arm = describe(result, file, knowns, links=to in ROBOTS)
     return written(arm, to), arm.warnings
 
@@ -71,13 +69,17 @@ def takes(to: str, knowns: Knowns) -> None:
 
 def written(arm: Description, to: str) -> str:
     """The text of an arm in the format `to`."""
-    content = _robot(arm, rotors=to == "mjcf") if to in ROBOTS else program(arm)
+    content = _robot(arm, rotors=to == "mjcf") if to in ROBOTS else _program(arm)
     content |= {"arm": arm, "units": UNITS, "bent": set(SINES) & set(arm.model.names)}
-    header = template(TEMPLATES / "header.j2").render(content).rstrip()
+    header = _filled("header", content).rstrip()
     # nothing in it ends a comment of C or a string of Python
     header = header.replace("*/", "* /").replace("\\", "/").replace('"""', "'''")
-    filled = content | {"header": header}
-    return str(template(TEMPLATES / f"arm{SUFFIXES[to]}.j2").render(filled))
+    return _filled(f"arm{SUFFIXES[to]}", content | {"header": header})
+
+
+def _filled(name: str, content: dict[str, Any]) -> str:
+    """The text of a template."""
+    return str(template(Path(__file__).parent / f"templates/{name}.j2").render(content))
 
 
 def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
@@ -111,6 +113,66 @@ def _robot(arm: Description, *, rotors: bool) -> dict[str, Any]:
         "second": second,
         "turned": (math.cos(0.5 * arm.turn), 0, -math.sin(0.5 * arm.turn), 0),
     }
+
+
+def _program(arm: Description) -> dict[str, Any]:
+    """What the templates of programs are made of: nothing but a mathematical library is needed.
+
+    The model's columns become expressions that C99 and Python read alike. In them q1, q2, w1, w2
+    are angles and velocities, s1 … c12 sines and cosines of θ1, θ2 and θ1 + θ2, t1 and t2
+    tanh(ω / ω_s); parameters have their names in capitals. M and n are inertia, by joint of torque
+    and of acceleration, and rest of the columns that are the joints' load; X and r those of the
+    others; g is what of n stays at rest.
+    """
+    terms = [TERMS[name] for name in arm.model.terms]
+    lacking = [term for term in terms if term.timing is not None or term.elastic]
+    model = replace(arm.model, terms=outside(arm.model.terms, names_in(lacking)))
+    (M, n), (X, r) = model.compiled.of_load, model.compiled.beside_load
+    g = [
+        {
+            product: pairs
+            for product, pairs in weighted.items()
+            if not any("omega" in name for atom in product for name in atom.slopes())
+        }
+        for weighted in n
+    ]
+    constants = {name.upper(): arm.value[name] for name in model.names}
+    for term in terms:
+        constants |= {shape.upper(): getattr(model, shape) for shape in term.shapes}
+    content: dict[str, Any] = {"lacking": lacking, "constants": constants, "atoms": {}}
+    for name, held in {
+        "gravity": g,
+        "inertia": (*M, *X),
+        "load": M,
+        "rest": n,
+        "friction": r,
+    }.items():
+        atoms = {atom for weighted in held for product in weighted for atom in product}
+        content["atoms"][name] = [
+            f"{one.name} = {one.source}" for one in sorted(atoms) if one.source
+        ]
+    for name, held in {"M": M, "n": n, "r": r, "g": g}.items():
+        content[name] = [_source(model, weighted) or "0.0" for weighted in held]
+    content["X"] = [_source(model, weighted) for weighted in X]
+    for kind in ("gains", "by_load"):
+        names = attributes(model, kind)
+        content[kind] = [[one.upper() for one, of in names if of == joint] for joint in (0, 1)]
+    return content
+
+
+def _source(model: Model, weighted: Weighted) -> str:
+    """An expression that is linear in the parameters, as text; none where it is nothing."""
+    return " + ".join(
+        " * ".join(
+            [
+                *([] if factor == 1 else [f"{factor:g}"]),
+                model.names[place].upper(),
+                *(atom.name for atom in product),
+            ]
+        )
+        for product, pairs in weighted.items()
+        for place, factor in pairs
+    )
 
 
 def _payload(result: Result, file: str, knowns: Knowns) -> dict[str, Any]:
@@ -180,4 +242,4 @@ def controller_call(
         centre = apart * cmath.exp(-1j * math.radians(flange[2]))
         x, y = (f"{round(one, 5) + 0.0:.5f}" for one in (centre.real, centre.imag))
     filled = {"mass": f"{value['m_p']:.5f}", "x": x, "y": y, "flag": flag("flange")}
-    return str(template(TEMPLATES / "controller.txt.j2").render(filled))
+    return _filled("controller.txt", filled)

@@ -32,7 +32,7 @@ from algid.methods import settles
 from algid.model import UNITS as PARAMETER_UNITS
 from algid.results import Estimate, Status
 from algid.settings import Settings
-from algid.table4 import UNITS, finite, unloaded_rows
+from algid.table4 import UNITS, UNLOADED_ROWS, finite, sums
 
 STAGE1_WINDOW = 2.0  # s
 _STAGE2_UNITS = UNITS | {"l1": "m"}
@@ -69,7 +69,7 @@ def run_paper(
         if _is_no_arm(np.where(usable[: k.size], k, np.nan), wander):
             parameters = distrusted(parameters)
         if usable.all():
-            rows |= unloaded_rows(k)
+            rows |= sums(UNLOADED_ROWS, k)
     if loaded is None:
         return Identified(parameters, {}, {}, rows)
     payload = ("m_p", "l1")

@@ -102,14 +102,14 @@ def _loaded_rows(
     """Estimates of the loaded arm's rows of Table 4, save those with a constant that is `gone`."""
     combined = {}
     status_of = dict(zip(fit.names, fit.status, strict=True))
-    for name in LOADED_ROWS:
+    for name, constants in LOADED_ROWS.items():
         unit = TABLE_UNITS[name]
         status = "OK"
         if not fit.converged:
             status = "NOT_CONVERGED"
-        elif any(status_of.get(one) == "FROM_PRIOR" for one in _LOADED[name]):
+        elif any(status_of.get(one) == "FROM_PRIOR" for one in constants):
             status = "FROM_PRIOR"
-        if not gone.isdisjoint(_LOADED[name]):
+        if not gone.isdisjoint(constants):
             continue
         if name in rows:
             half = fit.quantile * stds[name]
@@ -199,15 +199,6 @@ def unknown(unit: str) -> Estimate:
     )
 
 
-def _constants_in(row: str) -> tuple[str, ...]:
-    """The constants of whose sum a row of Table 4 is; a loaded one holds the payload's share."""
-    return within(row.split("+"), CONSTANT_NAMES)
-
-
-_ROWS = dict(zip(UNLOADED_ROWS, map(_constants_in, UNLOADED_ROWS), strict=True))
-_LOADED = dict(zip(LOADED_ROWS, map(_constants_in, LOADED_ROWS), strict=True))
-
-
 def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
     """Table 4's rows and their standard deviations.
 
@@ -215,9 +206,9 @@ def table_rows(fit: Fit) -> tuple[dict[str, float], dict[str, float]]:
     """
     rows: dict[str, float] = {}
     stds: dict[str, float] = {}
-    kinds = [(False, _ROWS)]
+    kinds = [(False, UNLOADED_ROWS)]
     if fit.shared.payload:
-        kinds.append((True, _LOADED))
+        kinds.append((True, LOADED_ROWS))
     unusable = set(np.array(fit.names)[np.array(fit.status) == "NOT_IDENTIFIABLE"].tolist())
     for loaded, constants_of in kinds:
         jacobian = fit.shared.jacobian(fit.values, loaded)

@@ -15,7 +15,7 @@ from algid.notices import Notice, has_code, merged
 from algid.results import Result
 from algid.results.verdict import LEAST_R2
 from algid.settings import Settings
-from algid.table4 import paper_errors, table4, true_parameters, true_rows
+from algid.table4 import table4, true_parameters
 
 CONTRADICTED = ("WRONG_CONVENTION", "LOST_SAMPLES", "OTHER_JOINTS")
 """Checks by which estimates are wrong, unless the user accepts them.
@@ -107,7 +107,7 @@ def result_of(outcome: Identified, settings: Settings, survey: Recordings) -> Re
         loaded=outcome.loaded,
         payload=outcome.payload,
         paper_payload=outcome.paper_payload,
-        table4=table4(outcome.rows, outcome.stds, true_rows(truth, payload), paper_errors(truth)),
+        table4=table4(outcome.rows, outcome.stds, truth, payload),
         truth=true_parameters(truth, payload),
         fit=outcome.fit,
         settings=settings.as_json(),

@@ -49,7 +49,7 @@ BAD, DEAD = (
             False,
             1,
             [
-                "c: failed: no\\x1b[31m torque",
+                "c: failed: no\\u001b[31m torque",
                 "d: killed: three times",
                 "1 ok, 1 incomplete, 1 failed, 1 killed; 4 run now, 0 left; out/jobs.parquet",
             ],

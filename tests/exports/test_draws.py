@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import xml.etree.ElementTree as ET
-from itertools import islice
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -15,7 +16,7 @@ import algid
 from algid.arm import FloatArray, regressor
 from algid.base.compiled import student_quantile
 from algid.base.errors import ResultError, SettingError
-from algid.exports.draws import draws_of, freedom_of
+from algid.exports.draws import drawn_files, freedom_of
 from algid.model import Model
 from algid.results import Result
 from tests.exports.arms import ODD, result_of, states, values_of
@@ -43,16 +44,27 @@ def correlated(seed: int = 5, std: float = 0.01, value: dict[str, float] = VALUE
     return made.model_copy(update={**moved, "fit": fit})
 
 
+def drawn(
+    result: Result, to: str, count: int, seed: int
+) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Manifest and files of draws."""
+    files, _ = drawn_files(result, "arm", to, {}, count, seed)
+    return json.loads(files["manifest.json"]), files
+
+
 def test_draws_are_students_with_the_estimates_covariance() -> None:
     result, count = correlated(std=1e-3), 3000
-    several = list(islice(draws_of(result, "arm", 1, {}, links=False), count))
-    assert sum(refused for *_, refused in several) == 0
-    assert result.fit is not None
-    names, covariance = result.fit.covariance_names, result.covariance
-    drawn = np.array([[numbers[name] for name in names] for numbers, *_ in several])
+    manifest, files = drawn(result, "parquet", count, 1)
+    assert (manifest["refused"], manifest["distribution"]) == (0, "Student's t")
+    assert manifest["degrees_of_freedom"] == pytest.approx(NU, rel=1e-6)
+    names, covariance = manifest["names"], np.array(manifest["covariance"])
+    np.testing.assert_array_equal(covariance, result.covariance)
+    table = pl.read_parquet(files["draws.parquet"])
+    assert table["draw"].to_list() == list(range(1, count + 1))
+    drawn_numbers = table.select(names).to_numpy()
     mean = np.array([result.estimates[name].estimate for name in names])
     size = np.sqrt(np.diag(covariance))
-    z = (drawn - mean) / size
+    z = (drawn_numbers - mean) / size
     # of Student's t: the variance ν / (ν - 2), 95 % within its quantile; bounds are four deviations
     wide = NU / (NU - 2)
     np.testing.assert_allclose(z.mean(axis=0), 0, atol=4 * np.sqrt(wide / count))
@@ -72,15 +84,16 @@ def test_the_degrees_of_freedom_are_those_of_the_interval() -> None:
 def test_every_draw_is_a_possible_arm() -> None:
     """Errors of 60 %: every other arm of the distribution has a friction or an inertia below 0."""
     result = correlated(std=0.6)
-    several = list(islice(draws_of(result, "arm", 3, {}, links=True), 50))
-    assert sum(refused for *_, refused in several) > 10
-    for numbers, arm, _ in several:
-        assert min(numbers[name] for name in ("k3", "k5", "k6", "k7", "f1", "m_p", "l2")) >= 0
-        assert numbers["k3"] * numbers["k5"] > numbers["k1"] ** 2
-        assert arm.links is not None
-        assert min(min(link.mass, link.length, link.inertia) for link in arm.links) > 0
+    manifest, files = drawn(result, "urdf", 50, 3)
+    assert manifest["refused"] > 10
+    for row in manifest["draws"]:
+        assert min(row[name] for name in ("k3", "k5", "k6", "k7", "f1", "m_p", "l2")) >= 0
+        assert row["k3"] * row["k5"] > row["k1"] ** 2
+        said = re.findall(r'(?:mass value|ixx|iyy|izz)="([^"]+)"', files[row["file"]].decode())
+        assert len(said) == 8
+        assert min(map(float, said)) > 0
     with pytest.raises(ResultError, match=r"100 draws in a row are no arm .f1 >= 0.; identify"):
-        next(draws_of(correlated(value=VALUE | {"f1": -0.4}), "arm", 0, {}, links=False))
+        drawn(correlated(value=VALUE | {"f1": -0.4}), "csv", 1, 0)
 
 
 @pytest.mark.parametrize("to", ["mjcf", "urdf", "sdf"])

@@ -188,5 +188,5 @@ def test_numbers_travel_in_single_precision_unless_they_are_beyond_it() -> None:
 
 def test_names_are_no_markup_for_plotly() -> None:
     assert label("<b>x</b>&") == "&lt;b&gt;x&lt;/b&gt;&amp;"
-    assert label("a\x1b\u202e") == "a\\x1b\\u202e"
+    assert label("a\x1b\u202e") == "a\\u001b\\u202e"
     assert label("x" * 100) == "x" * 55 + "…"

@@ -54,9 +54,9 @@ def test_the_standard_deviation_decides_how_many_digits_are_worth_writing() -> N
 
 
 def test_what_cannot_be_seen_is_written_as_an_escape() -> None:
-    assert visible("a\x1b[31mb\n\u202eé") == "a\\x1b[31mb\\x0a\\u202eé"
+    assert visible("a\x1b[31mb\n\u202eé") == "a\\u001b[31mb\\n\\u202eé"
     assert visible("x" * 1000) == "x" * 300 + "…"
-    assert file_name("C:\\logs\\a\tb.csv") == "a\\x09b.csv"
+    assert file_name("C:\\logs\\a\tb.csv") == "a\\tb.csv"
     assert file_name("/") == "/"
 
 
